@@ -1,5 +1,5 @@
 # make demo   plan, drive, certify and film one world
-# make test   all tests but the long ones (make test-slow: the long ones too)
+# make test   all tests but the long ones (make test-slow: the long ones)
 # make docs   the site, with everything that its pages show: docs/_build/html/index.html
 # make dist   wheel and sdist in dist/, checked in a fresh environment outside the checkout
 # Everything else that these need they set up themselves, in .venv.
@@ -49,7 +49,7 @@ test: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup
 
 test-slow: $(VENV)/.dev $(VENV)/.warm
-	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m ''
+	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m slow
 
 # What pages show runs again when they or the packages change. Both halves use a process for each core, four at most.
 DEPTHS := * */* */*/* */*/*/*

@@ -1,13 +1,13 @@
 """A building of 40 x 30 m as a map of 0.05 m a pixel: what each stage of its use costs, and the loop among 10,000 cylinders.
 
 python -m benchmarks.building               # tables for docs/benchmarks.md
-python -m benchmarks.building --only tasks  # 30 random tasks in it, with the campaign's statistics
+python -m benchmarks.building tasks         # 30 random tasks in it, with the campaign's statistics
 python -m benchmarks.building --map DIR     # only write the map, to look at it
 """
 
 from __future__ import annotations
 
-import argparse
+import contextlib
 import itertools
 import os
 import resource
@@ -28,13 +28,15 @@ from antdrive.planners import Query, checked, load_planner, smooth
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim import Engine, Rollout, Scenario, certify, run
 from antdrive.sim.driving.following import follow
-from antdrive.worlds import Disc, Route, Task, World, import_map_server, load_task, rasterise, save_task
+from antdrive.worlds import import_map_server, load_task, rasterise, save_task
+from benchmarks.loop import task_among, winding
+from benchmarks.tables import chosen, command_line
 
 RESOLUTION = 0.05  # [m]
 SIZE = (40.0, 30.0)  # [m]
 START, GOAL = (1.5, 15.0, 0.0), (38.0, 26.6)
 DOOR, WALL, CORRIDOR = 1.0, 0.15, 2.2  # widths [m]
-ROUNDS = 7
+SMALLEST = ("tasks loop --tasks 1 --jobs 1 --rounds 1",)
 T = TypeVar("T")
 
 
@@ -170,62 +172,51 @@ def tasks(folder: Path, number: int, apart: float, jobs: int) -> None:
     print((folder / "tasks.md").read_text(encoding="utf-8"))
 
 
-def task_among(count: int) -> Task:
-    """An 18 m drive among `count` thin cylinders in a hall of 40 x 30 m."""
-    rng = np.random.default_rng(0)
-    discs: list[Disc] = []
-    while len(discs) < count:
-        x, y = rng.uniform((0.2, 0.2), (39.8, 29.8)).tolist()
-        if abs(y - 15) > 1:
-            discs.append(Disc(x, y, 0.05))
-    return Task(World(f"hall-{count}", (0, 0, 40, 30), tuple(discs)), (1, 15, 0), (19, 15))
-
-
-def loop(counts: tuple[int, ...] = (400, 10_000)) -> None:
+def loop(rounds: int, counts: tuple[int, ...] = (400, 10_000)) -> None:
     """Print what a step of the drive loop costs among many cylinders, in processor time."""
     robot, controller = load_robot("turtlebot"), PurePursuit()
-    x = np.linspace(1, 19, 73)
-    route = Route(np.stack([x, 15 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
     costs: dict[int, list[float]] = {count: [] for count in counts}
-    built = []
-    for count in counts:
-        task = task_among(count)
-        tracked = controller.prepare(route, task.world, robot, 0.05, 1 / 60)
-        built.append((count, task, tracked, Engine(task.world, robot).__enter__()))
-    for turn in range(ROUNDS + 1):
-        for count, task, tracked, engine in built:
-            started = time.process_time()
-            log = follow(engine, controller, tracked, task, limit=120)
-            assert log.outcome.name == "SUCCEEDED", log.outcome
-            if turn:
-                costs[count].append((time.process_time() - started) / (len(log.t) - 1) * 1e6)
+    with contextlib.ExitStack() as stack:
+        built = []
+        for count in counts:
+            task = task_among(count, SIZE, 0.05)
+            tracked = controller.prepare(winding(task), task.world, robot, 0.05, 1 / 60)
+            built.append((count, task, tracked, stack.enter_context(Engine(task.world, robot))))
+        for turn in range(rounds + 1):
+            for count, task, tracked, engine in built:
+                started = time.process_time()
+                log = follow(engine, controller, tracked, task, limit=120)
+                assert log.outcome.name == "SUCCEEDED", log.outcome
+                if turn:
+                    costs[count].append((time.process_time() - started) / (len(log.t) - 1) * 1e6)
     first = costs[counts[0]]
     print("\ncylinders   us/step   / the first")
     for count, values in costs.items():
         ratio = statistics.median(a / b for a, b in zip(values, first, strict=True))
         print(f"{count:9}   {statistics.median(values):7.1f}   {ratio:11.2f}")
-    for *_, engine in built:
-        engine.__exit__(None, None, None)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--map", type=Path)
-    parser.add_argument("--only", choices=("stages", "tasks", "loop"))
-    parser.add_argument("--jobs", type=int, default=2, help="processes that drive the tasks")
-    asked = parser.parse_args()
-    if asked.map is not None:
-        asked.map.mkdir(parents=True, exist_ok=True)
-        print(write_map(asked.map))
+    given = command_line(
+        __doc__,
+        parts=([], "stages, tasks, loop; default: all"),
+        map=(Path, "only write the map into this folder"),
+        tasks=(30, "random tasks"),
+        jobs=(2, "processes that drive the tasks"),
+        rounds=(7, "of the loop"),
+    )
+    if given.map is not None:
+        given.map.mkdir(parents=True, exist_ok=True)
+        print(write_map(given.map))
         return
-    parts = (asked.only,) if asked.only else ("stages", "tasks", "loop")
+    parts = chosen(given.parts, ("stages", "tasks", "loop"))
     with tempfile.TemporaryDirectory() as folder:
         if "stages" in parts:
             stages(Path(folder))
         if "tasks" in parts:
-            tasks(Path(folder), 30, 10.0, asked.jobs)
+            tasks(Path(folder), given.tasks, 10.0, given.jobs)
     if "loop" in parts:
-        loop()
+        loop(given.rounds)
 
 
 if __name__ == "__main__":

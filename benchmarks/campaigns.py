@@ -1,4 +1,4 @@
-"""What campaigns survive and cost: `python -m benchmarks.campaigns [PART ...] [--small] [--drive]`, by default all parts.
+"""What campaigns survive and cost: `python -m benchmarks.campaigns [PART ...] [--share S] [--drive]`, by default all parts.
 
 - kill: 2,000 short runs with 20 `kill -9` at random moments: of workers, of the parent, of dask's workers and of its
   scheduler, five each. After resuming, the canonical table must be that of an undisturbed campaign, byte for byte.
@@ -9,13 +9,12 @@
   of plain processes, which is what the machine gives.
 - overhead: 100,000 runs that do nothing: what the engines, the folder and the expansion cost for each.
 
-`--small` takes a twentieth of the runs. `--drive` kills campaigns of real drives instead of runs that sleep. Each result (of
+`--share 0.05` takes a twentieth of the runs. `--drive` kills campaigns of real drives instead of runs that sleep. Each result (of
 `kill`: of each victim) is kept in out/campaigns and not measured again.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import dataclasses
 import hashlib
@@ -40,9 +39,10 @@ from antdrive.runs.campaigns.rows import fault_row
 from antdrive.runs.campaigns.running import Finished
 from antdrive.runs.campaigns.store import parts_in
 from antdrive.runs.campaigns.sweeping import sweep
-from benchmarks.planners import table
+from benchmarks.tables import chosen, command_line, table
 
-OUT = Path(__file__).parent.parent / "out" / "campaigns"
+SMALLEST = ("kill-parent overhead --share 0.005",)
+OUT = Path("out/campaigns").resolve()
 SHORT = 0.02  # how long a run sleeps in a campaign that is killed [s]
 LONG = 0.2  # how long a run computes where efficiency is measured [s]
 ROUNDS = 3  # how often each engine has its turn there
@@ -307,7 +307,7 @@ def print_parts(parts: list[str], share: float, drive: bool) -> Iterator[str]:
             kept(f"kill-{v.replace(' ', '-')}-{runs}-{drive}", lambda v=v: kill(v, kills, runs, drive))  # type: ignore[misc]
             for v in victims
         ]
-        heads = ("killed", "kills", "commands", "lost", "double", "same table", "s")
+        heads = "killed | kills | commands | lost | double | same table | s"
         yield "\n".join(table(heads, [tuple(map(str, row.values())) for row in rows]))
     measures = (("equality", equality, 160), ("efficiency", efficiency, 1000), ("overhead", overhead, 100_000))
     for name, measure, runs in measures:
@@ -325,16 +325,14 @@ def main() -> None:
         work = None if drive == "1" else Sleeping(SHORT)
         go(Path(folder), int(runs), work, jobs=2, dask=dask[0] if dask else None)
         return
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("parts", nargs="*", default=[], metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--small", action="store_true")
-    parser.add_argument("--drive", action="store_true")
-    asked = parser.parse_args()
-    for part in asked.parts:
-        if part not in PARTS:
-            parser.error(f"unknown part {part!r}; choose from {', '.join(PARTS)}")
-    parts = asked.parts or ["kill", "equality", "efficiency", "overhead"]
-    for text in print_parts(parts, 0.05 if asked.small else 1.0, asked.drive):
+    given = command_line(
+        __doc__,
+        parts=([], ", ".join(PARTS)),
+        share=(1.0, "how many of the runs"),
+        drive=(False, "kill campaigns of real drives"),
+    )
+    parts = chosen(given.parts, PARTS) if given.parts else ["kill", "equality", "efficiency", "overhead"]
+    for text in print_parts(parts, given.share, given.drive):
         print(text, flush=True)
 
 

@@ -28,6 +28,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+SMALLEST = ("--count 1 --seconds 0.1 --rounds 1",)
 HERE = Path(__file__).parent.parent
 SIZES = ((640, 480), (1280, 720))
 MOVERS = (0, 6, 24)

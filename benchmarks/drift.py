@@ -1,13 +1,12 @@
 """How far the same drives drift with other compilers' targets and versions: `python -m benchmarks.drift`.
 
 The same scenarios are driven again by other processes: with machine code for a generic CPU (`NUMBA_CPU_NAME=generic`), without
-compilation (`NUMBA_DISABLE_JIT=1`, some scenarios only), and by the interpreters that `--python` names, which may have other
+compilation (`NUMBA_DISABLE_JIT=1`, some scenarios only), and by the interpreters that are named, NAME=PATH, which may have other
 versions of Python and numpy. The default tolerances of `antdrive.sim.log.metrics` come from the table that is printed.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -19,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.planners import table
+from benchmarks.tables import command_line, print_table
 
+SMALLEST = ("--size tiny --variants 1",)
 HZ = 10
 WALL_CLOCK = ("plan_s", "drive_wall_s")
 
@@ -119,13 +119,13 @@ def apart(a: Mapping[str, Any], b: Mapping[str, Any]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--python", action="append", default=[], metavar="NAME=PATH", help="another interpreter; may be repeated"
+    arguments = command_line(
+        __doc__,
+        python=([], "NAME=PATH of other interpreters"),
+        write=(Path, "drive in this process and write what came out as JSON"),
+        size=("full", "how many scenarios: tiny, small or full"),
+        variants=(3, "how many of: again, generic CPU, not compiled"),
     )
-    parser.add_argument("--write", type=Path, help="drive in this process and write what came out as JSON")
-    parser.add_argument("--size", choices=("tiny", "small", "full"), default="full", help="how many scenarios")
-    arguments = parser.parse_args()
     ours = drive_all(arguments.size)
     if arguments.write:
         arguments.write.write_text(json.dumps(ours))
@@ -134,21 +134,17 @@ def main() -> None:
         ("again", sys.executable, arguments.size, {}),
         ("generic CPU", sys.executable, arguments.size, {"NUMBA_CPU_NAME": "generic"}),
         ("not compiled", sys.executable, "tiny", {"NUMBA_DISABLE_JIT": "1"}),
-    ]
+    ][: arguments.variants]
     for text in arguments.python:
         name, _, path = text.partition("=")
         variants.append((name, path, arguments.size, {}))
-    heads = [
-        "drives", "kind", "bit-identical", "other verdict", "line [m]", "min_clearance_m", "driven_length_m", "duration_s",
-        "tracking_error_max_m", "metrics that changed by more than 1e-6",
-    ]  # fmt: skip
+    heads = "drives | kind | bit-identical | other verdict | line [m] | min_clearance_m | driven_length_m | duration_s"
     found: list[list[str]] = []
     for name, python, size, extra in variants:
         print(f"driving: {name}", file=sys.stderr)
         found += rows(name, ours, other(python, size, extra))
         print(*found[-1], sep=" | ", file=sys.stderr)
-    for line in table(heads, found):
-        print(line)
+    print_table(f"{heads} | tracking_error_max_m | metrics that changed by more than 1e-6", found)
 
 
 if __name__ == "__main__":

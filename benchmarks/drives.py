@@ -9,7 +9,6 @@ Tables:
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import math
 import statistics
@@ -29,9 +28,11 @@ from antdrive.robots import load_robot
 from antdrive.runs.pool import call_all
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import measure, tracking_error
-from antdrive.worlds import generate, import_barn, rasterise
-from benchmarks.planners import table
+from antdrive.worlds import Task, generate, import_barn, rasterise
+from benchmarks.tables import command_line, missing, print_tables, table
 from tools.shared_data import BARN
+
+SMALLEST = ("--worlds 2 --jobs 1",)
 
 
 class Result(NamedTuple):
@@ -58,9 +59,7 @@ class Result(NamedTuple):
 
 def drive(name: str, task: Any, planner: str, robot: str, **settings: Any) -> Result:
     """Drive once; the rollout stays in this process."""
-    done = run(
-        Scenario(task=task, planner=load_planner(planner), planner_name=planner, robot=load_robot(robot), **settings)
-    )
+    done = run(Scenario.of(task, planner, robot, **settings))
     log = done.rollout
     if log is None:
         return Result(name, done.outcome.name, False, 0, {}, math.nan, {})
@@ -79,7 +78,10 @@ def failures(results: Sequence[Result]) -> str:
     return ", ".join(wrong) or "none"
 
 
-def barn_tasks(source: Path) -> dict[str, Any]:
+def barn_tasks(source: Path) -> dict[str, Task]:
+    """BARN's worlds by name, in the order of their numbers."""
+    if not source.exists():
+        missing(f"no worlds at {source}; docs/how-to/data.md says where BARN's are")
     with tempfile.TemporaryDirectory() as folder:
         if source.is_file():
             with tarfile.open(source) as archive:
@@ -91,8 +93,7 @@ def barn_tasks(source: Path) -> dict[str, Any]:
 
 def barn(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
     """BARN's worlds, driven by the jackal."""
-    tasks = barn_tasks(source)
-    rows = []
+    tasks, rows = dict(list(barn_tasks(source).items())[:worlds]), []
     for planner, smoothing, noise in (
         ("astar", "clearance", 0.0), ("astar", "taut", 0.0), ("astar", "none", 0.0), ("ants", "clearance", 0.0),
         ("aco-han", "clearance", 0.0),
@@ -150,18 +151,8 @@ def forests(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
                 f"{100 * min((r.metrics['min_clearance_m'] for r in paths if r.metrics), default=math.nan):.1f} cm",
             ]
         )
-    heads = [
-        "worlds",
-        "robot",
-        "noise",
-        "with a path",
-        "without",
-        "certified",
-        "with contacts",
-        "certified with contacts",
-        "min. clearance",
-    ]
-    yield from table(heads, rows)
+    heads = "worlds | robot | noise | with a path | without | certified | with contacts | certified with contacts"
+    yield from table(f"{heads} | min. clearance", rows)
     yield "Failures: " + ("; ".join(wrong) or "none.")
     yield ""
 
@@ -194,19 +185,14 @@ def smooth(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", nargs="*", help="tables to print; default: all")
-    parser.add_argument("--worlds", type=int, default=1000, help="number of random worlds")
-    parser.add_argument("--jobs", type=int, help="processes; by default one per core")
-    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
-    arguments = parser.parse_args()
-    makers = {f.__name__: f for f in (barn, forests, smooth)}
-    for name in arguments.tables or makers:
-        if name not in makers:
-            parser.error(f"no table is called {name!r}; choose from {', '.join(makers)}")
-        print(f"## {name}\n")
-        for line in makers[name](arguments.jobs, arguments.barn, arguments.worlds):
-            print(line, flush=True)
+    given = command_line(
+        __doc__,
+        tables=([], "tables to print; default: all"),
+        worlds=(1000, "number of random worlds, and of BARN's at most"),
+        jobs=(int, "processes; by default one per core"),
+        barn=(BARN, "folder or archive of BARN's world_*.world files"),
+    )
+    print_tables(given.tables, {f.__name__: f for f in (barn, forests, smooth)}, given.jobs, given.barn, given.worlds)
 
 
 if __name__ == "__main__":

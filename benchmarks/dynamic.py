@@ -1,4 +1,4 @@
-"""Drives among movers: `python -m benchmarks.dynamic [--quick] [--jobs N] [--dynabarn FILE] [--only TEXT] [TABLE ...]`.
+"""Drives among movers: `python -m benchmarks.dynamic [--most N] [--jobs N] [--dynabarn FILE] [--only TEXT] [TABLE ...]`.
 
 Tables:
 
@@ -9,7 +9,6 @@ Tables:
 
 from __future__ import annotations
 
-import argparse
 import collections
 import dataclasses
 import itertools
@@ -22,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from antdrive.planners import Query, load_planner, plan_in_time
+from antdrive.planners import Query, plan_in_time
 from antdrive.robots import load_robot
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, run
@@ -40,9 +39,10 @@ from antdrive.worlds import (
     load_task,
     rasterise,
 )
-from benchmarks.planners import table
+from benchmarks.tables import command_line, missing, print_tables, table
 from tools.shared_data import DYNABARN
 
+SMALLEST = ("--most 1 --jobs 1",)
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
 LATELY = 1.0  # what a mover did in this time before a contact is said [s]
 JUMP, TURN = 0.3, 0.7  # a mover that gets so far between two rows of a log has jumped [m]; a turn that is said [rad]
@@ -83,25 +83,9 @@ class Result(NamedTuple):
     proved: bool = True
 
 
-def drive(
-    name: str,
-    task: Task,
-    planner: str,
-    robot: str,
-    seed: int = 0,
-    options: dict[str, str] | None = None,
-    **settings: Any,
-) -> Result:
+def drive(name: str, task: Task, planner: str, robot: str, **settings: Any) -> Result:
     """Drive once; the rollout stays in this process."""
-    scenario = Scenario(
-        task=task,
-        planner=load_planner(planner, **(options or {})),
-        planner_name=planner,
-        robot=load_robot(robot),
-        seed=seed,
-        **settings,
-    )
-    done = run(scenario)
+    done = run(Scenario.of(task, planner, robot, **settings))
     log = done.rollout
     if log is None:
         return Result(name, done.outcome, math.nan, 0, False, done.reason)
@@ -144,21 +128,15 @@ def columns(results: Sequence[Result]) -> list[str]:
             f"{statistics.mean(r.replans for r in results):.1f}" if results else "–"]  # fmt: skip
 
 
-HEADS = (
-    "certified successes",
-    "collided",
-    "hit while standing",
-    "hit by a teleport",
-    "other endings",
-    "mean time",
-    "replans",
-)
+HEADS = "certified successes | collided | hit while standing | hit by a teleport | other endings | mean time | replans"
 
 
-def dynabarn(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
+def dynabarn(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
     """DynaBARN's worlds, driven by the jackal."""
-    tasks = import_dynabarn(source)
-    offsets = [START_INTERVAL * k for k in range(2 if quick else 10)]
+    if not source.exists():
+        missing(f"no worlds at {source}; docs/how-to/data.md says where DynaBARN's are")
+    tasks = import_dynabarn(source)[: most or None]
+    offsets = [START_INTERVAL * k for k in range(min(most or 10, 10))]
     cases = [
         (f"{task.world.name}+{off:g}s", dataclasses.replace(task, world=task.world.later(off)))
         for task, off in itertools.product(tasks, offsets)
@@ -177,7 +155,7 @@ def dynabarn(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
             rows.append([policy if kind == "easy" else "", kind, *columns(some)])
         if policy in LISTED:
             wrong += [f"- {policy}: {r.name}: {r.outcome.key} ({r.reason})" for r in got if not r.certified]
-    yield from table(["the robot may", "worlds", *HEADS], rows)
+    yield from table(f"the robot may | worlds | {HEADS}", rows)
     yield "\nDrives that failed with avoidance and replanning, or by lidar:\n"
     yield from wrong
 
@@ -225,9 +203,9 @@ def random_drive(seed: int, settings: dict[str, Any]) -> Result:
     return result._replace(proved=proof.solved)
 
 
-def random(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
+def random(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
     """Random worlds, driven by the turtlebot."""
-    seeds, rows, wrong = range(20 if quick else 500), [], []
+    seeds, rows, wrong = range(most or 500), [], []
     for policy in ("neither", "avoid and replan"):
         got = call_all((partial(random_drive, seed, POLICIES[policy]) for seed in seeds), jobs)
         proved = [r for r in got if r.proved]
@@ -238,41 +216,37 @@ def random(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
             for r in got
             if not r.certified
         ]
-    yield from table(["the robot may", "worlds", *HEADS], rows)
+    yield from table(f"the robot may | worlds | {HEADS}", rows)
     yield "\nDrives that failed with avoidance and replanning:\n"
     yield from wrong
 
 
-def hasan(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
+def hasan(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
     """hasan's cases, driven by the turtlebot."""
     names = [name for name in list_worlds() if name.startswith("hasan") and load_task(name).world.movers]
-    rows = []
+    names, rows = names[: most or None], []
     for planner in ("mmas-dstar", "dstar"):
         for name in names:
             calls = (
-                partial(drive, name, load_task(name), planner, "turtlebot", seed=k) for k in range(1 if quick else 5)
+                partial(drive, name, load_task(name), planner, "turtlebot", seed=k) for k in range(min(most or 5, 5))
             )
             rows.append([f"`{planner}`", name, *columns(call_all(calls, jobs))])
-    yield from table(["planner", "case", *HEADS], rows)
+    yield from table(f"planner | case | {HEADS}", rows)
 
 
 TABLES = {"dynabarn": dynabarn, "random": random, "hasan": hasan}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", nargs="*", metavar="TABLE", default=list(TABLES), help=", ".join(TABLES))
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--quick", action="store_true", help="drive fewer scenarios")
-    parser.add_argument("--dynabarn", type=Path, default=DYNABARN, metavar="FILE")
-    parser.add_argument("--only", default="", metavar="TEXT", help="dynabarn: only the rows whose name holds this text")
-    given = parser.parse_args()
-    for name in given.tables:
-        if name not in TABLES:
-            parser.error(f"unknown table {name!r}; choose from {', '.join(TABLES)}")
-        print(f"## {name}: {TABLES[name].__doc__}\n")
-        print("\n".join(TABLES[name](given.jobs, given.dynabarn, given.quick, given.only)), flush=True)
-        print()
+    given = command_line(
+        __doc__,
+        tables=([], ", ".join(TABLES)),
+        jobs=(2, "processes"),
+        most=(0, "at most so many worlds, moments or seeds of each kind; 0: all"),
+        dynabarn=(DYNABARN, "the file of DynaBARN's worlds"),
+        only=("", "dynabarn: only the rows whose name holds this text"),
+    )
+    print_tables(given.tables, TABLES, given.jobs, given.dynabarn, given.most, given.only)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,6 @@ processor's time), and other work on the machine disturbs the figures little.
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -35,9 +34,10 @@ from antdrive.sim.driving.survey import Senses
 from antdrive.sim.sensing import OccupancyMap
 from antdrive.sim.sensing.matching import ScanMatcher
 from benchmarks.drives import barn_tasks
-from benchmarks.planners import table
+from benchmarks.tables import command_line, print_table
 from tools.shared_data import BARN
 
+SMALLEST = ("--drives 1 --worlds 1",)
 WORLDS = ("world_0", "world_138", "world_186", "world_24", "world_288", "world_66")
 PERIOD = "loop"
 PARTS = ("scan", "match", "map", "watch", "sight", "replans")
@@ -98,7 +98,7 @@ def costs(meter: Meter, scenario: Scenario, drives: int) -> tuple[dict[str, floa
     return {part: least.get(part, 0.0) for part in (PERIOD, *PARTS)}, done.succeeded
 
 
-def rows(source: Path, drives: int) -> Iterator[list[str]]:
+def rows(source: Path, drives: int, worlds: int) -> Iterator[list[str]]:
     meter = Meter()
     meter.watch(drive, "_control_period", PERIOD)
     for owner, method, name in (
@@ -114,7 +114,7 @@ def rows(source: Path, drives: int) -> Iterator[list[str]]:
     tasks = barn_tasks(source)
     for sensors, settings in SENSORS:
         to_know, everything = [], []
-        for world in WORLDS:
+        for world in WORLDS[:worlds]:
             noise = {"noise": settings["noise"]} if settings else {}
             given, _ = costs(meter, Scenario.of(tasks[world], "astar", "jackal", **noise), drives)
             found, certified = costs(
@@ -135,16 +135,14 @@ def shown(share: float) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
-    parser.add_argument("--drives", type=int, default=8, help="how often each drive is repeated")
-    options = parser.parse_args()
-    if not options.barn.exists():
-        print(f"no worlds at {options.barn}; give --barn")
-        return
+    given = command_line(
+        __doc__,
+        barn=(BARN, "folder or archive of BARN's world_*.world files"),
+        drives=(8, "how often each drive is repeated"),
+        worlds=(len(WORLDS), "how many of the worlds"),
+    )
     heads = ("sensors", "world", "loop with the map [ms/s]", "loop", *PARTS, "to know", "all")
-    for line in table(heads, rows(options.barn, options.drives)):
-        print(line, flush=True)
+    print_table(heads, rows(given.barn, given.drives, given.worlds))
 
 
 if __name__ == "__main__":

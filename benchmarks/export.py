@@ -8,7 +8,6 @@ scans at export. In a process that has exported before, packages and compiled co
 
 from __future__ import annotations
 
-import argparse
 import resource
 import statistics
 import subprocess
@@ -18,7 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from antdrive.sim import Perception, Rollout, Scenario, run
+from benchmarks.tables import command_line, print_table
 
+SMALLEST = ("--rounds 1 --drives 1",)
 KINDS = ("mcap", "rosbag2", "csv")
 #: The scenarios' settings by what a row of the table is called.
 DRIVES = {
@@ -65,9 +66,9 @@ def messages(log: Path) -> tuple[int, int]:
     return sum(len(topic.stamps) for topic in topics_of(rollout, scans)), len(scans.rows)
 
 
-def rows(folder: Path, rounds: int) -> Iterator[list[str]]:
+def rows(folder: Path, rounds: int, drives: int) -> Iterator[list[str]]:
     """The rows of the table."""
-    for name, (world, planner, settings) in DRIVES.items():
+    for name, (world, planner, settings) in list(DRIVES.items())[-drives:]:
         log = run(Scenario.of(world, planner, "jackal", **settings)).rollout
         assert log is not None
         file = log.save(folder / f"{name}.npz")
@@ -86,13 +87,12 @@ def rows(folder: Path, rounds: int) -> Iterator[list[str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=5, help="medians of so many fresh processes")
+    given = command_line(
+        __doc__, rounds=(5, "medians of so many fresh processes"), drives=(len(DRIVES), "how many of the drives")
+    )
     with tempfile.TemporaryDirectory() as name:
-        print("| drive | size | to | the first in a process | later ones | the command |")
-        print("|---|---|---|---|---|---|")
-        for row in rows(Path(name), parser.parse_args().rounds):
-            print(f"| {' | '.join(row)} |", flush=True)
+        heads = "drive | size | to | the first in a process | later ones | the command"
+        print_table(heads, rows(Path(name), given.rounds, given.drives))
 
 
 if __name__ == "__main__":

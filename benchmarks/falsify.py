@@ -18,7 +18,7 @@ import collections
 import dataclasses
 import statistics
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,10 @@ from antdrive.runs.failures.search import METHODS
 from antdrive.runs.failures.space import feasible
 from antdrive.runs.pool import Pool
 from antdrive.sim import Scenario, run
-from benchmarks.planners import table
 from benchmarks.resuming import append_line, current_commit, read_lines
+from benchmarks.tables import chosen, command_line, print_tables, table
 
+SMALLEST = ("--seeds 1 --budget 2 --worlds 2",)
 CARELESS: dict[str, Any] = {"margin": 0.0, "noise": 1.0, "smoothing": "none"}
 SETUPS = {
     "careless turtlebot": Scenario.of("empty", "astar", "turtlebot", **CARELESS),
@@ -118,7 +119,9 @@ def searched(arguments: argparse.Namespace, asked: Sequence[tuple[Any, ...]]) ->
 def methods(arguments: argparse.Namespace) -> Iterator[str]:
     """Guided search against random worlds, careless set-ups."""
     budget, obstacles = arguments.budget, arguments.obstacles
-    names = arguments.setups or [name for name in SETUPS if name.startswith("careless")]
+    names = chosen(
+        arguments.setups.split(",") if arguments.setups else [name for name in SETUPS if "careless" in name], SETUPS
+    )
     # Seed by seed, so that an unfinished file has as many of each set-up and method.
     asked = [
         (name, method, seed, budget, obstacles)
@@ -170,29 +173,18 @@ def _worlds(arguments: argparse.Namespace, name: str) -> Iterator[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", nargs="*", help="tables to print; default: all")
-    parser.add_argument("--seeds", type=int, default=10, help="searches of each set-up and method")
-    parser.add_argument("--budget", type=int, default=100, help="runs of each of these searches")
-    parser.add_argument(
-        "--setups", nargs="+", choices=tuple(SETUPS), help="of the table methods; default: the careless"
+    given = command_line(
+        __doc__,
+        tables=([], "tables to print; default: all"),
+        seeds=(10, "searches of each set-up and method"),
+        budget=(100, "runs of each of these searches"),
+        setups=("", f"of the table methods: some of {', '.join(SETUPS)}, with commas; default: the careless"),
+        obstacles=(10, "cylinders in each world"),
+        worlds=(1000, "random worlds of the tables default and noise"),
+        jobs=(2, "searches at the same time"),
+        results=(Path, "file with a line for each search, to go on with"),
     )
-    parser.add_argument("--obstacles", type=int, default=10, help="cylinders in each world")
-    parser.add_argument("--worlds", type=int, default=1000, help="random worlds of the tables default and noise")
-    parser.add_argument("--jobs", type=int, default=2, help="searches at the same time")
-    parser.add_argument("--results", type=Path, help="file with a line for each search, to go on with")
-    arguments = parser.parse_args()
-    makers: dict[str, Callable[[argparse.Namespace], Iterator[str]]] = {
-        "methods": methods,
-        "default": default,
-        "noise": noise,
-    }
-    for name in arguments.tables or makers:
-        if name not in makers:
-            parser.error(f"no table is called {name!r}; choose from {', '.join(makers)}")
-        print(f"## {name}\n")
-        for line in makers[name](arguments):
-            print(line, flush=True)
+    print_tables(given.tables, {f.__name__: f for f in (methods, default, noise)}, given)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ with `--sight`, what it costs to show what a robot without a map has seen.
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import subprocess
@@ -23,11 +22,10 @@ from antdrive.sim.scenario import Scenario
 from antdrive.views.film.parallel import process_count
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.video import film
+from benchmarks.tables import command_line
 
-ROUNDS = 3
+SMALLEST = ("--rounds 1 --seconds 0.2 --frames 2", "--sight --rounds 1 --frames 2", "--memory --seconds 0.2")
 SIZES = ((640, 480), (1280, 720))
-FRAMES = 40  # of each camera and round, evenly over a drive
-SECONDS = 10.0  # length of the filmed part of the run [s]
 
 
 def cut(rollout: Rollout, seconds: float) -> Rollout:
@@ -42,32 +40,33 @@ def cut(rollout: Rollout, seconds: float) -> Rollout:
     return dataclasses.replace(rollout, t=np.arange(len(rows)) * step, contacts=np.empty((0, 4)), **arrays)
 
 
-def speed(rollout: Rollout) -> None:
+def speed(rollout: Rollout, rounds: int, seconds: float) -> None:
     count = len(rollout.record.world.obstacles)
-    print(f"{count} cylinders; best of {ROUNDS}; a moving camera renders in {process_count()} processes")
+    print(f"{count} cylinders; best of {rounds}; a moving camera renders in {process_count()} processes")
     print("camera    size        film fps   on one core")
     with tempfile.TemporaryDirectory() as folder:
         for camera in ("top", "oblique", "follow"):
             for size in SIZES:
-                part, rates = cut(rollout, SECONDS), []
+                part, rates = cut(rollout, seconds), []
                 for jobs in (None, 1) if camera == "follow" else (1,):
                     runs = [
-                        film(part, Path(folder) / "a.mp4", camera=camera, size=size, jobs=jobs) for _ in range(ROUNDS)
+                        film(part, Path(folder) / "a.mp4", camera=camera, size=size, jobs=jobs) for _ in range(rounds)
                     ]
                     rates.append(max(info.frames / info.wall_s for info in runs))
                 print(f"{camera:8}  {size[0]:4}x{size[1]:<4} {rates[0]:9.0f} {rates[-1]:13.0f}")
 
 
-def memory(path: Path) -> None:
+def memory(path: Path, seconds: float) -> None:
     """Print the peak memory of rendering and encoding a short and a long film, each in its own process."""
     for camera in ("oblique", "follow"):
         peaks = []
-        for seconds in (10, 300):
-            code = f"from benchmarks.film import peak; peak({str(path)!r}, {camera!r}, {seconds})"
+        for length in (seconds, 30 * seconds):
+            code = f"from benchmarks.film import peak; peak({str(path)!r}, {camera!r}, {length})"
             done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
             peaks.append(float(done.stdout))
         print(
-            f"{camera:8} 640x480   10 s: {peaks[0]:.0f} MB   5 min: {peaks[1]:.0f} MB   difference {peaks[1] - peaks[0]:.0f} MB"
+            f"{camera:8} 640x480   {seconds:g} s: {peaks[0]:.0f} MB   {30 * seconds:g} s: {peaks[1]:.0f} MB   "
+            f"difference {peaks[1] - peaks[0]:.0f} MB"
         )
 
 
@@ -80,18 +79,18 @@ def peak(path: str, camera: str, seconds: float) -> None:
     print(own + child)
 
 
-def sight() -> None:
+def sight(rounds: int, frames: int) -> None:
     """Print the processor time of a frame of a drive without a map, with what the robot has seen and without."""
     import dataclasses
 
     log = run(Scenario.of("forest", "astar", "jackal", map="none", localisation="matching", noise=1.0, seed=1)).rollout
     assert log is not None
     plain = dataclasses.replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
-    moments = np.linspace(0.0, float(log.t[-1]), FRAMES)
+    moments = np.linspace(0.0, float(log.t[-1]), frames)
     print("| camera | with what it has seen | without |\n|---|---|---|")
     for camera in ("top", "oblique", "follow"):
         costs = {True: [], False: []}
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             for seen in costs:
                 shot = Shot(log if seen else plain, camera=camera, size=SIZES[-1])
                 for at in moments:
@@ -102,20 +101,24 @@ def sight() -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--memory", action="store_true", help="measure peak memory instead of the rate")
-    parser.add_argument("--sight", action="store_true", help="measure frames that show what the robot has seen instead")
-    options = parser.parse_args()
-    if options.sight:
-        sight()
+    given = command_line(
+        __doc__,
+        memory=(False, "measure peak memory instead of the rate"),
+        sight=(False, "measure frames that show what the robot has seen instead"),
+        rounds=(3, "of each film"),
+        seconds=(10.0, "length of the filmed part of the run [s]"),
+        frames=(40, "with --sight: of each camera and round, evenly over a drive"),
+    )
+    if given.sight:
+        sight(given.rounds, given.frames)
         return
     log = run(Scenario.of("forest")).rollout
     assert log is not None
-    if not options.memory:
-        speed(log)
+    if not given.memory:
+        speed(log, given.rounds, given.seconds)
         return
     with tempfile.TemporaryDirectory() as folder:
-        memory(log.save(Path(folder) / "rollout.npz"))
+        memory(log.save(Path(folder) / "rollout.npz"), given.seconds)
 
 
 if __name__ == "__main__":

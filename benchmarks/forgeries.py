@@ -1,4 +1,4 @@
-"""Forged and broken logs, and which check finds each: `python -m benchmarks.forgeries [--kinds WORD ...]`. Prints Markdown.
+"""Forged and broken logs, and which check finds each: `python -m benchmarks.forgeries [WORD ...]`. Prints Markdown.
 
 A forger has a genuine log, changes it, and computes a new digest, so that the digest never finds anything here.
 `benchmarks.forged_logs` holds the forgeries by name; each is applied to every genuine drive of `genuine_drives` that it
@@ -13,7 +13,6 @@ makes sense for. The checks are those of `antdrive verify`, from the cheapest on
 
 from __future__ import annotations
 
-import argparse
 import collections
 import dataclasses
 import tempfile
@@ -29,7 +28,9 @@ from antdrive.sim.driving.replay import replay
 from antdrive.sim.log.binding import differences
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
 from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
-from benchmarks.planners import table
+from benchmarks.tables import command_line, print_table
+
+SMALLEST = ("rows robot",)
 
 
 def genuine_drives() -> dict[str, Rollout]:
@@ -130,13 +131,11 @@ def all_findings(drives: Mapping[str, Rollout], kinds: Mapping[str, Kind] = KIND
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kinds", nargs="*", metavar="WORD", default=[""], help="only kinds with one of these words")
-    given = parser.parse_args()
+    words = command_line(__doc__, kinds=([], "only kinds with one of these words")).kinds or [""]
     drives = genuine_drives()
     for name, log in drives.items():
         print(f"- {name}: {log.outcome.key}, {len(log.t)} rows, {certify(log).sentence}")
-    chosen = {name: kind for name, kind in KINDS.items() if any(word in name for word in given.kinds)}
+    chosen = {name: kind for name, kind in KINDS.items() if any(word in name for word in words)}
     results = all_findings(drives, chosen)
     rows = []
     for name in chosen:
@@ -146,7 +145,7 @@ def main() -> None:
     total = collections.Counter(r.level for r in results)
     rows.append([f"all {len(chosen)} kinds", str(len(results)), *(str(total[level]) for level in LEVELS), ""])
     print()
-    print("\n".join(table(["forgery", "logs", *LEVELS, "for example"], rows)))
+    print_table(["forgery", "logs", *LEVELS, "for example"], rows)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ drives one of them again and prints all about it.
 
 from __future__ import annotations
 
-import argparse
 import collections
 import functools
 import itertools
@@ -32,12 +31,13 @@ from antdrive.sim import Certificate, Rollout, Scenario, run
 from antdrive.worlds import Task, generate
 from antdrive.worlds.files.world_file import save_task
 from benchmarks.dynamic import random_task
-from benchmarks.planners import table
 from benchmarks.second_audit import Least, least_clearance
+from benchmarks.tables import command_line, table
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same values, read ten times faster
 ROOT = Path(__file__).parent.parent
-RESULTS = ROOT / "out" / "held_out"
+RESULTS = Path("out/held_out")
+SMALLEST = ("--drives 2 --jobs 1 --margins fixed",)
 STREAM = 0x48454C44  # keeps these worlds apart from those of all other seeds
 SAME = 2e-4  # the certificate's and the second audit's least clearance at the rows agree to this [m]
 # The share of worlds of each kind; drives among movers take several times as long.
@@ -218,15 +218,16 @@ def results_of(path: Path) -> list[dict[str, Any]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--drives", type=int, default=10_000)
-    parser.add_argument("--first", type=int, default=0, metavar="N", help="number of the first drive")
-    parser.add_argument("--jobs", type=int, default=2, help="processes")
-    parser.add_argument("--seed", type=int, default=2026, help="another seed gives other worlds")
-    parser.add_argument("--margins", choices=MARGINS, default="auto", help="0.03 m, with noise 0.06 m; or auto")
-    parser.add_argument("--only", type=int, metavar="N", help="drive one again and print all about it")
-    parser.add_argument("--results", type=Path, help="JSONL file; the default is below out/held_out")
-    given = parser.parse_args()
+    given = command_line(
+        __doc__,
+        drives=(10_000, "how many"),
+        first=(0, "number of the first drive"),
+        jobs=(2, "processes"),
+        seed=(2026, "another seed gives other worlds"),
+        margins=("auto", "fixed: 0.03 m, with noise 0.06 m; or auto"),
+        only=(int, "number of a drive: drive it again and print all about it"),
+        results=(Path, "JSONL file; the default is below out/held_out"),
+    )
     if given.only is not None:
         print(json.dumps(drive(given.only, given.seed, given.margins), indent=1))
         return

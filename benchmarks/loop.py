@@ -9,6 +9,7 @@ A second table compares the loop among 24 movers that the robot avoids with the 
 
 from __future__ import annotations
 
+import contextlib
 import statistics
 import time
 
@@ -22,20 +23,27 @@ from antdrive.sim.driving.rules import Avoid
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
+from benchmarks.tables import command_line
 
-ROUNDS = 9
+SMALLEST = ("--rounds 1",)
 MOVERS = 24
 
 
-def task_among(count: int) -> Task:
-    """An 18 m drive among `count` thin cylinders."""
-    rng = np.random.default_rng(0)
+def task_among(count: int, size: tuple[float, float] = (20.0, 20.0), radius: float = 0.1) -> Task:
+    """An 18 m drive through the middle of a hall among `count` thin cylinders."""
+    rng, middle = np.random.default_rng(0), size[1] / 2
     discs: list[Disc] = []
     while len(discs) < count:
-        x, y = rng.uniform(0.2, 19.8, 2)
-        if abs(y - 10) > 1:
-            discs.append(Disc(x, y, 0.1))
-    return Task(World(f"bench-{count}", (0, 0, 20, 20), tuple(discs)), (1, 10, 0), (19, 10))
+        x, y = rng.uniform((0.2, 0.2), (size[0] - 0.2, size[1] - 0.2)).tolist()
+        if abs(y - middle) > 1:
+            discs.append(Disc(x, y, radius))
+    return Task(World(f"bench-{count}", (0, 0, *size), tuple(discs)), (1, middle, 0), (19, middle))
+
+
+def winding(task: Task) -> Route:
+    """The route of the drive, which winds about the middle of the hall."""
+    x = np.linspace(1, 19, 73)
+    return Route(np.stack([x, task.start[1] + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
 
 
 def with_movers(task: Task) -> Task:
@@ -51,7 +59,7 @@ def with_movers(task: Task) -> Task:
     return Task(world, task.start, task.goal)
 
 
-def table_of_movers(route: Route) -> None:
+def table_of_movers(route: Route, rounds: int) -> None:
     """Print what the loop costs among movers: seen and avoided, not seen, and absent."""
     robot, controller, still = load_robot("turtlebot"), PurePursuit(), task_among(10)
     moving = with_movers(still)
@@ -59,7 +67,7 @@ def table_of_movers(route: Route) -> None:
     motions = Trajectories.of(moving.world, moving.start[:2])
     costs: dict[str, list[float]] = {}
     with Engine(still.world, robot) as empty, Engine(moving.world, robot, trajectories=motions) as full:
-        for turn in range(ROUNDS + 1):
+        for turn in range(rounds + 1):
             for name, engine, task in (
                 ("no movers", empty, still),
                 (f"{MOVERS} movers, not seen", full, moving),
@@ -79,19 +87,19 @@ def table_of_movers(route: Route) -> None:
 
 
 def main() -> None:
+    rounds = command_line(__doc__, rounds=(9, "of each measurement")).rounds
     robot, controller = load_robot("turtlebot"), PurePursuit()
     p = bullet()
     print("discs   bare us/step   loop us/step   loop / bare   x real time   step / step among 10")
-    engines = {}
+    engines, stack = {}, contextlib.ExitStack()
     for count in (10, 100, 400):
         task = task_among(count)
-        x = np.linspace(1, 19, 73)
-        route = Route(np.stack([x, 10 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
+        route = winding(task)
         tracked = controller.prepare(route, task.world, robot, 0.05, 1 / 60)
-        engines[count] = (Engine(task.world, robot).__enter__(), task, tracked)
+        engines[count] = (stack.enter_context(Engine(task.world, robot)), task, tracked)
     bare: dict[int, list[float]] = {count: [] for count in engines}
     loop: dict[int, list[float]] = {count: [] for count in engines}
-    for turn in range(ROUNDS + 1):
+    for turn in range(rounds + 1):
         for count, (engine, task, tracked) in engines.items():
             started = time.perf_counter()
             log = follow(engine, controller, tracked, task, limit=120)
@@ -117,9 +125,8 @@ def main() -> None:
             f"{count:5}   {statistics.median(bare[count]):12.1f}   {us:12.1f}   {ratio:11.2f}   {1e6 / 240 / us:11.0f}"
             f"   {growth:20.2f}"
         )
-    table_of_movers(route)
-    for engine, _, _ in engines.values():
-        engine.__exit__(None, None, None)
+    table_of_movers(route, rounds)
+    stack.close()
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ Every combination of robot, noise and smoothing drives random worlds, half of th
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import math
 from dataclasses import replace
@@ -15,15 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.planners import load_planner
-from antdrive.robots import load_robot
 from antdrive.runs.margins.choice import choose_margin, with_chosen_margin
 from antdrive.runs.margins.prediction import Calibration
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import generate
-from benchmarks.planners import table
+from benchmarks.tables import command_line, print_table
 
+SMALLEST = ("--worlds 2 --robots turtlebot --smoothings taut --noises 0 --jobs 1",)
 FIRST_SEED = 50_000
 
 
@@ -47,10 +45,7 @@ class Driven(NamedTuple):
 
 def scenario(kind: str, seed: int, robot: str, noise: float, smoothing: str) -> Scenario:
     task = generate(kind, np.random.default_rng(seed), {}, name=f"{kind} {seed}", note="")
-    return Scenario(
-        task=task, planner=load_planner("astar"), planner_name="astar", robot=load_robot(robot), noise=noise,
-        smoothing=smoothing, seed=seed, margin=0.0,
-    )  # fmt: skip
+    return Scenario.of(task, "astar", robot, noise=noise, smoothing=smoothing, seed=seed, margin=0.0)
 
 
 def drive(kind: str, seed: int, robot: str, noise: float, smoothing: str, margin: float | None) -> Driven:
@@ -80,16 +75,19 @@ def row(calibration: Calibration, drives: list[Driven]) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--worlds", type=int, default=60, help="number of random worlds for each row")
-    parser.add_argument("--robots", default="turtlebot,jackal", help="robots, separated by commas")
-    parser.add_argument("--jobs", type=int, help="processes; by default one per core")
-    parser.add_argument("--fixed", type=float, help="drive with this margin instead [m]; predictions are those of auto")
-    arguments = parser.parse_args()
+    arguments = command_line(
+        __doc__,
+        worlds=(60, "number of random worlds for each row"),
+        robots=("turtlebot,jackal", "robots, separated by commas"),
+        smoothings=("none,taut,clearance", "kinds of smoothing, separated by commas"),
+        noises=("0,1", "levels of noise, separated by commas"),
+        jobs=(int, "processes; by default one per core"),
+        fixed=(float, "drive with this margin instead [m]; predictions are those of auto"),
+    )
     rows, wrong = [], []
-    for robot, noise, smoothing in itertools.product(
-        arguments.robots.split(","), (0.0, 1.0), ("none", "taut", "clearance")
-    ):
+    robots, smoothings = arguments.robots.split(","), arguments.smoothings.split(",")
+    noises = map(float, arguments.noises.split(","))
+    for robot, noise, smoothing in itertools.product(robots, noises, smoothings):
         calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).conditions)
         worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]
         calls = [partial(drive, *world, robot, noise, smoothing, arguments.fixed) for world in worlds]
@@ -106,8 +104,7 @@ def main() -> None:
         "beyond the prediction", "with a path", "with contacts", "not certified",
     ]  # fmt: skip
     print()
-    for line in table(heads, rows):
-        print(line)
+    print_table(heads, rows)
     print("Not certified, or beyond the prediction: " + ("; ".join(wrong) or "none."))
 
 

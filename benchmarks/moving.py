@@ -10,7 +10,6 @@ cost-to-go in cells, summed over all cells visited.
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import time
 from collections.abc import Iterator
@@ -20,7 +19,9 @@ import numpy as np
 from antdrive.planners import OnlineAgent, Query, agent_for, load_planner
 from antdrive.runs.papers.maps import environments
 from antdrive.runs.papers.movers import Strollers, drive
-from benchmarks.planners import seconds, table
+from benchmarks.tables import command_line, print_table, seconds
+
+SMALLEST = ("--seeds 1 --cases 1",)
 
 #: hasan, Table 1: alpha/beta, cells propagated, steps, total cost, seconds; basic D*'s total cost and seconds.
 PRINTED = {
@@ -43,12 +44,11 @@ def runs(name: str, query: Query, count: int, seeds: range) -> Iterator[tuple[bo
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=20, help="number of runs per case and planner")
-    seeds = range(parser.parse_args().seeds)
+    given = command_line(__doc__, seeds=(20, "number of runs per case and planner"), cases=(6, "how many of the cases"))
+    seeds = range(given.seeds)
     for count in (1, 10):
         rows = []
-        for case, query in environments().items():
+        for case, query in list(environments().items())[: given.cases]:
             exponents, cells, steps, cost, wall, dstar_cost, dstar_wall = PRINTED[case[:2]]
             rows.append([case, "hasan, printed", exponents, "", str(steps), f"{cost:g}", str(cells), "", f"{wall:g} s"])
             rows.append(["", "its D*", "", "", "", f"{dstar_cost:g}", "", "", f"{dstar_wall:g} s"])
@@ -69,18 +69,8 @@ def main() -> None:
                     seconds(statistics.median(wall for _, _, wall in done)),
                 ])  # fmt: skip
         print(f"{count} mover{'s' if count > 1 else ''}; median (range) of {len(seeds)} seeds\n")
-        heads = [
-            "case",
-            "",
-            "alpha/beta",
-            "arrived",
-            "steps",
-            "total cost",
-            "cells propagated",
-            "cycles broken",
-            "time",
-        ]
-        print("\n".join(table(heads, rows)))
+        heads = "case |  | alpha/beta | arrived | steps | total cost | cells propagated | cycles broken | time"
+        print_table(heads, rows)
 
 
 if __name__ == "__main__":

@@ -44,6 +44,8 @@ from tools.shared_data import BARN, DYNABARN
 
 # Spelling -------------------------------------------------------------------------------------------------------------
 
+SMALLEST = ("list",)
+
 #: The words of commands.
 COMMANDS = {
     "find_margin": ["find-margin"],

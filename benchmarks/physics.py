@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +17,11 @@ from antdrive import Disc, RobotSpec, World, load_robot
 from antdrive.base.types import Pose
 from antdrive.robots.footprint import footprint_clearance
 from antdrive.sim import Engine
+from benchmarks.tables import command_line
 
 ROBOTS = ("turtlebot", "jackal")
 RATES = (60, 120, 240, 1000)  # physics steps per second
+SMALLEST = ("--rates 1",)
 DEPTHS = (-20.0, -10.0, -5.0, -2.0, -1.0, 1.0, 2.0, 5.0, 10.0, 20.0)  # clearance of a pass [mm]
 OPEN = World("open", (-50, -50, 50, 50))
 
@@ -151,11 +154,11 @@ def head_on(robot: RobotSpec, hz: int, speed: float) -> float:
         return -1e3 * float(footprint_clearance(world, robot.footprint, [engine.state().pose])[0])
 
 
-def print_turns() -> None:
+def print_turns(rates: Sequence[int]) -> None:
     """Print how well commands are followed."""
     print("| robot | physics [Hz] | speed | yaw rate | sideways [mm/s] | stop as in the file / v²/2a | zero at once |")
     print("|---|---|---|---|---|---|---|")
-    for name, hz in itertools.product(ROBOTS, RATES):
+    for name, hz in itertools.product(ROBOTS, rates):
         robot = load_robot(name)
         turn, (way, ideal), (hard, _) = (
             worst_turn(robot, hz),
@@ -168,13 +171,13 @@ def print_turns() -> None:
         )
 
 
-def print_passes() -> None:
+def print_passes(rates: Sequence[int]) -> None:
     """Print what physics feels of passes, beside what the closed form says of them."""
     print(
         "| robot | physics [Hz] | passes | overlap, not felt | felt without overlap | deepest overlap when felt [mm] |"
     )
     print("|---|---|---|---|---|---|")
-    for name, hz in itertools.product(ROBOTS, RATES):
+    for name, hz in itertools.product(ROBOTS, rates):
         robot = load_robot(name)
         missed = false = count = 0
         for share in (0.25, 0.5, 1.0):
@@ -190,9 +193,10 @@ def print_passes() -> None:
 
 
 def main() -> None:
-    print_turns()
+    rates = RATES[: command_line(__doc__, rates=(len(RATES), "how many of the rates of physics, lowest first")).rates]
+    print_turns(rates)
     print()
-    print_passes()
+    print_passes(rates)
 
 
 if __name__ == "__main__":

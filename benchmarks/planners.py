@@ -12,15 +12,15 @@ The peer is python_motion_planning 1.1.1 (GPL, hence never imported here): PYTHO
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
+import functools
 import itertools
 import json
 import math
 import statistics
 import subprocess
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,9 @@ from antdrive.planners import PLANNERS, Planner, PlanResult, Query, capabilities
 from antdrive.planners.colonies.colony import ColonyGraph, TourConstruction
 from antdrive.runs.papers.maps import blocks, environments, han_ants, optimum, scattered
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise
+from benchmarks.tables import command_line, percent, print_tables, seconds, table
 
+SMALLEST = ("--quick hasan",)
 SEEDS = range(10)
 
 
@@ -86,23 +88,6 @@ def solve(planner: Planner, query: Query, seed: int) -> PlanResult:
 
 
 # Tables
-
-
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Markdown, a line at a time."""
-    yield f"| {' | '.join(heads)} |"
-    yield "|" + "---|" * len(heads)
-    for row in rows:
-        yield f"| {' | '.join(row)} |"
-    yield ""
-
-
-def seconds(value: float) -> str:
-    return f"{1e3 * value:.2g} ms" if value < 0.0995 else f"{1e3 * value:.0f} ms" if value < 1 else f"{value:.2f} s"
-
-
-def percent(share: float) -> str:
-    return f"{100 * max(share, 0.0):.1f} %"
 
 
 def summary(planner: Planner, queries: Sequence[Query]) -> tuple[int, list[float], float]:
@@ -453,22 +438,16 @@ def peer(quick: bool, python: str) -> Iterator[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", nargs="*", help="which to print")
-    parser.add_argument("--quick", action="store_true", help="fewer seeds and sizes")
-    parser.add_argument("--peer", metavar="PYTHON", help="an interpreter with python_motion_planning 1.1.1")
-    arguments = parser.parse_args()
-    makers = {f.__name__: f for f in (quality, hard, papers, hasan, han2007, speed)}
-    for name in arguments.tables or [*makers, *(["peer"] if arguments.peer else [])]:
-        if name == "peer":
-            lines = peer(arguments.quick, arguments.peer or parser.error("peer: needs --peer PYTHON"))
-        elif name in makers:
-            lines = makers[name](arguments.quick)
-        else:
-            parser.error(f"no table is called {name!r}; choose from {', '.join([*makers, 'peer'])}")
-        print(f"## {name}\n")
-        for line in lines:
-            print(line, flush=True)
+    given = command_line(
+        __doc__,
+        tables=([], "which to print"),
+        quick=(False, "fewer seeds and sizes"),
+        peer=(str, "an interpreter with python_motion_planning 1.1.1"),
+    )
+    makers: dict[str, Any] = {f.__name__: f for f in (quality, hard, papers, hasan, han2007, speed)}
+    if given.peer:
+        makers["peer"] = functools.partial(peer, python=given.peer)
+    print_tables(given.tables, makers, given.quick)
 
 
 if __name__ == "__main__":

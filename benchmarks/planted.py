@@ -8,7 +8,6 @@ must change nothing: every test passes, and every drive is the same, bit for bit
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import multiprocessing
@@ -25,8 +24,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from benchmarks.planners import table
 from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, with_check, with_pytest
+from benchmarks.tables import command_line, print_table
 
 Edit = Callable[[Path], None]
 
@@ -146,6 +145,7 @@ def no_avoidance() -> None:
 DESK = "x: 4.0, y: 2.3,"
 NOISE = r"((?:pose_xy|pose_yaw|encoder|slip|delay): )([\d.]+)"
 ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "TZ": "Asia/Kolkata"}
+SMALLEST = ("desk verbose",)
 HEADS = {
     "Planted": ["planted", "tests that fail", "right place", "the most telling line"],
     "Harmless": ["harmless", "tests that pass", "bit-identical"],
@@ -284,7 +284,7 @@ def in_fork(folder: Path, patch: Callable[[], None] | None) -> Tests:
     process = multiprocessing.get_context("fork").Process(target=work)
     process.start()
     process.join()
-    found = json.loads(out.read_text())
+    (found,) = json.loads(out.read_text())  # one round
     assert isinstance(found, dict)
     return found
 
@@ -400,16 +400,8 @@ def harmless_row(change: Harmless, before: Tests) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--only", action="append", default=[], metavar="WORDS", help="changes whose names contain the words"
-    )
-    arguments = parser.parse_args()
-    chosen = [
-        change
-        for change in (*PLANTED, *HARMLESS)
-        if not arguments.only or any(w in change.name for w in arguments.only)
-    ]
+    words = command_line(__doc__, names=([], "changes whose names contain one of these; default: all")).names
+    chosen = [change for change in (*PLANTED, *HARMLESS) if not words or any(w in change.name for w in words)]
     from antdrive import Scenario, run
 
     run(Scenario.of("empty", "astar"))  # the forked processes need not import again
@@ -422,8 +414,8 @@ def main() -> None:
         print("  " + " | ".join(row), file=sys.stderr)
         found[type(change)].append(row)
     for kind, rows in found.items():
-        for line in table(HEADS[kind.__name__], rows) if rows else ():
-            print(line)
+        if rows:
+            print_table(HEADS[kind.__name__], rows)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Which reading of a paper makes its claims true? `python -m benchmarks.readings PLANNER [--seeds N]`.
+"""Which reading of a paper makes its claims true? `python -m benchmarks.readings [PLANNER ...] [--seeds N]`.
 
 Planners: pfaco (lee2008), as and iaco (suganthi2019), maco (ibraheem2016). Each reading of what the paper leaves open runs
 on the same recreated maps with the same seeds and the same number of ant steps. For pfaco a second table varies the
@@ -9,7 +9,6 @@ bootstrapped over maps, and p is Wilcoxon's, against the rival on the same maps.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import math
 import time
@@ -26,8 +25,10 @@ from antdrive.runs.papers.maps import blocks, scattered
 from antdrive.runs.papers.trials import Trial, solve
 from antdrive.runs.statistics.bootstrap import medians_by_world
 from antdrive.runs.statistics.significance import wilcoxon
+from benchmarks.tables import chosen, command_line
 
 Options = Mapping[str, Any]
+SMALLEST = ("iaco --seeds 1",)
 NO_PATH = 1e6  # the gap that stands for no path [%]
 
 
@@ -104,12 +105,7 @@ SEARCHES = {
         "iaco",
         {"ants": 25, "explorers": 75, "iterations": 100, **TABLE_1, "heuristic": "step"},
         math.inf,
-        {
-            "backtrack": (False, True),
-            "shortcut": (False, True),
-            "depositors": ("common", "all"),
-            "elite": (1.0, 25.0),
-        },
+        {"backtrack": (False, True), "shortcut": (False, True), "depositors": ("common", "all"), "elite": (1.0, 25.0)},
         {},
         (),
     ),
@@ -186,12 +182,9 @@ def run(name: str, seeds: int) -> None:
 
 def main() -> None:
     """Run the searches that are named."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("planners", nargs="+", choices=sorted(SEARCHES), metavar="PLANNER")
-    parser.add_argument("--seeds", type=int, default=10)
-    options = parser.parse_args()
-    for name in options.planners:
-        run(name, options.seeds)
+    given = command_line(__doc__, planners=([], ", ".join(SEARCHES)), seeds=(10, "of each map"))
+    for name in chosen(given.planners, SEARCHES):
+        run(name, given.seeds)
 
 
 if __name__ == "__main__":

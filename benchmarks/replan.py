@@ -16,8 +16,10 @@ import numpy as np
 
 from antdrive.planners import Planner, Query, load_planner, replanner_for
 from antdrive.worlds import Disc, Grid, World, rasterise
+from benchmarks.tables import command_line
 
-SIDE, CHANGES, WORLDS, ANT_WORLDS = 200, 12, 40, 4
+SIDE = 200
+SMALLEST = ("--worlds 1 --changes 3",)
 
 
 def discs(rng: np.random.Generator) -> Grid:
@@ -43,13 +45,13 @@ def timed(call: Callable[[], Any]) -> tuple[float, Any]:
     return time.perf_counter() - began, answer
 
 
-def drive(planner: Planner, query: Query, rng: np.random.Generator) -> list[tuple[float, ...]]:
+def drive(planner: Planner, query: Query, changes: int, rng: np.random.Generator) -> list[tuple[float, ...]]:
     """For each change the seconds for the repair, for planning anew and for `astar`, and the gaps of repair and new plan."""
     replanner, astar = replanner_for(planner, query, rng), load_planner("astar")
     replanner.block([])  # the first edit prepares the grid once
     blocked: list[Any] = []
     rows = []
-    for turn in range(CHANGES):
+    for turn in range(changes):
         path = replanner.result().cells
         if len(path) < 40:
             break
@@ -78,21 +80,22 @@ def drive(planner: Planner, query: Query, rng: np.random.Generator) -> list[tupl
     return rows
 
 
-def measured(planner: Planner, kind: Callable[[np.random.Generator], Grid], worlds: int) -> Any:
+def measured(planner: Planner, kind: Callable[[np.random.Generator], Grid], worlds: int, changes: int) -> Any:
     """The columns of `drive` over a number of worlds."""
     rng = np.random.default_rng(0)
-    drive(planner, corner_to_corner(kind(rng)), rng)  # warms up
-    return np.array([row for _ in range(worlds) for row in drive(planner, corner_to_corner(kind(rng)), rng)]).T
+    drive(planner, corner_to_corner(kind(rng)), changes, rng)  # warms up
+    return np.array([row for _ in range(worlds) for row in drive(planner, corner_to_corner(kind(rng)), changes, rng)]).T
 
 
 def main() -> None:
+    given = command_line(__doc__, worlds=(40, "of each kind; a tenth of them for ants"), changes=(12, "in each world"))
     print(
         "| 200×200 | planner | repair, µs: median | 90 % | 99 % | anew, µs | anew / repair | `astar`, µs | `astar` / repair |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for kind in (discs, scattered):
         for name in ("dstar-lite", "dstar"):
-            repair, anew, astar, *gaps = measured(load_planner(name), kind, WORLDS)
+            repair, anew, astar, *gaps = measured(load_planner(name), kind, given.worlds, given.changes)
             assert np.abs(gaps).max() < 1e-12
             spread = " | ".join(f"{q:.0f}" for q in np.percentile(repair * 1e6, [50, 90, 99]))
             print(
@@ -104,7 +107,7 @@ def main() -> None:
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for kind in (discs, scattered):
-        warm, cold, _, *gaps = measured(load_planner("ants"), kind, ANT_WORLDS)
+        warm, cold, _, *gaps = measured(load_planner("ants"), kind, max(1, given.worlds // 10), given.changes)
         spread = " | ".join(f"{q:.0f}" for q in np.percentile(warm * 1e3, [50, 90]))
         lacks = [f"{100 * np.median(gap):.2f} % | {100 * gap.max():.2f} %" for gap in gaps]
         print(

@@ -1,6 +1,6 @@
-"""How fast `astar` is beside other libraries' A*: `python -m benchmarks.search [ARCHIVE]`.
+"""How fast `astar` is beside other libraries' A*: `python -m benchmarks.search [--archive FILE]`.
 
-Needs the extra `peers`, best in an environment of its own. ARCHIVE is a .tar.xz with the MovingAI maps named in `MOVINGAI` and
+Needs the extra `peers`, best in an environment of its own. FILE is a .tar.xz with the MovingAI maps named in `MOVINGAI` and
 their problems. Every solver gets the same grids and queries in turns within one run, so the ratios mean something where times do
 not. Each path is checked against the solver's own corner rule and against the optimum under it, by scipy. A ratio above 1 says
 how many times longer the peer took than `astar`. Prints Markdown.
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import statistics
-import sys
 import tarfile
 import tempfile
 import time
@@ -19,30 +18,32 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import nano_astar
 import numpy as np
-import pyastar2d
-import python_motion_planning as pmp
-import scipy.sparse
-import tcod.path
-from w9_pathfinding.envs import DiagonalMovement
-from w9_pathfinding.envs import Grid as W9Grid
-from w9_pathfinding.pf import AStar as W9AStar
 
 from antdrive.planners import Query, load_planner
 from antdrive.worlds import Disc, Grid, World, rasterise
 from antdrive.worlds.formats.movingai import import_movingai_map, import_movingai_problems
+from benchmarks.tables import command_line, missing
 from tools.shared_data import MOVINGAI as ARCHIVE
+
+try:
+    import nano_astar
+    import pyastar2d
+    import python_motion_planning as pmp
+    import scipy.sparse
+    import tcod.path
+    from w9_pathfinding.envs import DiagonalMovement
+    from w9_pathfinding.envs import Grid as W9Grid
+    from w9_pathfinding.pf import AStar as W9AStar
+except ImportError as error:
+    missing(f"{error}: the extra `peers` brings what is measured against")
 
 Cell = tuple[int, int]
 Solve = Callable[[Cell, Cell], Any]  # the peer's own kind of path
 
-MOVINGAI = {
-    "512² game (AR0011SR)": "AR0011SR",
-    "512² random 25 %": "random512-25-0",
-    "512² maze": "maze512-8-0",
-}
-QUERIES, TURNS = 25, 5
+MOVINGAI = {"512² game (AR0011SR)": "AR0011SR", "512² random 25 %": "random512-25-0", "512² maze": "maze512-8-0"}
+TURNS = 5
+SMALLEST = ("--queries 1 --fresh 1",)
 RNG = np.random.default_rng(0)
 ROOT2 = math.sqrt(2.0)
 
@@ -185,11 +186,11 @@ def far_queries(free: Any, count: int, rng: np.random.Generator) -> list[tuple[C
     return found
 
 
-def problems(folder: Path, name: str, rng: np.random.Generator) -> tuple[Any, list[tuple[Cell, Cell]]]:
+def problems(folder: Path, name: str, count: int, rng: np.random.Generator) -> tuple[Any, list[tuple[Cell, Cell]]]:
     """A MovingAI map and some of the longer half of its problems."""
     free = import_movingai_map(folder / f"{name}.map").free.copy()
     listed = sorted(import_movingai_problems(folder / f"{name}.map.scen"), key=lambda p: p.optimal)
-    picked = rng.choice(len(listed) // 2, size=QUERIES, replace=False) + len(listed) // 2
+    picked = rng.choice(len(listed) // 2, size=count, replace=False) + len(listed) // 2
     return free, [(listed[i].start, listed[i].goal) for i in picked]
 
 
@@ -229,11 +230,11 @@ def measure(free: Any, queries: Sequence[tuple[Cell, Cell]]) -> dict[str, Row]:
     return rows
 
 
-def one_shot(rng: np.random.Generator) -> dict[str, list[float]]:
+def one_shot(maps: int, rng: np.random.Generator) -> dict[str, list[float]]:
     """From a picture of free cells never seen before to a path: preparing the map counts."""
     solvers = [s for s in SOLVERS if s.largest >= 512]
     took: dict[str, list[float]] = {s.name: [] for s in solvers}
-    for turn in range(61):
+    for turn in range(maps + 1):
         free = disc_picture(rng)
         (query,) = far_queries(free, 1, rng)
         for s in solvers:
@@ -252,23 +253,29 @@ def ratio(times: Sequence[float], ours: Sequence[float]) -> str:
 
 def main() -> None:
     rng = np.random.default_rng(1)
-    archive = Path(sys.argv[1]) if len(sys.argv) > 1 else ARCHIVE
+    given = command_line(
+        __doc__,
+        archive=(ARCHIVE, "of MovingAI's maps"),
+        queries=(25, "on each map"),
+        fresh=(60, "maps that are met for the first time"),
+    )
+    archive, queries = given.archive, given.queries
     picture = disc_picture(rng)
     maps: dict[str, tuple[Any, list[tuple[Cell, Cell]]]] = {
-        "100×100 discs": (picture, far_queries(picture, QUERIES, rng))
+        "100×100 discs": (picture, far_queries(picture, queries, rng))
     }
     with tempfile.TemporaryDirectory() as folder:
         if archive.exists():
             with tarfile.open(archive) as tar:
                 tar.extractall(folder, filter="data")
-            maps |= {title: problems(Path(folder), name, rng) for title, name in MOVINGAI.items()}
+            maps |= {title: problems(Path(folder), name, queries, rng) for title, name in MOVINGAI.items()}
         else:
             print(f"No MovingAI maps at {archive}: only the discs are measured.\n")
     results = {title: measure(*made) for title, made in maps.items()}
-    fresh = one_shot(rng)
+    fresh = one_shot(given.fresh, rng)
     ours = SOLVERS[0].name
 
-    print(f"Median of {QUERIES} queries, ms\n")
+    print(f"Median of {queries} queries, ms\n")
     print("| solver |", " | ".join(maps), "| fresh 100×100 map, one query |")
     print("|---" * (len(maps) + 2) + "|")
     for s in SOLVERS:
@@ -283,7 +290,7 @@ def main() -> None:
         last = ratio(fresh[s.name], fresh[ours]) if s.name in fresh else ""
         rows = [r[s.name] for r in results.values() if s.name in r]
         cut, over = sum(row.cut for row in rows), max(row.over for row in rows)
-        share = f"in {cut} of {QUERIES * len(rows)} paths" if cut else "none"
+        share = f"in {cut} of {queries * len(rows)} paths" if cut else "none"
         print(f"| {s.name} |", " | ".join([*cells, last, share, f"{over:.1%}"]), "|")
 
 

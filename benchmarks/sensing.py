@@ -6,7 +6,6 @@ by a centimetre from scan to scan. Times are processor time; of nine blocks of 2
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import time
 from collections.abc import Callable, Iterator
@@ -16,8 +15,9 @@ import numpy.typing as npt
 
 from antdrive.robots import Lidar, load_robot
 from antdrive.sim.sensing import MappedGround, MoverTracker, OccupancyMap, Scanner, clear_distance
-from benchmarks.planners import table
+from benchmarks.tables import command_line, print_table
 
+SMALLEST = ("--blocks 1 --beams 36",)
 HALL = (-10.0, -10.0, 10.0, 10.0)
 SCANS = 200
 
@@ -87,23 +87,18 @@ def tracks(lidar: Lidar, blocks: int) -> Iterator[list[str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--blocks", type=int, default=9, help="of 200 scans each; the fastest counts")
-    parser.add_argument("--beams", type=int, default=720, help="beams of the lidar, which else is jackal's")
-    options = parser.parse_args()
+    given = command_line(
+        __doc__,
+        blocks=(9, "of 200 scans each; the fastest counts"),
+        beams=(720, "beams of the lidar, which else is jackal's"),
+    )
     lidar = load_robot("jackal").lidar
     assert lidar is not None
-    lidar = dataclasses.replace(lidar, beams=options.beams)
-    for head, rows in (
-        (("discs", "exact scan [µs]", "with noise [µs]"), rays(lidar, options.blocks)),
-        (
-            ("cell [m]", "horizon [m]", "insert [µs]", "discs() [µs]", "discs", "clear way [µs]"),
-            maps(lidar, options.blocks),
-        ),
-        (("movers", "tracked at most", "tracking [µs]"), tracks(lidar, options.blocks)),
-    ):
-        for line in table(head, rows):
-            print(line, flush=True)
+    lidar = dataclasses.replace(lidar, beams=given.beams)
+    print_table("discs | exact scan [µs] | with noise [µs]", rays(lidar, given.blocks))
+    heads = "cell [m] | horizon [m] | insert [µs] | discs() [µs] | discs | clear way [µs]"
+    print_table(heads, maps(lidar, given.blocks))
+    print_table("movers | tracked at most | tracking [µs]", tracks(lidar, given.blocks))
 
 
 if __name__ == "__main__":

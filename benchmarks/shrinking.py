@@ -7,7 +7,6 @@ drives that fail are shrunk.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import statistics
 import time
@@ -20,8 +19,9 @@ from antdrive.runs.failures.passes import with_obstacles
 from antdrive.runs.failures.shrink import shrink
 from antdrive.sim import Run, Scenario, run
 from antdrive.worlds import generate
-from benchmarks.planners import table
+from benchmarks.tables import command_line, print_table
 
+SMALLEST = ("--failures 1 --seconds 2",)
 FOREST = {"count": "60", "size": "14", "radius": "0.15,0.5", "clearance": "1.0"}
 
 
@@ -42,11 +42,12 @@ def is_one_minimal(scenario: Scenario) -> bool:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--failures", type=int, default=10, help="how many failures are shrunk")
-    parser.add_argument("--seconds", type=float, default=600.0, help="wall-clock time for each [s]")
-    parser.add_argument("--robot", default="turtlebot", help="that drives")
-    arguments = parser.parse_args()
+    arguments = command_line(
+        __doc__,
+        failures=(10, "how many failures are shrunk"),
+        seconds=(600.0, "wall-clock time for each [s]"),
+        robot=("turtlebot", "that drives"),
+    )
     rows, counts, times = [], [], []
     for done in itertools.islice(failed_runs(arguments.robot), arguments.failures):
         started, cpu = time.perf_counter(), time.process_time()
@@ -69,9 +70,8 @@ def main() -> None:
             ]
         )
         print(rows[-1], flush=True)
-    heads = ["world", "failure", "obstacles", "noise", "size", "runs", "wall time", "CPU time", "1-minimal"]
-    for line in table(heads, rows):
-        print(line)
+    heads = "world | failure | obstacles | noise | size | runs | wall time | CPU time | 1-minimal"
+    print_table(heads, rows)
     print(f"Median: {statistics.median(counts):g} obstacles, {statistics.median(times):.1f} s of CPU time.")
 
 

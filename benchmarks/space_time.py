@@ -17,9 +17,17 @@ import numpy as np
 from antdrive.base import Floats
 from antdrive.planners import Query, TimedPlan, plan_in_time, reachable
 from antdrive.worlds import Grid, MoverMotion
-from benchmarks.planners import seconds, table
+from benchmarks.tables import command_line, print_table, seconds
 
-CELL, SPEED, INFLATE, WORLDS = 0.2, 0.5, 0.25, 20
+SMALLEST = ("--worlds 1 --sizes 1",)
+CELL, SPEED, INFLATE = 0.2, 0.5, 0.25
+SIZES = (
+    (50, 10, 60.0),
+    (50, 40, 60.0),
+    (100, 10, 120.0),
+    (200, 10, 240.0),
+    (200, 40, 240.0),
+)  # cells, movers, horizon [s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,13 +79,14 @@ def world(size: int, count: int, make: Maker, rng: np.random.Generator) -> tuple
 
 
 def main() -> None:
+    given = command_line(__doc__, worlds=(20, "of each size and kind"), sizes=(len(SIZES), "how many of the sizes"))
     rows = []
-    for size, count, horizon in ((50, 10, 60.0), (50, 40, 60.0), (100, 10, 120.0), (200, 10, 240.0), (200, 40, 240.0)):
+    for size, count, horizon in SIZES[: given.sizes]:
         for make in (shuttle, carousel):
             rng = np.random.default_rng([size, count])
             plans: list[TimedPlan] = []
             walls = []
-            for _ in range(WORLDS):
+            for _ in range(given.worlds):
                 query, movers = world(size, count, make, rng)
                 tries = [plan_in_time(query, movers, speed=SPEED, horizon=horizon) for _ in range(3)]
                 walls.append(min(plan.wall_s for plan in tries))
@@ -86,13 +95,13 @@ def main() -> None:
                     assert plans[-1].clearance(movers) >= INFLATE
             ways = [plan for plan in plans if plan.solved]
             rows.append([
-                f"{size}×{size}", f"{count}, {'to and fro' if make is shuttle else 'round'}", f"{len(ways)}/{WORLDS}",
+                f"{size}×{size}", f"{count}, {'to and fro' if make is shuttle else 'round'}", f"{len(ways)}/{given.worlds}",
                 f"{statistics.median(plan.duration for plan in ways):.1f} s",
                 f"{sum(plan.waited > 0 for plan in ways)}",
                 f"{statistics.median(plan.work for plan in plans):.0f}", seconds(statistics.median(walls)), seconds(max(walls)),
             ])  # fmt: skip
-    heads = ["grid", "movers", "a way exists", "arrival, median", "with waits", "intervals expanded", "time", "most"]
-    print("\n".join(table(heads, rows)))
+    heads = "grid | movers | a way exists | arrival, median | with waits | intervals expanded | time | most"
+    print_table(heads, rows)
 
 
 if __name__ == "__main__":

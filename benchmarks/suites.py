@@ -13,7 +13,6 @@ code is 1 if a test failed or a drive was another one.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import functools
 import itertools
@@ -28,9 +27,11 @@ from pathlib import Path
 
 import yaml
 
-from benchmarks.planners import table
 from benchmarks.resuming import append_line, current_commit, read_lines
 from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, rounds_with_pytest, with_check
+from benchmarks.tables import command_line, print_table
+
+SMALLEST = ("--scenarios 10 --jobs 1", "--repeats 1 --within 1")
 
 
 def suite(scenarios: int) -> str:
@@ -143,22 +144,20 @@ def counted(rounds: Sequence[Round]) -> Iterator[list[str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenarios", type=int, default=200, help="of the generated suite")
-    parser.add_argument("--jobs", type=int, default=2, help="processes of accept and check")
-    parser.add_argument("--repeats", type=int, default=0, help="how often to run the example's tests instead")
-    parser.add_argument("--within", type=int, default=10, help="how often one run of pytest runs them")
-    parser.add_argument("--results", type=Path, help="file with a line for each of these runs, to go on with")
-    arguments = parser.parse_args()
+    arguments = command_line(
+        __doc__,
+        scenarios=(200, "of the generated suite"),
+        jobs=(2, "processes of accept and check"),
+        repeats=(0, "how often to run the example's tests instead"),
+        within=(10, "how often one run of pytest runs them"),
+        results=(Path, "file with a line for each of these runs, to go on with"),
+    )
     rounds: list[Round] = []
     if arguments.repeats or arguments.results:
         rounds = repeats(arguments.repeats, arguments.within, arguments.results)
-        found = table(["run with", "rounds", "tests", "failed", "other drive"], counted(rounds))
+        print_table("run with | rounds | tests | failed | other drive", counted(rounds))
     else:
-        heads = ["command", "wall time", "processor time", "says"]
-        found = table(heads, speed(arguments.scenarios, arguments.jobs))
-    for line in found:
-        print(line)
+        print_table("command | wall time | processor time | says", speed(arguments.scenarios, arguments.jobs))
     for one in rounds:
         for name, message in one.failed.items():
             print(f"round {one.number}, {one.way}: {name}: {message.strip().splitlines()[0]}")

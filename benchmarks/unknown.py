@@ -31,10 +31,11 @@ from antdrive.runs.campaigns.results import SweepResults
 from antdrive.runs.statistics.price import Ratio, prices
 from antdrive.runs.statistics.runs import RunTable
 from antdrive.views.film.failures import film_failures
-from benchmarks.planners import table
+from benchmarks.tables import command_line, missing, print_tables, table
 from tools.shared_data import BARN
 
-HEADS = ("", "certified", "score", "time [s]", "contacts", "seen [m²]", "time x", "length x", "wall [s]")
+SMALLEST = ("ablations --worlds 1 --variants 2 --jobs 0 --results out", "contacts --worlds 2 --jobs 0 --results out")
+HEADS = " | certified | score | time [s] | contacts | seen [m²] | time x | length x | wall [s]"
 
 
 @dataclass(frozen=True)
@@ -80,27 +81,29 @@ def robot_of(variant: Variant, folder: Path) -> str:
     return str(path)
 
 
-def ablations(options: argparse.Namespace) -> Iterator[str]:
+def ablations(given: argparse.Namespace) -> Iterator[str]:
     """The table of all variants, line by line."""
-    options.results.mkdir(parents=True, exist_ok=True)
-    worlds = unpacked(options.barn, options.results / "worlds")
+    if not given.barn.exists():
+        missing(f"no worlds at {given.barn}; docs/how-to/data.md says where BARN's are")
+    given.results.mkdir(parents=True, exist_ok=True)
+    worlds = unpacked(given.barn, given.results / "worlds")
     fastest = reference_times(worlds)
     sensing = {"noise": 1.0, "map": "none", "localisation": "matching"}
 
     def driven(name: str, planner: str, robot: str, settings: Mapping[str, Any]) -> Any:
-        data = campaign_data(worlds, options.trials, planner, robot, settings)
-        chosen = data["worlds"][:: max(1, len(data["worlds"]) // (options.worlds or len(data["worlds"])))]
-        data["worlds"] = chosen[: options.worlds]
-        return filmed(sweep(data, options.results / name, jobs=options.jobs, keep="failed"), options.films).table
+        data = campaign_data(worlds, given.trials, planner, robot, settings)
+        chosen = data["worlds"][:: max(1, len(data["worlds"]) // (given.worlds or len(data["worlds"])))]
+        data["worlds"] = chosen[: given.worlds or None]
+        return filmed(sweep(data, given.results / name, jobs=given.jobs, keep="failed"), given.films).table
 
     def rows() -> Iterator[list[str]]:
         known: dict[str, Any] = {}
-        for variant in VARIANTS:
+        for variant in VARIANTS[: given.variants]:
             if variant.planner not in known:
-                given = {**sensing, "map": "given", "localisation": "fixes"}
-                known[variant.planner] = driven(f"{variant.planner} with the map", variant.planner, "jackal", given)
+                mapped = {**sensing, "map": "given", "localisation": "fixes"}
+                known[variant.planner] = driven(f"{variant.planner} with the map", variant.planner, "jackal", mapped)
                 yield row(f"{variant.planner} with the map", known[variant.planner], fastest, None)
-            robot = robot_of(variant, options.results)
+            robot = robot_of(variant, given.results)
             settings = {**sensing, "odometry": variant.odometry, "localisation": variant.localisation}
             runs = driven(variant.name, variant.planner, robot, settings)
             yield row(variant.name, runs, fastest, known[variant.planner])
@@ -141,9 +144,9 @@ def shown(ratio: Ratio) -> str:
     return f"{ratio.mean:.3f} ({ratio.low:.3f}–{ratio.high:.3f})"
 
 
-def contacts(options: argparse.Namespace) -> Iterator[str]:
+def contacts(given: argparse.Namespace) -> Iterator[str]:
     """Contacts by robot and kind of world, and the drives that did not arrive."""
-    half = (options.worlds or 1000) // 2
+    half = (given.worlds or 1000) // 2
     data = {
         "worlds": [{"generate": kind, "seeds": half} for kind in ("forest", "barn")],
         "planners": ["astar"],
@@ -151,7 +154,7 @@ def contacts(options: argparse.Namespace) -> Iterator[str]:
         "noise": [1.0],
         "settings": {"map": "none", "localisation": "matching"},
     }
-    runs = filmed(sweep(data, options.results, jobs=options.jobs, keep="failed"), options.films).table.to_pylist()
+    runs = filmed(sweep(data, given.results, jobs=given.jobs, keep="failed"), given.films).table.to_pylist()
     yield from table(("robot", "worlds", "drives", "certified", "contacts while driving", "ends"), counted(runs))
     for run in runs:
         if not run["succeeded"]:
@@ -170,20 +173,18 @@ def counted(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("ablations", "contacts"))
-    parser.add_argument("--results", type=Path, required=True, help="folder for what was driven")
-    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
-    parser.add_argument("--worlds", type=int, help="how many worlds; all of BARN's, or 1,000 random ones, without")
-    parser.add_argument("--trials", type=int, default=1, help="how often each of BARN's worlds is driven")
-    parser.add_argument("--jobs", type=int, default=1, help="processes; 0: this one")
-    parser.add_argument("--films", action="store_true", help="film each drive that did not arrive")
-    options = parser.parse_args()
-    if options.what == "ablations" and not options.barn.exists():
-        print(f"no worlds at {options.barn}; give --barn")
-        return
-    for line in {"ablations": ablations, "contacts": contacts}[options.what](options):
-        print(line, flush=True)
+    given = command_line(
+        __doc__,
+        tables=([], "ablations, contacts"),
+        results=(Path("out/unknown"), "folder for what was driven"),
+        barn=(BARN, "folder or archive of BARN's world_*.world files"),
+        worlds=(0, "how many worlds; 0: all of BARN's, or 1,000 random ones"),
+        variants=(len(VARIANTS), "how many rows of the ablations"),
+        trials=(1, "how often each of BARN's worlds is driven"),
+        jobs=(1, "processes; 0: this one"),
+        films=(False, "film each drive that did not arrive"),
+    )
+    print_tables(given.tables, {"ablations": ablations, "contacts": contacts}, given)
 
 
 if __name__ == "__main__":

@@ -128,3 +128,12 @@ def test_the_source_distribution_holds_each_file_once(tmp_path: Path) -> None:
     assert "src/antdrive/worlds/world.py" in names
     assert not {"worlds", "worlds/world.py"} & set(names)
     assert "tests/test_import_name.py" in names
+
+
+def test_a_package_called_tests_elsewhere_hides_none_of_these(tmp_path: Path) -> None:
+    """Processes that tests start import `tests`, and some distributions install a package by that name."""
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "__init__.py").touch()
+    code = "import tests.worlds.malformed as found; print(found.__file__)"
+    found = called(sys.executable, "-c", code, cwd=ROOT, PYTHONPATH=str(tmp_path))
+    assert found == f"{ROOT / 'tests' / 'worlds' / 'malformed.py'}\n"

@@ -58,14 +58,19 @@ STATIC = [name for name in list_worlds() if not name.endswith("-moving")]
     "name", [pytest.param(name, marks=pytest.mark.slow) if name.startswith("hasan") else name for name in STATIC]
 )
 def test_every_catalogue_world_is_driven(name: str, robot: str, planner: str) -> None:
+    if robot == "jackal" and name in TOO_NARROW_FOR_JACKAL:
+        with pytest.raises(FieldError, match=f"start: jackal at .* {TOO_NARROW_FOR_JACKAL[name]}"):
+            Scenario.of(name, planner, robot)
+        return
     result = run(Scenario.of(name, planner, robot))
-    fits = name != "no-path" and (robot == "turtlebot" or name not in TOO_NARROW_FOR_JACKAL)
+    fits = name != "no-path"
     assert result.outcome is (Outcome.SUCCEEDED if fits else Outcome.NO_PATH)
     assert result.succeeded == fits
     assert (result.certificate is not None) == fits
 
 
-TOO_NARROW_FOR_JACKAL = {"hasan-3c", "hasan-5f"}  # start or goal lies in a cell beside a wall
+#: The papers' start is the middle of a cell of 0.5 m, a jackal 0.508 m long: what it overlaps in the cell next to that.
+TOO_NARROW_FOR_JACKAL = {"hasan-3c": "overlaps the upper wall by 0.004", "hasan-5f": r"overlaps obstacles\[116\]"}
 
 
 def test_a_large_world_is_driven_in_the_fast_suite_too() -> None:

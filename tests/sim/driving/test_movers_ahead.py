@@ -210,15 +210,15 @@ def test_a_policy_may_leave_movers_to_local_avoidance(jackal: RobotSpec) -> None
 
 @pytest.mark.slow
 def test_a_robot_without_a_map_drives_round_busy_ground(jackal: RobotSpec) -> None:
-    """Twelve shuttles, as fast as the robot nearly, which stay 3.5 m off the long walls."""
+    """Ten shuttles, as fast as the robot nearly, which stay 3.5 m off the long walls; the robot sees them from 4 m off."""
     shuttles = tuple(
         Keyframed(
             radius=0.4,
-            keyframes=((0.0, 3.0 + 0.9 * k, 5.5), (4.0, 3.0 + 0.9 * k, 12.5)),
+            keyframes=((0.0, 5.0 + 0.9 * k, 5.5), (4.0, 5.0 + 0.9 * k, 12.5)),
             loop="pingpong",
             phase=2.3 * k,
         )
-        for k in range(12)
+        for k in range(10)
     )
     hall = World("hall", (0.0, 0.0, 16.0, 18.0), movers=shuttles)
     task = Task(hall, (1.0, 9.0, 0.0), (15.0, 9.0), goal_tolerance=0.5, cell=0.25)

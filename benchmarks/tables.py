@@ -1,0 +1,87 @@
+"""What benchmarks share: the options of their command lines and the tables that they print.
+
+Each benchmark names in `SMALLEST` the words of its smallest call, one string for each call. `tests/benchmarks` makes these calls.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NoReturn
+
+MISSING = 77  # the exit code where data or packages are missing; test drivers take it for a skip
+
+
+def command_line(doc: str | None, **settings: tuple[Any, str]) -> argparse.Namespace:
+    """The options of the command line.
+
+    Args:
+        doc: what the benchmark does
+        settings: default and help by name; a list makes positional words, False a flag, and a type an option without a default
+    """
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, (default, words) in settings.items():
+        if isinstance(default, list):
+            parser.add_argument(name, nargs="*", help=words)
+        elif default is False:
+            parser.add_argument(f"--{name}", action="store_true", help=words)
+        elif isinstance(default, type):
+            parser.add_argument(f"--{name}", type=default, help=words)
+        else:
+            parser.add_argument(f"--{name}", type=type(default), default=default, help=words)
+    return parser.parse_args()
+
+
+def missing(what: str) -> NoReturn:
+    """End because data or packages are missing."""
+    print(what, file=sys.stderr)
+    sys.exit(MISSING)
+
+
+def table(heads: str | Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Markdown, a line at a time.
+
+    Args:
+        heads: of the columns; in a string " | " stands between them
+        rows: the cells
+    """
+    heads = heads.split(" | ") if isinstance(heads, str) else heads
+    yield f"| {' | '.join(heads)} |"
+    yield "|" + "---|" * len(heads)
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
+    yield ""
+
+
+def print_table(heads: str | Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table as its rows come."""
+    for line in table(heads, rows):
+        print(line, flush=True)
+
+
+def chosen(names: Sequence[str], known: Iterable[str]) -> list[str]:
+    """The names, or all that are known; ends at one that is not known."""
+    known = list(known)
+    for name in names:
+        if name not in known:
+            sys.exit(f"{name!r} is none of {', '.join(known)}")
+    return list(names) or known
+
+
+def print_tables(names: Sequence[str], makers: Mapping[str, Callable[..., Iterable[str]]], *given: Any) -> None:
+    """Print the tables of these names, or all, each under its name."""
+    for name in chosen(names, makers):
+        print(f"## {name}\n")
+        for line in makers[name](*given):
+            print(line, flush=True)
+
+
+def seconds(value: float) -> str:
+    """A time with two digits or more."""
+    return f"{1e3 * value:.2g} ms" if value < 0.0995 else f"{1e3 * value:.0f} ms" if value < 1 else f"{value:.2f} s"
+
+
+def percent(share: float) -> str:
+    """A share that is not below 0."""
+    return f"{100 * max(share, 0.0):.1f} %"
