@@ -112,10 +112,10 @@ def controller(**factors: float) -> Callable[[], None]:
 
 
 def less_inflation() -> None:
-    from antdrive.sim import pipeline
+    from antdrive.sim.driving import routes
 
-    rasterise = pipeline.rasterise  # type: ignore[attr-defined]
-    pipeline.rasterise = lambda world, cell, inflate: rasterise(world, cell, inflate - 0.02)  # type: ignore[attr-defined]
+    rasterise = routes.rasterise
+    routes.rasterise = lambda world, cell, inflate: rasterise(world, cell, inflate - 0.02)
 
 
 def wider_track() -> None:

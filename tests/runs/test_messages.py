@@ -110,7 +110,6 @@ def test_wrong_questions_about_many_runs_are_refused_in_one_line(tmp_path, small
             "no pairs": lambda: pairs_of(PairedRuns.of(apart)),
             "no reference": lambda: pairs_of(paired, against="nobody"),
             "no metric": lambda: compare_metric(paired, [(0, 1)], "speed", "higher"),
-            "no such planner": lambda: paired.select(["none"]),
         },
         "not worse": numbered(
             lambda w=words: not_worse(paired, *w)

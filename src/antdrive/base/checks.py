@@ -7,7 +7,9 @@ import functools
 import json
 import math
 import numbers
+import os
 from collections.abc import Hashable, Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
 from pydantic import AfterValidator, BeforeValidator, TypeAdapter, ValidationError
@@ -106,6 +108,27 @@ def suggest(word: str, choices: Iterable[str]) -> str:
     valid = list(choices)
     close = difflib.get_close_matches(word, valid, n=1)
     return f"did you mean {close[0]}?" if close else f"choose from {', '.join(valid)}"
+
+
+def resolve(kind: str, name: str | os.PathLike[str], known: Mapping[str, Path], folder: Path | None = None) -> Path:
+    """The file of a world or a robot: that of the catalogue, or a file; the catalogue's names come first.
+
+    Args:
+        kind: what is named, such as "world"
+        name: a name of the catalogue, or a path
+        known: the files of the catalogue by name
+        folder: where relative paths begin; None: in the working directory
+
+    Raises:
+        FieldError: there is no such file.
+    """
+    if isinstance(name, str) and name in known:
+        return known[name]
+    path = Path(name) if folder is None else folder / name
+    if not os.path.lexists(path):
+        hint = suggest(path.stem, known)
+        raise FieldError(kind, f"{os.fspath(name)}: no such file, nor a {kind} of the catalogue; {hint}")
+    return path
 
 
 def show(value: Any, limit: int = 40) -> str:

@@ -6,10 +6,9 @@ import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from antdrive.base.errors import InputError
+from antdrive.base.errors import FieldError, InputError
 from antdrive.cli.parse import pair
 from antdrive.cli.scenario import GROUPS
 
@@ -40,16 +39,17 @@ def check_worlds(words: Sequence[str]) -> None:
     Raises:
         InputError: there is no such world.
     """
-    from antdrive.base.checks import suggest
+    from antdrive.base.checks import resolve
     from antdrive.worlds.files.world_file import list_worlds
 
     known = list_worlds()
     for word in words:
-        if word in known or Path(word).is_file():
-            continue
-        if Path(word).is_dir():
-            raise InputError(f"{word}: neither a world file nor the folder of a campaign, as antdrive sweep writes it")
-        raise InputError(f"{word}: no such file or folder, nor a world of the catalogue; {suggest(word, known)}")
+        try:
+            if resolve("world", word, known).is_dir():
+                problem = "neither a world file nor the folder of a campaign, as antdrive sweep writes it"
+                raise InputError(f"{word}: {problem}")
+        except FieldError as error:
+            raise InputError(error.problem) from None
 
 
 def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeAlias, get_type_hints
 
 from pydantic import BaseModel, Field, create_model, model_validator
 
-from antdrive.base.checks import OneLine, SchemaVersion, check, schema_of, suggest
+from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of
 from antdrive.base.document import Document, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.records import STRICT
@@ -110,11 +110,10 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
     Raises:
         InputError: the file does not exist, or something in it is wrong.
     """
-    known = list_robots()
-    path = known[robot] if isinstance(robot, str) and robot in known else Path(robot)
-    if not os.path.lexists(path):
-        hint = suggest(path.stem, known)
-        raise input_error(os.fspath(robot), f"no such file and no such robot in the catalogue; {hint}")
+    try:
+        path = resolve("robot", robot, list_robots())
+    except FieldError as error:
+        raise input_error(error.problem) from None
     if path.suffix.lower() in (".urdf", ".xacro"):
         raise input_error(str(path), f"is no robot file; make one of it with antdrive robots import {path}")
     return _robot_in(read_yaml(path), os.fspath(path), path.stem)

@@ -12,7 +12,6 @@ from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
 
 from antdrive.base.checks import show, suggest
 from antdrive.base.errors import FieldError
-from antdrive.robots import Avoidance, PurePursuit
 from antdrive.sim.log.record import changes, plain_value, settings_of
 from antdrive.sim.policy import Perception, PerceptionKind, ReplanPolicy
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
@@ -156,7 +155,12 @@ class _Discs(Form):
 class _Record(Form):
     """A record of settings: what differs from the defaults."""
 
-    default: Any = None
+    name: str = ""
+
+    @property
+    def default(self) -> Any:
+        """The record of a scenario that does not say; made when it is asked for, because it may load a compiler."""
+        return SETTINGS[self.name].default
 
     def read(self, key: str, value: Any) -> Any:
         if not isinstance(value, dict):
@@ -212,9 +216,9 @@ FORMS: Mapping[str, Form] = {
     "margin": _Margin(MarginValue),
     "perception": _Sees(str | None),
     "discs": _Discs(list[Disc], []),
-    "controller": _Record(dict[str, float], {}, PurePursuit()),
-    "avoidance": _Switched(Switch, True, Avoidance()),
-    "replanning": _Switched(Switch, True, ReplanPolicy(), ReplanPolicy(around_movers=False)),
+    "controller": _Record(dict[str, float], {}, "controller"),
+    "avoidance": _Switched(Switch, True, "avoidance"),
+    "replanning": _Switched(Switch, True, "replanning", ReplanPolicy(around_movers=False)),
 }
 
 

@@ -112,19 +112,14 @@ def write_artefacts(
     run: Run, folder: Path, baseline: Baseline | None, *, film: bool, faults: Sequence[str], commands: Sequence[str]
 ) -> dict[str, str]:
     """Write everything about a test into its folder; the files by what they are. Earlier files are removed first."""
-    from antdrive.views.figures.plan_figures import plan_figure
-    from antdrive.views.figures.run_figures import overview
+    from antdrive.views.figures.run_figures import picture_of
 
     remove_artefacts(folder)
-    rollout, files = run.rollout, {}
-    if rollout is None:
-        s = run.scenario
-        files["overview"] = str(folder / "overview.png")
-        plan_figure(s.task, run.grid, run.plan, s.robot, files["overview"], mapped=not s.exploring)
-    else:
-        files["rollout"] = str(rollout.save(folder / "rollout.npz"))
-        files["overview"] = str(folder / "overview.png")
-        overview(rollout, files["overview"])
+    rollout = run.rollout
+    files = {} if rollout is None else {"rollout": str(rollout.save(folder / "rollout.npz"))}
+    files["overview"] = str(folder / "overview.png")
+    picture_of(run, files["overview"])
+    if rollout is not None:
         files |= _comparison(rollout, baseline, folder, film)
     _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
     result = {**run.as_dict(), "files": files, "command": commands[0] if commands else "", "faults": list(faults)}

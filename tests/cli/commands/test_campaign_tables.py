@@ -141,7 +141,7 @@ def test_report_writes_every_kind(antdrive: Call, campaign: Path, tmp_path: Path
             ["compare", "camp", "--against", "astar", "--allow", "fun=1"],
             "camp: allow: unknown 'fun'; choose from success",
         ),
-        (["compare", "kamp"], "kamp: no such file or folder, nor a world of the catalogue"),
+        (["compare", "kamp"], "kamp: no such file, nor a world of the catalogue"),
         (
             ["compare", "camp/parts", "-p", "astar"],
             "camp/parts: neither a world file nor the folder of a campaign, as antdrive sweep",

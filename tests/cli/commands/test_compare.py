@@ -161,6 +161,6 @@ def test_a_second_comparison_in_the_same_folder_is_told(refused: Refused, small:
 def test_a_mistyped_folder_is_named(refused: Refused, tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
     assert refused("compare", "slalon") == (
-        "antdrive: slalon: no such file or folder, nor a world of the catalogue; did you mean slalom?\n"
+        "antdrive: slalon: no such file, nor a world of the catalogue; did you mean slalom?\n"
     )
     assert "runs: neither a world file nor the folder of a campaign" in refused("compare", "runs")

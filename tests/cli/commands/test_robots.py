@@ -8,7 +8,7 @@ import pytest
 from antdrive.robots import load_robot
 from tests.cli.calling import Call
 
-URDF = Path(__file__).parents[3] / "robots" / "importing" / "urdf"
+URDF = Path(__file__).parents[2] / "robots" / "importing" / "urdf"
 
 
 def test_every_robot_is_listed(antdrive: Call) -> None:

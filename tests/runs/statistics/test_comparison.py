@@ -117,7 +117,7 @@ def test_seeds_that_change_no_drive_are_no_evidence():
     assert rows[0].counted == once.counted
     assert [row.pairs for row in compare_success(paired, pairs_of(paired))] == [30, 300, 300]
     assert compare_metric(paired, [(0, 1)], "duration_s", "lower")[0].pairs <= 30
-    still = paired.select(["astar", "dijkstra"])
+    still = PairedRuns.of(paired.table, ["astar", "dijkstra"])
     assert common_medians(still, ["duration_s"])[0] == still.success.all(axis=1).sum() / 10
 
 
@@ -153,7 +153,7 @@ def test_a_wall_time_of_repeated_drives_is_their_median():
     columns["plan_s"] = [0.3, 0.1, 0.2, 4, 5, 6, 0.9, 0.7, 0.8, 7, 8, 9]
     paired = PairedRuns.of(RunTable(columns))
     assert paired.values("plan_s").T.tolist() == [[0.2] * 3 + [0.8] * 3, [4, 5, 6, 7, 8, 9]]
-    assert common_medians(paired.select(["astar"]), ["plan_s"])[1]["plan_s"][0][0] == 0.5
+    assert common_medians(PairedRuns.of(paired.table, ["astar"]), ["plan_s"])[1]["plan_s"][0][0] == 0.5
     first = [paired.table.columns["duration_s"][k] for k in (0, 6)]
     assert paired.values("duration_s")[[0, 3], 0].tolist() == first
 
@@ -262,7 +262,7 @@ def test_medians_are_taken_where_every_planner_succeeded(paired):
 
 
 def test_planners_are_selected(paired):
-    few = paired.select(["poor", "good"])
+    few = PairedRuns.of(paired.table, ["poor", "good"])
     assert few.planners == ("poor", "good")
     whole = compare_success(paired, [(0, 2)])[0]
     part = compare_success(few, [(1, 0)])[0]

@@ -30,7 +30,7 @@ def test_the_verdict_turns_at_the_end_of_the_interval(paired):
 
 
 def test_one_planner_alone_has_the_interval_of_the_comparison(paired):
-    two = paired.select(["b", "a"])
+    two = PairedRuns.of(paired.table, ["b", "a"])
     assert not_worse(two, "a", "success", 0.1, "higher")[0].interval == compare_success(two, [(0, 1)])[0].interval
     plain = compare_metric(two, [(0, 1)], "duration_s", "lower")[0]
     assert not_worse(two, "a", "duration_s", 1, "higher")[0].interval == plain.interval

@@ -11,7 +11,7 @@ import pytest
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.exporting import export
-from antdrive.views.export.scans import LOGGED, Scans
+from antdrive.views.export.scans import LOGGED, DriveScans
 from tests.views.scanned import scanned
 
 mcap_reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
@@ -78,7 +78,7 @@ def test_scans_taken_at_export_are_those_that_the_drive_would_have_taken(
     log: Rollout, said: Any, tmp_path: Path
 ) -> None:
     mapped = dataclasses.replace(log.record, sensing=None)
-    assert Scans.of(dataclasses.replace(log, record=mapped)).source == LOGGED
+    assert DriveScans.of(dataclasses.replace(log, record=mapped)).source == LOGGED
     bare = dataclasses.replace(log, record=mapped, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
     taken, logged = ([(at, m.ranges) for name, at, m in s if name == "/scan"] for s in (read(bare, tmp_path), said))
     assert [at for at, _ in taken] == [at for at, _ in logged]

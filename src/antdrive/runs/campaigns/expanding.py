@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.checks import suggest
+from antdrive.base.checks import resolve, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError
 from antdrive.base.files import file_name
@@ -138,11 +138,10 @@ def _robots(campaign: Campaign) -> list[NamedRobot]:
     """The robots of a campaign, each once."""
     known, found = list_robots(), dict[str, NamedRobot]()
     for i, name in enumerate(campaign.entry.robots):
-        path = known.get(name, campaign.folder / name)
-        if not path.is_file():
-            raise campaign.error(
-                ("robots", i), f"{name}: no such file, nor a robot of the catalogue; {suggest(name, known)}"
-            )
+        try:
+            path = resolve("robot", name, known, campaign.folder)
+        except FieldError as error:
+            raise campaign.error(("robots", i), error.problem) from None
         robot = load_robot(path)
         content = canonical_hash(robot)
         word = name if name in known else f"{ROBOTS}/{content[:8]}/{path.name}"

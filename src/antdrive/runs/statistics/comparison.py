@@ -143,28 +143,12 @@ def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
     for k, (i, j) in enumerate(pairs):
         mask, gap = masks[k], gaps[masks[k], k]
         first, second = int((gap > 0).sum()), int((gap < 0).sum())
-        n, worlds = int(mask.sum()), paired.worlds_in(mask)
+        n = int(mask.sum())
         interval = success_interval(paired, mask, i, j, by_world[k]) if n else NOWHERE
-        rows.append(
-            PairedComparison(
-                measure=SUCCESS,
-                first=paired.planners[i],
-                second=paired.planners[j],
-                direction="higher",
-                pairs=n,
-                worlds=worlds,
-                dropped=0,
-                unpaired=_unpaired(paired, i, j),
-                first_wins=first,
-                second_wins=second,
-                ties=n - first - second,
-                difference=(first - second) / n if n else math.nan,
-                interval=interval,
-                effect=(first - second) / (first + second) if first + second else 0.0,
-                p=mcnemar(first, second) if n else math.nan,
-                p_worlds=math.nan,
-            )
-        )
+        difference = (first - second) / n if n else math.nan
+        effect = (first - second) / (first + second) if first + second else 0.0
+        p = mcnemar(first, second) if n else math.nan
+        rows.append(_row(paired, SUCCESS, "higher", (i, j), mask, 0, (first, second), difference, interval, effect, p))
     return _corrected(paired, rows, masks, gaps)
 
 
@@ -208,31 +192,47 @@ def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direct
     for k, (i, j) in enumerate(pairs):
         gap = gaps[k][masks[k]]
         lower, higher = int((gap < 0).sum()), int((gap > 0).sum())
-        rows.append(
-            PairedComparison(
-                measure=metric,
-                first=paired.planners[i],
-                second=paired.planners[j],
-                direction=better,
-                pairs=len(gap),
-                worlds=paired.worlds_in(masks[k]),
-                dropped=int((shared[k] & ~masks[k]).sum()),
-                unpaired=_unpaired(paired, i, j),
-                first_wins=higher if sign > 0 else lower,
-                second_wins=lower if sign > 0 else higher,
-                ties=len(gap) - lower - higher,
-                difference=float(np.median(gap)) if len(gap) else math.nan,
-                interval=intervals[k],
-                effect=sign * rank_biserial(gap),
-                p=wilcoxon(gap) if len(gap) else math.nan,
-                p_worlds=math.nan,
-            )
-        )
+        wins = (higher, lower) if sign > 0 else (lower, higher)
+        dropped, effect = int((shared[k] & ~masks[k]).sum()), sign * rank_biserial(gap)
+        difference, p = (float(np.median(gap)), wilcoxon(gap)) if len(gap) else (math.nan, math.nan)
+        rows.append(_row(paired, metric, better, (i, j), masks[k], dropped, wins, difference, intervals[k], effect, p))
     return _corrected(paired, rows, masks, np.stack(ranks, axis=1))
 
 
-def _unpaired(paired: PairedRuns, i: int, j: int) -> int:
-    return int((paired.present[:, i] != paired.present[:, j]).sum())
+def _row(
+    paired: PairedRuns,
+    measure: str,
+    direction: Direction,
+    planners: tuple[int, int],
+    mask: Flags,
+    dropped: int,
+    wins: tuple[int, int],
+    difference: float,
+    interval: Interval,
+    effect: float,
+    p: float,
+) -> PairedComparison:
+    """A comparison on the instances of a mask, without the test over worlds."""
+    i, j = planners
+    pairs = int(mask.sum())
+    return PairedComparison(
+        measure=measure,
+        first=paired.planners[i],
+        second=paired.planners[j],
+        direction=direction,
+        pairs=pairs,
+        worlds=paired.worlds_in(mask),
+        dropped=dropped,
+        unpaired=int((paired.present[:, i] != paired.present[:, j]).sum()),
+        first_wins=wins[0],
+        second_wins=wins[1],
+        ties=pairs - sum(wins),
+        difference=difference,
+        interval=interval,
+        effect=effect,
+        p=p,
+        p_worlds=math.nan,
+    )
 
 
 def _corrected(

@@ -37,17 +37,18 @@ class PairedRuns:
     seeded: Flags
 
     @classmethod
-    def of(cls, table: RunTable) -> PairedRuns:
-        """Arrange a table.
+    def of(cls, table: RunTable, planners: Sequence[str] = ()) -> PairedRuns:
+        """Arrange the runs of a table, or of some planners in this order.
 
         Raises:
-            FieldError: the table is empty, or a planner has two runs of one instance.
+            FieldError: the table is empty, no such planner is in it, or a planner has two runs of one instance.
         """
+        table = table.of_planners(planners) if planners else table
         if not len(table):
             raise FieldError("runs", "none; the campaign has no finished run")
         labels = table.texts("planner")
-        planners = tuple(dict.fromkeys(labels))
-        column = _places(labels)
+        planners = tuple(dict.fromkeys(planners or labels))
+        column = np.array([planners.index(label) for label in labels])
         described = (*PLACE, *table.settings)
         instances, first, place = np.unique(_joint(table, (*described, "seed")), return_index=True, return_inverse=True)
         row = np.full((len(instances), len(planners)), -1, dtype=np.int64)
@@ -117,28 +118,6 @@ class PairedRuns:
         both[places[repeated]] = False
         return both
 
-    def select(self, planners: Sequence[str]) -> PairedRuns:
-        """The runs of some planners only.
-
-        Raises:
-            FieldError: no such planner among the runs.
-        """
-        for label in planners:
-            if label not in self.planners:
-                raise FieldError("planner", f"unknown {label!r}; the campaign has {', '.join(self.planners)}")
-        chosen = [self.planners.index(label) for label in dict.fromkeys(planners)]
-        here = self.present[:, chosen].any(axis=1)
-        return PairedRuns(
-            self.table,
-            tuple(self.planners[k] for k in chosen),
-            self.worlds,
-            self.world[here],
-            self.setting_group[here],
-            self.row[here][:, chosen],
-            self.success[here][:, chosen],
-            self.seeded[here][:, chosen],
-        )
-
 
 def _twice(table: RunTable, label: str) -> str:
     """What is wrong with a table in which a planner has two runs of one instance."""
@@ -147,11 +126,6 @@ def _twice(table: RunTable, label: str) -> str:
     if lacks:
         why = f"the table lacks {' and '.join(lacks)}, which may tell them apart; antdrive sweep of the same campaign adds them"
     return f"{label} has two runs of one world, task, settings and seed; {why}"
-
-
-def _places(labels: list[str]) -> Ints:
-    order = {label: k for k, label in enumerate(dict.fromkeys(labels))}
-    return np.array([order[label] for label in labels])
 
 
 def _joint(table: RunTable, names: Sequence[str]) -> Ints:

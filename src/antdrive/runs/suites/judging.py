@@ -68,7 +68,10 @@ def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
         verdict = _verdict(run, baseline)
         if run.succeeded:
             gains.extend(verdict)
-        elif not _was_as_demanded(demands, baseline) or _as_demanded(run, demands):  # else it is among the faults
+        elif not _demanded(baseline.outcome, baseline.certified, demands) or _demanded(
+            run.outcome, _certified(run), demands
+        ):
+            # else it is among the faults
             faults.extend(verdict)
         if run.rollout is not None and baseline.line and run.outcome is baseline.outcome:
             for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
@@ -77,9 +80,13 @@ def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
     return Judgement(tuple(faults), tuple(gains))
 
 
+def _certified(run: Run) -> bool:
+    return run.certificate is not None and run.certificate.certified
+
+
 def unfulfilled(run: Run, demands: Demands) -> Iterator[str]:
     """What a run does not fulfil, whatever the baseline, a sentence each."""
-    certified = run.certificate is not None and run.certificate.certified
+    certified = _certified(run)
     if run.outcome is not demands.outcome:
         reason = f" ({run.reason})" if run.reason else ""
         yield f"outcome: {run.outcome.key}, expected {demands.outcome.key}{reason}"
@@ -109,7 +116,7 @@ def _verdict(run: Run, baseline: Baseline) -> list[str]:
     """How outcome and certificate differ from the baseline's, a sentence each."""
     if run.outcome is not baseline.outcome:
         return [f"outcome: {run.outcome.key}, in the baseline {baseline.outcome.key}"]
-    certified = run.certificate is not None and run.certificate.certified
+    certified = _certified(run)
     if certified == baseline.certified:
         return []
     words = "certified collision-free"
@@ -120,18 +127,8 @@ def _verdict(run: Run, baseline: Baseline) -> list[str]:
     ]
 
 
-def _as_demanded(run: Run, demands: Demands) -> bool:
-    """Whether outcome and certificate of a run are those that its test demands."""
-    certified = run.certificate is not None and run.certificate.certified
-    return _demanded(run.outcome, certified, demands)
-
-
-def _was_as_demanded(demands: Demands, baseline: Baseline) -> bool:
-    """Whether outcome and certificate of the earlier drive are those that the test demands now."""
-    return _demanded(baseline.outcome, baseline.certified, demands)
-
-
 def _demanded(outcome: Outcome, certified: bool, demands: Demands) -> bool:
+    """Whether an outcome and a certificate are those that the test demands."""
     wanted = True if demands.must_be_certified else demands.certified
     return outcome is demands.outcome and wanted in (None, certified)
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.checks import show, suggest
-from antdrive.base.errors import InputError, input_error
+from antdrive.base.checks import resolve, show, suggest
+from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.planners.own_code import OwnCodeError, is_own, object_in, record_name
 from antdrive.planners.plan import Planner
 from antdrive.planners.registry import load_planner, make_planner
@@ -87,13 +87,10 @@ def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
 
 def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:
     """A file of the catalogue, or one relative to the suite; the catalogue's names come first."""
-    if name in known:
-        return known[name]
-    path = case.suite.parent / name
-    if not path.is_file():
-        hint = suggest(Path(name).stem, known)
-        raise case.error(key, f"{name}: no such file beside the suite, nor in the catalogue; {hint}")
-    return path
+    try:
+        return resolve(key, name, known, case.suite.parent)
+    except FieldError as error:
+        raise case.error(key, error.problem) from None
 
 
 def _at_planner(case: SuiteCase, text: str) -> InputError:

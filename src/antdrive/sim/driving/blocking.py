@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,10 @@ from antdrive.base import Floats
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.parts import Others
 from antdrive.worlds import Disc, Grid, Task
+
+if TYPE_CHECKING:
+    from antdrive.planners import Query
+    from antdrive.sim.driving.traffic import Zone
 
 STEP = 0.25  # movers are predicted at least this often [s]
 MIN_RADIUS = 0.01  # smaller discs are left out [m]
@@ -58,6 +63,15 @@ def blocked_cells(grid: Grid, discs: list[Disc]) -> npt.NDArray[np.bool_]:
         near = np.hypot(x[None, c0:c1] - disc.x, y[r0:r1, None] - disc.y) <= reach
         blocked[r0:r1, c0:c1] |= near
     return blocked & grid.free
+
+
+def closed_cells(query: Query, discs: list[Disc], zone: Zone | None = None) -> npt.NDArray[np.bool_]:
+    """Which cells (R, C) discs and a zone close; neither the start nor the goal is."""
+    closed = blocked_cells(query.grid, discs)
+    if zone is not None:
+        closed |= zone.blocked
+    closed[query.start] = closed[query.goal] = False
+    return closed
 
 
 def close_route(discs: list[Disc], tracked: TrackedPath, arc: float, reach: float, inflate: float) -> bool:

@@ -65,7 +65,7 @@ class CellByCell(Replanning):
             to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
         self._routes.wrong = self._routes.wrong or check_step(self._query, here, to)
         if self._routes.wrong:
-            self.log.append(Replan(now, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0))
+            self.log.append(Replan.failed(now, trigger))
             return None
         xy = self._line(pose, here, to, tick)
         if to is not None:
@@ -90,7 +90,7 @@ class CellByCell(Replanning):
         self._noted_at = now
         self.blockage.failed(tick, pose)
         if self.blockage.reason:
-            self.log.append(Replan(now, DECISION, False, math.inf, 0, np.empty((0, 2)), 0.0))
+            self.log.append(Replan.failed(now, DECISION))
 
     def _line(self, pose: Pose, here: tuple[int, int], to: tuple[int, int] | None, tick: int) -> Floats:
         """From the robot to the next cell (2 or 3, 2) [m], by the centre of its own cell where it must."""

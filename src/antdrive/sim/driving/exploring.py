@@ -29,7 +29,7 @@ from antdrive.planners.plan import Cell
 from antdrive.robots import TrackedPath, Twist
 from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
-from antdrive.sim.driving.blocking import blocked_cells
+from antdrive.sim.driving.blocking import closed_cells
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.own_map import PATIENCE
 from antdrive.sim.driving.parts import RouteGuide, Rows
@@ -191,16 +191,12 @@ class Exploration(RouteGuide):
             task = dataclasses.replace(task, world=_with(task.world, discs))
             return self._ask(task, rasterise(task.world, grid.cell, grid.inflate))
         query = Query.between(grid, task)
-        blocked = blocked_cells(grid, discs)
-        if zone is not None:
-            blocked |= zone.blocked
-        blocked[query.start] = blocked[query.goal] = False
         if query.unreachable:
             return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
         # Movers change so many cells that a search is repaired no faster than made anew.
         replanner = replanner_for(planner, query, self._rng)
         with blaming(planner):
-            replanner.block(np.argwhere(blocked))
+            replanner.block(np.argwhere(closed_cells(query, discs, zone)))
             answer = replanner.result()
         return self._routes.checked(query, answered(planner, answer))
 

@@ -33,7 +33,7 @@ from antdrive.planners import (
 )
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blockage import Blockage
-from antdrive.sim.driving.blocking import blocked_cells, with_obstacles
+from antdrive.sim.driving.blocking import closed_cells, with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversOnMap
 from antdrive.sim.driving.parts import Others
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
@@ -69,6 +69,11 @@ class Replan:
     work: int
     route: Floats
     wall_s: float
+
+    @classmethod
+    def failed(cls, t: float, trigger: str) -> Replan:
+        """An attempt for which nothing was planned."""
+        return cls(t, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0)
 
 
 class Replanning(OneRoute):
@@ -165,7 +170,7 @@ class Replanning(OneRoute):
         try:
             task = dataclasses.replace(self._task, start=pose)
         except ValueError:  # the estimated pose lies outside the world or in an obstacle
-            self.log.append(Replan(now, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0))
+            self.log.append(Replan.failed(now, trigger))
             return None
         if self._timed:
             plan = self._routes.ask(self._routes.query(self._grid, task, now), self._rng)
@@ -204,10 +209,7 @@ class Replanning(OneRoute):
         query = Query.between(self._grid, task)
         if self._replanner is None:
             self._replanner = replanner_for(self._planner, query, self._rng)
-        blocked = blocked_cells(self._grid, discs)
-        if zone is not None:
-            blocked |= zone.blocked
-        blocked[query.start] = blocked[query.goal] = False
+        blocked = closed_cells(query, discs, zone)
         with blaming(self._planner):
             self._replanner.clear(np.argwhere(self._blocked & ~blocked))
             self._replanner.block(np.argwhere(blocked & ~self._blocked))

@@ -69,7 +69,9 @@ def sheet(path: str | Path | None, size: tuple[float, float], dpi: float = 160) 
     with styled():
         figure = new_figure(*size)
         yield figure
-        finished(figure, target, dpi)
+        figure.set_dpi(dpi)
+        if target is not None:
+            write_figure(figure, target, dpi)
 
 
 def head(figure: Figure, title: str, outcome: Outcome | None = None) -> None:
@@ -139,14 +141,6 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
     with written_whole(target) as temporary:
         figure.savefig(temporary, format=kind, dpi=dpi, metadata=empty)
     return target
-
-
-def finished(figure: Figure, target: Path | None, dpi: float) -> Figure:
-    """A figure as functions return it, written if there is a target."""
-    figure.set_dpi(dpi)
-    if target is not None:
-        write_figure(figure, target, dpi)
-    return figure
 
 
 def save_figure(figure: Figure, path: str | Path, *, dpi: float | None = None) -> Path:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from antdrive.runs.statistics.bootstrap import medians_by_world
-from antdrive.views.figures.canvas import checked, finished, new_figure, styled
+from antdrive.views.figures.canvas import sheet
 from antdrive.views.style import INK, MUTED, hexed, planner_style
 
 Floats: TypeAlias = npt.NDArray[np.float64]
@@ -57,10 +57,8 @@ def convergence_figure(
     dpi: float = 160,
 ) -> Figure:
     """Draw the best length so far while planners iterate, a panel for each map."""
-    target = checked(path)
-    with styled():
-        across = 2 if len(curves) == 4 else min(len(curves), 3)
-        figure = new_figure(3.9 * across, 3.2 * -(-len(curves) // across))
+    across = 2 if len(curves) == 4 else min(len(curves), 3)
+    with sheet(path, (3.9 * across, 3.2 * -(-len(curves) // across)), dpi) as figure:
         for k, (title, on_map) in enumerate(curves.items()):
             axes: Any = figure.add_subplot(-(-len(curves) // across), across, k + 1, label=title)
             spans = [_draw(axes, curve, number, on_map, single) for number, curve in enumerate(on_map)]
@@ -75,7 +73,7 @@ def convergence_figure(
             axes.set_ylim(low - 0.06 * (top - low) - 0.1, top + 0.06 * (top - low) + 0.1)
             axes.set_xlim(left=0.0)
             axes.legend(loc="upper right", fontsize=7)
-        return finished(figure, target, dpi)
+    return figure
 
 
 def _draw(

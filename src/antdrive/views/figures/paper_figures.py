@@ -12,7 +12,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from antdrive.views.figures.canvas import checked, finished, new_figure, styled
+from antdrive.views.figures.canvas import colour_bar, sheet
 from antdrive.views.style import INK, MUTED, hexed, planner_style
 
 if TYPE_CHECKING:
@@ -30,9 +30,7 @@ def history_figure(
     dpi: float = 160,
 ) -> Figure:
     """Draw the best path length so far by iteration for one or more planners."""
-    target = checked(path)
-    with styled():
-        figure = new_figure(6.4, 4.0)
+    with sheet(path, (6.4, 4.0), dpi) as figure:
         axes: Any = figure.add_subplot(label="history")
         for name, runs in histories.items():
             colour, dash = planner_style(name)
@@ -65,18 +63,16 @@ def history_figure(
         axes.set(xlabel="iteration", ylabel=f"best path so far [{unit}]")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper right")
-        return finished(figure, target, dpi)
+    return figure
 
 
 def maps_figure(
     paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], path: str | Path | None = None, *, dpi: float = 160
 ) -> Figure:
     """Draw paths on maps as the papers do: blocked cells black, the start a red square, the goal a blue one."""
-    target = checked(path)
-    with styled():
-        across = min(len(paths), 3)
-        down = -(-len(paths) // across)
-        figure = new_figure(3.3 * across, 4.1 * down)
+    across = min(len(paths), 3)
+    down = -(-len(paths) // across)
+    with sheet(path, (3.3 * across, 4.1 * down), dpi) as figure:
         layout: Any = figure.get_layout_engine()
         layout.set(h_pad=0.16, hspace=0.06)  # room for titles above and legends below the maps
         for k, (title, (query, plans)) in enumerate(paths.items()):
@@ -98,7 +94,7 @@ def maps_figure(
             axes.set(xticks=[], yticks=[])
             axes.grid(False)
             axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=1)
-        return finished(figure, target, dpi)
+    return figure
 
 
 def ants_figure(
@@ -112,10 +108,8 @@ def ants_figure(
     dpi: float = 160,
 ) -> Figure:
     """Draw path length by number of ants: every seed, the mean, and the values that a paper prints."""
-    target = checked(path)
     colour = hexed(planner_style(planner)[0])
-    with styled():
-        figure = new_figure(5.6, 4.0)
+    with sheet(path, (5.6, 4.0), dpi) as figure:
         axes: Any = figure.add_subplot(label="lengths")
         counts = sorted(lengths)
         for count in counts:
@@ -132,7 +126,7 @@ def ants_figure(
         axes.set_xticks(counts, [str(count) for count in counts])
         axes.minorticks_off()
         axes.legend(loc="upper right")
-        return finished(figure, target, dpi)
+    return figure
 
 
 def sweep_figure(
@@ -144,11 +138,9 @@ def sweep_figure(
     dpi: float = 160,
 ) -> Figure:
     """Draw the mean path length by crossover and mutation probability, with and without elitism side by side."""
-    target = checked(path)
     both = np.concatenate([np.ravel(values) for values in lengths.values()])
     finite = both[np.isfinite(both)]
-    with styled():
-        figure = new_figure(9.4, 3.9)
+    with sheet(path, (9.4, 3.9), dpi) as figure:
         for k, elitism in enumerate((True, False)):
             title = "with elitism" if elitism else "without elitism"
             axes: Any = figure.add_subplot(1, 2, k + 1, label=title)
@@ -171,7 +163,5 @@ def sweep_figure(
                     fontsize=7.5,
                     color="white" if dark else hexed(INK),
                 )
-        bar = figure.colorbar(drawn, ax=figure.axes, shrink=0.85, aspect=26)
-        bar.set_label("mean path length [cells]")
-        bar.outline.set_visible(False)
-        return finished(figure, target, dpi)
+        colour_bar(figure, drawn, figure.axes, "mean path length [cells]", shrink=0.85, aspect=26, pad=0.05)
+    return figure

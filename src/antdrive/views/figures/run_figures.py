@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,9 @@ from antdrive.views.figures.curves import draw_clearance, draw_limiters, draw_sp
 from antdrive.views.figures.map_chart import draw_along, draw_driven, draw_legend, draw_map
 from antdrive.views.scene import Scene
 from antdrive.views.style import BAD, GOOD, ROUTE, SHELL, hexed, planner_style
+
+if TYPE_CHECKING:
+    from antdrive.sim.pipeline import Run
 
 Floats = npt.NDArray[np.float64]
 
@@ -58,6 +61,17 @@ def overview(
         planner = rollout.record.planner.name
         head(figure, f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", rollout.outcome)
     return figure
+
+
+def picture_of(run: Run, path: str | Path) -> None:
+    """Write the overview of a run, or its plan where it did not drive."""
+    from antdrive.views.figures.plan_figures import plan_figure
+
+    s = run.scenario
+    if run.rollout is not None:
+        overview(run.rollout, path)
+    else:
+        plan_figure(s.task, run.grid, run.plan, s.robot, path, mapped=not s.exploring)
 
 
 def certificate_figure(

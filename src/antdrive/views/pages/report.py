@@ -180,15 +180,11 @@ def counted(runs: Sequence[ReportedRun]) -> str:
 
 def _drawn(run: Run) -> list[Attachment]:
     """The overview of a run made in Python, or its plan where it did not drive."""
-    from antdrive.views.figures.plan_figures import plan_figure
-    from antdrive.views.figures.run_figures import overview
+    from antdrive.views.figures.run_figures import picture_of
 
     with tempfile.TemporaryDirectory() as folder:
-        path, s = Path(folder) / "overview.png", run.scenario
-        if run.rollout is not None:
-            overview(run.rollout, path)
-        else:
-            plan_figure(s.task, run.grid, run.plan, s.robot, path, mapped=not s.exploring)
+        path = Path(folder) / "overview.png"
+        picture_of(run, path)
         return [_embedded(path, FIGURE_CAPTIONS["overview.png"])]
 
 

@@ -83,9 +83,7 @@ def summarise(
     strict: bool = False,
 ) -> CampaignSummary:
     """Compute a campaign's tables."""
-    paired = PairedRuns.of(table.of_planners(planners) if planners else table)
-    if planners:
-        paired = paired.select(planners)
+    paired = PairedRuns.of(table, planners)
     table = paired.table
     chosen = list(metrics) if metrics is not None else known_metrics(paired, DEFAULT_METRICS)
     for name in chosen:

@@ -14,7 +14,7 @@ import yaml
 from pydantic import BaseModel, Field
 
 from antdrive.base.atomic import written_whole
-from antdrive.base.checks import OneLine, SchemaVersion, check, schema_of, suggest, yaml_number
+from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of, suggest, yaml_number
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.records import STRICT
@@ -142,11 +142,10 @@ def load_tasks(world: str | os.PathLike[str]) -> Mapping[str, Task]:
 
 def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
     """The tasks of a world by name; None is its own."""
-    known = list_worlds()
-    path = known[world] if isinstance(world, str) and world in known else Path(world)
-    if not os.path.lexists(path):
-        hint = suggest(path.stem, known)
-        raise input_error(os.fspath(world), f"no such file, nor a world of the catalogue; {hint}")
+    try:
+        path = resolve("world", world, list_worlds())
+    except FieldError as error:
+        raise input_error(error.problem) from None
     if path.suffix.lower() in OF_OTHERS:
         raise input_error(str(path), f"is no world file; make one of it with antdrive worlds import {path}")
     return _tasks_in(read_yaml(path), os.fspath(path), path.stem)
