@@ -63,7 +63,10 @@ toc_object_entries_show_parents = "hide"
 nitpick_ignore_regex = [
     ("py:.*", r"(numpy|np|numpy\.typing|npt)\.[\w.]+"),
     ("py:.*", r"(matplotlib|pyarrow|pandas|pydantic|hypothesis|typer|distributed|dask)(\.[\w.]+)?"),
-    ("py:.*", r"(antdrive\.views\.pages\.summary\.)?(Path|Figure|SearchStrategy|CampaignSummary|Ants|Ranking)"),
+    (
+        "py:.*",
+        r"(antdrive\.(views\.pages\.summary|runs\.campaigns\.running)\.)?(Path|Figure|SearchStrategy|CampaignSummary|Finished|Ants|Ranking)",
+    ),
     ("py:.*", r"(typing|collections|pathlib|enum|os|types|abc|contextlib|dataclasses)\.[\w.]+"),
     # Arrays as compiled code takes them; no part of what is offered.
     ("py:class", r"antdrive\.[\w.]+\._kernels_\w+\.\w+"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
+import sys
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -19,7 +20,9 @@ from sphinx.ext.napoleon import GoogleDocstring
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.nodes import make_refnode
+from sphinx.util.typing import stringify_annotation
 
+STRINGIFY = stringify_annotation
 IMPORTED = re.compile(r"^from (\.[\w.]*) import (\w+)", re.MULTILINE)
 
 
@@ -93,9 +96,15 @@ def property_read(app: Sphinx, what: str, name: str, thing: Any, options: Any, l
 
 
 def signature_read(app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: Any, returned: Any) -> Any:
-    """Write types without their limits, and defaults that have no literal, such as `<factory>`, as three dots."""
-    plain = re.sub(r"Annotated\[([^,\[\]]+), (?:[^\[\]]|\[[^\[\]]*\])*\]", r"\1", signature or "")
-    return (re.sub(r"<[^<>]*>", "...", plain), returned) if signature else None
+    """Write defaults that have no literal, such as `<factory>`, as three dots: Sphinx can only read what Python can."""
+    return (re.sub(r"<[^<>]*>", "...", signature), returned) if signature else None
+
+
+def without_limits(annotation: Any, *words: Any, **options: Any) -> str:
+    """A type as text, without what `Annotated` adds to it."""
+    return str(
+        STRINGIFY(annotation.__origin__ if hasattr(annotation, "__metadata__") else annotation, *words, **options)
+    )
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -105,6 +114,9 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("missing-reference", resolve)
     app.connect("autodoc-process-signature", signature_read)
     app.connect("autodoc-process-docstring", property_read, priority=400)
+    for module in [module for name, module in sys.modules.items() if name.startswith("sphinx.")]:
+        if hasattr(module, "stringify_annotation"):
+            module.stringify_annotation = without_limits
     # The first line of an attribute's docstring is a sentence: napoleon takes what stands before a colon for a type.
     GoogleDocstring._consume_inline_attribute = lambda self: ("", self._consume_to_end())
     return {"parallel_read_safe": True, "parallel_write_safe": True}
