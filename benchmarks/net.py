@@ -67,11 +67,11 @@ EXAMPLES = Path("examples")
 
 #: Keys and columns that differ between repetitions, or follow the spelling of commands.
 VOLATILE = {
-    "times", "plan_s", "drive_wall_s", "replans_s", "wall_s", "attempts", "versions", "command", "commit", "machine", "created",
+    "times", "plan_s", "drive_wall_s", "replans_s", "wall_s", "attempts", "versions", "command", "fingerprint", "commit", "machine", "created",
     "version.antdrive", "version.numpy", "version.pybullet", "version.numba", "version.python", "code",
 }  # fmt: skip
 #: Hashes that cover the version of antdrive too: compared as long as the versions are the same.
-WITH_VERSION = {"digest", "key", "planner_version", "fingerprint", "hash"}
+WITH_VERSION = {"digest", "key", "planner_version", "hash"}
 #: What wall clocks leave in printed text, and what stands there instead.
 CLOCKS = ((re.compile(r"(?m)(  +|\| )[\d.e-]+ m?s( \|)?$"), r"\1TIME"),)  # the last column of a table
 SKIPPED = {".png", ".pdf", ".mp4", ".webp", ".gif", ".html", ".py", ".lock", ".pyc"}
