@@ -67,8 +67,8 @@ EXAMPLES = Path("examples")
 
 #: Keys and columns that differ between repetitions, or follow the spelling of commands.
 VOLATILE = {
-    "times", "plan_s", "drive_wall_s", "replans_s", "wall_s", "attempts", "versions", "command", "fingerprint", "commit", "machine", "created",
-    "version.antdrive", "version.numpy", "version.pybullet", "version.numba", "version.python", "code",
+    "times", "plan_s", "drive_wall_s", "replans_s", "wall_s", "attempts", "versions", "command", "fingerprint", "commit",
+    "machine", "created", "version.antdrive", "version.numpy", "version.pybullet", "version.numba", "version.python", "code",
 }  # fmt: skip
 #: Hashes that cover the version of antdrive too: compared as long as the versions are the same.
 WITH_VERSION = {"digest", "key", "planner_version", "hash"}

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import inspect
 import json
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 
@@ -355,3 +356,15 @@ def identity_text(
     parts = {"task": task, "planner": planner, "options": plain, "robot": robot, **more}
     parts["settings"] = settings_of(part_of_key(fields, without))
     return json.dumps(parts, sort_keys=True)
+
+
+def _short(signature: inspect.Signature) -> inspect.Signature:
+    """Return a signature whose types do not carry what is declared beside them, so that `help()` can be read."""
+    parameters = [
+        one.replace(annotation=get_args(one.annotation)[0]) if get_origin(one.annotation) is Annotated else one
+        for one in signature.parameters.values()
+    ]
+    return signature.replace(parameters=parameters)
+
+
+Scenario.__signature__ = _short(inspect.signature(Scenario))  # type: ignore[attr-defined]
