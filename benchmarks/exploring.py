@@ -28,8 +28,8 @@ import numpy as np
 
 from antdrive.sim import Scenario, run
 from antdrive.sim.driving import drive
-from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.stopping_constraint import Caution
 from antdrive.sim.driving.survey import Senses
 from antdrive.sim.sensing import OccupancyMap
 from antdrive.sim.sensing.matching import ScanMatcher

@@ -76,7 +76,9 @@ def test_where_nothing_can_be_fetched_it_says_how_to_get_a_python(tmp_path: Path
     assert "apt-get install python3.11" in done.stderr
 
 
-@pytest.mark.parametrize(("fits", "made"), [(True, ["test", "docs"]), (False, ["test"])], ids=["3.11", "3.10"])
+@pytest.mark.parametrize(
+    ("fits", "made"), [(True, ["test", "test-slow", "docs"]), (False, ["test", "test-slow"])], ids=["3.11", "3.10"]
+)
 def test_integration_builds_the_site_where_python_is_new_enough(tmp_path: Path, fits: bool, made: list[str]) -> None:
     """A stand-in for the Python of .venv ends as 3.11 or 3.10 would on the question of the version."""
     (tmp_path / "bin").mkdir()

@@ -110,7 +110,7 @@ def test_ctrl_c_is_one_line(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> 
     [
         ["compare", "WORLD", "-p", "aco-han", "-p", "astar"],
         ["find-margin", "WORLD", "-p", "aco-han", "--seeds", "1"],
-        ["reproduce", "lee2008", "--seeds", "1"],
+        ["reproduce", "lee2008", "--seeds", "1", "--jobs", "1"],
     ],
     ids=lambda words: words[0],
 )

@@ -14,7 +14,7 @@ def test_a_process_for_each_core_that_may_be_used(
 ) -> None:
     """joblib counts those of a container; the operating system says how many its host has."""
     found: list[int] = []
-    case = SimpleNamespace(entry=SimpleNamespace(margin=0.03))
+    case = SimpleNamespace(given={"margin": 0.03})
 
     def check_cases(cases: list[Any], *, jobs: int, **others: Any) -> list[Any]:
         found.append(jobs)

@@ -15,7 +15,7 @@ from antdrive.robots import Footprint, list_robots, load_robot
 from antdrive.sim import Outcome, Rollout, Run, Scenario, certify, run
 from antdrive.sim.log.certificate import _between_steps, _clearances
 from antdrive.views.film.meshes import robot_parts
-from antdrive.views.scene import Body, Scene, contact_point
+from antdrive.views.scene import Scene, contact_point
 from antdrive.worlds import Cruising, Disc, Task, World, task_to_dict
 from benchmarks.second_audit import least_clearance
 
@@ -110,7 +110,7 @@ def test_a_robot_is_drawn_within_its_footprint(name: str) -> None:
     feet = {"nose": Footprint.polygon(NOSE), "puck": Footprint.disc(0.5, (0.1, 0.05))}
     robot = load_robot(name if name in list_robots() else "warehouse")
     robot = dataclasses.replace(robot, footprint=feet.get(name, robot.footprint))
-    for part in robot_parts(Body.of(robot)):
+    for part in robot_parts(robot):
         if not part.wheel:
             deepest = min(robot.footprint.depth(x, y) for x, y in part.mesh.vertices[:, :2].tolist())
             assert deepest >= -1e-9, part.colour

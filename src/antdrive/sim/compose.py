@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 from antdrive.planners import capabilities_of
 from antdrive.robots import LIMITERS, Avoidance
-from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.cellwise import CellByCell
 from antdrive.sim.driving.driver import full_turn
 from antdrive.sim.driving.exploring import Exploration
@@ -38,6 +37,7 @@ from antdrive.sim.driving.rules import (
     Pursuit,
     StayInSight,
 )
+from antdrive.sim.driving.stopping_constraint import Caution
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Tracked, Watch
 from antdrive.sim.policy import Perception, ReplanPolicy

@@ -14,7 +14,7 @@ from antdrive.sim.compose import compose
 from antdrive.sim.driving.drive import Progress, drive, unheard
 from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.driving.triggers import OBSTRUCTED
+from antdrive.sim.driving.replan_causes import OBSTRUCTED
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS, measure
 from antdrive.sim.log.outcome import Outcome

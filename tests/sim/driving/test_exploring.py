@@ -13,9 +13,9 @@ from antdrive.robots import RobotSpec, Twist
 from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Rollout, Run, Scenario, run
 from antdrive.sim.compose import told
-from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.own_map import forgetting_ticks
 from antdrive.sim.driving.replay import map_of, replay
+from antdrive.sim.driving.stopping_constraint import Caution
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Watch
 from antdrive.sim.log.record import ReplanRecord

@@ -15,8 +15,8 @@ from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec
 from antdrive.sim import Perception, ReplanPolicy, Scenario, run
 from antdrive.sim.driving.movers_ahead import SLACK, MoversSeenAhead
+from antdrive.sim.driving.replan_causes import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.traffic import FADING, FAST, TrackedTraffic
-from antdrive.sim.driving.triggers import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.watching import Tracked
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.worlds import Keyframed, Task, World, rasterise

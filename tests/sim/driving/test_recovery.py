@@ -16,8 +16,8 @@ from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.own_map import forgetting_ticks
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import Look, Recovery
+from antdrive.sim.driving.replan_causes import LOOKED
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.driving.triggers import LOOKED
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Cruising, Disc, Task, World
 from tests.sim.driving.guides import exploration_of

@@ -13,7 +13,7 @@ from antdrive.base.plane import place_name
 from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.sim.driving.blocking import covered_discs, with_obstacles
-from antdrive.sim.driving.gaps import STILL, NarrowGaps
+from antdrive.sim.driving.mover_gaps import STILL, NarrowGaps
 from antdrive.sim.driving.parts import Others
 from antdrive.worlds import Grid, Task, rasterise
 

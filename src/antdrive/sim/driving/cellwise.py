@@ -13,8 +13,8 @@ from antdrive.base.plane import polyline_length
 from antdrive.planners import PLANNERS, PlanResult, Query, agent_for, blaming, check_step, smooth
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
+from antdrive.sim.driving.replan_causes import MISSED
 from antdrive.sim.driving.replanning import Replan, Replanning
-from antdrive.sim.driving.triggers import MISSED
 from antdrive.sim.log.record import DECISION
 from antdrive.worlds import Grid, Route, segment_clearance
 

@@ -1,7 +1,7 @@
 """Routes in a world without a map: planned through what the lidar has seen, and anew when it finds something in the way.
 
 What nobody has seen counts as free for a plan (S. Koenig and Y. Smirnov, *Sensor-based planning with the freespace
-assumption*, ICRA 1997), and never for the speed, see `antdrive.sim.driving.caution`.
+assumption*, ICRA 1997), and never for the speed, see `antdrive.sim.driving.stopping_constraint`.
 """
 
 from __future__ import annotations
@@ -34,11 +34,7 @@ from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.own_map import PATIENCE
 from antdrive.sim.driving.parts import RouteGuide, Rows
 from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
-from antdrive.sim.driving.replanning import Replan
-from antdrive.sim.driving.routes import RoutePlanner
-from antdrive.sim.driving.survey import Survey
-from antdrive.sim.driving.traffic import Zone
-from antdrive.sim.driving.triggers import (
+from antdrive.sim.driving.replan_causes import (
     BACKED,
     DISCOVERED,
     HELD,
@@ -49,6 +45,10 @@ from antdrive.sim.driving.triggers import (
     STALLED,
     STRAYED,
 )
+from antdrive.sim.driving.replanning import Replan
+from antdrive.sim.driving.routes import RoutePlanner
+from antdrive.sim.driving.survey import Survey
+from antdrive.sim.driving.traffic import Zone
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise

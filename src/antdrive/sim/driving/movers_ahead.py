@@ -16,10 +16,10 @@ from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.planners import PlanResult
 from antdrive.robots import RobotSpec, TrackedPath
 from antdrive.sim.driving.blocking import close_route, covered_discs
-from antdrive.sim.driving.gaps import NarrowGaps
+from antdrive.sim.driving.mover_gaps import NarrowGaps
 from antdrive.sim.driving.parts import Others
+from antdrive.sim.driving.replan_causes import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.traffic import TrackedTraffic, Traffic, Zone
-from antdrive.sim.driving.triggers import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.watching import Tracked
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, World, rasterise

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from antdrive.sim.driving.triggers import LOOKED
+from antdrive.sim.driving.replan_causes import LOOKED
 from antdrive.sim.log.record import DriveRecord, ReplanRecord
 
 MAP_CELL = 0.05  # side of the map's cells [m]

@@ -36,10 +36,10 @@ from antdrive.sim.driving.blockage import Blockage
 from antdrive.sim.driving.blocking import closed_cells, with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversOnMap
 from antdrive.sim.driving.parts import Others
+from antdrive.sim.driving.replan_causes import LATE, MISSED, STRAYED, WAITED
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
 from antdrive.sim.driving.schedule import Schedule
 from antdrive.sim.driving.traffic import Traffic, Zone
-from antdrive.sim.driving.triggers import LATE, MISSED, STRAYED, WAITED
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, rasterise

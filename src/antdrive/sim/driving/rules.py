@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from antdrive.base import Pose
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, Twist
-from antdrive.sim.driving.caution import SLOWEST, Caution
 from antdrive.sim.driving.parts import Guide, Moment, Others, Step
 from antdrive.sim.driving.schedule import slow_down
+from antdrive.sim.driving.stopping_constraint import SLOWEST, Caution
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Task
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from antdrive.base import Floats, Pose
 from antdrive.robots import Footprint, Lidar, RobotSpec, Twist, footprint_clearance, load_robot
-from antdrive.sim.driving.caution import Caution
+from antdrive.sim.driving.stopping_constraint import Caution
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.sensing import Scanner
 from antdrive.worlds import Disc, World
