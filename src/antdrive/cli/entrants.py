@@ -20,17 +20,11 @@ MAX_PLANNERS = 6
 
 @dataclass(frozen=True)
 class Entrant:
-    """A planner with its options, as the command line names it.
+    """A planner with its options, as the command line names it."""
 
-    Attributes:
-        label: what it is called in tables, folders and `--set`
-        name: the planner's name
-        settings: its own `--set` in the words of `antdrive run`
-    """
-
-    label: str
-    name: str
-    settings: tuple[str, ...] = ()
+    label: str  # what it is called in tables, folders and `--set`
+    name: str  # the planner's name
+    settings: tuple[str, ...] = ()  # its own `--set` in the words of `antdrive run`
 
 
 def check_worlds(words: Sequence[str]) -> None:

@@ -29,23 +29,14 @@ OURS = "This is our simulator on the challenge's public worlds, no official scor
 
 @dataclass(frozen=True)
 class Published:
-    """A result that somebody else has published.
+    """A result that somebody else has published."""
 
-    Attributes:
-        who: the entry
-        where: which worlds, how often, and how the figure came about
-        source: where it can be looked up
-        score: mean score
-        success: share of runs that arrived; not a number where it is not known
-        seconds: mean time of a run that arrived [s]; not a number where it is not known
-    """
-
-    who: str
-    where: str
-    source: str
-    score: float
-    success: float = math.nan
-    seconds: float = math.nan
+    who: str  # the entry
+    where: str  # which worlds, how often, and how the figure came about
+    source: str  # where it can be looked up
+    score: float  # mean score
+    success: float = math.nan  # share of runs that arrived; not a number where it is not known
+    seconds: float = math.nan  # mean time of a run that arrived [s]; not a number where it is not known
 
 
 COPIED = "the organisers' report on the BARN challenge at ICRA 2026, which we have not read"
@@ -63,21 +54,13 @@ PUBLISHED = (
 
 @dataclass(frozen=True)
 class BarnLine:
-    """A world's results, or those of all worlds.
+    """A world's results, or those of all worlds."""
 
-    Attributes:
-        world: its name
-        runs: number of runs
-        arrived: how many of them stopped at the goal, certified
-        seconds: mean time of those [s], by the challenge's clock; not a number where there are none
-        score: mean score of all runs
-    """
-
-    world: str
-    runs: int
-    arrived: int
-    seconds: float
-    score: float
+    world: str  # its name
+    runs: int  # number of runs
+    arrived: int  # how many of them stopped at the goal, certified
+    seconds: float  # mean time of those [s], by the challenge's clock; not a number where there are none
+    score: float  # mean score of all runs
 
 
 def unpacked(source: Path, folder: Path) -> Path:

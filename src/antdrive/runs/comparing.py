@@ -28,23 +28,14 @@ def mark_of(scenarios: Mapping[str, Scenario], cases: Sequence[tuple[str, int]])
 
 @dataclass(frozen=True)
 class Compared:
-    """One run of a comparison, without its log.
+    """One run of a comparison, without its log."""
 
-    Attributes:
-        label: of the planner
-        world: the world's name
-        seed: the random seed
-        facts: what `Run.as_dict` says
-        drive: a SHA-256 of what was driven, whatever was planned; empty if the robot did not drive
-        plan: the planned line as bytes
-    """
-
-    label: str
-    world: str
-    seed: int
-    facts: Mapping[str, Any]
-    drive: str
-    plan: bytes
+    label: str  # of the planner
+    world: str  # the world's name
+    seed: int  # the random seed
+    facts: Mapping[str, Any]  # what `Run.as_dict` says
+    drive: str  # a SHA-256 of what was driven, whatever was planned; empty if the robot did not drive
+    plan: bytes  # the planned line as bytes
 
     @classmethod
     def of(cls, label: str, run: Run) -> Compared:

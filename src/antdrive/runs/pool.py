@@ -39,23 +39,14 @@ class WorkerDied(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class Done(Generic[Item, Result]):
-    """What came of one item.
+    """What came of one item."""
 
-    Attributes:
-        item: the item
-        number: its place among the items
-        result: what the work returned; None where its process died
-        died: how its process ended, in words; empty where it did not die
-        slow: whether the process was ended because the run took longer than the limit
-        attempts: how often the run was tried
-    """
-
-    item: Item
-    number: int
-    result: Result | None = None
-    died: str = ""
-    slow: bool = False
-    attempts: int = 1
+    item: Item  # the item
+    number: int  # its place among the items
+    result: Result | None = None  # what the work returned; None where its process died
+    died: str = ""  # how its process ended, in words; empty where it did not die
+    slow: bool = False  # whether the process was ended because the run took longer than the limit
+    attempts: int = 1  # how often the run was tried
 
     @property
     def value(self) -> Result:

@@ -50,21 +50,13 @@ BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar doe
 
 
 class Composition(NamedTuple):
-    """What the record says of a composition; None: the robot has no use for it.
+    """What the record says of a composition; None: the robot has no use for it."""
 
-    Attributes:
-        perception: what the robot perceives of movers
-        avoidance: how it avoids them
-        replanning: when it looks for a new route
-        limiters: the names of the rules that limit its speed
-        mapped: whether its plans are those of the world's map
-    """
-
-    perception: Perception | None
-    avoidance: Avoidance | None
-    replanning: ReplanPolicy | None
-    limiters: tuple[str, ...]
-    mapped: bool
+    perception: Perception | None  # what the robot perceives of movers
+    avoidance: Avoidance | None  # how it avoids them
+    replanning: ReplanPolicy | None  # when it looks for a new route
+    limiters: tuple[str, ...]  # the names of the rules that limit its speed
+    mapped: bool  # whether its plans are those of the world's map
 
 
 class Parts(NamedTuple):

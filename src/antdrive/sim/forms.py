@@ -76,15 +76,10 @@ MarginValue = Annotated[Any, PlainValidator(_margin), WithJsonSchema(_MARGIN_SCH
 
 @dataclasses.dataclass(frozen=True)
 class Form:
-    """Numbers and words, which are written as they are.
+    """Numbers and words, which are written as they are."""
 
-    Attributes:
-        written: what a file may hold, for pydantic; None: the field's own type and bounds
-        usual: the value in a file that means the default; None: the default itself
-    """
-
-    written: Any = None
-    usual: Any = None
+    written: Any = None  # what a file may hold, for pydantic; None: the field's own type and bounds
+    usual: Any = None  # the value in a file that means the default; None: the default itself
 
     def read(self, key: str, value: Any) -> Any:
         """The field's value that a file's value means.

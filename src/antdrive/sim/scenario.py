@@ -43,23 +43,14 @@ _KINDS: Mapping[str, Any] = {
 
 @dataclass(frozen=True, kw_only=True)
 class MarginChoice:
-    """What a margin was chosen by, see `antdrive.runs.margins.with_chosen_margin`.
+    """What a margin was chosen by, see `antdrive.runs.margins.with_chosen_margin`."""
 
-    Attributes:
-        margin: the margin that was chosen [m]
-        loss: how much of it a drive is predicted to use up [m]
-        reserve: what the predicted loss leaves of it, at least [m]
-        probability: of a larger loss than predicted
-        drives: number of drives that the prediction rests on
-        conditions: what the loss depends on, as `Scenario.loss_conditions`
-    """
-
-    margin: float
-    loss: float
-    reserve: float
-    probability: float
-    drives: int
-    conditions: tuple[Any, ...]
+    margin: float  # the margin that was chosen [m]
+    loss: float  # how much of it a drive is predicted to use up [m]
+    reserve: float  # what the predicted loss leaves of it, at least [m]
+    probability: float  # of a larger loss than predicted
+    drives: int  # number of drives that the prediction rests on
+    conditions: tuple[Any, ...]  # what the loss depends on, as `Scenario.loss_conditions`
 
 
 @dataclass(frozen=True, kw_only=True)

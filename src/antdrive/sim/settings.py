@@ -33,32 +33,19 @@ SLOWEST_CONTROL = 10  # [Hz]
 
 @dataclass(frozen=True)
 class Setting:
-    """How people write a field of a scenario.
+    """How people write a field of a scenario."""
 
-    Attributes:
-        help: the description, in files, in `--help` and on reference pages
-        group: the panel of `--help`
-        metavar: what `--help` calls the value
-        key: the key in files, in errors and in tables; empty: the field's name
-        flag: the option; None: the key with `--`; empty: there is none
-        form: how values are written, see `antdrive.sim.forms`
-        choices: the words that the field can be
-        axis: the key of a campaign file that lists values; empty: one of its `settings`
-        column: the column in a campaign's table; empty: the key
-        usual: what the default None means, for `--help`
-        since: the format of a campaign's keys that the setting joined in; later ones are left out at their default
-    """
-
-    help: str
-    group: str
-    metavar: str = ""
-    key: str = ""
-    flag: str | None = None
-    form: str = "plain"
-    choices: tuple[str, ...] = ()
-    axis: str = ""
-    column: str = ""
-    usual: str = ""
+    help: str  # the description, in files, in `--help` and on reference pages
+    group: str  # the panel of `--help`
+    metavar: str = ""  # what `--help` calls the value
+    key: str = ""  # the key in files, in errors and in tables; empty: the field's name
+    flag: str | None = None  # the option; None: the key with `--`; empty: there is none
+    form: str = "plain"  # how values are written, see `antdrive.sim.forms`
+    choices: tuple[str, ...] = ()  # the words that the field can be
+    axis: str = ""  # the key of a campaign file that lists values; empty: one of its `settings`
+    column: str = ""  # the column in a campaign's table; empty: the key
+    usual: str = ""  # what the default None means, for `--help`
+    # the format of a campaign's keys that the setting joined in; later ones are left out at their default
     since: int = 1
 
 
@@ -214,23 +201,14 @@ class Settings:
 
 @dataclass(frozen=True)
 class DeclaredSetting:
-    """A setting as declared in `Settings`.
+    """A setting as declared in `Settings`."""
 
-    Attributes:
-        name: the field of the scenario
-        kind: the field's type; that of other records as text
-        optional: whether None is a value
-        bounds: of numbers, as pydantic takes them
-        setting: how people write it
-        field: the field of the record
-    """
-
-    name: str
-    kind: Any
-    optional: bool
-    bounds: tuple[Ge | Gt | Le, ...]
-    setting: Setting
-    field: "dataclasses.Field[Any]"
+    name: str  # the field of the scenario
+    kind: Any  # the field's type; that of other records as text
+    optional: bool  # whether None is a value
+    bounds: tuple[Ge | Gt | Le, ...]  # of numbers, as pydantic takes them
+    setting: Setting  # how people write it
+    field: "dataclasses.Field[Any]"  # the field of the record
 
     @property
     def key(self) -> str:

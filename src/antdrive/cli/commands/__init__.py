@@ -11,17 +11,11 @@ from typing import NamedTuple
 
 
 class Command(NamedTuple):
-    """A command that is not imported yet.
+    """A command that is not imported yet."""
 
-    Attributes:
-        module: below `antdrive.cli.commands`
-        function: in it; returns the exit code
-        summary: the first line of the function's docstring, for the list of commands
-    """
-
-    module: str
-    function: str
-    summary: str
+    module: str  # below `antdrive.cli.commands`
+    function: str  # in it; returns the exit code
+    summary: str  # the first line of the function's docstring, for the list of commands
 
 
 ABOUT = """Plan paths, drive them in physics, certify the drives and film them.

@@ -94,29 +94,17 @@ class CheckResult:
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """What a drive is judged by, and where its results go.
+    """What a drive is judged by, and where its results go."""
 
-    Attributes:
-        address: the test, as commands name it
-        name: the test's name in its baseline
-        demands: what the test demands
-        baseline: the file of its baseline; None: it has none
-        commands: how to repeat the test
-        accept: the command that accepts the drive
-        update: which baselines to write
-        folder: where logs, pictures and films of the test are written; None: nowhere
-        results: which of them are written; None: none
-    """
-
-    address: str
-    name: str
-    demands: Demands
-    baseline: Path | None
-    commands: tuple[str, ...]
-    accept: str
-    update: Update = ""
-    folder: Path | None = None
-    results: Results | None = None
+    address: str  # the test, as commands name it
+    name: str  # the test's name in its baseline
+    demands: Demands  # what the test demands
+    baseline: Path | None  # the file of its baseline; None: it has none
+    commands: tuple[str, ...]  # how to repeat the test
+    accept: str  # the command that accepts the drive
+    update: Update = ""  # which baselines to write
+    folder: Path | None = None  # where logs, pictures and films of the test are written; None: nowhere
+    results: Results | None = None  # which of them are written; None: none
 
     def judge(self, run: Run) -> CheckResult:
         """Judge a run.

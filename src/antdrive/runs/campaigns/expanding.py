@@ -32,38 +32,24 @@ WORLDS, ROBOTS = "worlds", "robots"  # folders in a campaign's folder with what 
 
 @dataclass(frozen=True, eq=False)
 class NamedRobot:
-    """A robot as a campaign and its commands call it.
+    """A robot as a campaign and its commands call it."""
 
-    Attributes:
-        robot: the robot
-        name: what tables call it: its own name, or its file where another robot of the campaign has that name, too
-        content: its canonical hash
-        word: what commands call it
-        file: its file; None: it is of the catalogue
-    """
-
-    robot: RobotSpec
-    name: str
-    content: str
-    word: str
-    file: Path | None
+    robot: RobotSpec  # the robot
+    name: str  # what tables call it: its own name, or its file where another robot of the campaign has that name, too
+    content: str  # its canonical hash
+    word: str  # what commands call it
+    file: Path | None  # its file; None: it is of the catalogue
 
 
 @dataclass(frozen=True, eq=False)
 class NamedSettings:
-    """One combination of route, noise, margin and settings.
+    """One combination of route, noise, margin and settings."""
 
-    Attributes:
-        fields: fields of `Scenario` by name; the margin may be "auto", and perception None until the world is known
-        columns: what tables say of them, by column
-        words: the words of `antdrive run` for them; None where it has no flags for all
-        place: where in the campaign the settings are written
-    """
-
+    # fields of `Scenario` by name; the margin may be "auto", and perception None until the world is known
     fields: Mapping[str, Any]
-    columns: Mapping[str, Any]
-    words: tuple[str, ...] | None
-    place: Location
+    columns: Mapping[str, Any]  # what tables say of them, by column
+    words: tuple[str, ...] | None  # the words of `antdrive run` for them; None where it has no flags for all
+    place: Location  # where in the campaign the settings are written
 
     def among(self, movers: bool) -> NamedSettings:
         """The settings with what robots perceive in a world with movers, or without; so keys name what is driven."""
@@ -75,23 +61,15 @@ class NamedSettings:
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """The runs of a campaign.
+    """The runs of a campaign."""
 
-    Attributes:
-        jobs: the runs in the campaign's order: by world, task, robot, route, noise, margin, planner and seed
-        duplicates: how many combinations were left out because they mean the same as an earlier one
-        counts: how many there are of worlds, tasks in each, robots, and so on, by name
-        worlds: the world files that the runs' commands name, by path relative to the campaign's folder
-        robots: likewise the files of robots
-        planners: likewise the files of people's own planners
-    """
-
+    # the runs in the campaign's order: by world, task, robot, route, noise, margin, planner and seed
     jobs: tuple[Job, ...]
-    duplicates: int
-    counts: dict[str, int]
-    worlds: dict[str, Task]
-    robots: dict[str, Path]
-    planners: dict[str, Path]
+    duplicates: int  # how many combinations were left out because they mean the same as an earlier one
+    counts: dict[str, int]  # how many there are of worlds, tasks in each, robots, and so on, by name
+    worlds: dict[str, Task]  # the world files that the runs' commands name, by path relative to the campaign's folder
+    robots: dict[str, Path]  # likewise the files of robots
+    planners: dict[str, Path]  # likewise the files of people's own planners
 
 
 def expand(campaign: Campaign) -> Expansion:

@@ -24,27 +24,16 @@ PLANNER_FILES = "planners"  # the folder in a campaign's folder with the files t
 
 @dataclass(frozen=True, eq=False)
 class PlannerVariant:
-    """A planner with options.
+    """A planner with options."""
 
-    Attributes:
-        label: what tables call it, such as "aco-han ants=50"
-        name: its registered name; for people's own code the file's or module's name and that of the class
-        source: what `load_planner` takes for it
-        word: what commands within the campaign's folder call it
-        file: its file; None: it is registered or in a module
-        version: what its code is
-        given: the options that the campaign sets
-        options: all its options as plain values
-    """
-
-    label: str
-    name: str
-    source: str
-    word: str
-    file: Path | None
-    version: str
-    given: Mapping[str, Any]
-    options: Mapping[str, Any]
+    label: str  # what tables call it, such as "aco-han ants=50"
+    name: str  # its registered name; for people's own code the file's or module's name and that of the class
+    source: str  # what `load_planner` takes for it
+    word: str  # what commands within the campaign's folder call it
+    file: Path | None  # its file; None: it is registered or in a module
+    version: str  # what its code is
+    given: Mapping[str, Any]  # the options that the campaign sets
+    options: Mapping[str, Any]  # all its options as plain values
 
 
 def planner_variants(campaign: Campaign) -> list[PlannerVariant]:

@@ -25,23 +25,14 @@ OWN = "own"  # the name of the task that a world brings
 
 @dataclass(frozen=True, eq=False)
 class NamedTask:
-    """A world with start and goal, as a campaign calls it.
+    """A world with start and goal, as a campaign calls it."""
 
-    Attributes:
-        world: what the campaign calls the world
-        name: what the campaign calls start and goal
-        task: the task
-        catalogue: the world's name in the catalogue, if the task is the one of the catalogue
-        place: where the campaign names the world
-        others: the other tasks that the world's file lists, by name
-    """
-
-    world: str
-    name: str
-    task: Task
-    catalogue: str | None
-    place: Location
-    others: Mapping[str, Task] = field(default_factory=dict)
+    world: str  # what the campaign calls the world
+    name: str  # what the campaign calls start and goal
+    task: Task  # the task
+    catalogue: str | None  # the world's name in the catalogue, if the task is the one of the catalogue
+    place: Location  # where the campaign names the world
+    others: Mapping[str, Task] = field(default_factory=dict)  # the other tasks that the world's file lists, by name
 
 
 def campaign_worlds(campaign: Campaign) -> list[NamedTask]:

@@ -18,15 +18,10 @@ OUTCOMES = (*(one.key for one in Outcome), PLANNER_FAULT, CRASHED, TOO_SLOW)
 
 @dataclass(frozen=True, eq=False)
 class MissingRuns:
-    """What is to be done.
+    """What is to be done."""
 
-    Attributes:
-        jobs: the runs to make, in the campaign's order
-        forgotten: the keys of those among them whose present results are to be forgotten
-    """
-
-    jobs: tuple[Job, ...]
-    forgotten: frozenset[str]
+    jobs: tuple[Job, ...]  # the runs to make, in the campaign's order
+    forgotten: frozenset[str]  # the keys of those among them whose present results are to be forgotten
 
 
 def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, again: Sequence[str]) -> MissingRuns:

@@ -23,14 +23,10 @@ LOGS = "rollouts"  # the folder with the logs that are kept
 
 @dataclass(frozen=True, eq=False)
 class Finished:
-    """What a worker hands back about a run.
+    """What a worker hands back about a run."""
 
-    Attributes:
-        row: what came out of it, by column
-        log: the log as bytes, if it is to be kept and the worker does not share the campaign's folder
-    """
-
-    row: dict[str, Any]
+    row: dict[str, Any]  # what came out of it, by column
+    # the log as bytes, if it is to be kept and the worker does not share the campaign's folder
     log: bytes | None = None
 
 
@@ -40,15 +36,10 @@ Work: TypeAlias = Callable[[Job], Finished]
 
 @dataclass(frozen=True)
 class Driving:
-    """Plan, drive and certify a run.
+    """Plan, drive and certify a run."""
 
-    Attributes:
-        keep: which runs' logs are kept
-        folder: the campaign's folder, where logs are written; None: they are handed back
-    """
-
-    keep: Keep = "none"
-    folder: str | None = None
+    keep: Keep = "none"  # which runs' logs are kept
+    folder: str | None = None  # the campaign's folder, where logs are written; None: they are handed back
 
     def __call__(self, job: Job) -> Finished:
         """Make the run. What its planner raises, and what antdrive itself raises, is the run's result, not the campaign's end.

@@ -27,19 +27,13 @@ SUITE = "failures.drive.yaml"
 
 @dataclass(frozen=True, eq=False)
 class Reported:
-    """A failure as it is handed over.
+    """A failure as it is handed over."""
 
-    Attributes:
-        name: its name in the suite, and of its world
-        finding: the failure as it was found
-        run: the run of the small scenario; that scenario alone where the planner raised something
-        repeats: whether the found scenario, and the small one as it is read from its files, gave the same bits in another
-            process
-    """
-
-    name: str
-    finding: Finding
-    run: Run | Scenario
+    name: str  # its name in the suite, and of its world
+    finding: Finding  # the failure as it was found
+    run: Run | Scenario  # the run of the small scenario; that scenario alone where the planner raised something
+    # whether the found scenario, and the small one as it is read from its files, gave the same bits in another
+    # process
     repeats: bool
 
     @property

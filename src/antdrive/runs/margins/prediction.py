@@ -25,25 +25,17 @@ MOST = 0.5, 2.0  # no margin above the larger of these is tried [m], [radii of t
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """A margin that was chosen by calibration, and what it rests on.
+    """A margin that was chosen by calibration, and what it rests on."""
 
-    Attributes:
-        margin: the least margin whose predicted loss leaves the reserve [m]
-        loss: the predicted loss with this margin: no more than a fraction `probability` of drives is expected to lose more [m]
-        largest: the largest loss among the calibration's drives with this margin [m]
-        reserve: part of the margin that is left beyond the predicted loss, at least [m]
-        probability: of a drive along a course of the calibration that loses more than `loss`
-        drives: how many drives the prediction rests on
-        key: the conditions that it holds for, as `Conditions.key`
-    """
-
-    margin: float
+    margin: float  # the least margin whose predicted loss leaves the reserve [m]
+    # the predicted loss with this margin: no more than a fraction `probability` of drives is expected to lose
+    # more [m]
     loss: float
-    largest: float
-    reserve: float
-    probability: float
-    drives: int
-    key: str
+    largest: float  # the largest loss among the calibration's drives with this margin [m]
+    reserve: float  # part of the margin that is left beyond the predicted loss, at least [m]
+    probability: float  # of a drive along a course of the calibration that loses more than `loss`
+    drives: int  # how many drives the prediction rests on
+    key: str  # the conditions that it holds for, as `Conditions.key`
 
     __pydantic_config__ = STRICT
 

@@ -34,36 +34,22 @@ METHOD = 3  # to be counted up when courses, statistic or search change, so that
 
 
 class Loss(NamedTuple):
-    """How much of the margin a drive used up.
+    """How much of the margin a drive used up."""
 
-    Attributes:
-        footprint: by the robot's footprint [m]
-        disc: by the smallest disc around it, for which plans are made; never less than by the footprint [m]
-    """
-
-    footprint: float
-    disc: float
+    footprint: float  # by the robot's footprint [m]
+    disc: float  # by the smallest disc around it, for which plans are made; never less than by the footprint [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """What the loss of margin depends on, as far as a calibration takes it into account.
+    """What the loss of margin depends on, as far as a calibration takes it into account."""
 
-    Attributes:
-        robot: drives
-        controller: follows the route
-        noise: the factor on the robot's documented noise
-        smoothing: how plans become routes
-        physics_hz: physics steps per simulated second
-        control_hz: control periods per simulated second
-    """
-
-    robot: RobotSpec
-    controller: PurePursuit
-    noise: float
-    smoothing: str
-    physics_hz: int = 240
-    control_hz: int = 60
+    robot: RobotSpec  # drives
+    controller: PurePursuit  # follows the route
+    noise: float  # the factor on the robot's documented noise
+    smoothing: str  # how plans become routes
+    physics_hz: int = 240  # physics steps per simulated second
+    control_hz: int = 60  # control periods per simulated second
 
     @classmethod
     def of(cls, scenario: Scenario) -> Conditions:

@@ -37,48 +37,29 @@ NOWHERE = Interval(math.nan, math.nan)
 
 @dataclass(frozen=True)
 class PairedComparison:
-    """Two planners on the runs that they share.
+    """Two planners on the runs that they share."""
 
-    Attributes:
-        measure: "success" or the name of a metric
-        first: label of the first planner
-        second: label of the second planner
-        direction: whether lower or higher values are better, or neither
-        pairs: number of pairs that the numbers rest on
-        worlds: number of worlds that these pairs are in
-        dropped: pairs left out because not both succeeded; 0 for success
-        unpaired: runs of either planner without a partner
-        first_wins: pairs in which the first planner's value is better; where no direction is, those in which it is lower
-        second_wins: pairs in which the second planner's value is better, or lower
-        ties: pairs with equal values
-        difference: first minus second: of success shares, or the median of the paired differences
-        interval: 95 % interval of the difference
-        effect: matched-pairs rank biserial correlation, -1 to 1; above 0 if the first planner wins, or has less where no
-            direction is better
-        p: exact McNemar or Wilcoxon signed rank, over pairs; nan without pairs
-        p_worlds: signs flipped by world; nan where no world has two pairs, or there is one world
-        p_holm: `p` with Holm's correction over all comparisons of this measure
-        p_worlds_holm: `p_worlds` with Holm's correction
-    """
-
-    measure: str
-    first: str
-    second: str
-    direction: Direction
-    pairs: int
-    worlds: int
-    dropped: int
-    unpaired: int
+    measure: str  # "success" or the name of a metric
+    first: str  # label of the first planner
+    second: str  # label of the second planner
+    direction: Direction  # whether lower or higher values are better, or neither
+    pairs: int  # number of pairs that the numbers rest on
+    worlds: int  # number of worlds that these pairs are in
+    dropped: int  # pairs left out because not both succeeded; 0 for success
+    unpaired: int  # runs of either planner without a partner
+    # pairs in which the first planner's value is better; where no direction is, those in which it is lower
     first_wins: int
-    second_wins: int
-    ties: int
-    difference: float
-    interval: Interval
+    second_wins: int  # pairs in which the second planner's value is better, or lower
+    ties: int  # pairs with equal values
+    difference: float  # first minus second: of success shares, or the median of the paired differences
+    interval: Interval  # 95 % interval of the difference
+    # matched-pairs rank biserial correlation, -1 to 1; above 0 if the first planner wins, or has less where no
+    # direction is better
     effect: float
-    p: float
-    p_worlds: float
-    p_holm: float = math.nan
-    p_worlds_holm: float = math.nan
+    p: float  # exact McNemar or Wilcoxon signed rank, over pairs; nan without pairs
+    p_worlds: float  # signs flipped by world; nan where no world has two pairs, or there is one world
+    p_holm: float = math.nan  # `p` with Holm's correction over all comparisons of this measure
+    p_worlds_holm: float = math.nan  # `p_worlds` with Holm's correction
 
     @property
     def decisive_p(self) -> float:

@@ -27,26 +27,18 @@ FEWEST_WORLDS = 6
 
 @dataclass(frozen=True)
 class NonInferiority:
-    """A planner against the reference.
+    """A planner against the reference."""
 
-    Attributes:
-        measure: "success" or the name of a metric
-        planner: its label
-        reference: label of the planner that it is compared with
-        allowed: by how much the planner may be worse: a share of successes, or in the metric's unit
-        advantage: by how much it is better: difference of shares, or median of the paired differences; below 0 if worse
-        interval: of the advantage, such that all intervals of the table hold at once with 95 %
-        worlds: number of worlds that the pairs are in
-        needed: worlds that show it with a chance of 80 % if the two are equally good, from the spread between these worlds
-    """
-
-    measure: str
-    planner: str
-    reference: str
-    allowed: float
+    measure: str  # "success" or the name of a metric
+    planner: str  # its label
+    reference: str  # label of the planner that it is compared with
+    allowed: float  # by how much the planner may be worse: a share of successes, or in the metric's unit
+    # by how much it is better: difference of shares, or median of the paired differences; below 0 if worse
     advantage: float
-    interval: Interval
-    worlds: int
+    interval: Interval  # of the advantage, such that all intervals of the table hold at once with 95 %
+    worlds: int  # number of worlds that the pairs are in
+    # worlds that show it with a chance of 80 % if the two are equally good, from the spread between these
+    # worlds
     needed: int
 
     @property

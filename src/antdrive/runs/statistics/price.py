@@ -17,19 +17,12 @@ TIME, LENGTH = "arrival_s", "driven_length_m"
 
 
 class Ratio(NamedTuple):
-    """How a number without the map compares with the same number with it, over all pairs.
+    """How a number without the map compares with the same number with it, over all pairs."""
 
-    Attributes:
-        mean: geometric mean of the pairs' ratios
-        low: lower end of its 95 % interval, from a bootstrap that draws worlds and then pairs within
-        high: upper end
-        most: the largest ratio of a pair
-    """
-
-    mean: float
-    low: float
-    high: float
-    most: float
+    mean: float  # geometric mean of the pairs' ratios
+    low: float  # lower end of its 95 % interval, from a bootstrap that draws worlds and then pairs within
+    high: float  # upper end
+    most: float  # the largest ratio of a pair
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,10 @@ from antdrive.base.types import Floats
 
 
 class StepCurve(NamedTuple):
-    """A curve that rises in steps.
+    """A curve that rises in steps."""
 
-    Attributes:
-        x: where it rises, ascending, (M,)
-        share: its value from there on, 0 to 1, (M,)
-    """
-
-    x: Floats
-    share: Floats
+    x: Floats  # where it rises, ascending, (M,)
+    share: Floats  # its value from there on, 0 to 1, (M,)
 
     def at(self, x: float) -> float:
         """The curve's value."""

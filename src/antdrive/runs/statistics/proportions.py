@@ -12,15 +12,10 @@ CONFIDENCE = 0.95
 
 
 class Interval(NamedTuple):
-    """A confidence interval.
+    """A confidence interval."""
 
-    Attributes:
-        low: its lower end
-        high: its upper end
-    """
-
-    low: float
-    high: float
+    low: float  # its lower end
+    high: float  # its upper end
 
 
 def wilson(successes: int, total: int, confidence: float = CONFIDENCE) -> Interval:

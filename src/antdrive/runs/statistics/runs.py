@@ -36,12 +36,9 @@ REQUIRED = ("world", "planner", "seed", "outcome", "succeeded")
 
 @dataclass(frozen=True, eq=False)
 class RunTable:
-    """The runs of a campaign, a row each.
+    """The runs of a campaign, a row each."""
 
-    Attributes:
-        columns: by name the value of each run, None where it has none; `REQUIRED` names those that must be there
-    """
-
+    # by name the value of each run, None where it has none; `REQUIRED` names those that must be there
     columns: Mapping[str, Sequence[Any]]
 
     def __post_init__(self) -> None:

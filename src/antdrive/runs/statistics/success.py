@@ -21,28 +21,19 @@ NOWHERE = Interval(math.nan, math.nan)
 
 @dataclass(frozen=True)
 class PlannerSuccess:
-    """How often a planner succeeds, on the instances that every planner ran.
+    """How often a planner succeeds, on the instances that every planner ran."""
 
-    Attributes:
-        planner: its label
-        runs: number of all its runs
-        elsewhere: how many of them are left out, because some other planner lacks a run of their instance
-        counted: number of different runs among the rest: where the seed changes no drive, one run stands for all seeds
-        successes: how many of the counted runs succeeded
-        interval: Wilson's 95 % interval for the share
-        over_worlds: 95 % interval over worlds: by bootstrap, or Wilson's for whole worlds if all runs ended alike; nan
-            where no world has two counted runs, or there is one world
-        outcomes: number of all runs by outcome
-    """
-
-    planner: str
-    runs: int
-    elsewhere: int
+    planner: str  # its label
+    runs: int  # number of all its runs
+    elsewhere: int  # how many of them are left out, because some other planner lacks a run of their instance
+    # number of different runs among the rest: where the seed changes no drive, one run stands for all seeds
     counted: int
-    successes: int
-    interval: Interval
+    successes: int  # how many of the counted runs succeeded
+    interval: Interval  # Wilson's 95 % interval for the share
+    # 95 % interval over worlds: by bootstrap, or Wilson's for whole worlds if all runs ended alike; nan where
+    # no world has two counted runs, or there is one world
     over_worlds: Interval
-    outcomes: Mapping[str, int]
+    outcomes: Mapping[str, int]  # number of all runs by outcome
 
     @property
     def share(self) -> float:

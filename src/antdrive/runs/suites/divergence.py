@@ -21,21 +21,13 @@ SAME = "world, robot and settings are those of the baseline"
 
 @dataclass(frozen=True)
 class Divergence:
-    """Where a drive leaves the line of its baseline.
+    """Where a drive leaves the line of its baseline."""
 
-    Attributes:
-        t: the first sample of the baseline's line at which the two are more than `APART` apart [s]
-        now: where the robot is then [m]
-        then: where it was in the baseline [m]
-        limiter: the rule that limits the robot's speed then
-        limiter_then: the rule that limited it in the baseline
-    """
-
-    t: float
-    now: Point
-    then: Point
-    limiter: str
-    limiter_then: str
+    t: float  # the first sample of the baseline's line at which the two are more than `APART` apart [s]
+    now: Point  # where the robot is then [m]
+    then: Point  # where it was in the baseline [m]
+    limiter: str  # the rule that limits the robot's speed then
+    limiter_then: str  # the rule that limited it in the baseline
 
     @property
     def sentence(self) -> str:

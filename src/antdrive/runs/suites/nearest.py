@@ -21,23 +21,15 @@ _WALL_OF_CONTACT = (0, 2, 1, 3)  # left, right, lower, upper as columns after th
 
 @dataclass(frozen=True)
 class ClosestApproach:
-    """The robot beside a thing.
-
-    Attributes:
-        thing: an obstacle, a mover or a wall, as messages call it
-        t: when [s]
-        x: where the robot was [m]
-        y: where the robot was [m]
-        clearance: distance between the robot's surface and the thing's [m]
-    """
+    """The robot beside a thing."""
 
     __pydantic_config__ = STRICT
 
-    thing: str
-    t: float
-    x: float
-    y: float
-    clearance: float
+    thing: str  # an obstacle, a mover or a wall, as messages call it
+    t: float  # when [s]
+    x: float  # where the robot was [m]
+    y: float  # where the robot was [m]
+    clearance: float  # distance between the robot's surface and the thing's [m]
 
     @property
     def place(self) -> str:

@@ -19,19 +19,12 @@ STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
 
 
 class StuckClock(NamedTuple):
-    """How long the robot has made no progress along its route. Waiting for a mover does not count.
+    """How long the robot has made no progress along its route. Waiting for a mover does not count."""
 
-    Attributes:
-        farthest: the farthest that the robot has got along the route [m]
-        driving: control periods since then in which the robot was to drive, not rotate
-        turning: control periods since then in which the robot rotated in place
-        held: how many of all these its sight limited the robot's speed
-    """
-
-    farthest: float = 0.0
-    driving: int = 0
-    turning: int = 0
-    held: int = 0
+    farthest: float = 0.0  # the farthest that the robot has got along the route [m]
+    driving: int = 0  # control periods since then in which the robot was to drive, not rotate
+    turning: int = 0  # control periods since then in which the robot rotated in place
+    held: int = 0  # how many of all these its sight limited the robot's speed
 
     def after(self, pursuit: PursuitState, waiting: bool) -> StuckClock:
         """The clock after one more control period."""

@@ -25,65 +25,39 @@ if TYPE_CHECKING:
 
 
 class Ending(NamedTuple):
-    """How a drive ends.
+    """How a drive ends."""
 
-    Attributes:
-        outcome: the kind of ending
-        reason: what the outcome's sentence leaves open; may be empty
-    """
-
-    outcome: Outcome
-    reason: str = ""
+    outcome: Outcome  # the kind of ending
+    reason: str = ""  # what the outcome's sentence leaves open; may be empty
 
 
 class Step(NamedTuple):
-    """What the robot does in one control period.
+    """What the robot does in one control period."""
 
-    Attributes:
-        command: the twist that is commanded
-        pursuit: the controller's state: how far the robot has got, and what limited its speed
-        speed_limit: the speed that the schedule allows [m/s]
-        avoids: whether the command avoids a mover, even if another rule then slowed it
-        waits: whether the robot waits on purpose, so that the time does not count as being stuck
-        arrived: whether the robot stands at the goal, where it gives way to a mover
-    """
-
-    command: Twist = Twist(0.0, 0.0)
+    command: Twist = Twist(0.0, 0.0)  # the twist that is commanded
+    # the controller's state: how far the robot has got, and what limited its speed
     pursuit: PursuitState = PursuitState()
-    speed_limit: float = math.inf
-    avoids: bool = False
-    waits: bool = False
-    arrived: bool = False
+    speed_limit: float = math.inf  # the speed that the schedule allows [m/s]
+    avoids: bool = False  # whether the command avoids a mover, even if another rule then slowed it
+    waits: bool = False  # whether the robot waits on purpose, so that the time does not count as being stuck
+    arrived: bool = False  # whether the robot stands at the goal, where it gives way to a mover
 
 
 class Moment(NamedTuple):
-    """What the rules know in one control period.
+    """What the rules know in one control period."""
 
-    Attributes:
-        tick: the number of the control period
-        pose: where the robot believes that it will be when the command takes effect
-        state: where it is
-        path: the path that it follows
-        before: what it did in the control period before
-        clock: how long it has made no progress
-    """
-
-    tick: int
-    pose: Pose
-    state: State
-    path: TrackedPath
-    before: Step
-    clock: StuckClock
+    tick: int  # the number of the control period
+    pose: Pose  # where the robot believes that it will be when the command takes effect
+    state: State  # where it is
+    path: TrackedPath  # the path that it follows
+    before: Step  # what it did in the control period before
+    clock: StuckClock  # how long it has made no progress
 
 
 class Plant(Protocol):
-    """A robot that executes twists: in physics (`Bullet`), exactly (`Kinematic`), or as a log has it (`Logged`).
+    """A robot that executes twists: in physics (`Bullet`), exactly (`Kinematic`), or as a log has it (`Logged`)."""
 
-    Attributes:
-        state: where the robot is and how fast
-    """
-
-    state: State
+    state: State  # where the robot is and how fast
 
     @property
     def touched(self) -> bool:
@@ -160,17 +134,11 @@ class Others(Protocol):
 
 
 class Guide(Protocol):
-    """Says which path to follow during a drive. What is implemented here holds where it is always the same.
+    """Says which path to follow during a drive. What is implemented here holds where it is always the same."""
 
-    Attributes:
-        log: the attempts to find a new route
-        wrong: what is wrong with a plan that the planner gave during the drive; empty if nothing is
-        blocked: which mover closes every way, once the robot has no patience left; empty before
-    """
-
-    log: list[Replan]
-    wrong: str = ""
-    blocked: str = ""
+    log: list[Replan]  # the attempts to find a new route
+    wrong: str = ""  # what is wrong with a plan that the planner gave during the drive; empty if nothing is
+    blocked: str = ""  # which mover closes every way, once the robot has no patience left; empty before
 
     @property
     def may_wait(self) -> bool:
@@ -228,13 +196,9 @@ class Rule(Protocol):
 
 
 class Decider(Protocol):
-    """Decides what the robot does: a `Driver`, a rehearsal, or a log.
+    """Decides what the robot does: a `Driver`, a rehearsal, or a log."""
 
-    Attributes:
-        step: what the robot does now
-    """
-
-    step: Step
+    step: Step  # what the robot does now
 
     @property
     def fraction(self) -> float:

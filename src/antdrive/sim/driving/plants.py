@@ -24,33 +24,19 @@ AFTER_CONTACT = 0.5  # after a collision the robot brakes for this long in the l
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """What a drive logged: T rows, one per physics step; row 0 is the start.
+    """What a drive logged: T rows, one per physics step; row 0 is the start."""
 
-    Attributes:
-        outcome: how the drive ended
-        reason: what the outcome's sentence leaves open; may be empty
-        t: times since the start (T,) [s]
-        pose: true poses of the axle's centre (T, 3) [m, m, rad]
-        twist: measured speeds and yaw rates (T, 2) [m/s, rad/s]
-        command: the commands that were in force when a row was reached (T, 2) [m/s, rad/s]
-        clearance: distances from the footprint to the nearest obstacle, mover or wall (T,) [m]
-        limiter: what held the speed (T,), an index into `LIMITERS`
-        movers: positions of the movers (T, M, 2) [m]
-        contacts: one line per contact (K, 4): row, obstacle, distance [m], force [N]
-        actuated: the twists that the wheels' motors were set to (T, 2) [m/s, rad/s]
-    """
-
-    outcome: Outcome
-    reason: str
-    t: Floats
-    pose: Floats
-    twist: Floats
-    command: Floats
-    clearance: Floats
-    limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]
-    movers: Floats
-    contacts: Floats
-    actuated: Floats
+    outcome: Outcome  # how the drive ended
+    reason: str  # what the outcome's sentence leaves open; may be empty
+    t: Floats  # times since the start (T,) [s]
+    pose: Floats  # true poses of the axle's centre (T, 3) [m, m, rad]
+    twist: Floats  # measured speeds and yaw rates (T, 2) [m/s, rad/s]
+    command: Floats  # the commands that were in force when a row was reached (T, 2) [m/s, rad/s]
+    clearance: Floats  # distances from the footprint to the nearest obstacle, mover or wall (T,) [m]
+    limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]  # what held the speed (T,), an index into `LIMITERS`
+    movers: Floats  # positions of the movers (T, M, 2) [m]
+    contacts: Floats  # one line per contact (K, 4): row, obstacle, distance [m], force [N]
+    actuated: Floats  # the twists that the wheels' motors were set to (T, 2) [m/s, rad/s]
 
 
 class Bullet:

@@ -50,25 +50,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Replan:
-    """One attempt to find a new route.
+    """One attempt to find a new route."""
 
-    Attributes:
-        t: simulated time of the attempt [s]
-        trigger: what set it off, such as `OBSTRUCTED`
-        solved: whether a new route was found
-        cost: length of the new plan [m]; inf without one
-        work: the planner's effort, in units of `PlanResult.work_unit`
-        route: the new route (N, 2) [m]; empty without one
-        wall_s: wall time that the attempt took [s]
-    """
-
-    t: float
-    trigger: str
-    solved: bool
-    cost: float
-    work: int
-    route: Floats
-    wall_s: float
+    t: float  # simulated time of the attempt [s]
+    trigger: str  # what set it off, such as `OBSTRUCTED`
+    solved: bool  # whether a new route was found
+    cost: float  # length of the new plan [m]; inf without one
+    work: int  # the planner's effort, in units of `PlanResult.work_unit`
+    route: Floats  # the new route (N, 2) [m]; empty without one
+    wall_s: float  # wall time that the attempt took [s]
 
     @classmethod
     def failed(cls, t: float, trigger: str) -> Replan:

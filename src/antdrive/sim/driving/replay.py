@@ -43,21 +43,13 @@ SAME_NOISE = 1e-6
 
 @dataclass(frozen=True)
 class ReplayCheck:
-    """How a replay differs from the log.
+    """How a replay differs from the log."""
 
-    Attributes:
-        exact: whether pose, twist and contacts are the log's, bit for bit
-        position: the largest distance between replayed and logged positions [m]
-        turn: the largest difference of headings [rad]
-        twist: the largest difference of speeds [m/s] or yaw rates [rad/s]
-        problems: why the log is not that of a drive, a sentence each
-    """
-
-    exact: bool
-    position: float
-    turn: float
-    twist: float
-    problems: tuple[str, ...]
+    exact: bool  # whether pose, twist and contacts are the log's, bit for bit
+    position: float  # the largest distance between replayed and logged positions [m]
+    turn: float  # the largest difference of headings [rad]
+    twist: float  # the largest difference of speeds [m/s] or yaw rates [rad/s]
+    problems: tuple[str, ...]  # why the log is not that of a drive, a sentence each
 
     @property
     def sentence(self) -> str:

@@ -21,35 +21,20 @@ from antdrive.worlds.world import by_geometry
 
 @dataclass(eq=False, kw_only=True)
 class RoutePlanner:
-    """Plans and prepares the routes of one drive.
+    """Plans and prepares the routes of one drive."""
 
-    Attributes:
-        planner: finds the paths
-        planner_label: its name in records
-        task: the world as the robot is told of it, the start and the goal
-        robot: drives the routes
-        controller: follows them
-        margin: distance kept free around the robot, on top of its radius [m]
-        cell: side of the cells of grids [m]
-        smoothing: how plans become routes
-        hz: control periods per second
-        seed: the seed of the drive's random numbers
-        motions: the motions of the movers, for planners in space and time
-        wrong: what is wrong with the planner's first wrong plan; empty if none was
-    """
-
-    planner: Planner
-    planner_label: str
-    task: Task
-    robot: RobotSpec
-    controller: PurePursuit
-    margin: float
-    cell: float
-    smoothing: str
-    hz: int
-    seed: int
-    motions: tuple[MoverMotion, ...] = ()
-    wrong: str = ""
+    planner: Planner  # finds the paths
+    planner_label: str  # its name in records
+    task: Task  # the world as the robot is told of it, the start and the goal
+    robot: RobotSpec  # drives the routes
+    controller: PurePursuit  # follows them
+    margin: float  # distance kept free around the robot, on top of its radius [m]
+    cell: float  # side of the cells of grids [m]
+    smoothing: str  # how plans become routes
+    hz: int  # control periods per second
+    seed: int  # the seed of the drive's random numbers
+    motions: tuple[MoverMotion, ...] = ()  # the motions of the movers, for planners in space and time
+    wrong: str = ""  # what is wrong with the planner's first wrong plan; empty if none was
 
     @property
     def inflate(self) -> float:

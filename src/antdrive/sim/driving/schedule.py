@@ -19,15 +19,10 @@ MAX_LAG = 0.5  # a robot farther behind its schedule than this is late [m]
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """Where along its route the robot should be at each time; linear in between.
+    """Where along its route the robot should be at each time; linear in between."""
 
-    Attributes:
-        t: times (N,) [s]
-        arc: distances along the route at those times (N,) [m]
-    """
-
-    t: Floats
-    arc: Floats
+    t: Floats  # times (N,) [s]
+    arc: Floats  # distances along the route at those times (N,) [m]
 
     @classmethod
     def of(cls, plan: TimedPlan, route: Route) -> Schedule:

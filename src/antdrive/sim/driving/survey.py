@@ -32,38 +32,24 @@ FAR_AMONG_MOVERS = 15.0  # scans are matched up to this far where movers, which 
 
 
 class Scan(NamedTuple):
-    """One scan.
+    """One scan."""
 
-    Attributes:
-        tick: the control period in which it was taken
-        estimate: where the robot believed it was
-        ranges: what was measured (beams,) [m]
-        movers: which beams met movers that are followed (beams,); None where nobody looks for movers
-    """
-
-    tick: int
-    estimate: Pose
-    ranges: Floats
+    tick: int  # the control period in which it was taken
+    estimate: Pose  # where the robot believed it was
+    ranges: Floats  # what was measured (beams,) [m]
+    # which beams met movers that are followed (beams,); None where nobody looks for movers
     movers: npt.NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Senses:
-    """What a robot is surveying with.
+    """What a robot is surveying with."""
 
-    Attributes:
-        scanner: the lidar in the true world
-        world: what stands in it
-        trajectories: the true motions of the movers; None where there are none
-        rng: where the noise of ranges comes from; None: no noise
-        hz: control periods per second
-    """
-
-    scanner: Scanner
-    world: World
-    trajectories: Trajectories | None
-    rng: np.random.Generator | None
-    hz: int
+    scanner: Scanner  # the lidar in the true world
+    world: World  # what stands in it
+    trajectories: Trajectories | None  # the true motions of the movers; None where there are none
+    rng: np.random.Generator | None  # where the noise of ranges comes from; None: no noise
+    hz: int  # control periods per second
 
     @classmethod
     def of(cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int) -> Senses:

@@ -30,17 +30,11 @@ TELEPORT_SLACK = 0.01  # physics reports a contact at the mover's position one s
 
 
 class Touch(NamedTuple):
-    """One meeting of the robot with an obstacle.
+    """One meeting of the robot with an obstacle."""
 
-    Attributes:
-        step: the row at which the touch began
-        obstacle: index of the obstacle: cylinders, then movers, then walls
-        outcome: COLLIDED, HIT_WHILE_STANDING or HIT_BY_TELEPORT
-    """
-
-    step: int
-    obstacle: int
-    outcome: Outcome
+    step: int  # the row at which the touch began
+    obstacle: int  # index of the obstacle: cylinders, then movers, then walls
+    outcome: Outcome  # COLLIDED, HIT_WHILE_STANDING or HIT_BY_TELEPORT
 
 
 def touches(

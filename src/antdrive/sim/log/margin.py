@@ -40,43 +40,26 @@ REACTION = 0.25  # the controller has answered slip that is older than this [s]
 
 @dataclass(frozen=True)
 class Contribution:
-    """The part of the margin that one cause took, at the place where it took most.
+    """The part of the margin that one cause took, at the place where it took most."""
 
-    Attributes:
-        cause: a key of `CAUSES`
-        metres: the largest loss [m]; 0 if the cause never brought the robot closer to an obstacle than planned
-        t: when the loss was largest [s]
-        x: where [m]
-        y: where [m]
-        at_tightest: the loss, or the gain where negative, at the place where the robot had least clearance [m]
-    """
-
-    cause: str
-    metres: float
-    t: float
-    x: float
-    y: float
-    at_tightest: float
+    cause: str  # a key of `CAUSES`
+    metres: float  # the largest loss [m]; 0 if the cause never brought the robot closer to an obstacle than planned
+    t: float  # when the loss was largest [s]
+    x: float  # where [m]
+    y: float  # where [m]
+    at_tightest: float  # the loss, or the gain where negative, at the place where the robot had least clearance [m]
 
 
 @dataclass(frozen=True)
 class Budget:
-    """A drive's safety margin, broken down by cause. Clearances are those of the disc around the robot.
+    """A drive's safety margin, broken down by cause. Clearances are those of the disc around the robot."""
 
-    Attributes:
-        margin: the margin that was planned with [m]
-        left: the least clearance that was left of it [m]
-        t: when that was [s]
-        x: where [m]
-        y: where [m]
-        contributions: one for each of `CAUSES`, in that order; their `at_tightest` add up to margin - left
-    """
-
-    margin: float
-    left: float
-    t: float
-    x: float
-    y: float
+    margin: float  # the margin that was planned with [m]
+    left: float  # the least clearance that was left of it [m]
+    t: float  # when that was [s]
+    x: float  # where [m]
+    y: float  # where [m]
+    # one for each of `CAUSES`, in that order; their `at_tightest` add up to margin - left
     contributions: tuple[Contribution, ...]
 
     @property
@@ -134,21 +117,14 @@ def budget(rollout: Rollout) -> Budget:
 
 @dataclass(frozen=True)
 class MarginTrial:
-    """All drives with one margin, up to the first that failed.
+    """All drives with one margin, up to the first that failed."""
 
-    Attributes:
-        margin: the margin that was tried [m]
-        drives: number of drives
-        impassable: number of worlds that this margin closes; they are not counted as drives
-        failed: the seed of the drive that failed: no success, not certified, or too little clearance left; or None
-        left: the least clearance of all drives [m]
-    """
-
-    margin: float
-    drives: int
-    impassable: int
+    margin: float  # the margin that was tried [m]
+    drives: int  # number of drives
+    impassable: int  # number of worlds that this margin closes; they are not counted as drives
+    # the seed of the drive that failed: no success, not certified, or too little clearance left; or None
     failed: int | None
-    left: float
+    left: float  # the least clearance of all drives [m]
 
     @property
     def safe(self) -> bool:

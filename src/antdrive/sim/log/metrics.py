@@ -32,15 +32,10 @@ Better: TypeAlias = Literal["lower", "higher", "neither"]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How much worse a metric may become before a comparison with an earlier drive fails.
+    """How much worse a metric may become before a comparison with an earlier drive fails."""
 
-    Attributes:
-        absolute: in the metric's unit
-        relative: a share of the earlier value; the two allowances add up
-    """
-
-    absolute: float = 0.0
-    relative: float = 0.0
+    absolute: float = 0.0  # in the metric's unit
+    relative: float = 0.0  # a share of the earlier value; the two allowances add up
 
     def allowed(self, earlier: float) -> float:
         """The allowance, in the metric's unit."""
@@ -49,19 +44,13 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that describes a drive. Call it with a rollout.
+    """A number that describes a drive. Call it with a rollout."""
 
-    Attributes:
-        unit: the unit of the number; "1" for a ratio or a count
-        function: computes the number from a rollout
-        better: whether a lower or a higher number is better, or neither
-        tolerance: how much worse than in an earlier drive it may be; None where it is not to be compared, as with
-            wall-clock times
-    """
-
-    unit: str
-    function: Callable[[Rollout], float]
-    better: Better = "neither"
+    unit: str  # the unit of the number; "1" for a ratio or a count
+    function: Callable[[Rollout], float]  # computes the number from a rollout
+    better: Better = "neither"  # whether a lower or a higher number is better, or neither
+    # how much worse than in an earlier drive it may be; None where it is not to be compared, as with wall-clock
+    # times
     tolerance: Tolerance | None = None
 
     @property

@@ -28,40 +28,24 @@ ROUNDING = 0.0015  # of a range in a log, and what is left over [m]
 
 
 class Beams(NamedTuple):
-    """A scan as it lay in the world.
+    """A scan as it lay in the world."""
 
-    Attributes:
-        eye: the lidar's true x, y [m] and yaw [rad] (3,)
-        first: the direction of the first beam, from the lidar's heading [rad]
-        reaches: how far each beam got (beams,) [m]: to what it met, or to the lidar's range
-    """
-
-    eye: Floats
-    first: float
-    reaches: Floats
+    eye: Floats  # the lidar's true x, y [m] and yaw [rad] (3,)
+    first: float  # the direction of the first beam, from the lidar's heading [rad]
+    reaches: Floats  # how far each beam got (beams,) [m]: to what it met, or to the lidar's range
 
 
 class Sighting(NamedTuple):
-    """A cylinder or a mover, when it was first seen, and when the robot was nearest to it.
+    """A cylinder or a mover, when it was first seen, and when the robot was nearest to it."""
 
-    Attributes:
-        obstacle: its place in `record.world.obstacles`; that of a mover in `record.world.movers`
-        seen_at: when a beam first met it [s]; infinite if none did
-        seen_from: how far its surface was from the footprint then [m]; not a number if it was never seen
-        nearest_at: when the robot was nearest [s]
-        nearest: how far the surface was from the footprint then [m]
-        touched: whether the robot touched it, or a mover touched the robot
-        mover: whether it is a mover
-        followed_at: when the robot first followed a mover, as far as `tracks` tell [s]; infinite if it never did
-    """
-
-    obstacle: int
-    seen_at: float
-    seen_from: float
-    nearest_at: float
-    nearest: float
-    touched: bool
-    mover: bool = False
+    obstacle: int  # its place in `record.world.obstacles`; that of a mover in `record.world.movers`
+    seen_at: float  # when a beam first met it [s]; infinite if none did
+    seen_from: float  # how far its surface was from the footprint then [m]; not a number if it was never seen
+    nearest_at: float  # when the robot was nearest [s]
+    nearest: float  # how far the surface was from the footprint then [m]
+    touched: bool  # whether the robot touched it, or a mover touched the robot
+    mover: bool = False  # whether it is a mover
+    # when the robot first followed a mover, as far as `tracks` tell [s]; infinite if it never did
     followed_at: float = math.inf
 
     @property

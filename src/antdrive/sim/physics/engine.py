@@ -48,36 +48,23 @@ WALL_THICKNESS = 0.1  # half of it [m]
 
 
 class Contact(NamedTuple):
-    """The robot's chassis touching something at one physics step.
+    """The robot's chassis touching something at one physics step."""
 
-    Attributes:
-        obstacle: what is touched; indices count the world's obstacles, then its movers, then the walls in
-            the order left, right, bottom, top
-        distance: distance of the surfaces [m]; negative where they overlap
-        force: normal force [N]
-    """
-
+    # what is touched; indices count the world's obstacles, then its movers, then the walls in the order left,
+    # right, bottom, top
     obstacle: int
-    distance: float
-    force: float
+    distance: float  # distance of the surfaces [m]; negative where they overlap
+    force: float  # normal force [N]
 
 
 class State(NamedTuple):
-    """Pose and velocity of the robot, measured at the axle's centre.
+    """Pose and velocity of the robot, measured at the axle's centre."""
 
-    Attributes:
-        x: position [m]
-        y: position [m]
-        yaw: heading [rad]
-        speed: forward speed [m/s]
-        yaw_rate: counter-clockwise [rad/s]
-    """
-
-    x: float
-    y: float
-    yaw: float
-    speed: float
-    yaw_rate: float
+    x: float  # position [m]
+    y: float  # position [m]
+    yaw: float  # heading [rad]
+    speed: float  # forward speed [m/s]
+    yaw_rate: float  # counter-clockwise [rad/s]
 
     @property
     def pose(self) -> Pose:

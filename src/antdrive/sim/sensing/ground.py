@@ -19,17 +19,11 @@ SIGMAS = 3.0  # errors up to so many standard deviations are allowed for
 
 
 class Hits(NamedTuple):
-    """Where the beams of a scan ended.
+    """Where the beams of a scan ended."""
 
-    Attributes:
-        beams: the numbers of the beams that met something near enough (N,)
-        points: where they ended, in the frame of the estimated pose (N, 2) [m]
-        explained: whether what stands still explains them (N,)
-    """
-
-    beams: npt.NDArray[np.intp]
-    points: Floats
-    explained: npt.NDArray[np.bool_]
+    beams: npt.NDArray[np.intp]  # the numbers of the beams that met something near enough (N,)
+    points: Floats  # where they ended, in the frame of the estimated pose (N, 2) [m]
+    explained: npt.NDArray[np.bool_]  # whether what stands still explains them (N,)
 
 
 class Ground(Protocol):

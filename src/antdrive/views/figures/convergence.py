@@ -28,25 +28,16 @@ TWICE = 0.35  # how far a colour goes towards ink where a planner has two curves
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ConvergenceCurve:
-    """The runs of one planner on the maps of one panel.
+    """The runs of one planner on the maps of one panel."""
 
-    Attributes:
-        name: the planner with its setting
-        planner: the planner's name, for its style
-        best: for each run, the best length so far by iteration [cells]; inf while there is none
-        maps: the number of each run's map (N,)
-        steps: how many ant steps each run took (N,), every iteration counting the same; None: iterations are shown
-        optimum: the shortest length [cells]
-        printed: the length that the paper prints [cells]; None: it prints none
-    """
-
-    name: str
-    planner: str
-    best: Sequence[Floats]
-    maps: Ints
+    name: str  # the planner with its setting
+    planner: str  # the planner's name, for its style
+    best: Sequence[Floats]  # for each run, the best length so far by iteration [cells]; inf while there is none
+    maps: Ints  # the number of each run's map (N,)
+    # how many ant steps each run took (N,), every iteration counting the same; None: iterations are shown
     steps: Floats | None
-    optimum: float
-    printed: float | None
+    optimum: float  # the shortest length [cells]
+    printed: float | None  # the length that the paper prints [cells]; None: it prints none
 
 
 def convergence_figure(
