@@ -59,10 +59,10 @@ def by_command(log: Path, kind: str, target: Path) -> float:
 def messages(log: Path) -> tuple[int, int]:
     """How many messages and scans the bag of a log has."""
     from antdrive.views.export.exporting import topics_of
-    from antdrive.views.export.scans import Scans
+    from antdrive.views.export.scans import DriveScans
 
     rollout = Rollout.load(log)
-    scans = Scans.of(rollout)
+    scans = DriveScans.of(rollout)
     return sum(len(topic.stamps) for topic in topics_of(rollout, scans)), len(scans.rows)
 
 
