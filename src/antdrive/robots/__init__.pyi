@@ -1,12 +1,12 @@
 from .control.avoidance import Avoidance as Avoidance
 from .control.avoidance import AvoidanceState as AvoidanceState
-from .control.profile import SpeedProfile as SpeedProfile
-from .control.profile import speed_profile as speed_profile
 from .control.pursuit import LIMITERS as LIMITERS
 from .control.pursuit import PurePursuit as PurePursuit
 from .control.pursuit import PursuitState as PursuitState
 from .control.pursuit import TrackedPath as TrackedPath
 from .control.pursuit import Twist as Twist
+from .control.speed_limits import SpeedProfile as SpeedProfile
+from .control.speed_limits import speed_profile as speed_profile
 from .files import list_robots as list_robots
 from .files import load_robot as load_robot
 from .files import robot_schema as robot_schema

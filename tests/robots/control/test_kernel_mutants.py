@@ -11,7 +11,7 @@ from antdrive.robots.control._kernels_avoidance import AvoidanceWeights, Encount
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs
 from antdrive.robots.control._kernels_path import PathSamples, clear_lookaheads, project
 from antdrive.robots.control._kernels_pursuit import rotation, slow_for_curvature
-from antdrive.robots.control.profile import speed_profile
+from antdrive.robots.control.speed_limits import speed_profile
 from antdrive.worlds import Disc, Route, World
 from tests.robots.control.test_rules import LIMITS, TUNING
 

@@ -23,9 +23,9 @@ from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
-from antdrive.robots.control.profile import SpeedProfile, speed_profile
+from antdrive.robots.control.speed_limits import speed_profile, speeds_along
 from antdrive.robots.spec import RobotSpec
-from antdrive.worlds import Route, World, point_clearance
+from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
 
 SPACING = 0.02  # distance between the samples along a route [m]
@@ -228,7 +228,9 @@ class PurePursuit:
         heading = np.interp(at, profile.arc, profile.heading)
         if route.curvature is None:
             curvature[:] = np.nan
-        speed = self._speed_limits(route, world, robot, profile, lookahead, tuning)
+        near_obstacles = self.min_speed_near_obstacles, self.clearance_time
+        braking = self.braking * robot.max_acceleration
+        speed = speeds_along(route, world, robot.radius, profile, lookahead, tuning, near_obstacles, braking)
         limits = MotionLimits(
             speed=robot.max_speed,
             yaw_rate=robot.max_yaw_rate,
@@ -294,28 +296,6 @@ class PurePursuit:
         distance = self.lookahead_max + clearance + side
         discs, starts = _discs_by_square(by_geometry(world), side, distance)
         return ObstacleIndex(discs, starts, bounds, side)
-
-    def _speed_limits(
-        self,
-        route: Route,
-        world: World,
-        robot: RobotSpec,
-        profile: SpeedProfile,
-        lookahead: Floats,
-        tuning: PursuitTuning,
-    ) -> Floats:
-        """The speed limit at the samples (S,) [m/s]: the least of profile, obstacles and `lookahead` over its time."""
-        spacing = tuning.spacing
-        at = spacing * np.arange(len(lookahead))
-        xy = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
-        clearance = point_clearance(world, xy) - robot.radius
-        speed: Floats = np.minimum(lookahead / tuning.lookahead_time, np.interp(at, profile.arc, profile.limit))
-        near_obstacles = self.min_speed_near_obstacles + np.maximum(clearance, 0.0) / self.clearance_time
-        speed = np.minimum(speed, near_obstacles)
-        for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
-            speed[int(stop / spacing) : int(stop / spacing) + 2] = 0.0
-        _kernels_path.brake_backwards(speed, spacing, self.braking * robot.max_acceleration)
-        return speed
 
 
 def unsorted(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:

@@ -17,8 +17,10 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
+from antdrive.robots.control import _kernels_path
+from antdrive.robots.control._kernels_pursuit import PursuitTuning
 from antdrive.robots.spec import RobotSpec
-from antdrive.worlds import Route
+from antdrive.worlds import Route, World, point_clearance
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,3 +187,29 @@ def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple
         for before, here, after in (np.split(found, 3) for found in at(np.concatenate((s - blend, s, s + blend))))
     )
     return heading, curvature, change
+
+
+def speeds_along(
+    route: Route,
+    world: World,
+    radius: float,
+    profile: SpeedProfile,
+    lookahead: Floats,
+    tuning: PursuitTuning,
+    near_obstacles: tuple[float, float],
+    braking: float,
+) -> Floats:
+    """Return the speed limit at the samples of a route (S,) [m/s]: the least of profile, clearance and lookahead.
+
+    Beside obstacles it is a least speed [m/s] plus the clearance [m] over a time [s]: `near_obstacles` holds both.
+    """
+    spacing = tuning.spacing
+    at = spacing * np.arange(len(lookahead))
+    xy = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
+    clearance = point_clearance(world, xy) - radius
+    speed: Floats = np.minimum(lookahead / tuning.lookahead_time, np.interp(at, profile.arc, profile.limit))
+    speed = np.minimum(speed, near_obstacles[0] + np.maximum(clearance, 0.0) / near_obstacles[1])
+    for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
+        speed[int(stop / spacing) : int(stop / spacing) + 2] = 0.0
+    _kernels_path.brake_backwards(speed, spacing, braking)
+    return speed

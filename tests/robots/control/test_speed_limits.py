@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from antdrive.base import Floats
 from antdrive.robots import RobotSpec
-from antdrive.robots.control.profile import SpeedProfile, speed_profile, turning_time
+from antdrive.robots.control.speed_limits import SpeedProfile, speed_profile, turning_time
 from antdrive.worlds import Route
 
 
