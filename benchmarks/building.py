@@ -27,7 +27,7 @@ from PIL import Image
 from antdrive.planners import Query, checked, load_planner, smooth
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim import Engine, Rollout, Scenario, certify, run
-from antdrive.sim.driving.following import follow
+from antdrive.sim.driving.drive import follow
 from antdrive.worlds import import_map_server, load_task, rasterise, save_task
 from benchmarks.loop import task_among, winding
 from benchmarks.tables import chosen, command_line
@@ -36,7 +36,7 @@ RESOLUTION = 0.05  # [m]
 SIZE = (40.0, 30.0)  # [m]
 START, GOAL = (1.5, 15.0, 0.0), (38.0, 26.6)
 DOOR, WALL, CORRIDOR = 1.0, 0.15, 2.2  # widths [m]
-SMALLEST = ("tasks loop --tasks 1 --jobs 1 --rounds 1",)
+SMALLEST = ("loop --rounds 1",)
 T = TypeVar("T")
 
 

@@ -41,7 +41,7 @@ from antdrive.runs.campaigns.store import parts_in
 from antdrive.runs.campaigns.sweeping import sweep
 from benchmarks.tables import chosen, command_line, table
 
-SMALLEST = ("kill-parent overhead --share 0.005",)
+SMALLEST = ("overhead --share 0.005",)
 OUT = Path("out/campaigns").resolve()
 SHORT = 0.02  # how long a run sleeps in a campaign that is killed [s]
 LONG = 0.2  # how long a run computes where efficiency is measured [s]

@@ -29,7 +29,7 @@ import numpy as np
 from antdrive.sim import Scenario, run
 from antdrive.sim.driving import drive
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.stopping_constraint import Caution
+from antdrive.sim.driving.stopping_constraint import StayInSight
 from antdrive.sim.driving.survey import Senses
 from antdrive.sim.sensing import OccupancyMap
 from antdrive.sim.sensing.matching import ScanMatcher
@@ -107,7 +107,7 @@ def rows(source: Path, drives: int, worlds: int) -> Iterator[list[str]]:
         (OccupancyMap, "insert", "map"),
         (Exploration, "trigger", "watch"),
         (Exploration, "refreshed", "watch"),
-        (Caution, "limit", "sight"),
+        (StayInSight, "limit", "sight"),
         (Exploration, "replan", "replans"),
     ):
         meter.watch(owner, method, name)

@@ -59,7 +59,7 @@ def by_command(log: Path, kind: str, target: Path) -> float:
 def messages(log: Path) -> tuple[int, int]:
     """How many messages and scans the bag of a log has."""
     from antdrive.views.export.exporting import topics_of
-    from antdrive.views.export.scans import DriveScans
+    from antdrive.views.export.samples import DriveScans
 
     rollout = Rollout.load(log)
     scans = DriveScans.of(rollout)

@@ -22,11 +22,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from antdrive.runs.failures.failure import failure_of
-from antdrive.runs.failures.handover import fingerprint_of
-from antdrive.runs.failures.hunt import Finding, Hunt, find_failures
-from antdrive.runs.failures.search import METHODS
-from antdrive.runs.failures.space import feasible
+from antdrive.planners.anyangle.passage import feasible
+from antdrive.runs.failures.failure import Attempt, failure_of
+from antdrive.runs.failures.hunt import METHODS, Finding, Hunt, find_failures
 from antdrive.runs.pool import Pool
 from antdrive.sim import Scenario, run
 from benchmarks.resuming import append_line, current_commit, read_lines
@@ -100,7 +98,9 @@ def repeats(finding: Finding) -> bool:
     """Whether a failure gives the same bits again, fails in the same way, and has a path."""
     done = run(finding.scenario)
     room = feasible(finding.scenario.task, finding.scenario.inflate)
-    return room and fingerprint_of(done) == finding.fingerprint and failure_of(done) == finding.failure
+    return (
+        room and Attempt(done.scenario, done).fingerprint == finding.fingerprint and failure_of(done) == finding.failure
+    )
 
 
 def searched(arguments: argparse.Namespace, asked: Sequence[tuple[Any, ...]]) -> list[Search]:

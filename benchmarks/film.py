@@ -19,9 +19,8 @@ import numpy as np
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
-from antdrive.views.film.parallel import process_count
 from antdrive.views.film.shot import Shot
-from antdrive.views.film.video import film
+from antdrive.views.film.video import film, process_count
 from benchmarks.tables import command_line
 
 SMALLEST = ("--rounds 1 --seconds 0.2 --frames 2", "--sight --rounds 1 --frames 2", "--memory --seconds 0.2")

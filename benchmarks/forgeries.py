@@ -25,7 +25,7 @@ from antdrive.planners import load_planner
 from antdrive.robots import load_robot
 from antdrive.sim import Rollout, Scenario, certify, run
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.log.binding import differences
+from antdrive.sim.log.record import differences
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
 from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
 from benchmarks.tables import command_line, print_table

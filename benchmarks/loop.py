@@ -17,8 +17,8 @@ import numpy as np
 
 from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
 from antdrive.sim import Perception
-from antdrive.sim.driving.following import OnePath, follow
-from antdrive.sim.driving.perception import Told
+from antdrive.sim.driving.drive import OnePath, follow
+from antdrive.sim.driving.others import Told
 from antdrive.sim.driving.rules import Avoid
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import Engine

@@ -14,9 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.runs.margins.choice import choose_margin, with_chosen_margin
-from antdrive.runs.margins.prediction import Calibration
-from antdrive.runs.margins.trial import Conditions
+from antdrive.runs.margins.choice import Calibration, choose_margin, with_chosen_margin
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import generate
@@ -89,7 +87,7 @@ def main() -> None:
     robots, smoothings = arguments.robots.split(","), arguments.smoothings.split(",")
     noises = map(float, arguments.noises.split(","))
     for robot, noise, smoothing in itertools.product(robots, noises, smoothings):
-        calibration = choose_margin(Conditions.of(scenario("forest", FIRST_SEED, robot, noise, smoothing)))
+        calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).loss_conditions)
         worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]
         calls = [partial(drive, *world, robot, noise, smoothing, arguments.fixed) for world in worlds]
         drives = call_all(calls, arguments.jobs)

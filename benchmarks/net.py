@@ -610,7 +610,7 @@ TASKS = {
     "worlds": ["forest", "w.yaml"],
     "planners": ["astar"],
     "robots": ["turtlebot", "jackal"],
-    "routes": ["clearance", "none"],
+    "smoothing": ["clearance", "none"],
     "tasks": {"random": 2, "seed": 1, "min_distance": 3},
     "settings": {"unseen": [[], [{"x": 3.0, "y": 3.0, "radius": 0.2}]]},
     "rollouts": "failed",

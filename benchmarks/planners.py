@@ -90,11 +90,13 @@ def solve(planner: Planner, query: Query, seed: int) -> PlanResult:
 # Tables
 
 
-def summary(planner: Planner, queries: Sequence[Query]) -> tuple[int, list[float], float]:
-    """How many arrived, the gaps of these, and the median time."""
+def summary(planner: Planner, queries: Sequence[Query]) -> tuple[str, str, str]:
+    """How many arrived, the gaps of these (median / most), and the median time, once the planner is compiled."""
+    solve(planner, queries[0], 0)
     results = [solve(planner, query, seed) for seed, query in enumerate(queries)]
     gaps = [r.cost / optimum(q) - 1 for r, q in zip(results, queries, strict=True) if r.solved]
-    return len(gaps), gaps, statistics.median(r.wall_s for r in results)
+    gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
+    return f"{len(gaps)}/{len(queries)}", gap, seconds(statistics.median(r.wall_s for r in results))
 
 
 def quality(quick: bool) -> Iterator[str]:
@@ -108,13 +110,8 @@ def quality(quick: bool) -> Iterator[str]:
         for name, planner in PLANNERS.items():
             if capabilities_of(planner).needs_world and make is random_grid:
                 continue
-            solve(planner, queries[20][0], 0)  # compiled before it is timed
-            row = [f"`{name}`"]
-            for size in sizes:
-                arrived, gaps, wall = summary(planner, queries[size])
-                gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
-                row.append(f"{arrived}/{len(seeds)}, {gap}, {seconds(wall)}")
-            rows.append(row)
+            solve(planner, queries[20][0], 0)  # compiled where a query is small
+            rows.append([f"`{name}`", *(", ".join(summary(planner, queries[size])) for size in sizes)])
         yield f"{kind.capitalize()}; arrived, gap median / most, time"
         yield ""
         yield from table(heads, rows)
@@ -131,13 +128,10 @@ def hard(quick: bool) -> Iterator[str]:
         "100×100, in a cup": lambda seed: cup(100),
     }
     planner, rows = load_planner("ants"), []
-    solve(planner, cup(20), 0)
     for label, make in kinds.items():
         queries = [make(seed) for seed in SEEDS[: 2 if quick else 5]]
-        arrived, gaps, wall = summary(planner, queries)
-        gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
         length = statistics.median(len(solve(load_planner("astar"), query, 0).cells) for query in queries)
-        rows.append([label, f"{length:.0f}", f"{arrived}/{len(queries)}", gap, seconds(wall)])
+        rows.append([label, f"{length:.0f}", *summary(planner, queries)])
     yield from table(["map", "cells of the shortest way", "`ants` arrived", "gap median / most", "time"], rows)
 
 
@@ -188,28 +182,16 @@ def papers(quick: bool) -> Iterator[str]:
     for paper, place, name, options, queries, printed in paper_maps(quick):
         row = [paper, place, f"`{name}`", printed]
         helped = load_planner(name, **{**options, "iterations": 100, "backtrack": True, "shortcut": True})
-        for planner in (load_planner(name, **options), helped, load_planner("ants")):
-            solve(planner, queries[0], 0)
-            arrived, gaps, wall = summary(planner, queries)
-            gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
-            row.append(f"{arrived}/{len(queries)}, {gap}, {seconds(wall)}")
+        planners = (load_planner(name, **options), helped, load_planner("ants"))
+        row += [", ".join(summary(planner, queries)) for planner in planners]
         row.insert(4, f"{statistics.median(map(optimum, queries)):.1f}")
         rows.append(row)
     yield "Recreated maps; arrived, gap median / most, time"
     yield ""
-    yield from table(
-        [
-            "paper",
-            "map",
-            "planner",
-            "printed",
-            "shortest here",
-            "by the paper",
-            "backtrack, shortcut, 100 iterations",
-            "`ants`",
-        ],
-        rows,
+    heads = (
+        "paper | map | planner | printed | shortest here | by the paper | backtrack, shortcut, 100 iterations | `ants`"
     )
+    yield from table(heads, rows)
 
 
 # hasan's environments, 50×50
@@ -301,15 +283,8 @@ def han2007(quick: bool) -> Iterator[str]:
             solved = [r for r in results if r.solved]
             line = f"{statistics.mean(r.length or r.cost for r in solved):.3f}" if solved else "–"
             grid = f"{statistics.mean(r.cost for r in solved):.3f}" if solved else "–"
-            rows.append(
-                [
-                    f"`{name}`",
-                    f"{len(solved)}/{len(results)}",
-                    grid,
-                    line,
-                    seconds(statistics.median(r.wall_s for r in results)),
-                ]
-            )
+            wall = seconds(statistics.median(r.wall_s for r in results))
+            rows.append([f"`{name}`", f"{len(solved)}/{len(results)}", grid, line, wall])
     yield from table(["the same map", "arrived", "path of cells", "line driven", "time"], rows)
 
 
@@ -427,11 +402,8 @@ def peer(quick: bool, python: str) -> Iterator[str]:
             ratio = statistics.median(t / w for (t, _), w in zip(answers, walls, strict=True))
             longer = sum(r.cost > length + 1e-9 for r, length in zip(results, lengths, strict=True))
             wall = statistics.median(walls)
-            label = (
-                f"`{name}`"
-                + (", its settings" if options else "")
-                + (", backtrack, shortcut" if "backtrack" in options else "")
-            )
+            words = [", its settings"] * bool(options) + [", backtrack, shortcut"] * ("backtrack" in options)
+            label = f"`{name}`{''.join(words)}"
             rows.append([kind, label, f"{len(gap)}/{len(seeds)}", percent(statistics.median(gap)), seconds(wall), f"{ratio:,.0f}",
                          str(longer)])  # fmt: skip
     yield from table(["grid", "planner", "arrived", "gap", "time", "times faster", "longer than the peer's"], rows)

@@ -23,7 +23,7 @@ from antdrive.planners import Query
 from antdrive.runs.papers.experiments import Experiment, ibraheem2016
 from antdrive.runs.papers.maps import blocks, scattered
 from antdrive.runs.papers.trials import Trial, solve
-from antdrive.runs.statistics.bootstrap import medians_by_world
+from antdrive.runs.statistics.intervals import medians_by_world
 from antdrive.runs.statistics.significance import wilcoxon
 from benchmarks.tables import chosen, command_line
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from operator import itemgetter
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
+
+import yaml
 
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.robots.importing.urdf import import_urdf
@@ -21,48 +23,13 @@ from benchmarks.drives import barn_tasks
 from benchmarks.tables import command_line, print_table
 from tools.shared_data import BARN
 
-URDF = Path(__file__).parent.parent / "tests" / "robots" / "importing" / "urdf"
+HERE = Path(__file__).parent
+URDF = HERE.parent / "tests" / "robots" / "importing" / "urdf"
 SMALLEST = ("",)
-#: What public specifications say of the robots that the URDF files are made after [m, kg, m/s, rad/s, m/s2, rad/s2, N m]. A
-#: value that no specification has is left out. The sources are those of the catalogue's robots of the same name.
-SPECIFICATIONS: Mapping[str, Mapping[str, float]] = MappingProxyType(
-    {
-        "burger.urdf": {
-            "length": 0.138, "width": 0.178, "height": 0.192, "mass": 1.0, "wheel_radius": 0.033, "track": 0.160,
-            "max_speed": 0.22, "max_yaw_rate": 2.84, "wheel_torque": 1.4,
-        },
-        "waffle.urdf": {
-            "length": 0.281, "width": 0.306, "height": 0.141, "mass": 1.8, "wheel_radius": 0.033, "track": 0.287,
-            "max_speed": 0.26, "max_yaw_rate": 1.82, "max_wheel_speed": 8.06, "wheel_torque": 2.7,
-        },
-        "turtlebot4.urdf": {
-            "length": 0.341, "width": 0.339, "height": 0.351, "mass": 3.9, "wheel_radius": 0.03575, "track": 0.233,
-            "max_speed": 0.31, "max_yaw_rate": 1.90, "max_acceleration": 0.9, "max_yaw_acceleration": 7.725,
-            "max_wheel_speed": 12.867,
-        },
-        "pioneer3dx.urdf": {
-            "length": 0.455, "width": 0.381, "height": 0.237, "mass": 9.0, "wheel_radius": 0.0975, "track": 0.331,
-            "swing radius": 0.267, "max_speed": 1.2, "max_yaw_rate": 5.236,
-        },
-        "warehouse.urdf.xacro": {
-            "length": 0.9, "width": 0.6, "height": 0.352, "mass": 70.0, "wheel_radius": 0.0625, "track": 0.445,
-            "max_speed": 1.5, "max_yaw_rate": 1.5, "max_acceleration": 2.0, "max_yaw_acceleration": 2.5,
-        },
-        "husky.urdf": {
-            "length": 0.990, "width": 0.670, "height": 0.39, "mass": 50.0, "wheel_radius": 0.1651, "track": 0.5708,
-            "max_speed": 1.0, "max_yaw_rate": 2.0, "max_acceleration": 3.0, "max_yaw_acceleration": 6.0,
-        },
-    }
-)  # fmt: skip
+#: Of each URDF file what public specifications say, and the units.
+SPECIFICATIONS, UNITS = itemgetter("robots", "units")(yaml.safe_load((HERE / "specifications.yaml").read_text()))
 #: What the import asks for where a file leaves it open: a vehicle with two axles turns about one of them.
-TOLD: Mapping[str, Mapping[str, Any]] = MappingProxyType(
-    {"husky.urdf": {"left": "rear_left_wheel", "right": "rear_right_wheel"}}
-)
-UNITS = {
-    "length": "m", "width": "m", "height": "m", "mass": "kg", "wheel_radius": "m", "track": "m", "swing radius": "m",
-    "max_speed": "m/s", "max_yaw_rate": "rad/s", "max_acceleration": "m/s²", "max_yaw_acceleration": "rad/s²",
-    "max_wheel_speed": "rad/s", "wheel_torque": "N m",
-}  # fmt: skip
+TOLD: dict[str, dict[str, Any]] = {"husky.urdf": {"left": "rear_left_wheel", "right": "rear_right_wheel"}}
 
 
 def importable() -> list[str]:

@@ -23,7 +23,7 @@ import numpy as np
 from antdrive.planners import Query, load_planner
 from antdrive.worlds import Disc, Grid, World, rasterise
 from antdrive.worlds.formats.movingai import import_movingai_map, import_movingai_problems
-from benchmarks.tables import command_line, missing
+from benchmarks.tables import command_line, missing, print_table
 from tools.shared_data import MOVINGAI as ARCHIVE
 
 try:
@@ -275,23 +275,24 @@ def main() -> None:
     fresh = one_shot(given.fresh, rng)
     ours = SOLVERS[0].name
 
+    heads = ["solver", *maps, "fresh 100×100 map, one query"]
     print(f"Median of {queries} queries, ms\n")
-    print("| solver |", " | ".join(maps), "| fresh 100×100 map, one query |")
-    print("|---" * (len(maps) + 2) + "|")
+    times, ratios = [], []
     for s in SOLVERS:
-        cells = [f"{statistics.median(r[s.name].seconds) * 1e3:.3f}" if s.name in r else "" for r in results.values()]
-        last = f"{statistics.median(fresh[s.name]) * 1e3:.3f}" if s.name in fresh else ""
-        print(f"| {s.name} |", " | ".join([*cells, last]), "|")
-    print("\nTime relative to `astar`: median of the ratios query by query / ratio of the sums\n")
-    print("| solver |", " | ".join(maps), "| fresh 100×100 map, one query | corners cut | over its own optimum |")
-    print("|---" * (len(maps) + 4) + "|")
-    for s in SOLVERS:
-        cells = [ratio(r[s.name].seconds, r[ours].seconds) if s.name in r else "" for r in results.values()]
-        last = ratio(fresh[s.name], fresh[ours]) if s.name in fresh else ""
-        rows = [r[s.name] for r in results.values() if s.name in r]
+        found = [r.get(s.name) for r in results.values()]
+        rows = [row for row in found if row]
         cut, over = sum(row.cut for row in rows), max(row.over for row in rows)
         share = f"in {cut} of {queries * len(rows)} paths" if cut else "none"
-        print(f"| {s.name} |", " | ".join([*cells, last, share, f"{over:.1%}"]), "|")
+        new = s.name in fresh
+        last = f"{statistics.median(fresh[s.name]) * 1e3:.3f}" if new else ""
+        times.append([s.name, *(f"{statistics.median(row.seconds) * 1e3:.3f}" if row else "" for row in found), last])
+        cells = [
+            ratio(row.seconds, r[ours].seconds) if row else "" for row, r in zip(found, results.values(), strict=True)
+        ]
+        ratios.append([s.name, *cells, ratio(fresh[s.name], fresh[ours]) if new else "", share, f"{over:.1%}"])
+    print_table(heads, times)
+    print("Time relative to `astar`: median of the ratios query by query / ratio of the sums\n")
+    print_table([*heads, "corners cut", "over its own optimum"], ratios)
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ from antdrive.runs.campaigns import sweep
 from antdrive.runs.campaigns.results import SweepResults
 from antdrive.runs.statistics.price import Ratio, prices
 from antdrive.runs.statistics.runs import RunTable
-from antdrive.views.film.failures import film_failures
+from antdrive.views.film.video import film_failures
 from benchmarks.tables import command_line, missing, print_tables, table
 from tools.shared_data import BARN
 

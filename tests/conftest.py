@@ -1,14 +1,13 @@
 """Robots, tasks and runs that many tests share."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import hypothesis
 import pytest
 
 from antdrive.planners import load_planner
-from antdrive.robots import RobotSpec, load_robot
-from antdrive.sim import Run, Scenario, run
+from antdrive.robots import load_robot
+from antdrive.sim import Scenario, run
 from antdrive.worlds import Disc, Task, World
 from tests.made_up_drive import made_up_drive as made_up_drive
 
@@ -19,7 +18,7 @@ hypothesis.settings.load_profile("repeatable")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def kernels_are_compiled_when_called() -> Iterator[None]:
+def kernels_are_compiled_when_called():
     """`make test` compiles all kernels before. Without it a test compiles those that it calls, not all in its first command."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("antdrive.cli.warm.is_warm", lambda: True)
@@ -27,36 +26,41 @@ def kernels_are_compiled_when_called() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def turtlebot() -> RobotSpec:
+def turtlebot():
     return load_robot("turtlebot")
 
 
 @pytest.fixture(scope="session")
-def jackal() -> RobotSpec:
+def jackal():
     return load_robot("jackal")
 
 
+@pytest.fixture(scope="session", params=["turtlebot", "jackal"])
+def spec(request):
+    """Each of two robots: a disc and a rectangle."""
+    return load_robot(request.param)
+
+
 @pytest.fixture(scope="session")
-def small_task() -> Task:
+def small_task():
     """A start and a goal with one cylinder between them."""
     world = World("small", (0.0, 0.0, 4.0, 3.0), (Disc(2.0, 1.5, 0.3),))
     return Task(world, (0.6, 1.4, 0.0), (3.4, 1.6), cell=0.2)
 
 
 @pytest.fixture(scope="session")
-def small_scenario(small_task: Task, turtlebot: RobotSpec) -> Scenario:
+def small_scenario(small_task, turtlebot):
     return Scenario(task=small_task, planner=load_planner("astar"), planner_name="astar", robot=turtlebot)
 
 
 @pytest.fixture(scope="session")
-def small_run(small_scenario: Scenario) -> Run:
+def small_run(small_scenario):
     return run(small_scenario)
 
 
 @pytest.fixture(scope="session")
-def collided_run(small_scenario: Scenario) -> Run:
+def collided_run(small_scenario):
     """The small run again, with a cylinder on its way that the planner does not know of."""
     clean = run(small_scenario)
-    assert clean.rollout is not None
     x, y = clean.rollout.pose[len(clean.rollout.pose) // 2, :2]
     return run(replace(small_scenario, unseen=(Disc(float(x), float(y), 0.1),)))

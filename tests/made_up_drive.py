@@ -1,10 +1,7 @@
 """What the tests of films and figures share: a made-up drive along a smooth curve among cylinders, without physics."""
 
-from __future__ import annotations
-
-import dataclasses
 import math
-from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,28 +9,22 @@ import pytest
 from antdrive.robots import load_robot
 from antdrive.robots.spec import Footprint
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import ComponentRecord
-from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.record import ComponentRecord, SensingRecord
+from antdrive.sim.log.rollout import millimetres
+from antdrive.sim.sensing import Scanner
 from antdrive.worlds.movers import Cruising
 from antdrive.worlds.world import Disc, Task, World
-from tests.records import made_up_record
+from tests.records import made_up_log, made_up_record
 
 
 @pytest.fixture(scope="session")
-def made_up_drive() -> Callable[..., Rollout]:
+def made_up_drive():
     return _made_up_drive
 
 
 def _made_up_drive(
-    *,
-    obstacles: int = 20,
-    seconds: float = 1.0,
-    collide: bool = False,
-    square: bool = False,
-    movers: int = 0,
-    size: tuple[float, float] = (4.0, 3.0),
-    outcome: str = "succeeded",
-) -> Rollout:
+    *, obstacles=20, seconds=1.0, collide=False, square=False, movers=0, size=(4.0, 3.0), outcome="succeeded"
+):
     """A rollout with a record of the usual form; `collide` puts a cylinder in the way and ends there."""
     rng = np.random.default_rng(7)
     hz, radius = 240, 0.18
@@ -45,7 +36,7 @@ def _made_up_drive(
     yaw = np.unwrap(np.arctan2(np.gradient(y, x + 1e-9 * t), 1.0))
     pose = np.column_stack([x, y, yaw])
     twist = np.column_stack([np.hypot(dx, dy), np.gradient(yaw, t)])
-    found: list[dict[str, float]] = []
+    found = []
     for _ in range(20000):
         if len(found) == obstacles:
             break
@@ -75,7 +66,7 @@ def _made_up_drive(
     )
     start_x, start_y, start_yaw = pose[0].tolist()
     task = Task(world, (start_x, start_y, start_yaw), (float(x[-1]), float(y[-1])), goal_tolerance=0.2, cell=0.25)
-    robot = dataclasses.replace(
+    robot = replace(
         load_robot("turtlebot"),
         footprint=Footprint(half_length=0.2, half_width=0.15) if square else Footprint.disc(radius),
         height=0.2,
@@ -93,16 +84,32 @@ def _made_up_drive(
     places = np.empty((len(t), movers, 2))
     for m, position in enumerate(here):
         places[:, m] = np.column_stack([position[0] + 0 * t, position[1] + 0.5 * t])
-    return Rollout(
-        t=t,
-        pose=pose,
-        twist=twist,
-        command=twist * 1.01,
-        clearance=np.minimum(away.min(axis=1, initial=9.0), walls),
-        limiter=(np.abs(twist[:, 1]) > 1).astype(np.uint8),
-        movers=places,
-        contacts=contacts,
+    return made_up_log(
+        pose, hz, record, twist=twist, command=twist * 1.01, clearance=np.minimum(away.min(axis=1, initial=9.0), walls),
+        limiter=(np.abs(twist[:, 1]) > 1).astype(np.uint8), movers=places, contacts=contacts,
         route=np.column_stack([x, y])[::24],
-        cells=np.empty((0, 2), dtype=np.int32),
-        record=record,
+    )  # fmt: skip
+
+
+def scanned(drive, **changes):
+    """The drive of a robot without a map and without noise; `changes` are of its lidar."""
+    lidar = drive.record.robot.lidar
+    exact = replace(lidar, **{"sigma": 0.0, "resolution": 0.0, "rate": 10.0, **changes})
+    rows = np.arange(0, len(drive.t), round(drive.record.physics_hz / exact.rate), dtype=np.int32)
+    scanner = Scanner.of(exact, drive.record.world)
+    x, y, yaw = drive.pose.T
+    radii = np.array([mover.radius for mover in drive.record.world.movers])
+    scans = [millimetres(scanner.scan((float(x[k]), float(y[k]), float(yaw[k])), drive.movers[k], radii)) for k in rows]
+    record = replace(
+        drive.record,
+        robot=replace(drive.record.robot, lidar=exact),
+        sensing=SensingRecord(map="none", localisation="true", odometry=1.0),
     )
+    return replace(drive, record=record, scans=np.array(scans), scan_rows=rows)
+
+
+def undriven(drive):
+    """The log of a run that ended before the robot drove."""
+    names = ("t", "pose", "twist", "command", "clearance", "limiter", "movers", "route")
+    record = replace(drive.record, outcome=Outcome.NO_PATH)
+    return replace(drive, record=record, **{name: getattr(drive, name)[:0] for name in names})

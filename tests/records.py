@@ -1,27 +1,25 @@
-"""A record of a drive that was never driven, for tests that make up a log."""
+"""Records and logs of drives that were never driven, and changes of what is frozen."""
 
-from typing import Any
+from dataclasses import replace
+
+import numpy as np
 
 from antdrive.robots import load_robot
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ComponentRecord, DriveRecord, PlanRecord, SmoothingRecord, TimesRecord
+from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds import Task, World
 
 
-def made_up_record(**changes: Any) -> DriveRecord:
+def made_up_record(**changes):
     """The record of a plain success from (1, 1) to (5, 1) in an empty world; `changes` replace its fields."""
-    values: dict[str, Any] = {
+    values = {
         "task": Task(World("made-up", (0.0, 0.0, 6.0, 4.0)), (1.0, 1.0, 0.0), (5.0, 1.0)),
         "unseen": (),
         "seed": 0,
         "planner": ComponentRecord(name="astar", settings={}),
         "plan": PlanRecord(
-            cost_m=4.0,
-            length_m=4.0,
-            grid_optimum_m=4.0,
-            euclidean_optimum_m=4.0,
-            work=17,
-            work_unit="cells expanded",
+            cost_m=4.0, length_m=4.0, grid_optimum_m=4.0, euclidean_optimum_m=4.0, work=17, work_unit="cells expanded"
         ),
         "robot": load_robot("turtlebot"),
         "controller": ComponentRecord(name="PurePursuit", settings={}),
@@ -44,3 +42,21 @@ def made_up_record(**changes: Any) -> DriveRecord:
         "times": TimesRecord(plan_s=0.25, drive_wall_s=1.5, replans_s=()),
     }
     return DriveRecord(**{**values, **changes})
+
+
+def changed(of, place, **values):
+    """A frozen record with other values at a place within it, as in `changed(log, "record.task.world", movers=())`."""
+    name, _, rest = place.partition(".")
+    inner = getattr(of, name)
+    return replace(of, **{name: changed(inner, rest, **values) if rest else replace(inner, **values)})
+
+
+def made_up_log(pose, hz, record, **arrays):
+    """The log of poses (T, 3) at a rate [1/s]; what `arrays` leave out is at rest, clear by 1 m, and empty."""
+    rows = len(pose)
+    given = {
+        "t": np.arange(rows) / hz, "twist": np.zeros((rows, 2)), "command": np.zeros((rows, 2)), "clearance": np.ones(rows),
+        "limiter": np.zeros(rows, np.uint8), "movers": np.empty((rows, 0, 2)), "contacts": np.empty((0, 4)),
+        "route": np.array(pose)[[0, -1], :2], "cells": np.empty((0, 2), np.int32), **arrays,
+    }  # fmt: skip
+    return Rollout(pose=pose, record=record, **given)

@@ -1,19 +1,17 @@
 """Whatever is added to a registry is finished: each step of CONTRIBUTING's checklists that can be forgotten has a test."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
 import pytest
 
 from antdrive import Outcome, Scenario, list_robots, load_robot, run
-from antdrive.cli.commands.worlds.import_ import import_world
+from antdrive.cli.commands.worlds import import_world
 from antdrive.robots import LIMITERS
 from antdrive.robots.control import _kernels_pursuit as rules
 from antdrive.sim.log.metrics import METRICS
-from antdrive.views.figures.curves import LIMITER_COLOURS
-from antdrive.views.style import VERDICTS
+from antdrive.views.colours import VERDICTS
+from antdrive.views.figures.run_figures import LIMITER_COLOURS
 from antdrive.worlds import IMPORTS
 
 ROOT = Path(__file__).parent.parent
@@ -22,7 +20,7 @@ CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
 
 
 @pytest.mark.parametrize("name", list_robots())
-def test_a_robot_of_the_catalogue_has_a_source_and_noise_and_drives(name: str) -> None:
+def test_a_robot_of_the_catalogue_has_a_source_and_noise_and_drives(name):
     robot = load_robot(name)
     assert robot.source, "the file says after which specification it is made"
     assert robot.noise.nonzero, "the file documents the robot's noise"
@@ -31,21 +29,21 @@ def test_a_robot_of_the_catalogue_has_a_source_and_noise_and_drives(name: str) -
 
 
 @pytest.mark.parametrize("name", METRICS)
-def test_a_metric_has_a_unit_and_a_definition(name: str) -> None:
+def test_a_metric_has_a_unit_and_a_definition(name):
     metric = METRICS[name]
     assert metric.unit
     assert metric.definition.endswith(".")
 
 
 @pytest.mark.parametrize("name", IMPORTS)
-def test_a_world_format_has_a_module_tests_and_a_place_in_the_help(name: str) -> None:
+def test_a_world_format_has_a_module_tests_and_a_place_in_the_help(name):
     assert (ROOT / "worlds" / "formats" / f"{name}.py").exists()
     assert (ROOT / "tests" / "worlds" / "formats" / f"test_{name}.py").exists()
     text = f"{import_world.__doc__} {GUIDES['worlds']}".lower().replace("_", "")
     assert name.replace("_", "") in text
 
 
-def test_a_limiter_has_a_colour_and_an_index_in_the_kernels() -> None:
+def test_a_limiter_has_a_colour_and_an_index_in_the_kernels():
     assert len(set(LIMITERS)) == len(LIMITERS)
     assert len(LIMITER_COLOURS) >= len(LIMITERS)
     constants = {name: value for name, value in vars(rules).items() if name.isupper() and isinstance(value, int)}
@@ -54,12 +52,12 @@ def test_a_limiter_has_a_colour_and_an_index_in_the_kernels() -> None:
 
 
 @pytest.mark.parametrize("outcome", Outcome)
-def test_an_outcome_has_a_verdict(outcome: Outcome) -> None:
+def test_an_outcome_has_a_verdict(outcome):
     assert outcome in VERDICTS
     assert not outcome.value.endswith("."), "the sentence continues in messages"
 
 
-def test_the_checklists_name_files_that_exist() -> None:
+def test_the_checklists_name_files_that_exist():
     named = re.findall(r"`((?:worlds|planners|robots|sim|tests|docs)/[\w/.-]*\w)/?`", CONTRIBUTING)
     assert len(named) > 10
     assert [path for path in named if not (ROOT / path).exists()] == []

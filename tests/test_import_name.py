@@ -1,7 +1,10 @@
-"""`antdrive` is the only name that the distribution installs, and works beside anybody's own packages."""
+"""The distribution: the set-up command, one version, one name that works beside anybody's own packages."""
 
 import importlib
 import os
+import re
+import shutil
+import stat
 import subprocess
 import sys
 import tarfile
@@ -10,9 +13,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 
 import antdrive
 from antdrive.worlds import load_task, save_task
+from tools.dist import built, version_of
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
@@ -26,7 +31,7 @@ def test_a_drive(drive):
 """
 
 
-def called(*words: str | Path, cwd: Path, **variables: str) -> str:
+def called(*words, cwd, **variables):
     """What a command prints; it must succeed. It knows nothing of how these tests were started."""
     clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "PYTEST", "VIRTUAL_ENV"))}
     done = subprocess.run(
@@ -37,7 +42,7 @@ def called(*words: str | Path, cwd: Path, **variables: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wheel(tmp_path_factory):
     from hatchling.builders.wheel import WheelBuilder
 
     (built,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path_factory.mktemp("wheel")), versions=["standard"])
@@ -45,9 +50,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module", params=["editable", "wheel"])
-def installed(
-    request: pytest.FixtureRequest, wheel: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, Path]:
+def installed(request, wheel, tmp_path_factory):
     """The Python of a fresh environment with antdrive and a project whose packages have the rooms' names, and that project.
 
     The project comes last on the import path: whatever antdrive's installation makes importable hides it.
@@ -70,7 +73,7 @@ def installed(
     return python, project
 
 
-def test_a_project_with_packages_of_the_same_names_imports_its_own(installed: tuple[Path, Path]) -> None:
+def test_a_project_with_packages_of_the_same_names_imports_its_own(installed):
     python, project = installed
     code = (
         f"import {', '.join(ROOMS)}, tests, antdrive; print(sim.OWNER, antdrive.__file__)\nimport antdrive.sim.pipeline"
@@ -87,21 +90,21 @@ def test_a_project_with_packages_of_the_same_names_imports_its_own(installed: tu
     assert all(Path(place).is_relative_to(project) for place in places.split())
 
 
-def test_a_project_with_packages_of_the_same_names_tests_its_drives(installed: tuple[Path, Path]) -> None:
+def test_a_project_with_packages_of_the_same_names_tests_its_drives(installed):
     """Kernels run as plain Python: the wheel's are not compiled."""
     python, project = installed
     assert called(python.with_name("antdrive"), "--version", cwd=project).startswith("antdrive ")
     assert "2 passed" in called(python, "-m", "pytest", "-q", "-W", "ignore", cwd=project, NUMBA_DISABLE_JIT="1")
 
 
-def test_the_offered_names_and_the_rooms_are_there() -> None:
+def test_the_offered_names_and_the_rooms_are_there():
     for name in antdrive.__all__:
         assert getattr(antdrive, name) is not None
     for room in ROOMS:
         assert importlib.import_module(f"antdrive.{room}") is getattr(antdrive, room)
 
 
-def test_importing_antdrive_loads_nothing_heavy(tmp_path: Path) -> None:
+def test_importing_antdrive_loads_nothing_heavy(tmp_path):
     code = (
         "import sys, antdrive, antdrive.worlds, antdrive.planners, antdrive.robots, antdrive.sim\n"
         "print([m for m in ('numpy', 'numba', 'pybullet', 'matplotlib', 'PIL', 'pydantic') if m in sys.modules])"
@@ -109,7 +112,7 @@ def test_importing_antdrive_loads_nothing_heavy(tmp_path: Path) -> None:
     assert called(sys.executable, "-c", code, cwd=tmp_path) == "[]\n"
 
 
-def test_a_wheel_holds_one_name_with_all_it_needs(wheel: Path) -> None:
+def test_a_wheel_holds_one_name_with_all_it_needs(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"antdrive"}
@@ -119,7 +122,7 @@ def test_a_wheel_holds_one_name_with_all_it_needs(wheel: Path) -> None:
     assert "antdrive/py.typed" in names
 
 
-def test_the_source_distribution_holds_each_file_once(tmp_path: Path) -> None:
+def test_the_source_distribution_holds_each_file_once(tmp_path):
     from hatchling.builders.sdist import SdistBuilder
 
     (built,) = SdistBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
@@ -130,10 +133,160 @@ def test_the_source_distribution_holds_each_file_once(tmp_path: Path) -> None:
     assert "tests/test_import_name.py" in names
 
 
-def test_a_package_called_tests_elsewhere_hides_none_of_these(tmp_path: Path) -> None:
+def test_a_package_called_tests_elsewhere_hides_none_of_these(tmp_path):
     """Processes that tests start import `tests`, and some distributions install a package by that name."""
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "__init__.py").touch()
     code = "import tests.worlds.malformed as found; print(found.__file__)"
     found = called(sys.executable, "-c", code, cwd=ROOT, PYTHONPATH=str(tmp_path))
     assert found == f"{ROOT / 'tests' / 'worlds' / 'malformed.py'}\n"
+
+
+VERSION = version_of((ROOT / "pyproject.toml").read_text())
+DATED = re.findall(r"^## (\d\S*) - (\d{4}-\d\d-\d\d)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+
+
+def parsed(path):
+    return yaml.safe_load(path.read_text())
+
+
+def test_the_version_is_the_same_everywhere():
+    citation = parsed(ROOT / "CITATION.cff")
+    assert (citation["version"], str(citation["date-released"])) == (VERSION, DATED[0][1])
+    assert DATED[0][0] == VERSION
+
+
+def test_the_changelog_has_dated_sections_below_what_is_unreleased():
+    heads = re.findall(r"^## (.+)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert heads == ["Unreleased", *(f"{version} - {date}" for version, date in DATED)]
+
+
+def test_the_version_is_read_from_the_project_and_nowhere_else():
+    assert version_of('[tool.x]\nversion = "9"\n\n[project]\nname = "a"\nversion = "1.2"\n') == "1.2"
+    with pytest.raises(ValueError, match="states no version"):
+        version_of('[project]\nname = "a"\n\n[tool.x]\nversion = "9"\n')
+
+
+def test_the_workflow_runs_what_everybody_runs():
+    (job,) = parsed(ROOT / ".github" / "workflows" / "ci.yml")["jobs"].values()
+    assert [step["run"] for step in job["steps"] if "run" in step] == [".ci/run"]
+    assert (ROOT / ".ci" / "run").stat().st_mode & 0o111
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml")) if path.stem != "config"],
+    ids=lambda path: path.stem,
+)
+def test_a_form_for_issues_is_one(path):
+    form = parsed(path)
+    assert form["name"]
+    assert form["description"]
+    questions = [part for part in form["body"] if part["type"] != "markdown"]
+    assert {part["type"] for part in questions} <= {"textarea", "input", "dropdown", "checkboxes"}
+    assert len({part["id"] for part in questions}) == len(questions)
+    assert all(part["attributes"]["label"] for part in questions)
+    assert any(part.get("validations", {}).get("required") for part in questions)
+
+
+def test_a_folder_that_holds_something_else_is_no_distribution(tmp_path):
+    with pytest.raises(ValueError, match="holds nothing; must hold antdrive-1-py3-none-any"):
+        built(tmp_path, "1")
+    for name in ("antdrive-1.tar.gz", "antdrive-1-py3-none-any.whl"):
+        (tmp_path / name).touch()
+    assert built(tmp_path, "1").suffix == ".whl"
+    (tmp_path / "antdrive-0.tar.gz").touch()
+    with pytest.raises(ValueError, match=r"holds antdrive-0\.tar\.gz, "):
+        built(tmp_path, "1")
+
+
+def test_make_knows_how_to_build_and_check_it():
+    done = subprocess.run(["make", "-n", "dist"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "-m build" in done.stdout
+    assert "-m tools.dist dist" in done.stdout
+
+
+SCRIPT = Path(__file__).parent.parent / "tools" / "find-python"
+# A Python that does not fit; like the one of a new Ubuntu it can install packages.
+UNFIT = """#!/bin/sh
+case "$*" in
+    *version_info*) exit 1 ;;
+    *"pip install"*) {pip} ;;
+    *) exit 1 ;;
+esac
+"""
+UV = """#!/bin/sh
+echo "$UV_PYTHON_INSTALL_DIR: $*" >> "$LOG"
+case "$*" in
+    "python find --managed-python 3.11") [ -e "$UV_PYTHON_INSTALL_DIR/python" ] && echo "$UV_PYTHON_INSTALL_DIR/python" ;;
+    "python install"*) {install} ;;
+    *) exit 2 ;;
+esac
+"""
+INSTALLS = 'mkdir -p "$UV_PYTHON_INSTALL_DIR" && : > "$UV_PYTHON_INSTALL_DIR/python"'
+
+
+def script(path, text):
+    path.write_text(text)
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+
+
+def find(folder, *, pip, install=INSTALLS, **environment):
+    """Run the script on a machine whose only Python does not fit."""
+    commands = folder / "bin"
+    commands.mkdir()
+    for name in ("sh", "cat", "mkdir", "cp", "chmod"):
+        (commands / name).symlink_to(shutil.which(name) or "")
+    script(commands / "python3", UNFIT.format(pip=pip))
+    script(folder / "uv", UV.format(install=install))
+    environment = {"PATH": str(commands), "LOG": str(folder / "log"), **environment}
+    return subprocess.run(["sh", str(SCRIPT)], cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_a_python_that_fits_is_used(tmp_path):
+    done = subprocess.run(
+        ["sh", str(SCRIPT)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHON": sys.executable},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout.strip(), done.stderr) == (0, sys.executable, "")
+    assert not (tmp_path / ".python").exists()
+
+
+def test_uv_is_fetched_from_the_index_and_installs_python_inside_the_checkout(tmp_path):
+    done = find(tmp_path, pip="mkdir -p .python/uv/bin && cp uv .python/uv/bin/uv")
+    assert (done.returncode, done.stdout.strip()) == (0, str(tmp_path / ".python/versions/python")), done.stderr
+    assert "into .python" in done.stderr
+    assert all(line.startswith(str(tmp_path / ".python")) for line in (tmp_path / "log").read_text().splitlines())
+
+
+@pytest.mark.parametrize(
+    ("pip", "install"), [("exit 1", INSTALLS), ("mkdir -p .python/uv/bin && cp uv .python/uv/bin/uv", "exit 1")],
+    ids=["no index", "no download"],
+)  # fmt: skip
+def test_where_nothing_can_be_fetched_it_says_how_to_get_a_python(tmp_path, pip, install):
+    done = find(tmp_path, pip=pip, install=install)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "apt-get install python3.11" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("fits", "made"), [(True, ["test", "test-slow", "docs"]), (False, ["test", "test-slow"])], ids=["3.11", "3.10"]
+)
+def test_integration_builds_the_site_where_python_is_new_enough_and_else_runs_its_pages(tmp_path, fits, made):
+    """A stand-in for the Python of .venv ends as 3.11 or 3.10 would on the question of the version."""
+    (tmp_path / "bin").mkdir()
+    script(tmp_path / "bin" / "make", '#!/bin/sh\necho "make $*"\n')
+    (tmp_path / ".venv" / "bin").mkdir(parents=True)
+    script(tmp_path / ".venv" / "bin" / "python", f'#!/bin/sh\necho "python $2"\nexit {int(fits)}\n')
+    (tmp_path / ".ci").mkdir()
+    shutil.copy(SCRIPT.parent.parent / ".ci" / "run", tmp_path / ".ci" / "run")
+    environment = {"PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}"}
+    done = subprocess.run([tmp_path / ".ci" / "run"], env=environment, capture_output=True, text=True, check=True)
+    assert [line.removeprefix("make ") for line in done.stdout.splitlines() if line.startswith("make ")] == made
+    assert ("needs Python 3.11" in done.stdout) is not fits
+    assert ("python tools.pages" in done.stdout) is not fits

@@ -5,7 +5,6 @@ import importlib
 import pkgutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -19,11 +18,11 @@ MODULES = sorted(path for room in RANKS for path in (ROOT / room).rglob("*.py"))
 HIDING = {"views.film"}
 
 
-def name_of(path: Path) -> str:
+def name_of(path):
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
-def nodes(tree: ast.AST, *, types: bool) -> Iterator[ast.AST]:
+def nodes(tree, *, types):
     """All nodes, inside functions too; `types`: also those for type checking alone."""
     if types or not (isinstance(tree, ast.If) and ast.unparse(tree.test) == "TYPE_CHECKING"):
         yield tree
@@ -31,9 +30,9 @@ def nodes(tree: ast.AST, *, types: bool) -> Iterator[ast.AST]:
             yield from nodes(child, types=types)
 
 
-def imported(path: Path, *, types: bool = True) -> set[str]:
+def imported(path, *, types=True):
     """The modules and names that a module imports."""
-    names: set[str] = set()
+    names = set()
     for node in nodes(ast.parse(path.read_text()), types=types):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
@@ -44,7 +43,7 @@ def imported(path: Path, *, types: bool = True) -> set[str]:
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_imports_go_one_way(path: Path) -> None:
+def test_imports_go_one_way(path):
     module = name_of(path)
     room = module.split(".")[0]
     for name in imported(path):
@@ -55,11 +54,11 @@ def test_imports_go_one_way(path: Path) -> None:
             assert other == room or RANKS[other] < RANKS[room], f"{module} imports {name}"
 
 
-def test_imports_have_no_circles() -> None:
+def test_imports_have_no_circles():
     """Neither modules nor folders; `graphlib` raises an error that names a circle."""
     known = {f"antdrive.{name_of(path)}": path for path in MODULES}
-    modules: dict[str, set[str]] = {}
-    folders: dict[Path, set[Path]] = {}
+    modules = {}
+    folders = {}
     for module, path in known.items():
         modules[module] = imported(path, types=False) & (set(known) - {module})
         for other in (known[one] for one in modules[module]):
@@ -70,13 +69,13 @@ def test_imports_have_no_circles() -> None:
     TopologicalSorter(folders).prepare()
 
 
-def test_pybullet_is_imported_by_one_module_and_numba_by_kernels() -> None:
+def test_pybullet_is_imported_by_one_module_and_numba_by_kernels():
     assert [path.name for path in MODULES if "pybullet" in imported(path)] == ["bullet.py"]
     assert all(path.name.startswith("_kernels") for path in MODULES if "numba" in imported(path))
 
 
 @pytest.mark.parametrize("room", [room for room in RANKS if (ROOT / room / "__init__.pyi").exists()])
-def test_every_offered_name_exists_and_hides_no_module(room: str) -> None:
+def test_every_offered_name_exists_and_hides_no_module(room):
     """`from antdrive.sim import run` means the same whether or not a module sim.run was imported before."""
     module = importlib.import_module(f"antdrive.{room}")
     submodules = {info.name for info in pkgutil.iter_modules(module.__path__)}
@@ -89,7 +88,7 @@ def test_every_offered_name_exists_and_hides_no_module(room: str) -> None:
 @pytest.mark.parametrize(
     "words", [["--help"], ["--version"], ["run", "--help"], ["planners", "--help"], ["robts"]], ids=" ".join
 )
-def test_light_commands_import_nothing_heavy(words: list[str]) -> None:
+def test_light_commands_import_nothing_heavy(words):
     code = (
         "import sys; from antdrive.cli.app import main\n"
         f"sys.argv = ['antdrive', *{words!r}]\n"

@@ -14,25 +14,25 @@ ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language):
     return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
 
 
 @pytest.fixture
-def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def home(tmp_path, monkeypatch):
     """An empty folder, in which commands are called. In this process, because each of its own would load all anew."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
+def exit_code(words, monkeypatch):
     monkeypatch.setattr(sys, "argv", words)
     with pytest.raises(SystemExit) as ended:
         main()
     return int(ended.value.code or 0)
 
 
-def test_the_python_block_is_ten_lines_that_run(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_python_block_is_ten_lines_that_run(home, capsys):
     (code,) = blocks("python")
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
     exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
@@ -40,7 +40,7 @@ def test_the_python_block_is_ten_lines_that_run(home: Path, capsys: pytest.Captu
     assert (home / "forest.npz").exists()
 
 
-def test_the_python_block_passes_mypy_strict(tmp_path: Path) -> None:
+def test_the_python_block_passes_mypy_strict(tmp_path):
     """With the project's own settings, which are strict: with others mypy would check all of antdrive, and once more after it."""
     (code,) = blocks("python")
     settings = ROOT / "pyproject.toml"
@@ -56,7 +56,7 @@ def test_the_python_block_passes_mypy_strict(tmp_path: Path) -> None:
     assert summary.startswith("Found 1 error in 1 file (checked 2 ")
 
 
-def test_the_commands_work(home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_commands_work(home, monkeypatch, capsys):
     lines = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
     commands = [(shlex.split(line.split("||")[0]), "||" in line) for line in lines if line.startswith("antdrive")]
     assert {fails for _, fails in commands} == {True, False}
@@ -71,7 +71,7 @@ def test_the_commands_work(home: Path, monkeypatch: pytest.MonkeyPatch, capsys: 
 
 
 @pytest.mark.parametrize("target", ["demo", "test"])
-def test_make_knows_the_two_commands(target: str) -> None:
+def test_make_knows_the_two_commands(target):
     assert f"make {target}" in TEXT
     done = subprocess.run(["make", "-n", target], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -88,10 +88,10 @@ PAGES = [
 ]
 
 
-PLACES: dict[Path, set[str]] = {}
+PLACES = {}
 
 
-def places(page: Path) -> set[str]:
+def places(page):
     """The anchors that GitHub, and the site, give to a page's headings."""
     if page not in PLACES:
         prose = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
@@ -101,7 +101,7 @@ def places(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_links_and_pictures_exist(page: str) -> None:
+def test_links_and_pictures_exist(page):
     targets = [
         t
         for t in re.findall(r"\]\(([^)\s]+)[^)]*\)", (ROOT / page).read_text())

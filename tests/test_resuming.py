@@ -1,17 +1,17 @@
-"""Benchmarks in pieces: what is in the file is not done again, and what is done is in the file."""
+"""Benchmarks in pieces do nothing again that is in their file; the searches over readings try designs that planners accept."""
 
-from __future__ import annotations
+import math
 
-from pathlib import Path
-
+import numpy as np
 import pytest
 
-from benchmarks import suites
+from antdrive.planners import load_planner
+from benchmarks import readings, suites
 from benchmarks.resuming import append_line, read_lines
-from benchmarks.suite_runs import Tests, rounds_with_pytest
+from benchmarks.suite_runs import rounds_with_pytest
 
 
-def test_a_file_holds_whole_lines(tmp_path: Path) -> None:
+def test_a_file_holds_whole_lines(tmp_path):
     path = tmp_path / "new" / "results.jsonl"
     assert read_lines(path) == read_lines(None) == []
     for number in range(3):
@@ -24,24 +24,22 @@ def test_a_file_holds_whole_lines(tmp_path: Path) -> None:
     assert read_lines(path) == whole
 
 
-def test_repeats_go_on_and_a_flake_is_exit_code_1(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_repeats_go_on_and_a_flake_is_exit_code_1(tmp_path, monkeypatch, capsys):
     """Runs of the tests are put in place; the sixth drives otherwise, the seventh fails."""
-    calls: list[int] = []
+    calls = []
 
-    def run(folder: Path, *words: str, **_: object) -> Tests:
+    def run(folder, *words, **_):
         calls.append(len(calls))
         digest, passed = ("x" if calls[-1] == 5 else "y"), calls[-1] != 6
         return {"a": {"passed": passed, "message": "it broke\nhere", "digest": digest, "outcome": "", "results": ""}}
 
-    def rounds(folder: Path, *words: str, times: int, **_: object) -> list[Tests]:
+    def rounds(folder, *words, times, **_):
         return [run(folder) for _ in range(times)]
 
     monkeypatch.setattr(suites, "with_check", run)
     monkeypatch.setattr(suites, "rounds_with_pytest", rounds)
 
-    def main(*words: str) -> int:
+    def main(*words):
         monkeypatch.setattr("sys.argv", ["suites", *words, "--results", str(tmp_path / "r.jsonl")])
         try:
             suites.main()
@@ -62,7 +60,7 @@ def test_repeats_go_on_and_a_flake_is_exit_code_1(
     assert len(calls) == 10, "one run of pytest makes three rounds, more than are missing"
 
 
-def test_one_run_of_pytest_gives_each_test_as_often_as_asked_for(tmp_path: Path) -> None:
+def test_one_run_of_pytest_gives_each_test_as_often_as_asked_for(tmp_path):
     (tmp_path / "test_two.py").write_text(
         "import pytest\nseen = []\n@pytest.fixture\ndef fresh():\n    seen.append(1)\n    return len(seen)\n"
         "def test_a(fresh): assert fresh == len(seen)\ndef test_b(): assert False, 'always'\n"
@@ -72,3 +70,29 @@ def test_one_run_of_pytest_gives_each_test_as_often_as_asked_for(tmp_path: Path)
     assert [{name: test["passed"] for name, test in tests.items()} for tests in rounds] == [
         {"test_two.py::test_a": True, "test_two.py::test_b": False, "test_two.py::test_c": True}
     ] * 6
+
+
+@pytest.mark.parametrize("name", readings.SEARCHES)
+def test_every_design_is_of_options_that_exist_and_no_two_are_the_same(name):
+    search = readings.SEARCHES[name]
+    load_planner(search.rival[0], **search.rival[1])
+    planners = [load_planner(search.planner, **{**search.fixed, **options}) for _, options in readings.designs(search)]
+    assert len(set(planners)) == len(planners)
+    full = math.prod(len(values) for values in search.readings.values())
+    assert len(planners) == full + 8 * len(search.under)
+    assert all(draw(0).grid.free.any() for draw in search.maps.values())
+
+
+def test_each_constant_of_the_fractional_design_is_at_each_level_half_of_the_time():
+    search = readings.SEARCHES["pfaco"]
+    rows = [options for words, options in readings.designs(search) if ":" in words and options["form"] == "local"]
+    for key, pair in search.constants.items():
+        assert [row[key] for row in rows].count(pair[0]) == 4
+    signs = np.array([[1 if row[key] == pair[1] else -1 for key, pair in search.constants.items()] for row in rows])
+    assert (signs.T @ signs == 8 * np.eye(5)).all()  # main effects do not mix
+
+
+def test_a_row_counts_who_was_shorter():
+    text = readings.line("reading", [1.0, 2.0, math.inf, math.inf], [2.0, 1.0, 3.0, math.inf], 0.5)
+    assert "| 2/4 |" in text
+    assert "| 1 : 2 |" in text

@@ -1,7 +1,5 @@
 """One meaning for each class name, and docstrings that tell users of a public name what they need."""
 
-from __future__ import annotations
-
 import ast
 import collections
 import dataclasses
@@ -10,7 +8,6 @@ import inspect
 import re
 import textwrap
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -24,7 +21,7 @@ PLAIN = {
 }  # fmt: skip
 
 
-def test_a_class_name_has_one_meaning() -> None:
+def test_a_class_name_has_one_meaning():
     names = collections.Counter(
         node.name
         for path in MODULES
@@ -34,7 +31,7 @@ def test_a_class_name_has_one_meaning() -> None:
     assert [name for name, count in names.items() if count > 1] == []
 
 
-def public() -> list[tuple[str, Any]]:
+def public():
     found = {}
     rooms = ("testing", "runs.campaigns", "runs.suites", "sim.sensing")
     for package in ("antdrive", *(f"antdrive.{name}" for name in (*PACKAGES[:-1], *rooms))):
@@ -43,7 +40,7 @@ def public() -> list[tuple[str, Any]]:
     return [(name, thing) for name, thing in found.items() if inspect.isclass(thing) or inspect.isfunction(thing)]
 
 
-def undescribed_fields(thing: type) -> list[str]:
+def undescribed_fields(thing):
     """The public fields of a record that no docstring of its classes describes in a line of their own."""
     if dataclasses.is_dataclass(thing):
         fields = [field.name for field in dataclasses.fields(thing)]
@@ -58,13 +55,13 @@ def undescribed_fields(thing: type) -> list[str]:
     ]  # fmt: skip
 
 
-def undescribed_parameters(function: Any) -> list[str]:
+def undescribed_parameters(function):
     doc = inspect.getdoc(function) or ""
     names = [name for name in inspect.signature(function).parameters if name not in PLAIN and not name.startswith("_")]
     return [name for name in names if not re.search(rf"\b{name}\b", doc)]
 
 
-def untold_errors(function: Any, doc: str) -> set[str]:
+def untold_errors(function, doc):
     """The names of what a function's own lines raise, if its docstring has no part on errors."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
     raised = {
@@ -74,7 +71,7 @@ def untold_errors(function: Any, doc: str) -> set[str]:
     return set() if "Raises:" in doc else names
 
 
-def test_public_functions_and_records_tell_what_they_raise() -> None:
+def test_public_functions_and_records_tell_what_they_raise():
     untold = {}
     for name, thing in public():
         members = vars(thing).items() if inspect.isclass(thing) else [("", thing)]
@@ -89,7 +86,7 @@ def test_public_functions_and_records_tell_what_they_raise() -> None:
 
 
 @pytest.mark.parametrize(("name", "thing"), public(), ids=[name for name, _ in public()])
-def test_public_names_document_their_fields_and_parameters(name: str, thing: Any) -> None:
+def test_public_names_document_their_fields_and_parameters(name, thing):
     missing = undescribed_fields(thing) if inspect.isclass(thing) else undescribed_parameters(thing)
     if inspect.isclass(thing):
         for key, member in vars(thing).items():

@@ -187,23 +187,40 @@ def worlds() -> list[str]:
 
 
 def arrays() -> list[str]:
-    """Name, shape, dtype and content of each array of a log, from the docstring and annotations of `Rollout`."""
-    from antdrive.sim.log.rollout import Rollout
+    """Name, shape, dtype and content of each array of a log, from the docstring of `Rollout`."""
+    import numpy as np
+
+    from antdrive.sim.log.rollout import FORMS, Rollout
 
     rows, contents = [], described(Rollout)
-    for field in dataclasses.fields(Rollout):
-        dtype = re.search(r"np\.(\w+)\]$", str(field.type))
-        shape = re.search(r"\((T|N|K|P|S)[\w, ]*\)", contents[field.name])
-        if dtype and shape:
-            rows.append((f"``{field.name}``", shape[0], dtype[1], told(contents[field.name])))
+    for name, (_, dtype) in FORMS.items():
+        shape = re.search(r"\((T|N|K|P|S)[\w, ]*\)", contents[name])
+        if shape:
+            rows.append((f"``{name}``", shape[0], np.dtype(dtype).name, told(contents[name])))
     return table("array, shape, dtype, content", rows)
 
 
 def record() -> list[str]:
-    """Every key of a log's record."""
-    from antdrive.sim.log.record import record_keys
+    """Every key of a log's record with its type; keys of nested records are dotted."""
+    from antdrive.sim.log import record as records
 
-    return table("key, JSON, content", ((f"``{key}``", kind, told(text)) for key, kind, text in record_keys()))
+    def rows(kind: type, prefix: str = "") -> Iterator[Row]:
+        for field in dataclasses.fields(kind):
+            name, of = f"{prefix}{field.name}", str(field.type)
+            yield f"``{name}``", json_type(of), told(described(kind)[field.name])
+            inner = re.search(r"\b(\w+Record)\b", of)
+            if inner:
+                yield from rows(getattr(records, inner[1]), f"{name}[]." if of.startswith("tuple") else f"{name}.")
+
+    return table("key, JSON, content", rows(records.DriveRecord))
+
+
+def json_type(annotation: str) -> str:
+    """What JSON calls the type of a field."""
+    kind = annotation.removesuffix(" | None")
+    words = {"str": "text", "float": "number", "int": "whole number", "bool": "true or false"}
+    plain = "list" if kind.startswith("tuple") else "text" if "Outcome" in kind else "object"
+    return words.get(kind, plain) + (" or null" if annotation.endswith(" | None") else "")
 
 
 def outcomes() -> list[str]:

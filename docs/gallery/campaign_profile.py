@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 from antdrive import sweep
-from antdrive.runs.statistics.profiles import performance_profiles
+from antdrive.runs.statistics.success import performance_profiles
 from matplotlib.figure import Figure
 
 campaign = {
     "worlds": [{"generate": "forest", "seeds": 6}],
     "planners": ["astar", {"name": "aco-han", "ants": [10, 100]}, "maco"],
-    "routes": "none",
+    "smoothing": "none",
 }
 with tempfile.TemporaryDirectory() as folder:
     results = sweep(campaign, Path(folder), jobs=1)

@@ -9,7 +9,7 @@ commitments. Here their colony and the ant system search a map of 20 × 20 cells
 from antdrive import Scenario, film, plan, run
 from antdrive.views import plan_figure
 from antdrive.views.figures.paper_figures import history_figure
-from antdrive.views.papers.films import paper_scenario
+from antdrive.views.papers import paper_scenario
 
 ageing = paper_scenario("ibraheem2016")
 

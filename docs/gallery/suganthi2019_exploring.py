@@ -11,7 +11,7 @@ import numpy as np
 from antdrive import film, load_planner, plan, run
 from antdrive.planners import Query
 from antdrive.views.figures.paper_figures import history_figure, maps_figure
-from antdrive.views.papers.films import paper_scenario
+from antdrive.views.papers import paper_scenario
 
 scenario = paper_scenario("suganthi2019")
 grid, _ = plan(scenario)

@@ -1,12 +1,9 @@
 """Files that are written whole, what killed processes leave, and folders that one process claims."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -24,22 +21,19 @@ with claimed(sys.argv[1]), written_whole(sys.argv[1] + "/film.mp4") as part:
 
 
 @pytest.fixture
-def writer(tmp_path: Path) -> subprocess.Popen[str]:
+def writer(tmp_path):
     """A process that has claimed the folder and written half a film."""
     process = subprocess.Popen([sys.executable, "-c", WRITES, str(tmp_path)], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
     assert process.stdout.readline() == "there\n"
     return process
 
 
-def kill(process: subprocess.Popen[str]) -> None:
+def kill(process):
     process.send_signal(signal.SIGKILL)
     process.communicate()
 
 
-def test_what_a_killed_process_left_is_removed_by_the_next_attempt(
-    writer: subprocess.Popen[str], tmp_path: Path
-) -> None:
+def test_what_a_killed_process_left_is_removed_by_the_next_attempt(writer, tmp_path):
     (tmp_path / ".film-mine.mp4").touch()
     with written_whole(tmp_path / "film.mp4") as part:
         part.write_text("whole")
@@ -55,9 +49,7 @@ def test_what_a_killed_process_left_is_removed_by_the_next_attempt(
     assert (tmp_path / "film.mp4").read_text() == "again"
 
 
-def test_a_folder_is_claimed_once_and_a_claim_dies_with_its_process(
-    writer: subprocess.Popen[str], tmp_path: Path
-) -> None:
+def test_a_folder_is_claimed_once_and_a_claim_dies_with_its_process(writer, tmp_path):
     says = rf"another run \(process {writer.pid}\) is writing into this folder"
     with pytest.raises(InputError, match=says), claimed(tmp_path):
         pytest.fail("claimed twice")
@@ -71,7 +63,7 @@ def test_a_folder_is_claimed_once_and_a_claim_dies_with_its_process(
         pass
 
 
-def test_a_long_name_is_written(tmp_path: Path) -> None:
+def test_a_long_name_is_written(tmp_path):
     with written_whole(tmp_path / f"{'n' * 240}.yaml") as part:
         part.touch()
     assert [len(path.stem) for path in tmp_path.iterdir()] == [240]

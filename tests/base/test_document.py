@@ -1,7 +1,5 @@
 """Documents are the same whichever parser reads them, and no text exhausts the stack."""
 
-from typing import Any
-
 import pytest
 import yaml
 from hypothesis import given, settings
@@ -21,7 +19,7 @@ PIECES = (
 )  # fmt: skip
 
 
-def read(text: str) -> Any:
+def read(text):
     """The data and the lines of a text, or the sentence about its fault."""
     try:
         found = parse_document(text, "file")
@@ -30,7 +28,7 @@ def read(text: str) -> Any:
     return repr(found.data), dict(found.lines)
 
 
-def read_by_pyyaml(text: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+def read_by_pyyaml(text, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(yaml, "__with_libyaml__", False)
         return read(text)
@@ -38,63 +36,44 @@ def read_by_pyyaml(text: str, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 @settings(max_examples=800)
 @given(st.lists(st.sampled_from(PIECES), max_size=14).map("".join))
-def test_both_parsers_read_the_same(text: str) -> None:
+def test_both_parsers_read_the_same(text):
     with pytest.MonkeyPatch.context() as patch:
         assert read(text) == read_by_pyyaml(text, patch)
 
 
 @pytest.mark.parametrize("name", list_worlds())
-def test_both_parsers_read_the_same_of_the_catalogue(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_parsers_read_the_same_of_the_catalogue(name, monkeypatch):
     text = read_yaml(list_worlds()[name])
     assert read(text) == read_by_pyyaml(text, monkeypatch)
     assert isinstance(load_task(name).world, World)
 
 
 @pytest.mark.skipif(not yaml.__with_libyaml__, reason="PyYAML was built without libyaml")
-def test_a_usual_world_is_read_by_libyaml(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_usual_world_is_read_by_libyaml(monkeypatch):
     monkeypatch.setattr(document, "_Loader", None)  # PyYAML's own parser would need it
     assert parse_document("schema: 1\nobstacles:\n  - {x: -1.0, y: 2.5e-3}  # a post\n", "file").lines[("schema",)] == 1
 
 
 @pytest.mark.parametrize("opening", ["[", "{a: ", "- ", "[\n"])
-def test_a_deep_text_is_refused_and_not_followed(opening: str) -> None:
+def test_a_deep_text_is_refused_and_not_followed(opening):
     with pytest.raises(InputError, match=f"nested deeper than {MAX_DEPTH} levels|cannot be parsed|not YAML"):
         parse_document(opening * 300_000, "file")
 
 
 @pytest.mark.parametrize("levels", range(MAX_DEPTH - 3, MAX_DEPTH + 3))
-def test_both_parsers_allow_the_same_depth(levels: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_parsers_allow_the_same_depth(levels, monkeypatch):
     text = "a: " + "[" * levels + "1" + "]" * levels
     assert read(text) == read_by_pyyaml(text, monkeypatch)
 
 
 NUMBERS = (
-    "0",
-    "1",
-    "-3",
-    "2.5",
-    "-0.0",
-    "1.0e-07",
-    "12.25e+3",
-    "1e5",
-    "010",
-    "1_0",
-    ".5",
-    "5.",
-    "true",
-    "x",
-    "",
-    "[1]",
+    "0", "1", "-3", "2.5", "-0.0", "1.0e-07", "12.25e+3", "1e5", "010", "1_0", ".5", "5.", "true", "x", "", "[1]",
     "'1'",
-)
+)  # fmt: skip
 ENTRIES = (
-    "  - {{x: {0}, y: {1}}}\n",
-    "  - {{x: {0}, y: {1}}} \n",
-    "  - {{x: {0}}}\n",
-    "  - {{y: {1}, x: {0}}}\n",
-    "  # a\n",
+    "  - {{x: {0}, y: {1}}}\n", "  - {{x: {0}, y: {1}}} \n", "  - {{x: {0}}}\n", "  - {{y: {1}, x: {0}}}\n", "  # a\n",
     "\n",
-)
+)  # fmt: skip
 BEFORE = ("", "a: 1\n", "a: {b: 1,\n", "a: 'b\n", "a: b\n  c\n", "posts: []\n", "a:\n", "- a\n", "{\n", "\tb\n")
 AFTER = ("", "a: 1\n", "  b: 1\n", "}\n", "'\n", "c: [1, 2]\n", "# end\n", "posts:\n  - {x: 1.0, y: 2.0}\n", "...\n")
 
@@ -108,14 +87,14 @@ AFTER = ("", "a: 1\n", "  b: 1\n", "}\n", "'\n", "c: [1, 2]\n", "# end\n", "post
     ),
     st.sampled_from(AFTER),
 )
-def test_a_table_is_the_same_however_it_is_read(before: str, rows: list[tuple[str, str, str]], after: str) -> None:
+def test_a_table_is_the_same_however_it_is_read(before, rows, after):
     text = before + "posts:\n" + "".join(entry.format(*numbers) for entry, *numbers in rows) + after
     with pytest.MonkeyPatch.context() as patch:
         assert read(text) == read_by_pyyaml(text, patch)
 
 
 @pytest.mark.skipif(not yaml.__with_libyaml__, reason="PyYAML was built without libyaml")
-def test_no_parser_sees_the_rows_of_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_parser_sees_the_rows_of_a_table(monkeypatch):
     seen = []
     compose = document._compose
     monkeypatch.setattr(document, "_compose", lambda text: seen.append(text) or compose(text))

@@ -1,7 +1,5 @@
 """Every benchmark runs in its smallest size: `SMALLEST` of its module has the words of each call."""
 
-from __future__ import annotations
-
 import ast
 import os
 import shlex
@@ -16,7 +14,7 @@ from benchmarks.tables import MISSING
 ROOT = Path(__file__).parents[2]
 
 
-def smallest(path: Path) -> list[str] | None:
+def smallest(path):
     """The words of each call; None of a module that is no benchmark. Nothing is imported: packages may be missing."""
     body = ast.parse(path.read_text(encoding="utf-8")).body
     if not any(isinstance(one, ast.FunctionDef) and one.name == "main" for one in body):
@@ -28,14 +26,14 @@ def smallest(path: Path) -> list[str] | None:
 CALLS = {path.stem: smallest(path) for path in sorted((ROOT / "benchmarks").glob("*.py"))}
 
 
-def test_every_benchmark_has_a_smallest_size() -> None:
+def test_every_benchmark_has_a_smallest_size():
     assert [name for name, calls in CALLS.items() if calls == []] == []
     assert len([name for name, calls in CALLS.items() if calls]) > 20
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "words"), [(name, words) for name, calls in CALLS.items() for words in calls or ()])
-def test_a_benchmark_runs_in_its_smallest_size(name: str, words: str, tmp_path: Path) -> None:
+def test_a_benchmark_runs_in_its_smallest_size(name, words, tmp_path):
     command = [sys.executable, "-m", f"benchmarks.{name}", *shlex.split(words)]
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)

@@ -1,27 +1,36 @@
 """Calling the command line in this process, in an empty folder."""
 
+import json
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 from antdrive.cli.app import main
-from antdrive.sim import Run
+from antdrive.runs.campaigns.rows import GRID, RESULT, result_schema
+from antdrive.runs.campaigns.store import write_table
 from antdrive.worlds import save_task
-from tests.cli.calling import Call, Refused
+from tests.runs.made_up_campaign import Skill, made_up_columns
+
+OFFICE = """\
+schema: 1
+bounds: [0, 0, 4, 3]
+start: [0.6, 0.6, 0]
+goal: [3.4, 0.6]
+cell: 0.25
+tasks:
+  - {name: dock, goal: [3.4, 2.4]}
+"""
 
 
 @pytest.fixture
-def antdrive(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, request: pytest.FixtureRequest
-) -> Iterator[Call]:
+def antdrive(monkeypatch, capsys, tmp_path, request):
     """Call `antdrive` with some words: its exit code, stdout and stderr. The report of a failed test shows how calls ended."""
     monkeypatch.chdir(tmp_path)
     before = signal.getsignal(signal.SIGTERM)
 
-    def call(*words: str | Path) -> tuple[int, str, str]:
+    def call(*words):
         monkeypatch.setattr(sys, "argv", ["antdrive", *map(str, words)])
         with pytest.raises(SystemExit) as ended:
             main()
@@ -35,10 +44,10 @@ def antdrive(
 
 
 @pytest.fixture
-def refused(antdrive: Call) -> Refused:
+def refused(antdrive):
     """Call `antdrive` with wrong words, which must end with exit code 2 and one line on stderr: that line."""
 
-    def call(*words: str | Path) -> str:
+    def call(*words):
         code, out, err = antdrive(*words)
         assert (code, out, err.count("\n")) == (2, "", 1), (code, out, err)
         assert err.startswith("antdrive: ")
@@ -48,7 +57,7 @@ def refused(antdrive: Call) -> Refused:
 
 
 @pytest.fixture
-def small(small_run: Run, tmp_path: Path) -> Path:
+def small(small_run, tmp_path):
     """The file of a small world that is quick to drive."""
     path = tmp_path / "small.yaml"
     save_task(small_run.scenario.task, path)
@@ -56,11 +65,11 @@ def small(small_run: Run, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def compiled(monkeypatch):
     """What was compiled: nothing at first, and nothing is cached yet. Compiling itself is left out."""
     done: list[str] = []
 
-    def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
+    def warm(jobs=None, progress=None):
         assert progress is not None
         progress(1.0)
         done.append("all")
@@ -68,3 +77,33 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr("antdrive.cli.warm.warm", warm)
     monkeypatch.setattr("antdrive.cli.warm.is_warm", lambda: bool(done))
     return done
+
+
+PLANNERS = {"astar": Skill(0.99, 1.0), "ants ants=10": Skill(0.6, 1.2, name="ants", options={"ants": 10})}
+
+
+def written(folder, planners, rng_seed=1):
+    """The folder of a campaign that was never run, of 10 worlds and 6 seeds; the runs of the last seed are not done."""
+    columns = made_up_columns(planners, worlds=10, seeds=6, rng_seed=rng_seed)
+    rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    (folder / "parts").mkdir(parents=True)
+    grid = [{name: row.get(name) for name in (*GRID, "option.ants")} for row in rows]
+    write_table(pa.Table.from_pylist(grid), folder / "grid.parquet")
+    results = [{name: row.get(name) for name in RESULT} for row in rows if row["seed"] < 5]
+    write_table(pa.Table.from_pylist(results, schema=result_schema()), folder / "parts" / "1.parquet")
+    (folder / "manifest.json").write_text(json.dumps({"size": len(rows)}))
+    return folder
+
+
+@pytest.fixture
+def camp(tmp_path):
+    """A folder with 100 of 120 runs done."""
+    return written(tmp_path / "camp", PLANNERS)
+
+
+@pytest.fixture
+def office(tmp_path):
+    """The file of a world with another task."""
+    path = tmp_path / "office.yaml"
+    path.write_text(OFFICE)
+    return path

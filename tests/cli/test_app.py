@@ -6,10 +6,8 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +15,11 @@ import pytest
 from antdrive.cli.commands import COMMANDS, ROBOTS, WORLDS
 from antdrive.cli.exits import BROKEN_PIPE
 from antdrive.cli.groups import application
-from antdrive.planners import PLANNERS, PlanResult, Progress, Query, watch
-from tests.cli.calling import Call, Refused
+from antdrive.planners import PLANNERS, watch
 
 
 @pytest.mark.parametrize(("group", "table"), [([], COMMANDS), (["worlds"], WORLDS), (["robots"], ROBOTS)])
-def test_help_lists_every_command_with_the_first_line_of_its_own(antdrive: Call, group: list[str], table: Any) -> None:
+def test_help_lists_every_command_with_the_first_line_of_its_own(antdrive, group, table):
     code, out, _ = antdrive(*group, "--help")
     assert code == 0
     listed = dict(re.findall(r"^  ([a-z-]+) {2,}(\S.*)$", out.split("Commands:")[1], flags=re.MULTILINE))
@@ -33,7 +30,7 @@ def test_help_lists_every_command_with_the_first_line_of_its_own(antdrive: Call,
 
 
 @pytest.mark.parametrize("name", [*COMMANDS, *(f"worlds {name}" for name in WORLDS)])
-def test_every_option_is_explained_with_its_unit(name: str) -> None:
+def test_every_option_is_explained_with_its_unit(name):
     command = application()
     for word in name.split():
         command = command.commands[word]
@@ -43,7 +40,7 @@ def test_every_option_is_explained_with_its_unit(name: str) -> None:
         assert unit in param.help, f"{name} {param.name}: {param.help}"
 
 
-def test_the_version_is_shown(antdrive: Call) -> None:
+def test_the_version_is_shown(antdrive):
     code, out, err = antdrive("--version")
     assert (code, err) == (0, "")
     assert out.startswith("antdrive 0.")
@@ -60,11 +57,11 @@ def test_the_version_is_shown(antdrive: Call) -> None:
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_a_wrong_word_is_one_line_that_names_the_help(refused: Refused, words: list[str], says: str) -> None:
+def test_a_wrong_word_is_one_line_that_names_the_help(refused, words, says):
     assert says in refused(*words)
 
 
-def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small: Path, tmp_path: Path) -> None:
+def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small, tmp_path):
     command = [sys.executable, "-m", "antdrive", "run", str(small), "--json", "--out", str(tmp_path / "r")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0
@@ -73,7 +70,7 @@ def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small: Path, t
 
 
 @pytest.mark.parametrize("closed", ["stdout", "stderr"])
-def test_a_closed_pipe_ends_the_program_silently(closed: str) -> None:
+def test_a_closed_pipe_ends_the_program_silently(closed):
     """As in `antdrive planners | head`, and with an error that nobody reads."""
     words = ["planners"] if closed == "stdout" else ["planners", "--bogus"]
     reading, writing = os.pipe()
@@ -81,13 +78,13 @@ def test_a_closed_pipe_ends_the_program_silently(closed: str) -> None:
     other = "stderr" if closed == "stdout" else "stdout"
     command = [sys.executable, "-m", "antdrive", *words]
     streams: dict[str, int] = {closed: writing, other: subprocess.PIPE}
-    done = subprocess.run(command, check=False, **streams)  # type: ignore[call-overload]
+    done = subprocess.run(command, check=False, **streams)
     os.close(writing)
     assert (done.returncode, getattr(done, other)) == (BROKEN_PIPE, b"")
 
 
-def test_another_closed_pipe_is_a_fault(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    def closed(*_: object, **__: object) -> None:
+def test_another_closed_pipe_is_a_fault(antdrive, monkeypatch):
+    def closed(*_, **__):
         raise BrokenPipeError(32, "Broken pipe")
 
     monkeypatch.setattr("antdrive.sim.pipeline.run", closed)
@@ -95,8 +92,8 @@ def test_another_closed_pipe_is_a_fault(antdrive: Call, monkeypatch: pytest.Monk
     assert (code, err.startswith("antdrive: internal error: BrokenPipeError: ")) == (3, True)
 
 
-def test_ctrl_c_is_one_line(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(*_: object, **__: object) -> None:
+def test_ctrl_c_is_one_line(antdrive, monkeypatch):
+    def interrupt(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("antdrive.sim.pipeline.run", interrupt)
@@ -114,10 +111,8 @@ def test_ctrl_c_is_one_line(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> 
     ],
     ids=lambda words: words[0],
 )
-def test_ctrl_c_while_planning_ends_a_command_that_plans_many_times(
-    antdrive: Call, small: Path, tmp_path: Path, words: list[str]
-) -> None:
-    def stop(progress: Progress) -> None:
+def test_ctrl_c_while_planning_ends_a_command_that_plans_many_times(antdrive, small, tmp_path, words):
+    def stop(progress):
         raise KeyboardInterrupt
 
     with watch(stop):
@@ -128,8 +123,8 @@ def test_ctrl_c_while_planning_ends_a_command_that_plans_many_times(
     assert not list((tmp_path / "out").rglob("*.*"))
 
 
-def test_a_full_disk_is_one_line(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object, **__: object) -> None:
+def test_a_full_disk_is_one_line(refused, monkeypatch):
+    def full(*_, **__):
         raise OSError(28, "No space left on device", "w.yaml")
 
     monkeypatch.setattr("antdrive.worlds.save_task", full)
@@ -139,21 +134,21 @@ def test_a_full_disk_is_one_line(refused: Refused, monkeypatch: pytest.MonkeyPat
 class Faulty:
     """A planner of somebody else that gets it wrong."""
 
-    def __init__(self, answer: Any) -> None:
+    def __init__(self, answer):
         self.answer = answer
 
-    def plan(self, query: Query, rng: Any) -> PlanResult:
+    def plan(self, query, rng):
         if isinstance(self.answer, Exception):
             raise self.answer
         right = PLANNERS["astar"].plan(query, rng)
-        return self.answer(right) if callable(self.answer) else self.answer  # type: ignore[no-any-return]
+        return self.answer(right) if callable(self.answer) else self.answer
 
 
 @pytest.fixture
-def faulty(monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], None]:
+def faulty(monkeypatch):
     """Make a planner `mine` known that answers so, or raises."""
 
-    def install(answer: Any) -> None:
+    def install(answer):
         monkeypatch.setattr("antdrive.planners.registry.PLANNERS", {**PLANNERS, "mine": Faulty(answer)})
 
     return install
@@ -170,9 +165,7 @@ def faulty(monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], None]:
     ],
     ids=["ZeroDivisionError", "ValueError", "OSError", "None"],
 )
-def test_a_fault_of_a_planner_is_one_line_with_exit_code_3(
-    antdrive: Call, small: Path, faulty: Callable[[Any], None], command: str, answer: Any, says: str
-) -> None:
+def test_a_fault_of_a_planner_is_one_line_with_exit_code_3(antdrive, small, faulty, command, answer, says):
     faulty(answer)
     code, out, err = antdrive(command, small, "-p", "mine")
     assert (code, out) == (3, "")
@@ -180,9 +173,7 @@ def test_a_fault_of_a_planner_is_one_line_with_exit_code_3(
 
 
 @pytest.mark.parametrize("place", [0, 4])
-def test_debug_shows_the_traceback_wherever_it_stands(
-    antdrive: Call, small: Path, faulty: Callable[[Any], None], place: int
-) -> None:
+def test_debug_shows_the_traceback_wherever_it_stands(antdrive, small, faulty, place):
     faulty(ZeroDivisionError("by zero"))
     words: list[str | Path] = ["run", small, "-p", "mine"]
     words.insert(place, "--debug")
@@ -192,8 +183,8 @@ def test_debug_shows_the_traceback_wherever_it_stands(
     assert re.fullmatch(r"antdrive: planner mine raised ZeroDivisionError: .*:\d+\)", err.splitlines()[-1])
 
 
-def test_any_other_exception_is_one_line_with_exit_code_3(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object, **__: object) -> None:
+def test_any_other_exception_is_one_line_with_exit_code_3(antdrive, monkeypatch):
+    def fail(*_, **__):
         raise ValueError("two\nlines")
 
     monkeypatch.setattr("antdrive.sim.pipeline.plan", fail)
@@ -202,9 +193,7 @@ def test_any_other_exception_is_one_line_with_exit_code_3(antdrive: Call, monkey
     assert err == r"antdrive: internal error: ValueError: two\nlines (run again with --debug for the traceback)" + "\n"
 
 
-def test_a_wrong_plan_is_an_outcome_and_is_not_driven(
-    antdrive: Call, small: Path, faulty: Callable[[Any], None]
-) -> None:
+def test_a_wrong_plan_is_an_outcome_and_is_not_driven(antdrive, small, faulty):
     faulty(lambda right: replace(right, cells=np.delete(right.cells, 2, axis=0)))
     code, out, err = antdrive("run", small, "-p", "mine", "--json", "-o", "r")
     result = json.loads(out)
@@ -216,7 +205,7 @@ def test_a_wrong_plan_is_an_outcome_and_is_not_driven(
     assert "mine gave a wrong plan (cells: step 1 from " in out
 
 
-def test_the_help_explains_the_exit_codes(antdrive: Call) -> None:
+def test_the_help_explains_the_exit_codes(antdrive):
     words = " ".join(antdrive("--help")[1].split())
     for code in ("0: success", "1: the drive", "2: wrong input", "3: a fault", "--debug"):
         assert code in words

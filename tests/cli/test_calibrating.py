@@ -2,23 +2,22 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.runs.margins import choice
-from antdrive.runs.margins.prediction import Calibration
-from antdrive.runs.margins.trial import Conditions, Loss
+from antdrive.runs.margins.choice import Calibration
+from antdrive.runs.margins.trial import Loss, key_of
 from antdrive.sim import Rollout
-from tests.cli.calling import Call, Refused
+from antdrive.sim.scenario import Conditions
 
 
-def keep(margin: float, **changes: Any) -> None:
+def keep(margin, **changes):
     """Put a calibration of the turtlebot into the cache."""
     usual = {"robot": load_robot("turtlebot"), "controller": PurePursuit(), "noise": 0.0, "smoothing": "clearance"}
-    key = Conditions(**{**usual, **changes}).key
+    key = key_of(Conditions(**{**usual, **changes}))
     choice._keep(
         Calibration(
             margin=margin, loss=margin - 0.011, largest=0.01, reserve=0.01, probability=1e-3, drives=80, key=key
@@ -27,7 +26,7 @@ def keep(margin: float, **changes: Any) -> None:
 
 
 @pytest.fixture(autouse=True)
-def cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+def cache(monkeypatch, tmp_path):
     """A cache folder without calibrations."""
     folder = tmp_path / "cache"
     folder.mkdir()
@@ -35,7 +34,7 @@ def cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_drive_with_a_chosen_margin_says_how_it_was_chosen(antdrive: Call, small: Path) -> None:
+def test_a_drive_with_a_chosen_margin_says_how_it_was_chosen(antdrive, small):
     keep(0.047)
     code, out, err = antdrive("run", small, "-p", "astar", "--margin", "auto", "--no-figures", "--out", "r")
     assert (code, err) == (0, "")
@@ -53,14 +52,14 @@ def test_a_drive_with_a_chosen_margin_says_how_it_was_chosen(antdrive: Call, sma
     assert "auto for a predicted loss of 0.0360 m; the footprint lost" in antdrive("margin", "r/rollout.npz")[1]
 
 
-def test_movers_and_unseen_obstacles_are_no_part_of_the_prediction(antdrive: Call, small: Path) -> None:
+def test_movers_and_unseen_obstacles_are_no_part_of_the_prediction(antdrive, small):
     keep(0.047)
     antdrive("run", small, "-p", "astar", "--margin", "auto", "--unseen", "2.0,2.7,0.1", "--no-figures", "--out", "r")
     assert json.loads(antdrive("margin", "r/rollout.npz", "--json")[1])["prediction"]["footprint_loss_m"] is None
     assert "this drive had movers or unseen obstacles" in antdrive("margin", "r/rollout.npz")[1]
 
 
-def test_a_margin_given_as_a_number_leaves_no_trace(antdrive: Call, small: Path) -> None:
+def test_a_margin_given_as_a_number_leaves_no_trace(antdrive, small):
     keep(0.047)
     code, out, _ = antdrive("run", small, "-p", "astar", "--margin", "0.047", "--no-figures", "--out", "r")
     assert code == 0
@@ -70,32 +69,21 @@ def test_a_margin_given_as_a_number_leaves_no_trace(antdrive: Call, small: Path)
         assert "margin_choice" not in json.loads(str(log["record"]))
 
 
-def test_plan_and_compare_take_it_too(antdrive: Call, small: Path) -> None:
+def test_plan_and_compare_take_it_too(antdrive, small):
     keep(0.047)
     keep(0.061, noise=1.0, smoothing="taut")
     code, out, _ = antdrive("plan", small, "-p", "astar", "--margin", "auto", "--json")
     assert (code, json.loads(out)["margin_m"]) == (0, 0.047)
     words = (
-        "-p",
-        "astar",
-        "-p",
-        "dijkstra",
-        "--noise",
-        "1",
-        "--smoothing",
-        "taut",
-        "--no-figures",
-        "--out",
-        "c",
-        "--json",
-    )
+        "-p", "astar", "-p", "dijkstra", "--noise", "1", "--smoothing", "taut", "--no-figures", "--out", "c", "--json"
+    )  # fmt: skip
     code, out, _ = antdrive("compare", small, *words, "--margin", "auto")
     assert code == 0
     assert [run["margin_m"] for run in json.loads(out)["runs"].values()] == [0.061, 0.061]
     assert "--margin auto" in json.loads(Path("c/astar/result.json").read_text())["command"]
 
 
-def test_where_the_chosen_margin_closes_every_way_the_reason_says_so(antdrive: Call) -> None:
+def test_where_the_chosen_margin_closes_every_way_the_reason_says_so(antdrive):
     keep(0.9)
     code, out, _ = antdrive("plan", "slalom", "-p", "astar", "--margin", "auto", "--json")
     reason = json.loads(out)["reason"]
@@ -106,7 +94,7 @@ def test_where_the_chosen_margin_closes_every_way_the_reason_says_so(antdrive: C
     assert "margin below" not in json.loads(out)["reason"]
 
 
-def test_a_calibration_that_is_due_is_announced(antdrive: Call, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_calibration_that_is_due_is_announced(antdrive, small, monkeypatch):
     monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [Loss(0.012, 0.012)] * choice.DRIVES)
     code, _, err = antdrive("plan", small, "-p", "astar", "--margin", "auto")
     assert (code, err.count("\n")) == (0, 1)
@@ -114,16 +102,9 @@ def test_a_calibration_that_is_due_is_announced(antdrive: Call, small: Path, mon
     assert antdrive("plan", small, "-p", "astar", "--margin", "auto")[::2] == (0, "")
 
 
-@pytest.mark.parametrize("text", ["soon", "-1", "inf", "nan", "AUTO"])
-def test_other_words_are_refused(refused: Refused, small: Path, text: str) -> None:
-    assert "--margin: " in refused("run", small, "--margin", text)
-
-
-def test_where_no_margin_is_enough_the_option_is_named(
-    refused: Refused, small: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_no_margin_is_enough_the_option_is_named(refused, small, monkeypatch):
     monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [Loss(margin, margin)] * choice.DRIVES)
-    monkeypatch.setattr("antdrive.cli.calibrating.print_error", lambda text: None)
+    monkeypatch.setattr("antdrive.cli.scenario.print_error", lambda text: None)
     assert "--margin: auto: none of the 12 margins tried, up to 0.25 m, leaves 0.01 m" in refused(
         "plan", small, "--margin", "auto"
     )

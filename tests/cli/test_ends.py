@@ -3,29 +3,10 @@
 import json
 from pathlib import Path
 
-import pytest
-
-from tests.cli.calling import Call, Refused
-
-OFFICE = """\
-schema: 1
-bounds: [0, 0, 4, 3]
-start: [0.6, 0.6, 0]
-goal: [3.4, 0.6]
-cell: 0.25
-tasks:
-  - {name: dock, goal: [3.4, 2.4]}
-"""
+from tests.cli.conftest import OFFICE
 
 
-@pytest.fixture
-def office(tmp_path: Path) -> Path:
-    path = tmp_path / "office.yaml"
-    path.write_text(OFFICE)
-    return path
-
-
-def test_a_run_takes_a_named_task_and_other_ends(antdrive: Call, office: Path) -> None:
+def test_a_run_takes_a_named_task_and_other_ends(antdrive, office):
     words = ("--task", "dock", "--start", "0.6,2.4,0.5", "-p", "astar", "--no-figures", "--json", "--out", "r")
     code, out, _ = antdrive("run", office, *words)
     facts = json.loads(out)
@@ -34,7 +15,7 @@ def test_a_run_takes_a_named_task_and_other_ends(antdrive: Call, office: Path) -
     assert antdrive("verify", "r")[0] == 0
 
 
-def test_plan_and_show_take_them_too(antdrive: Call, office: Path) -> None:
+def test_plan_and_show_take_them_too(antdrive, office):
     _, out, _ = antdrive("plan", office, "--goal", "0.6,2.4", "-p", "astar", "--json")
     assert json.loads(out)["cells"][-1] == [9, 2]
     _, out, _ = antdrive("worlds", "show", office, "--task", "dock", "--json")
@@ -42,7 +23,7 @@ def test_plan_and_show_take_them_too(antdrive: Call, office: Path) -> None:
     assert (shown["goal"], shown["tasks"]) == ([3.4, 2.4], ["dock"])
 
 
-def test_places_in_the_map_mean_the_same_as_those_in_the_world(antdrive: Call, office: Path) -> None:
+def test_places_in_the_map_mean_the_same_as_those_in_the_world(antdrive, office):
     """A world that lies in its map turned by a quarter to the left, with its origin at (10, -2)."""
     office.write_text(OFFICE + "frame: [10, -2, 1.5707963267948966]\n")
     words = ("plan", office, "-p", "astar", "--json")
@@ -54,7 +35,7 @@ def test_places_in_the_map_mean_the_same_as_those_in_the_world(antdrive: Call, o
     assert "goal in its map    [9.4, 1.4]" in shown
 
 
-def test_answers_name_places_in_both_frames(antdrive: Call, refused: Refused, office: Path) -> None:
+def test_answers_name_places_in_both_frames(antdrive, refused, office):
     posts = "obstacles:\n  - {x: 2, y: 0.7, radius: 0.65}\n  - {x: 2, y: 2.3, radius: 0.65}\n"
     office.write_text(OFFICE + posts + "frame: [10, -2, 1.5707963267948966]\n")
     code, out, _ = antdrive("plan", office, "-p", "astar", "--goal", "8.5,1.4", "--frame", "map")
@@ -70,7 +51,7 @@ def test_answers_name_places_in_both_frames(antdrive: Call, refused: Refused, of
     assert "result.json: frame: differs from the log" in antdrive("verify", "r")[1]
 
 
-def test_each_run_of_a_comparison_says_how_to_repeat_it(antdrive: Call, office: Path) -> None:
+def test_each_run_of_a_comparison_says_how_to_repeat_it(antdrive, office):
     code, _, _ = antdrive(
         "compare", office, "-p", "astar", "-p", "tangent", "--task", "dock", "--start", "0.6,1,0", "--frame", "map",
         "--no-figures", "--out", "c",
@@ -80,32 +61,8 @@ def test_each_run_of_a_comparison_says_how_to_repeat_it(antdrive: Call, office: 
     assert "--task=dock --start=0.6,1,0 --frame=map" in command
 
 
-def test_a_sweep_drives_the_tasks_of_a_file(antdrive: Call, office: Path) -> None:
+def test_a_sweep_drives_the_tasks_of_a_file(antdrive, office):
     code, out, _ = antdrive("sweep", "--world", office, "-p", "astar", "--tasks", "named", "--dry-run", "--json")
     assert (code, json.loads(out)["runs"]) == (0, 1)
     _, out, _ = antdrive("sweep", "--world", office, "-p", "astar", "--tasks", "7:1.5", "--dry-run", "--json")
     assert json.loads(out)["runs"] == 7
-
-
-@pytest.mark.parametrize(
-    ("words", "error"),
-    [
-        (("run", "--task", "dok"), "no task 'dok'; did you mean dock?"),
-        (("run", "--start", "1,2"), "--start 1,2: write X,Y,YAW: 3 numbers separated by commas"),
-        (("plan", "--goal", "9,9"), "--goal: (9, 9) is out of bounds"),
-        (("plan", "--goal", "1,1", "--frame", "robot"), "--frame robot: choose from world, map"),
-        (("run", "--start", "0.1,1,0"), "office: start: turtlebot at (0.1, 1)"),
-    ],
-)
-def test_wrong_ends_are_refused(refused: Refused, office: Path, words: tuple[str, ...], error: str) -> None:
-    assert error in refused(words[0], office, *words[1:])
-
-
-@pytest.mark.parametrize("tasks", ["0", "many", "3:", "3:far", "-3"])
-def test_wrong_numbers_of_tasks_are_refused(refused: Refused, office: Path, tasks: str) -> None:
-    assert f"--tasks {tasks}" in refused("sweep", "--world", office, "-p", "astar", f"--tasks={tasks}", "--dry-run")
-
-
-def test_a_world_without_tasks_has_none_to_sweep(refused: Refused) -> None:
-    words = ("--world", "empty", "-p", "astar", "--tasks", "named", "--dry-run")
-    assert "tasks: the file of world empty lists no tasks" in refused("sweep", *words)

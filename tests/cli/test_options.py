@@ -14,13 +14,13 @@ from antdrive.worlds import Disc
 FLAGGED = [name for name, one in SETTINGS.items() if one.flag]
 
 
-def parsed(*words: str, many: bool = False) -> dict[str, Any]:
+def parsed(*words, many=False):
     """What a command with the options of all settings is given for these words."""
     found: dict[str, Any] = {}
     names = [name for name in FLAGGED if not many or SETTINGS[name].is_word]
 
     @with_settings(names, many=many)
-    def command(**given: Any) -> int:
+    def command(**given):
         found.update(given)
         return 0
 
@@ -33,7 +33,7 @@ def parsed(*words: str, many: bool = False) -> dict[str, Any]:
     return found
 
 
-def test_no_words_give_the_defaults() -> None:
+def test_no_words_give_the_defaults():
     usual = scenario_fields({})
     assert scenario_fields(parsed()) == usual
 
@@ -48,12 +48,12 @@ def test_no_words_give_the_defaults() -> None:
     ],
     ids=lambda given: " ".join(given),
 )
-def test_the_words_that_repeat_settings_give_them_again(given: dict[str, Any]) -> None:
+def test_the_words_that_repeat_settings_give_them_again(given):
     words = setting_words(given)
     assert words is not None
     assert scenario_fields(parsed(*words)) == scenario_fields(given)
 
 
-def test_a_repeated_option_lists_values_and_what_is_not_given_is_left_out() -> None:
+def test_a_repeated_option_lists_values_and_what_is_not_given_is_left_out():
     words = ("--noise", "0", "--noise", "1", "--margin", "auto", "--margin", "0.1", "--map", "none")
     assert parsed(*words, many=True) == {"noise": [0.0, 1.0], "margin": ["auto", 0.1], "map": ["none"]}

@@ -1,20 +1,17 @@
 """Every block of code on every page is run: by the build of the site, or by a test that the page names."""
 
-from __future__ import annotations
-
 import importlib
 import re
 from collections import Counter
 from pathlib import Path
 
-import pytest
 import yaml
 from markdown_it import MarkdownIt
 
 from antdrive.robots.files import robot_from_text
 from antdrive.runs.campaigns import expand, make_campaign
 from antdrive.worlds import load_task, save_task
-from tools.pages import RUN, TESTED, Block, blocks_of, pages_with_code
+from tools.pages import RUN, TESTED, blocks_of, pages_with_code
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -41,7 +38,7 @@ NOT_RUN = [
 PLAIN = ["CONTRIBUTING.md", "docs/explanation/architecture.md", "docs/how-to/regression-tests.md"]
 
 
-def fault(page: str, block: Block) -> str:
+def fault(page, block):
     """Why nobody runs a block; empty if somebody does, or if there is nothing to run."""
     if block.language == "text" or block.language.startswith("{"):
         return ""
@@ -52,42 +49,42 @@ def fault(page: str, block: Block) -> str:
     return f"is {block.language} without a file: <!-- file: NAME --> before it writes it where the next block finds it"
 
 
-def test_every_block_has_somebody_who_runs_it() -> None:
+def test_every_block_has_somebody_who_runs_it():
     faults = [f"{page}:{block.line} {wrong}" for page, block in BLOCKS if (wrong := fault(page, block))]
     assert faults == []
 
 
-def code_of(text: str) -> list[tuple[str, int]]:
+def code_of(text):
     """The kind of each block of code in Markdown, fenced, indented or in a list, and the number of its first line."""
     blocks = [token for token in MarkdownIt().parse(text) if token.type in ("fence", "code_block") and token.map]
     return [(token.type, token.map[0] + 1) for token in blocks if token.map]
 
 
-def test_the_runner_finds_every_block_that_markdown_has() -> None:
+def test_the_runner_finds_every_block_that_markdown_has():
     for page in PAGES:
         text = page.read_text()
         found = [("fence", block.line - 1) for block in blocks_of(text) if block.language != "before"]
         assert found == code_of(text), page
 
 
-def test_only_these_blocks_are_neither_code_nor_what_code_printed() -> None:
+def test_only_these_blocks_are_neither_code_nor_what_code_printed():
     plain = [page for page, block in BLOCKS if block.language == "text" and not block.follows]
     assert sorted(plain) == PLAIN
 
 
-def test_nothing_else_is_left_out() -> None:
+def test_nothing_else_is_left_out():
     found = sorted((page, block.marks["not run"]) for page, block in BLOCKS if "not run" in block.marks)
     assert found == NOT_RUN
 
 
-def test_the_build_runs_all_pages_with_code_but_those_that_tests_run() -> None:
+def test_the_build_runs_all_pages_with_code_but_those_that_tests_run():
     built = {page.relative_to(ROOT).as_posix() for page in pages_with_code()}
     runnable = {page for page, block in BLOCKS if block.language in RUN and not block.marks}
     assert runnable <= built | set(TESTED)
     assert "python -m tools.pages --all" in (ROOT / "Makefile").read_text()
 
 
-def test_the_tests_that_pages_name_exist() -> None:
+def test_the_tests_that_pages_name_exist():
     named = [block.marks["run by"] for _, block in BLOCKS if "run by" in block.marks]
     assert named
     assert [one for one in named if not defines(one)] == []
@@ -98,14 +95,14 @@ def test_the_tests_that_pages_name_exist() -> None:
         assert all(f'"{part}"' in text for part in folder.split("/") if part), f"{file} does not read {page}"
 
 
-def defines(test: str) -> bool:
+def defines(test):
     """Whether there is a test `FILE::NAME`."""
     file, _, name = test.partition("::")
     path = ROOT / file
     return path.exists() and re.search(rf"^def {re.escape(name)}\(", path.read_text(), re.MULTILINE) is not None
 
 
-def block_of(page: str, test: str, language: str = "yaml") -> str:
+def block_of(page, test, language="yaml"):
     """The text of the block of a page that a test runs."""
     (text,) = [
         block.text
@@ -115,7 +112,7 @@ def block_of(page: str, test: str, language: str = "yaml") -> str:
     return text
 
 
-def test_each_footprint_of_the_page_is_one() -> None:
+def test_each_footprint_of_the_page_is_one():
     text = block_of("docs/reference/robots.md", "test_each_footprint_of_the_page_is_one")
     lines = text.splitlines()
     data = yaml.safe_load((ROOT / "robots" / "catalog" / "turtlebot3-burger.yaml").read_text())
@@ -124,7 +121,7 @@ def test_each_footprint_of_the_page_is_one() -> None:
     assert len(lines) == 4
 
 
-def test_the_campaign_file_of_the_guide_expands(tmp_path: Path) -> None:
+def test_the_campaign_file_of_the_guide_expands(tmp_path):
     """Whole it has millions of runs, so each key is expanded with all that it lists beside one value of every other."""
     test = "test_the_campaign_file_of_the_guide_expands"
     data = yaml.safe_load(block_of("docs/how-to/campaigns.md", test))
@@ -134,16 +131,9 @@ def test_the_campaign_file_of_the_guide_expands(tmp_path: Path) -> None:
     imported = [one for one in data["worlds"] if "import" in one]
     few = {"schema": 1, "worlds": ["gate"], "planners": ["astar"], "seeds": 1}
     numbers = {
-        "worlds": 22,
-        "tasks": 30,
-        "planners": 10,
-        "robots": 2,
-        "routes": 2,
-        "noise": 2,
-        "margin": 2,
-        "seeds": 10,
+        "worlds": 22, "tasks": 30, "planners": 10, "robots": 2, "smoothing": 2, "noise": 2, "margin": 2, "seeds": 10,
         "settings": 4,
-    }
+    }  # fmt: skip
     assert len(imported) == 2
     for key, number in numbers.items():
         listed = [one for one in data[key] if one not in imported] if key == "worlds" else data[key]
@@ -151,7 +141,7 @@ def test_the_campaign_file_of_the_guide_expands(tmp_path: Path) -> None:
     assert set(data) == {*few, *numbers, "note", "run_limit", "rollouts"}
 
 
-def test_the_site_shows_files_names_and_why_a_block_was_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_site_shows_files_names_and_why_a_block_was_not_run(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
     shown = importlib.import_module("antdrive_links").adapted(
         "Text.\n\n<!-- file: a.yaml -->\n```yaml\na: 1\n```\n\n<!-- not run: they need a cluster -->\n```sh\nx\n```\n",
@@ -162,7 +152,7 @@ def test_the_site_shows_files_names_and_why_a_block_was_not_run(monkeypatch: pyt
     assert "does not run these lines: they need a cluster.\n\n```sh" in shown
 
 
-def test_films_of_the_gallery_have_names_of_their_own() -> None:
+def test_films_of_the_gallery_have_names_of_their_own():
     """Examples run at the same time in one folder."""
     examples = list((ROOT / "docs" / "gallery").glob("*.py"))
     films = Counter(film for path in examples for film in re.findall(r'"([\w-]+\.mp4)"', path.read_text()))

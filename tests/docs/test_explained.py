@@ -1,12 +1,9 @@
 """Every planner of the registry has a page that explains it: idea, equations, picture, options, weaknesses, when to choose it."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -24,14 +21,14 @@ EXPLAINED = {
 
 
 @pytest.fixture
-def tables(monkeypatch: pytest.MonkeyPatch) -> Any:
+def tables(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
     return importlib.import_module("antdrive_tables")
 
 
-def attributes(text: str) -> dict[str, str]:
+def attributes(text):
     """The entries of a section `Attributes:`, read by another rule than the site's."""
-    found: dict[str, str] = {}
+    found = {}
     for block in re.findall(r"^ +Attributes:\n((?: {8}.*\n?|\n)+)", text, re.MULTILINE):
         for entry in re.split(r"^ {8}(?=\w+: )", block, flags=re.MULTILINE)[1:]:
             name, _, meaning = entry.partition(": ")
@@ -40,7 +37,7 @@ def attributes(text: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_a_planner_is_explained(name: str) -> None:
+def test_a_planner_is_explained(name):
     assert name in EXPLAINED, f"add `.. known:: planner {name}` to a page in docs/explanation/planners"
     page = EXPLAINED[name]
     text = page.read_text()
@@ -54,22 +51,22 @@ def test_a_planner_is_explained(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_a_planner_has_a_row_in_the_table(name: str) -> None:
+def test_a_planner_has_a_row_in_the_table(name):
     rows = [line for line in (PAGES / "index.md").read_text().splitlines() if line.startswith("| [`")]
     assert any(f"`{name}`" in row.split("|")[1] for row in rows), f"add {name} to docs/explanation/planners/index.md"
 
 
 @pytest.mark.parametrize("kind", dict.fromkeys(map(type, PLANNERS.values())), ids=lambda kind: kind.__name__)
-def test_a_planner_knows_its_weaknesses_and_every_option_is_described(kind: type, tables: Any) -> None:
+def test_a_planner_knows_its_weaknesses_and_every_option_is_described(kind, tables):
     assert "Known weakness" in (kind.__doc__ or "")
     assert tables.weaknesses_of(kind)
-    wanted: dict[str, str] = {}
+    wanted = {}
     for base in reversed(kind.__mro__):
         wanted |= attributes(inspect.getsource(base).split('"""')[1] if base.__module__.startswith("antdrive") else "")
     assert tables.described(kind) == wanted
 
 
-def test_the_lines_that_draw_pictures_are_python() -> None:
+def test_the_lines_that_draw_pictures_are_python():
     for page in PAGES.glob("*.md"):
         for code in re.findall(r"^```\{drawn\} .+?\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL):
             compile(code, page.name, "exec")

@@ -1,19 +1,26 @@
-"""Tables of the reference: those that people write name what the code has, and the others are made from it."""
-
-from __future__ import annotations
+"""Tables, files and measurements on pages: those that people write name what the code has and work, the others are made."""
 
 import dataclasses
 import importlib
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from antdrive.base.document import parse_document
+from antdrive.cli.commands import COMMANDS
+from antdrive.runs.campaigns import make_campaign, sweep
+from antdrive.runs.campaigns.campaign import CampaignFile
+from antdrive.runs.campaigns.rows import GRID, RESULT
+from antdrive.runs.campaigns.store import read_manifest
 from antdrive.runs.suites.baseline import Baseline
+from antdrive.runs.suites.suite import ScenarioEntry, load_suite, suite_schema
 from antdrive.sim.driving.rules import EXPLORING_LIMITERS
-from antdrive.sim.log.record import MarginRecord, SensingRecord, record_keys
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.record import MarginRecord, SensingRecord
 from antdrive.sim.log.rollout import ARRAYS, SENSED
 from tests.records import made_up_record
 
@@ -21,22 +28,22 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 
 
-def first_cells(page: str, heading: str) -> list[str]:
+def first_cells(page, heading):
     """What stands in backticks in the first column of the table below a heading."""
     table = (DOCS / page).read_text().partition(f"{heading}\n")[2].partition("|---|")[2].partition("\n\n")[0]
     return [name for row in table.splitlines()[1:] for name in re.findall(r"`([^`]+)`", row.split("|")[1])]
 
 
-def test_every_limiter_is_explained_in_its_order() -> None:
+def test_every_limiter_is_explained_in_its_order():
     assert first_cells("explanation/following.md", "### Limiters") == list(EXPLORING_LIMITERS)
 
 
-def test_every_key_of_a_baseline_is_explained() -> None:
+def test_every_key_of_a_baseline_is_explained():
     named = first_cells("reference/formats/baseline.md", "# The keys of a baseline")
     assert sorted(named) == sorted(field.name for field in dataclasses.fields(Baseline))
 
 
-def test_every_variable_that_the_code_reads_is_explained() -> None:
+def test_every_variable_that_the_code_reads_is_explained():
     folders = [ROOT / "src", ROOT / "tools"]
     sources = "".join(path.read_text() for folder in folders for path in folder.rglob("*.py"))
     read = set(re.findall(r"os\.environ(?:\.get\(|\[)\"(\w+)\"", sources))
@@ -44,12 +51,12 @@ def test_every_variable_that_the_code_reads_is_explained() -> None:
 
 
 @pytest.fixture
-def known(monkeypatch: pytest.MonkeyPatch) -> Any:
+def known(monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS / "_ext"))
     return importlib.import_module("antdrive_tables").KNOWN
 
 
-def test_every_table_that_a_page_asks_for_is_made(known: Any) -> None:
+def test_every_table_that_a_page_asks_for_is_made(known):
     pages = "".join(path.read_text() for path in DOCS.rglob("*.md") if not {"_build", "_gallery"} & set(path.parts))
     asked = {tuple(words.split()) for words in re.findall(r"^\.\. known:: (.+)$", pages, re.MULTILINE)}
     assert {name for name, *_ in asked} == set(known)
@@ -57,11 +64,136 @@ def test_every_table_that_a_page_asks_for_is_made(known: Any) -> None:
         assert len(known[name](*words)) > 2, name
 
 
-def test_every_array_and_every_key_of_a_log_is_explained(known: Any) -> None:
+def test_every_array_and_every_key_of_a_log_is_explained(known):
     choice = MarginRecord(loss_m=0.03, reserve_m=0.01, probability=1e-3, drives=80)
     sensing = SensingRecord(map="none", localisation="odometry", odometry=1.0)
     written = json.loads(made_up_record(margin_choice=choice, sensing=sensing).to_json())
     table = "\n".join([*known["arrays"](), *known["record"]()])
     for name in (*ARRAYS, *SENSED, *written, *(f"plan.{key}" for key in written["plan"]), "margin_choice.loss_m"):
         assert f" - ``{name}``" in table, name
-    assert all(kind and text for _, kind, text in record_keys())
+
+
+CAMPAIGNS = (DOCS / "how-to" / "campaigns.md").read_text()
+FOLDER = (DOCS / "reference" / "formats" / "campaign-folder.md").read_text()
+
+
+def test_the_file_that_the_guide_to_campaigns_shows_has_every_key_and_is_right():
+    block = max(re.findall(r"```yaml\n(.*?)```", CAMPAIGNS, flags=re.DOTALL), key=len)  # the others are first steps
+    data = parse_document(block, "docs/how-to/campaigns.md").data
+    assert make_campaign(data).entry.rollouts == "failed"
+    assert set(data) == {info.alias or name for name, info in CampaignFile.model_fields.items()}
+
+
+def test_every_column_of_a_campaign_is_explained():
+    names = {*GRID, *RESULT} - set(METRICS) | {"plan_s", "drive_wall_s"}
+    assert [name for name in names if f"`{name}`" not in FOLDER and not name.startswith("version.")] == []
+
+
+def test_every_key_of_a_manifest_is_explained(tmp_path):
+    sweep({"worlds": "empty", "planners": "astar"}, tmp_path / "out", jobs=0)
+    table = FOLDER.partition("`manifest.json` has these keys:")[2].partition("\n## ")[0]
+    assert re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE) == list(read_manifest(tmp_path / "out"))
+
+
+def test_the_line_for_pandas_reads_the_table(tmp_path, monkeypatch):
+    pandas = pytest.importorskip("pandas")
+    monkeypatch.chdir(tmp_path)
+    results = sweep({"worlds": "empty", "planners": "astar"}, "out/first", jobs=0)
+    (line,) = re.findall(r"^\| pandas \| `(.*)` \|$", CAMPAIGNS, flags=re.MULTILINE)
+    assert results.pandas().equals(eval(line, {"pandas": pandas}))
+
+
+PAGE = (DOCS / "how-to" / "regression-tests.md").read_text()
+REFERENCE = DOCS / "reference"
+
+
+def block(language):
+    (text,) = re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
+    return str(text)
+
+
+def test_the_tolerances_are_those_of_the_table_of_metrics():
+    page = (REFERENCE / "regression.md").read_text()
+    for name, metric in METRICS.items():
+        row = re.search(rf"^\| `{name}` \| (\w+) \| (.*) \|$", page, flags=re.MULTILINE)
+        if metric.tolerance is None:
+            assert row is None
+            continue
+        assert row, name
+        share = f" + {100 * metric.tolerance.relative:g} %" if metric.tolerance.relative else ""
+        unit = "" if metric.unit == "1" else f" {metric.unit}"
+        assert row.groups() == (metric.better, f"{metric.tolerance.absolute:g}{unit}{share}")
+
+
+def test_every_key_of_a_suite_is_explained():
+    table = (REFERENCE / "formats" / "suite.md").read_text().split("| key | meaning |")[1].split("\n\n")[0]
+    assert {key for key in ScenarioEntry.model_fields if f"`{key}`" not in table} == {"note"}
+    properties = suite_schema()["$defs"]["ScenarioEntry"]["properties"]
+    assert all(entry.get("description") for entry in properties.values())
+
+
+def test_the_suite_is_read(tmp_path):
+    (tmp_path / "page.drive.yaml").write_text(block("yaml"))
+    assert [case.id for case in load_suite(tmp_path / "page.drive.yaml")] == [
+        "forest[0]", "forest[1]", "random[0]", "random[1]", "random[2]", "closed-door[0]",
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_the_suite_and_the_tests_pass(tmp_path):
+    (tmp_path / "page.drive.yaml").write_text(block("yaml"))
+    (tmp_path / "test_page.py").write_text(block("python"))
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "antdrive.cli.testing.plugin"]
+    for words in (["--drive-update"], ["--drive-strict"]):
+        done = subprocess.run([*command, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout
+    assert "8 passed" in done.stdout
+
+
+COMMAND = re.compile(r"`(?:python -m (?P<module>[\w.]+)|make (?P<target>[\w-]+)|antdrive (?P<command>[\w-]+))[^`]*`")
+TABLE = re.compile(r"^\|[\s:|-]+\|$", re.MULTILINE)
+
+
+def sections(page):
+    """The text below each heading of a page, up to the next one."""
+    found = {}
+    for part in re.split(r"^(?=## )", page.read_text(), flags=re.MULTILINE)[1:]:
+        for section in re.split(r"^(?=### )", part, flags=re.MULTILINE):
+            found[section.partition("\n")[0]] = section
+    return found
+
+
+SECTIONS = {head: text for head, text in sections(ROOT / "docs" / "benchmarks.md").items() if TABLE.search(text)}
+
+
+@pytest.mark.parametrize("head", SECTIONS)
+def test_a_section_with_a_table_names_a_command_that_exists(head):
+    commands = list(COMMAND.finditer(SECTIONS[head]))
+    assert commands, "which command measures it again?"
+    for found in commands:
+        assert exists(found), found[0]
+
+
+def exists(found):
+    """Whether there is the module, the target of make or the command of antdrive."""
+    if found["target"]:
+        return re.search(rf"^{found['target']}:", (ROOT / "Makefile").read_text(), re.MULTILINE) is not None
+    if found["command"]:
+        return found["command"] in {*COMMANDS, "worlds", "robots"}
+    path = ROOT / found["module"].replace(".", "/")
+    return path.with_suffix(".py").exists() or (path / "__main__.py").exists()
+
+
+MARKS = {
+    (page.relative_to(ROOT).as_posix(), command)
+    for page in sorted((ROOT / "docs").rglob("*.md"))
+    if not {"_build", "_gallery"} & set(page.parts)
+    for command in re.findall(r"^<!-- measured by: (.+?) \|", page.read_text(), re.MULTILINE)
+}
+
+
+@pytest.mark.parametrize(("page", "command"), sorted(MARKS))
+def test_a_mark_names_a_command_that_exists(page, command):
+    found = COMMAND.fullmatch(f"`{command}`")
+    assert found
+    assert exists(found)

@@ -8,14 +8,13 @@ from pathlib import Path
 import pytest
 
 from antdrive.robots import load_robot
-from tests.cli.calling import Call
 from tests.cli.conftest import antdrive as antdrive  # a fixture
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "bridges"
 COMMANDS = [line for line in (EXAMPLE / "README.md").read_text().splitlines() if line.startswith("antdrive ")]
 
 
-def test_every_command_works_and_the_bag_lies_in_the_map(antdrive: Call, tmp_path: Path) -> None:
+def test_every_command_works_and_the_bag_lies_in_the_map(antdrive, tmp_path):
     pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
     shutil.copytree(EXAMPLE, tmp_path, dirs_exist_ok=True)
     said = {}

@@ -1,7 +1,5 @@
 """The campaigns in examples/ expand to as many runs as their README says."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import tarfile
@@ -18,12 +16,12 @@ SIZES = dict(re.findall(r"^\| `([\w.-]+)` \|.*\| ([^|]+) \|$", (FOLDER / "README
 FILES = sorted(path.name for path in FOLDER.glob("*.yaml"))
 
 
-def test_the_readme_lists_every_campaign() -> None:
+def test_the_readme_lists_every_campaign():
     assert sorted(SIZES) == FILES
 
 
 @pytest.mark.parametrize("name", [name for name in FILES if not name.startswith("barn")])
-def test_a_campaign_has_the_runs_that_the_readme_says(name: str) -> None:
+def test_a_campaign_has_the_runs_that_the_readme_says(name):
     expansion = expand(load_campaign(FOLDER / name))
     assert len(expansion.jobs) == int(SIZES[name])
     assert expansion.duplicates == 0
@@ -31,7 +29,7 @@ def test_a_campaign_has_the_runs_that_the_readme_says(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "each"), [("barn.yaml", 6), ("barn-planners.yaml", 170)])
-def test_a_barn_campaign_reads_the_worlds_beside_it(name: str, each: int, tmp_path: Path) -> None:
+def test_a_barn_campaign_reads_the_worlds_beside_it(name, each, tmp_path):
     if not BARN.exists():
         pytest.skip("needs BARN's worlds (docs/how-to/data.md)")
     shutil.copy(FOLDER / name, tmp_path)
@@ -44,7 +42,7 @@ def test_a_barn_campaign_reads_the_worlds_beside_it(name: str, each: int, tmp_pa
     assert len(expansion.jobs) == 3 * each
 
 
-def test_the_campaign_of_all_planners_has_all_that_plan_in_worlds_that_stand_still() -> None:
+def test_the_campaign_of_all_planners_has_all_that_plan_in_worlds_that_stand_still():
     entries = load_campaign(FOLDER / "barn-planners.yaml").entry.planners
     names = {one if isinstance(one, str) else one["name"] for one in entries}
     assert names == {name for name, planner in PLANNERS.items() if not capabilities_of(planner).needs_motions}

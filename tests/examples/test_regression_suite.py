@@ -1,7 +1,5 @@
 """The example of a repository with regression tests of drives: its tests pass, and every command of its page works."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -21,13 +19,13 @@ PLUGIN = ("-p", "antdrive.cli.testing.plugin", "-p", "no:cacheprovider")
 
 
 @pytest.fixture
-def checkout(tmp_path: Path) -> Path:
+def checkout(tmp_path):
     """A copy of the example, as it is in version control."""
     return Path(shutil.copytree(EXAMPLE, tmp_path / "checkout", ignore=shutil.ignore_patterns("__pycache__")))
 
 
 @pytest.fixture
-def variables(tmp_path: Path) -> dict[str, str]:
+def variables(tmp_path):
     """The environment of a user who has antdrive and pytest installed: both are on the path."""
     for name, module in (("antdrive", "antdrive"), ("pytest", f"pytest {' '.join(PLUGIN)}")):
         script = tmp_path / "bin" / name
@@ -38,11 +36,11 @@ def variables(tmp_path: Path) -> dict[str, str]:
     return {**env, "PATH": f"{tmp_path / 'bin'}{os.pathsep}{env['PATH']}", "PYTHONPATH": str(ROOT)}
 
 
-def run(words: list[str], folder: Path, env: dict[str, str]) -> subprocess.CompletedProcess[str]:
+def run(words, folder, env):
     return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, check=False)
 
 
-def test_its_tests_pass_and_use_every_baseline(checkout: Path, variables: dict[str, str]) -> None:
+def test_its_tests_pass_and_use_every_baseline(checkout, variables):
     done = run(["pytest", "-q", "--drive-strict", "--drive-film=never", "--junitxml=junit.xml"], checkout, variables)
     assert done.returncode == 0, done.stdout
     drives = len(list((checkout / "baselines").rglob("*.json")))
@@ -56,7 +54,7 @@ def test_its_tests_pass_and_use_every_baseline(checkout: Path, variables: dict[s
     assert all(re.fullmatch("[0-9a-f]{64}", fact["drive.digest"]) for fact in driven)
 
 
-def test_a_fault_of_the_planner_fails_its_tests(checkout: Path, variables: dict[str, str]) -> None:
+def test_a_fault_of_the_planner_fails_its_tests(checkout, variables):
     planner = checkout / "courier.py"
     planner.write_text(planner.read_text().replace("if not moves[here] >> k & 1:", "if not query.grid.free[cell]:"))
     words = ["antdrive", "check", "office.drive.yaml", "--only", "office", "--film", "never", "--json", "-j", "1"]
@@ -67,11 +65,11 @@ def test_a_fault_of_the_planner_fails_its_tests(checkout: Path, variables: dict[
     assert any("no allowed move" in fault for fault in test["faults"])
 
 
-def test_baselines_are_small() -> None:
+def test_baselines_are_small():
     assert all(path.stat().st_size <= 20_000 for path in (EXAMPLE / "baselines").rglob("*.json"))
 
 
-def test_its_workflow_calls_pytest_with_options_that_exist(checkout: Path, variables: dict[str, str]) -> None:
+def test_its_workflow_calls_pytest_with_options_that_exist(checkout, variables):
     (job,) = yaml.safe_load((EXAMPLE / ".github" / "workflows" / "drives.yml").read_text())["jobs"].values()
     (words,) = [step["run"].split() for step in job["steps"] if step.get("run", "").startswith("pytest")]
     assert run([*words, "--collect-only", "-q"], checkout, variables).returncode == 0
@@ -83,13 +81,13 @@ def test_its_workflow_calls_pytest_with_options_that_exist(checkout: Path, varia
     assert words[words.index("--drive-results") + 1] == kept
 
 
-def test_every_file_of_the_page_exists() -> None:
+def test_every_file_of_the_page_exists():
     for name in re.findall(r"^\| (`.*`) \|", PAGE, flags=re.MULTILINE):
         assert all((EXAMPLE / file).exists() for file in re.findall(r"`([^`]+)`", name)), name
 
 
 @pytest.mark.slow
-def test_every_command_of_the_page_works(checkout: Path, variables: dict[str, str]) -> None:
+def test_every_command_of_the_page_works(checkout, variables):
     start, *more, rest = re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL)
     done = run(["bash", "-ec", "".join([start, *more])], checkout.parent, variables)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -1,28 +1,15 @@
 """Properties of every planner in the registry. A planner added to `PLANNERS` is tested without further work."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
 from antdrive.base import InputError
-from antdrive.planners import (
-    PLANNERS,
-    Planner,
-    PlanResult,
-    PlanStatus,
-    Query,
-    capabilities_of,
-    check_plan,
-    load_planner,
-    path_cost,
-)
+from antdrive.planners import PLANNERS, PlanStatus, Query, capabilities_of, check_plan, path_cost
 from antdrive.worlds import DIRECTIONS, Grid, polyline_clearance
-from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
+from tests.planners.worlds_to_solve import catalogue, optimum, quick, random_query, sealed
 
 CATALOGUE = catalogue()
 NEEDS_WORLD = [name for name, planner in PLANNERS.items() if capabilities_of(planner).needs_world]
@@ -30,22 +17,14 @@ ON_GRIDS = [name for name in PLANNERS if name not in NEEDS_WORLD]
 INCOMPLETE = [name for name, planner in PLANNERS.items() if not capabilities_of(planner).complete]
 
 
-def quick(name: str) -> Planner:
-    """A planner with a budget that is small enough for a test."""
-    planner: Any = PLANNERS[name]
-    small = {"ants": 60, "iterations": 12}
-    known = {f.name for f in dataclasses.fields(planner)}
-    return load_planner(name, **{key: value for key, value in small.items() if key in known})
-
-
-def solve(name: str, query: Query, seed: int = 0) -> PlanResult:
+def solve(name, query, seed=0):
     """A planner's answer, which `check_plan` accepts whatever it is."""
-    result = quick(name).plan(query, np.random.default_rng(seed))
+    result = quick(name, ants=60, iterations=12).plan(query, np.random.default_rng(seed))
     assert check_plan(query, result) == ""
     return result
 
 
-def assert_valid(result: PlanResult, query: Query) -> None:
+def assert_valid(result, query):
     cells = result.cells
     assert tuple(cells[0]) == query.start
     assert tuple(cells[-1]) == query.goal
@@ -55,23 +34,22 @@ def assert_valid(result: PlanResult, query: Query) -> None:
     assert result.cost == pytest.approx(path_cost(cells, query.grid.cell), abs=1e-9)
 
 
-def assert_drivable(result: PlanResult, query: Query) -> None:
+def assert_drivable(result, query):
     """If a planner draws a line of its own, the line keeps the clearance and joins the exact ends."""
     if result.waypoints is None:
         assert result.length is None
         return
-    assert query.task is not None
     xy = query.grid.xy(result.line)
     np.testing.assert_allclose(xy[[0, -1]], [query.task.start[:2], query.task.goal], atol=1e-9)
     assert polyline_clearance(query.task.world, xy) >= query.grid.inflate - 1e-9
     # The polyline passes arcs on their outside, so it is no shorter than the curve that it approximates.
     drawn = float(np.hypot(*np.diff(xy, axis=0).T).sum())
-    assert drawn - 0.05 <= result.length <= drawn + 1e-9  # type: ignore[operator]
+    assert drawn - 0.05 <= result.length <= drawn + 1e-9
 
 
 @pytest.mark.parametrize("world", CATALOGUE)
 @pytest.mark.parametrize("name", PLANNERS)
-def test_every_world_of_the_catalogue_is_solved_along_allowed_moves(name: str, world: str) -> None:
+def test_every_world_of_the_catalogue_is_solved_along_allowed_moves(name, world):
     query = CATALOGUE[world]
     result = solve(name, query)
     if name in INCOMPLETE and not result.solved:
@@ -87,7 +65,7 @@ def test_every_world_of_the_catalogue_is_solved_along_allowed_moves(name: str, w
 
 
 @pytest.mark.parametrize("name", ON_GRIDS)
-def test_answers_on_random_grids_are_valid(name: str) -> None:
+def test_answers_on_random_grids_are_valid(name):
     rng = np.random.default_rng(11)
     for seed in range(40):
         query = random_query(rng, largest=12)
@@ -99,7 +77,7 @@ def test_answers_on_random_grids_are_valid(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_the_same_seed_gives_the_same_plan(name: str) -> None:
+def test_the_same_seed_gives_the_same_plan(name):
     one, two = (solve(name, CATALOGUE["forest"], seed=5) for _ in range(2))
     np.testing.assert_array_equal(one.cells, two.cells)
     np.testing.assert_array_equal(one.history.iteration_mean, two.history.iteration_mean)
@@ -107,7 +85,7 @@ def test_the_same_seed_gives_the_same_plan(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ON_GRIDS)
-def test_an_enclosed_goal_has_no_path(name: str) -> None:
+def test_an_enclosed_goal_has_no_path(name):
     result = solve(name, sealed())
     assert result.status is PlanStatus.NO_PATH
     assert len(result.cells) == 0
@@ -116,7 +94,7 @@ def test_an_enclosed_goal_has_no_path(name: str) -> None:
 
 @pytest.mark.parametrize("end", ["start", "goal"])
 @pytest.mark.parametrize("name", ON_GRIDS)
-def test_a_blocked_end_has_no_path(name: str, end: str) -> None:
+def test_a_blocked_end_has_no_path(name, end):
     free = np.ones((5, 5), dtype=np.bool_)
     free[0, 0] = False
     ends = {"start": (4, 4), "goal": (4, 4), end: (0, 0)}
@@ -126,7 +104,7 @@ def test_a_blocked_end_has_no_path(name: str, end: str) -> None:
 
 
 @pytest.mark.parametrize("name", ON_GRIDS)
-def test_a_start_at_the_goal_is_a_path_of_one_cell(name: str) -> None:
+def test_a_start_at_the_goal_is_a_path_of_one_cell(name):
     result = solve(name, Query(Grid.from_free(np.ones((3, 3))), (1, 1), (1, 1)))
     assert result.solved
     assert result.cells.tolist() == [[1, 1]]
@@ -134,13 +112,13 @@ def test_a_start_at_the_goal_is_a_path_of_one_cell(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NEEDS_WORLD)
-def test_a_planner_that_needs_a_world_refuses_a_bare_grid(name: str) -> None:
+def test_a_planner_that_needs_a_world_refuses_a_bare_grid(name):
     with pytest.raises(InputError, match="has no task"):
         solve(name, sealed())
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_the_query_is_not_changed(name: str) -> None:
+def test_the_query_is_not_changed(name):
     query = CATALOGUE["gate"]
     free, moves = query.grid.free.copy(), query.grid.moves.copy()
     solve(name, query)
@@ -149,8 +127,8 @@ def test_the_query_is_not_changed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_the_result_records_its_options(name: str) -> None:
-    planner: Any = quick(name)
+def test_the_result_records_its_options(name):
+    planner = quick(name, ants=60, iterations=12)
     result = planner.plan(CATALOGUE["empty"], np.random.default_rng(0))
     assert set(result.options) == {f.name for f in dataclasses.fields(planner)}
     assert result.wall_s > 0

@@ -1,12 +1,9 @@
 """Kernels of planners against slow definitions, where plans alone do not show a small fault."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
 
-from antdrive.base import Floats
 from antdrive.planners.anyangle._kernels_ga import tighten_all
 from antdrive.planners.anyangle._kernels_lines import Terrain, clear_cells, clear_line, corridor_moves, pull
 from antdrive.planners.colonies._kernels_colony import goal_pull, next_random
@@ -18,7 +15,7 @@ from antdrive.worlds import DIRECTIONS, Grid
 NO_DISCS, NO_WALLS = np.empty((0, 3)), np.zeros(4)
 
 
-def test_gates_lie_between_two_diagonally_opposite_blocked_cells() -> None:
+def test_gates_lie_between_two_diagonally_opposite_blocked_cells():
     rng = np.random.default_rng(3)
     for _ in range(60):
         rows, cols = rng.integers(3, 9, 2)
@@ -41,7 +38,7 @@ def test_gates_lie_between_two_diagonally_opposite_blocked_cells() -> None:
         np.testing.assert_array_equal(moves, expected)
 
 
-def test_a_vertex_that_is_consistent_leaves_the_queue_even_from_its_top() -> None:
+def test_a_vertex_that_is_consistent_leaves_the_queue_even_from_its_top():
     g, rhs = np.array([5, 6, 7]), np.array([9, 9, 9])
     heap, place, size = np.zeros((4, 3), np.int64), np.full(3, -1), 0
     for u in range(3):
@@ -56,11 +53,11 @@ def test_a_vertex_that_is_consistent_leaves_the_queue_even_from_its_top() -> Non
     assert heap[place[1], :2].tolist() == [6 + 3 + 4, 6]
 
 
-def test_moves_cost_what_their_direction_says() -> None:
+def test_moves_cost_what_their_direction_says():
     assert COST.tolist() == [DIAGONAL if dr and dc else STRAIGHT for dr, dc in DIRECTIONS]
 
 
-def test_a_line_touches_the_cell_behind_a_border_within_a_billionth() -> None:
+def test_a_line_touches_the_cell_behind_a_border_within_a_billionth():
     free = np.ones((3, 3), np.bool_)
     free[1] = False
     for row, touches in ((0.5, True), (0.5 - 5e-10, True), (0.5 - 2e-9, False), (0.4, False)):
@@ -69,7 +66,7 @@ def test_a_line_touches_the_cell_behind_a_border_within_a_billionth() -> None:
         assert clear_cells(free, 2.0 - row, 2.0, 2.0 - row, 0.0) is not touches
 
 
-def test_a_pulled_line_goes_each_time_to_the_last_point_in_sight() -> None:
+def test_a_pulled_line_goes_each_time_to_the_last_point_in_sight():
     rng, shorter = np.random.default_rng(4), 0
     for _ in range(40):
         free = rng.random((9, 9)) >= 0.15
@@ -85,14 +82,14 @@ def test_a_pulled_line_goes_each_time_to_the_last_point_in_sight() -> None:
     assert shorter > 10
 
 
-def distance(point: Floats, line: Floats) -> float:
+def distance(point, line):
     a, b = line[:-1], line[1:]
     length2 = ((b - a) ** 2).sum(axis=1)
     f = np.clip(((point - a) * (b - a)).sum(axis=1) / np.where(length2 > 0, length2, 1.0), 0.0, 1.0)
     return float(np.hypot(*(a + f[:, None] * (b - a) - point).T).min())
 
 
-def test_the_corridor_holds_the_cells_within_its_width() -> None:
+def test_the_corridor_holds_the_cells_within_its_width():
     rng = np.random.default_rng(5)
     for _ in range(40):
         rows, cols = (int(n) for n in rng.integers(2, 10, 2))
@@ -108,7 +105,7 @@ def test_the_corridor_holds_the_cells_within_its_width() -> None:
         np.testing.assert_array_equal(corridor_moves(moves, line, width), expected)
 
 
-def test_random_numbers_are_those_of_xorshift64() -> None:
+def test_random_numbers_are_those_of_xorshift64():
     state = 88172645463325252
     for _ in range(50):
         found = int(next_random(np.uint64(state)))
@@ -117,7 +114,7 @@ def test_random_numbers_are_those_of_xorshift64() -> None:
         assert found == state
 
 
-def test_the_goal_pulls_along_the_moves_that_lead_to_it() -> None:
+def test_the_goal_pulls_along_the_moves_that_lead_to_it():
     """The cosine of the angle between a move and the way to the goal; 0 for moves away from it or not allowed."""
     grid = Grid.from_free(np.random.default_rng(6).random((6, 7)) >= 0.1)
     found = np.full((42, 8), np.nan)
@@ -129,7 +126,7 @@ def test_the_goal_pulls_along_the_moves_that_lead_to_it() -> None:
         np.testing.assert_allclose(found[r * 7 + c, k], max(0.0, cosine), atol=1e-12)
 
 
-def test_via_points_without_obstacles_go_to_the_line_between_their_neighbours() -> None:
+def test_via_points_without_obstacles_go_to_the_line_between_their_neighbours():
     land = Terrain(NO_DISCS, NO_WALLS, 0.0, np.ones((30, 30), np.bool_), 0.0, 0.0, 1.0, True)
     rng, ends = np.random.default_rng(7), np.array([(2.0, 3.0), (25.0, 20.0)])
     for count in (1, 3, 5):

@@ -1,7 +1,5 @@
 """Planning time holds no loading of kernels. Nothing is timed: what is loaded within the clock is looked at instead."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -10,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, GridPlanner, PlanResult, Query, load_planner, watch
+from antdrive.planners import PLANNERS, GridPlanner, Query, load_planner, watch
 from antdrive.planners.loading import kernels_loaded, tiny_query
 
 # Each planner gets a process of its own, in which no kernel is loaded yet. It prints what its first plan loads by itself.
@@ -50,8 +48,7 @@ REPLANS = """
 import gc, os, sys
 from numba.core.dispatcher import Dispatcher
 from antdrive.sim import Scenario, run
-from antdrive.sim.driving.cellwise import CellByCell
-from antdrive.sim.driving.replanning import Replanning
+from antdrive.sim.driving.replanning import CellByCell, Replanning
 
 def overloads():
     return {f"{d.__module__}.{d.__name__}": len(d.overloads) for d in gc.get_objects() if isinstance(d, Dispatcher)}
@@ -88,7 +85,7 @@ needs_kernels = pytest.mark.skipif(
 )
 
 
-def printed(script: str, *words: str) -> dict[str, list[str]]:
+def printed(script, *words):
     """What a script prints about each of its words."""
     done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0, done.stderr
@@ -99,7 +96,7 @@ def printed(script: str, *words: str) -> dict[str, list[str]]:
 
 @needs_kernels
 @pytest.mark.parametrize("words", [SOON, pytest.param((*PLANNERS, *COLONIES), marks=pytest.mark.slow)], ids=len)
-def test_every_kernel_of_a_planner_is_loaded_before_the_clock_starts(words: tuple[str, ...]) -> None:
+def test_every_kernel_of_a_planner_is_loaded_before_the_clock_starts(words):
     for name, (_, *loaded) in printed(PLANS, *words).items():
         assert loaded == [], name
 
@@ -109,7 +106,7 @@ def test_every_kernel_of_a_planner_is_loaded_before_the_clock_starts(words: tupl
 @pytest.mark.parametrize(
     "words", ["dstar-lite clearance", "ants taut", "mmas-dstar none", "as clearance", "tangent taut"]
 )
-def test_every_kernel_of_a_replan_is_loaded_before_the_clock_starts(words: str) -> None:
+def test_every_kernel_of_a_replan_is_loaded_before_the_clock_starts(words):
     count, *loaded = printed(REPLANS, words)[words]
     assert int(count) > 0, "the drive replans"
     assert loaded == []
@@ -120,12 +117,12 @@ class Counting(GridPlanner):
 
     asked: list[Query] = []  # noqa: RUF012 - shared on purpose
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def _plan(self, query, rng):
         self.asked.append(query)
         return PLANNERS["astar"].plan(query, rng)
 
 
-def test_a_planner_is_rehearsed_once_and_planners_within_it_not_at_all() -> None:
+def test_a_planner_is_rehearsed_once_and_planners_within_it_not_at_all():
     Counting.asked.clear()
     query = tiny_query(Query, motions=False, task=True)
     longer = replace(query, start=(1, 1))
@@ -135,7 +132,7 @@ def test_a_planner_is_rehearsed_once_and_planners_within_it_not_at_all() -> None
 
 
 @pytest.mark.parametrize("name", ["aco-han", "ga-han", "hybrid"])
-def test_the_rehearsal_is_not_watched_and_leaves_the_random_numbers_alone(name: str) -> None:
+def test_the_rehearsal_is_not_watched_and_leaves_the_random_numbers_alone(name):
     query, seen = tiny_query(Query, motions=False, task=True), []
     planner = load_planner(name, iterations=7)
     rng, other = np.random.default_rng(5), np.random.default_rng(5)
@@ -147,11 +144,11 @@ def test_the_rehearsal_is_not_watched_and_leaves_the_random_numbers_alone(name: 
     assert rng.bit_generator.state == other.bit_generator.state
 
 
-def test_a_planner_that_fails_is_heard_where_it_is_timed() -> None:
+def test_a_planner_that_fails_is_heard_where_it_is_timed():
     class Failing(GridPlanner):
         """Always fails."""
 
-        def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        def _plan(self, query, rng):
             raise ArithmeticError(query.grid.shape)
 
     query = replace(tiny_query(Query, motions=False, task=True), start=(0, 0))

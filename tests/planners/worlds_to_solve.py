@@ -1,21 +1,18 @@
 """Grids and queries that the tests of planners share, and an oracle that shares no code with them."""
 
-from __future__ import annotations
-
+import dataclasses
 import heapq
 import math
-from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from antdrive.planners import Query
+from antdrive.planners import PLANNERS, Query, load_planner
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 
 
-def optimum(query: Query) -> float:
+def optimum(query):
     """The length of the shortest path [m], inf if there is none: a plain Dijkstra."""
     moves = query.grid.moves
     best, queue = {query.start: 0.0}, [(0.0, query.start)]
@@ -35,7 +32,7 @@ def optimum(query: Query) -> float:
     return math.inf
 
 
-def optimum_by_scipy(query: Query) -> float:
+def optimum_by_scipy(query):
     """The length of the shortest path by scipy, for grids that are too large for `optimum`."""
     rows, cols = query.grid.shape
     moves = query.grid.moves
@@ -49,7 +46,7 @@ def optimum_by_scipy(query: Query) -> float:
     return float(reached[query.goal[0] * cols + query.goal[1]]) * query.grid.cell
 
 
-def thinned(rng: np.random.Generator, side: int, cut: float) -> Query:
+def thinned(rng, side, cut):
     """A grid with moves that neither cells nor discs explain: each two-way move is left out with probability `cut`."""
     picture = Grid.from_free(rng.random((side, side)) >= 0.05)
     moves = picture.moves.copy()
@@ -61,7 +58,7 @@ def thinned(rng: np.random.Generator, side: int, cut: float) -> Query:
     return Query(Grid(picture.free, moves), *(tuple(map(int, end)) for end in ends))
 
 
-def random_query(rng: np.random.Generator, largest: int = 24) -> Query:
+def random_query(rng, largest=24):
     """Randomly blocked cells and two random free ends; some queries have no path."""
     shape = rng.integers(1, largest, size=2)
     free = rng.random(shape) >= rng.uniform(0.0, 0.5)
@@ -70,7 +67,7 @@ def random_query(rng: np.random.Generator, largest: int = 24) -> Query:
     return Query(Grid.from_free(free, cell=0.5), *(tuple(map(int, end)) for end in ends))
 
 
-def random_discs(rng: np.random.Generator, count: int = 14) -> Query:
+def random_discs(rng, count=14):
     """Random discs, so that moves between free cells may be closed too."""
     discs = tuple(Disc(*rng.uniform(0, 10, 2), rng.uniform(0.05, 0.9)) for _ in range(count))
     grid = rasterise(World("random", (0, 0, 10, 10), discs), 0.5, rng.uniform(0, 0.4))
@@ -81,7 +78,7 @@ def random_discs(rng: np.random.Generator, count: int = 14) -> Query:
     return Query(grid, *(tuple(map(int, end)) for end in ends))
 
 
-def _wall(x0: float, y0: float, x1: float, y1: float) -> list[Disc]:
+def _wall(x0, y0, x1, y1):
     count = max(2, int(math.hypot(x1 - x0, y1 - y0) / 0.3) + 1)
     return [
         Disc(float(x), float(y), 0.2)
@@ -89,12 +86,12 @@ def _wall(x0: float, y0: float, x1: float, y1: float) -> list[Disc]:
     ]
 
 
-def _query(size: float, discs: Iterable[Disc], start: tuple[float, float], goal: tuple[float, float]) -> Query:
+def _query(size, discs, start, goal):
     task = Task(World("test", (0, 0, size, size), tuple(discs)), (*start, 0.0), goal)
     return Query.between(rasterise(task.world, 0.5, 0.25), task)
 
 
-def _forest() -> list[Disc]:
+def _forest():
     rng, discs = np.random.default_rng(3), []
     while len(discs) < 40:
         x, y = rng.uniform(0, 10, 2)
@@ -103,7 +100,7 @@ def _forest() -> list[Disc]:
     return discs
 
 
-def catalogue() -> dict[str, Query]:
+def catalogue():
     """Small worlds, each difficult in one way; all have a path."""
     corner, far = (1.0, 1.0), (9.0, 9.0)
     slalom = _wall(2.5, 0, 2.5, 7) + _wall(5, 3, 5, 10) + _wall(7.5, 0, 7.5, 7)
@@ -118,8 +115,14 @@ def catalogue() -> dict[str, Query]:
     }
 
 
-def sealed() -> Query:
+def quick(name, **budget):
+    """A planner with a budget that is small enough for a test, as far as it has one."""
+    known = {f.name for f in dataclasses.fields(PLANNERS[name])}
+    return load_planner(name, **{key: value for key, value in budget.items() if key in known})
+
+
+def sealed():
     """A goal behind a wall without a gap."""
-    free: npt.NDArray[np.bool_] = np.ones((8, 8), dtype=np.bool_)
+    free = np.ones((8, 8), dtype=np.bool_)
     free[:, 4] = False
     return Query(Grid.from_free(free), (1, 1), (6, 6))

@@ -1,15 +1,12 @@
 import dataclasses
 import json
-import math
-from pathlib import Path
 
 import pytest
 
-from antdrive.base import InputError
-from antdrive.robots import Footprint, RobotSpec, list_robots, load_robot, robot_schema, robot_to_dict
+from antdrive.robots import Footprint, list_robots, load_robot, robot_schema, robot_to_dict
 from antdrive.robots.files import footprint_to_dict
 from antdrive.sim import Engine
-from antdrive.sim.log.binding import canonical_hash
+from antdrive.sim.log.record import canonical_hash
 from antdrive.worlds import World
 
 GOOD = """\
@@ -29,7 +26,7 @@ wheel_torque: 2.0
 """
 
 
-def test_catalogue_robots_load() -> None:
+def test_catalogue_robots_load():
     assert set(list_robots()) >= {"turtlebot", "jackal"}
     jackal = load_robot("jackal")
     assert jackal.radius == pytest.approx(0.333, abs=1e-3)
@@ -37,7 +34,7 @@ def test_catalogue_robots_load() -> None:
     assert load_robot("turtlebot").footprint.is_disc
 
 
-def test_a_robot_is_described_by_one_file(tmp_path: Path) -> None:
+def test_a_robot_is_described_by_one_file(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(GOOD)
     mine = load_robot(path)
@@ -56,7 +53,7 @@ def test_a_robot_is_described_by_one_file(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_footprint_need_not_be_centred_on_the_axle(tmp_path: Path, entry: str, footprint: Footprint) -> None:
+def test_a_footprint_need_not_be_centred_on_the_axle(tmp_path, entry, footprint):
     path = tmp_path / "mine.yaml"
     path.write_text(GOOD.replace("{radius: 0.2}", entry))
     mine = load_robot(path)
@@ -65,7 +62,7 @@ def test_a_footprint_need_not_be_centred_on_the_axle(tmp_path: Path, entry: str,
     assert load_robot(path) == mine, "what is written of it is read as the same"
 
 
-def test_robots_without_corners_and_lidar_are_recorded_as_they_always_were() -> None:
+def test_robots_without_corners_and_lidar_are_recorded_as_they_always_were():
     """Their logs and hashes stay the same, bit for bit."""
     jackal, turtlebot = (dataclasses.replace(load_robot(name), lidar=None) for name in ("jackal", "turtlebot"))
     assert canonical_hash(jackal) == "8b9a050572644a9fa8fa254c229c73dd56e9a5dfaf8124b543ecbd96a284d8c2"
@@ -81,61 +78,26 @@ def test_robots_without_corners_and_lidar_are_recorded_as_they_always_were() -> 
 
 #: Changes that make a robot's file wrong, in one way each.
 WRONG = (
-    ("mass: 5.0", "mass: -5.0"),
-    ("mass: 5.0", "mass: heavy"),
-    ("mass: 5.0\n", ""),
-    ("mass: 5.0", "mas: 5.0"),
-    ("{radius: 0.2}", "{radius: 0.2, length: 1.0}"),
-    ("{radius: 0.2}", "{length: 1.0}"),
-    ("track: 0.25", "track: 0.55"),
-    ("wheel_radius: 0.04", "wheel_radius: 0.4"),
-    ("{radius: 0.2}", "{length: 0.6, width: 0.2}"),
-    ("{radius: 0.2}", "{length: 0.06, width: 0.3}"),
-    ("{radius: 0.2}", "{polygon: [[0.2, 0.2], [0.2, -0.2]]}"),
+    ("mass: 5.0", "mass: -5.0"), ("mass: 5.0", "mass: heavy"), ("mass: 5.0\n", ""), ("mass: 5.0", "mas: 5.0"),
+    ("{radius: 0.2}", "{radius: 0.2, length: 1.0}"), ("{radius: 0.2}", "{length: 1.0}"), ("track: 0.25", "track: 0.55"),
+    ("wheel_radius: 0.04", "wheel_radius: 0.4"), ("{radius: 0.2}", "{length: 0.6, width: 0.2}"),
+    ("{radius: 0.2}", "{length: 0.06, width: 0.3}"), ("{radius: 0.2}", "{polygon: [[0.2, 0.2], [0.2, -0.2]]}"),
     ("{radius: 0.2}", "{polygon: [[0.3, -0.2], [0.3, 0.2], [0.0, 0.05], [-0.3, 0.2], [-0.3, -0.2]]}"),
-    ("{radius: 0.2}", "{radius: 0.2, polygon: [[1, 0], [0, 1], [-1, -1]]}"),
-    ("{radius: 0.2}", "{centre: [0.1, 0.0]}"),
+    ("{radius: 0.2}", "{radius: 0.2, polygon: [[1, 0], [0, 1], [-1, -1]]}"), ("{radius: 0.2}", "{centre: [0.1, 0.0]}"),
     ("{radius: 0.2}", "{radius: 0.2, centre: [0.1]}"),
-    ("{radius: 0.2}", "{length: 0.5, width: 0.4, centre: [0.23, 0.0]}"),
-    ("max_speed: 1", "max_speed: .inf"),
-    ("max_speed: 1", "max_speed: 0.0024"),
-    ("max_speed: 1", "max_speed: 30"),
-    ("mass: 5.0", "mass: 1.0e-300"),
-    ("height: 0.3", "height: 1.0e-300"),
-    ("{radius: 0.2}", "{radius: 0.005}"),
-    ("{radius: 0.2}", "{length: 0.6, width: 0.252}"),
-    ("height: 0.3", "height: 0.05"),
-    ("max_wheel_speed: 40.0", "max_wheel_speed: 20.0"),
-    ("max_yaw_rate: 3.0", "max_yaw_rate: 13.0"),
-    ("wheel_torque: 2.0", "wheel_torque: 0.09"),
-    ("mass: 5.0", "mass: 20000.0"),
+    ("{radius: 0.2}", "{length: 0.5, width: 0.4, centre: [0.23, 0.0]}"), ("max_speed: 1", "max_speed: .inf"),
+    ("max_speed: 1", "max_speed: 0.0024"), ("max_speed: 1", "max_speed: 30"), ("mass: 5.0", "mass: 1.0e-300"),
+    ("height: 0.3", "height: 1.0e-300"), ("{radius: 0.2}", "{radius: 0.005}"),
+    ("{radius: 0.2}", "{length: 0.6, width: 0.252}"), ("height: 0.3", "height: 0.05"),
+    ("max_wheel_speed: 40.0", "max_wheel_speed: 20.0"), ("max_yaw_rate: 3.0", "max_yaw_rate: 13.0"),
+    ("wheel_torque: 2.0", "wheel_torque: 0.09"), ("mass: 5.0", "mass: 20000.0"),
     ("max_yaw_acceleration: 8.0", "max_yaw_acceleration: 93.0"),
-    ("wheel_torque: 2.0", "wheel_torque: 2.0\nwheel_friction: 0.1"),
-    ("schema: 1", 'schema: 1\nname: "a\\0b"'),
-    ("schema: 1", 'schema: 1\nname: "a\\nb"'),
-    ("schema: 1", 'schema: 1\nname: "\\e[2J"'),
-    ("schema: 1", "schema: 9"),
-)
+    ("wheel_torque: 2.0", "wheel_torque: 2.0\nwheel_friction: 0.1"), ("schema: 1", 'schema: 1\nname: "a\\0b"'),
+    ("schema: 1", 'schema: 1\nname: "a\\nb"'), ("schema: 1", 'schema: 1\nname: "\\e[2J"'), ("schema: 1", "schema: 9"),
+)  # fmt: skip
 
 
-def test_a_heavy_robot_whose_motors_are_too_weak_is_refused(tmp_path: Path) -> None:
-    """20 t and 8 rad/s2, with motors for 0.55: it would oscillate and never arrive."""
-    path = tmp_path / "truck.yaml"
-    path.write_text(
-        GOOD.replace("{radius: 0.2}", "{length: 6.0, width: 2.5}")
-        .replace("height: 0.3", "height: 3.0")
-        .replace("mass: 5.0", "mass: 2.0e+4")
-        .replace("track: 0.25", "track: 2.0")
-        .replace("wheel_radius: 0.04", "wheel_radius: 0.5")
-        .replace("wheel_torque: 2.0", "wheel_torque: 1.0e+4")
-    )
-    with pytest.raises(
-        InputError, match=r"reach 0\.568 rad/s2 at most, but max_yaw_acceleration is 8; raise wheel_torque"
-    ):
-        load_robot(path)
-
-
-def test_the_promised_accelerations_are_reached_in_physics(tmp_path: Path) -> None:
+def test_the_promised_accelerations_are_reached_in_physics(tmp_path):
     """A robot whose motors can just do what it promises does so in physics; closed form and PyBullet agree."""
     path = tmp_path / "mine.yaml"
     path.write_text(
@@ -153,43 +115,13 @@ def test_the_promised_accelerations_are_reached_in_physics(tmp_path: Path) -> No
             assert getattr(engine.state(), rate) * 4 == pytest.approx(reached, rel=0.1)
 
 
-def test_the_files_name_is_made_printable_where_it_names_the_robot(tmp_path: Path) -> None:
+def test_the_files_name_is_made_printable_where_it_names_the_robot(tmp_path):
     path = tmp_path / "a\nb.yaml"
     path.write_text(GOOD)
     assert load_robot(path).name == "ab"
 
 
-def test_an_unknown_name_suggests_a_robot_of_the_catalogue() -> None:
-    with pytest.raises(InputError, match="did you mean jackal"):
-        load_robot("jackel")
-
-
-def test_the_schema_requires_what_the_file_requires() -> None:
+def test_the_schema_requires_what_the_file_requires():
     schema = robot_schema()
     assert set(schema["required"]) >= {"schema", "footprint", "mass", "track"}
     assert "name" not in schema["required"]
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "says"),
-    [
-        ("max_speed", 0.0025, "max_speed: must be between 0.05 and 10, got 0.0025"),
-        ("max_speed", math.nan, "max_speed: must be greater than 0, got nan"),
-        ("wheel_friction", 0.01, "wheel_friction: must be between 0.1 and 100, got 0.01"),
-        ("wheel_torque", 1e7, r"wheel_torque: must be between 1e-06 and 1e\+06, got 1e\+07"),
-    ],
-)
-def test_robots_that_antdrive_is_not_meant_for_cannot_be_made_in_python_either(
-    jackal: RobotSpec, key: str, value: float, says: str
-) -> None:
-    with pytest.raises(ValueError, match=says):
-        dataclasses.replace(jackal, **{key: value})
-
-
-@pytest.mark.parametrize("name", ["mine.urdf", "mine.urdf.xacro"])
-def test_a_urdf_file_is_no_robot_file_and_the_message_says_what_makes_one_of_it(tmp_path: Path, name: str) -> None:
-    path = tmp_path / name
-    path.write_text("<robot/>")
-    with pytest.raises(InputError) as caught:
-        load_robot(path)
-    assert str(caught.value) == f"{path}: is no robot file; make one of it with antdrive robots import {path}"

@@ -12,7 +12,7 @@ coordinate = st.floats(-3, 3)
 FOOTPRINTS = [Footprint.disc(0.3), Footprint.rectangle(0.5, 0.4), Footprint(0.2, 0.1, 0.05)]
 
 
-def outline(foot: Footprint, pose: tuple[float, float, float]) -> np.ndarray:
+def outline(foot, pose):
     """Points on a footprint's outline, from its definition: a rectangle's outline moved outwards."""
     sides = np.linspace(-1, 1, 801)
     hx, hy = foot.half_length, foot.half_width
@@ -29,9 +29,7 @@ def outline(foot: Footprint, pose: tuple[float, float, float]) -> np.ndarray:
 
 @pytest.mark.parametrize("foot", FOOTPRINTS, ids=["disc", "rectangle", "rounded"])
 @given(x=coordinate, y=coordinate, yaw=st.floats(-4, 4), dx=coordinate, dy=coordinate, radius=st.floats(0.05, 1))
-def test_distance_to_a_disc_is_that_of_the_outline(
-    foot: Footprint, x: float, y: float, yaw: float, dx: float, dy: float, radius: float
-) -> None:
+def test_distance_to_a_disc_is_that_of_the_outline(foot, x, y, yaw, dx, dy, radius):
     world = World("w", (-50, -50, 50, 50), (Disc(dx, dy, radius),))
     brute = np.hypot(*(outline(foot, (x, y, yaw)) - [dx, dy]).T).min() - radius
     exact = footprint_clearance(world, foot, [(x, y, yaw)])[0]
@@ -43,14 +41,14 @@ def test_distance_to_a_disc_is_that_of_the_outline(
 
 @pytest.mark.parametrize("foot", FOOTPRINTS, ids=["disc", "rectangle", "rounded"])
 @given(x=coordinate, y=coordinate, yaw=st.floats(-4, 4))
-def test_distance_to_the_walls_is_that_of_the_outline(foot: Footprint, x: float, y: float, yaw: float) -> None:
+def test_distance_to_the_walls_is_that_of_the_outline(foot, x, y, yaw):
     world = World("w", (-4, -5, 6, 7))
     points = outline(foot, (x, y, yaw))
     brute = min(points[:, 0].min() + 4, 6 - points[:, 0].max(), points[:, 1].min() + 5, 7 - points[:, 1].max())
     assert footprint_clearance(world, foot, [(x, y, yaw)])[0] == pytest.approx(brute, abs=1e-4)
 
 
-def test_many_poses_at_once_give_the_same_distances_as_one_by_one() -> None:
+def test_many_poses_at_once_give_the_same_distances_as_one_by_one():
     """The kernel reuses a list of nearby discs; it must never lack the nearest one."""
     rng = np.random.default_rng(1)
     world = World("w", (-10, -10, 10, 10), tuple(Disc(*rng.uniform(-9, 9, 2), 0.1) for _ in range(200)))
@@ -61,12 +59,12 @@ def test_many_poses_at_once_give_the_same_distances_as_one_by_one() -> None:
     np.testing.assert_array_equal(together, alone)
 
 
-def test_the_radius_is_that_of_the_circumscribed_circle() -> None:
+def test_the_radius_is_that_of_the_circumscribed_circle():
     assert Footprint.rectangle(0.508, 0.430).radius == pytest.approx(0.3328, abs=1e-4)
     assert Footprint.disc(0.18).radius == 0.18
 
 
-def test_discs_whose_centres_are_far_may_still_be_the_nearest() -> None:
+def test_discs_whose_centres_are_far_may_still_be_the_nearest():
     """Beside a blade of 2 m: one disc lies before its tip, one is so large that it comes near."""
     blade = Footprint.rectangle(2.0, 0.2)
     beside = Disc(0.0, -0.6, 0.05)

@@ -6,17 +6,15 @@ from pathlib import Path
 import pytest
 import yaml
 
-from antdrive.robots import Lidar, Odometry, RobotSpec, load_robot, robot_to_dict
+from antdrive.robots import Lidar, Odometry, load_robot, robot_to_dict
 from antdrive.robots.files import robot_schema
-from antdrive.sim import Run
-from antdrive.sim.log.binding import canonical_hash
-from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.record import DriveRecord, canonical_hash
 
 CATALOG = Path(__file__).parent.parent.parent / "robots" / "catalog"
 LIDAR = {"beams": 181, "field_of_view": 3.0, "min_range": 0.1, "max_range": 5.0, "rate": 10.0}
 
 
-def changed(tmp_path: Path, **lidar: object) -> RobotSpec:
+def changed(tmp_path, **lidar):
     values = yaml.safe_load((CATALOG / "turtlebot.yaml").read_text())
     values["lidar"] = {**LIDAR, **lidar}
     path = tmp_path / "mine.yaml"
@@ -24,18 +22,16 @@ def changed(tmp_path: Path, **lidar: object) -> RobotSpec:
     return load_robot(path)
 
 
-def test_jackal_carries_the_challenges_sensor(jackal: RobotSpec) -> None:
+def test_jackal_carries_the_challenges_sensor(jackal):
     lidar = jackal.lidar
-    assert lidar is not None
     assert (lidar.beams, lidar.rate, lidar.min_range, lidar.max_range) == (720, 50.0, 0.1, 30.0)
     assert math.degrees(lidar.spacing) == pytest.approx(0.3755, abs=1e-4)
     assert math.degrees(lidar.angles[-1]) == pytest.approx(135, abs=1e-3)
     assert lidar.angles[0] == -lidar.angles[-1]
 
 
-def test_turtlebot_sees_all_around(turtlebot: RobotSpec) -> None:
+def test_turtlebot_sees_all_around(turtlebot):
     lidar = turtlebot.lidar
-    assert lidar is not None
     assert lidar.full_circle
     assert math.degrees(lidar.spacing) == pytest.approx(1.0, abs=1e-6)
     assert lidar.angles[0] == -math.pi
@@ -43,40 +39,31 @@ def test_turtlebot_sees_all_around(turtlebot: RobotSpec) -> None:
 
 
 @pytest.mark.parametrize(("rate", "hz", "taken"), [(1000.0, 60, 60), (50.0, 60, 50), (60.0, 60, 60), (90.0, 30, 30)])
-def test_a_robot_takes_one_scan_in_a_control_period_at_most(tmp_path: Path, rate: float, hz: int, taken: int) -> None:
+def test_a_robot_takes_one_scan_in_a_control_period_at_most(tmp_path, rate, hz, taken):
     lidar = changed(tmp_path, rate=rate).lidar
-    assert lidar is not None
     assert lidar.at(hz).rate == taken
     due = [lidar.due(tick, hz) for tick in range(10 * hz)]
     assert due == [lidar.at(hz).due(tick, hz) for tick in range(10 * hz)]
     assert sum(due) == pytest.approx(10 * taken, abs=1)
 
 
-def test_a_file_places_the_lidar(tmp_path: Path) -> None:
+def test_a_file_places_the_lidar(tmp_path):
     lidar = changed(tmp_path, x=0.1, yaw=0.5).lidar
-    assert lidar is not None
     assert lidar.pose_on((1.0, 2.0, math.pi / 2)) == pytest.approx((1.0, 2.1, math.pi / 2 + 0.5))
 
 
 #: Values that no lidar has.
-WRONG: tuple[dict[str, object], ...] = (
-    {"beams": 2},
-    {"beams": 3.5},
-    {"max_range": -1.0},
-    {"min_range": 5.0},
-    {"field_of_view": 360.0},
-    {"range": 3.0},
-    {"rate": None},
-    {"x": 20.0},
-    {"x": 0.1, "y": -0.2},
-)
+WRONG = (
+    {"beams": 2}, {"beams": 3.5}, {"max_range": -1.0}, {"min_range": 5.0}, {"field_of_view": 360.0}, {"range": 3.0},
+    {"rate": None}, {"x": 20.0}, {"x": 0.1, "y": -0.2},
+)  # fmt: skip
 
 
-def test_the_schema_describes_the_lidar() -> None:
+def test_the_schema_describes_the_lidar():
     assert robot_schema()["$defs"]["Lidar"]["properties"]["beams"]["minimum"] == 3
 
 
-def test_a_robot_without_a_lidar_has_the_hash_that_it_always_had(tmp_path: Path) -> None:
+def test_a_robot_without_a_lidar_has_the_hash_that_it_always_had(tmp_path):
     """The hash of this file before robots could have lidars."""
     values = yaml.safe_load((CATALOG / "turtlebot.yaml").read_text())
     del values["lidar"]
@@ -91,16 +78,13 @@ def test_a_robot_without_a_lidar_has_the_hash_that_it_always_had(tmp_path: Path)
 BLIND_TURTLEBOT = "6015e6951db89082ddc290423b7db58efc1c599cf120244d54e904d6f4220f5f"
 
 
-def test_the_record_of_a_drive_holds_the_lidar(small_run: Run) -> None:
-    assert small_run.rollout is not None
+def test_the_record_of_a_drive_holds_the_lidar(small_run):
     record = small_run.rollout.record
     again = DriveRecord.from_json(record.to_json())
     assert isinstance(again.robot.lidar, Lidar)
     assert again.robot == record.robot
 
 
-def test_errors_of_odometry_scale() -> None:
+def test_errors_of_odometry_scale():
     assert Odometry().scaled(0).gyro_bias == 0
     assert Odometry().scaled(5).gyro_bias == pytest.approx(0.025)
-    with pytest.raises(ValueError, match=r"gyro_bias: must be between 0 and 1, got 5"):
-        Odometry(gyro_bias=5.0)

@@ -1,7 +1,5 @@
 """Footprints that are not centred on the axle: polygons, rectangles and discs beside it, against a dense outline."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -10,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.base import FieldError, Pose
-from antdrive.robots import Footprint, RobotSpec, footprint_clearance, load_robot
+from antdrive.base import FieldError
+from antdrive.robots import Footprint, footprint_clearance, load_robot
 from antdrive.robots.control._kernels_obstacles import turn_clearance
-from antdrive.robots.feasible import yaw_inertia
 from antdrive.robots.placing import gaps
+from antdrive.robots.spec import yaw_inertia
 from antdrive.sim.driving._kernels_movers import lower_by_movers
 from antdrive.sim.log.certificate import _polygon_to_points, _polygon_to_walls
 from antdrive.sim.log.contacts import _gap
@@ -25,7 +23,7 @@ DISCS = st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 1.0))
 
 
 @st.composite
-def footprints(draw: st.DrawFn) -> Footprint:
+def footprints(draw):
     """Polygons of 3 to 8 corners on an ellipse whose centre is not the axle's, and discs that are not centred on it."""
     a, b = draw(st.floats(0.2, 0.8)), draw(st.floats(0.2, 0.8))
     x, y = 0.2 * a * draw(st.floats(-1, 1)), 0.2 * b * draw(st.floats(-1, 1))
@@ -36,7 +34,7 @@ def footprints(draw: st.DrawFn) -> Footprint:
     return Footprint.polygon([(x + a * math.cos(angle), y + b * math.sin(angle)) for angle in angles])
 
 
-def outline(foot: Footprint, pose: Pose) -> np.ndarray:
+def outline(foot, pose):
     """Points every few millimetres of a footprint's edge at a pose, as x + iy, from its definition alone."""
     corners = np.array([complex(*corner) for corner in foot.corners])
     if len(corners) == 1:
@@ -47,7 +45,7 @@ def outline(foot: Footprint, pose: Pose) -> np.ndarray:
     return complex(*pose[:2]) + edge * np.exp(1j * pose[2])
 
 
-def contains(foot: Footprint, pose: Pose, x: float, y: float) -> bool:
+def contains(foot, pose, x, y):
     """Whether a point is within the footprint, by how often its outline winds around it."""
     seen = np.angle(outline(foot, pose) - complex(x, y))
     if len(foot.corners) > 1:  # in the order of the outline
@@ -58,9 +56,7 @@ def contains(foot: Footprint, pose: Pose, x: float, y: float) -> bool:
 
 @settings(max_examples=60)
 @given(footprints(), POSES, DISCS)
-def test_the_distance_to_a_disc_is_that_of_the_outline_for_everyone_who_computes_it(
-    foot: Footprint, pose: Pose, disc: tuple[float, float, float]
-) -> None:
+def test_the_distance_to_a_disc_is_that_of_the_outline_for_everyone_who_computes_it(foot, pose, disc):
     """The drive, the placing, the movers, the contacts and the certificate have code of their own."""
     x, y, radius = disc
     world = World("w", (-50.0, -50.0, 50.0, 50.0), (Disc(x, y, radius),))
@@ -88,7 +84,7 @@ WIDE = Footprint.rectangle(4.0, 4.0, (0.1, 0.0))
 
 @settings(max_examples=40)
 @given(footprints(), POSES)
-def test_the_distance_to_the_walls_is_that_of_the_outline(foot: Footprint, pose: Pose) -> None:
+def test_the_distance_to_the_walls_is_that_of_the_outline(foot, pose):
     world = World("w", (-4.0, -5.0, 6.0, 7.0))
     edge = outline(foot, pose)
     expected = [edge.real.min() + 4, 6 - edge.real.max(), edge.imag.min() + 5, 7 - edge.imag.max()]
@@ -105,13 +101,7 @@ def test_the_distance_to_the_walls_is_that_of_the_outline(foot: Footprint, pose:
 @given(
     footprints(), POSES, st.floats(-math.pi, math.pi), st.lists(DISCS, max_size=3), st.tuples(*[st.floats(0.3, 2)] * 4)
 )
-def test_the_clearance_of_a_turn_is_the_least_of_its_headings(
-    foot: Footprint,
-    pose: Pose,
-    turn: float,
-    discs: list[tuple[float, float, float]],
-    walls: tuple[float, float, float, float],
-) -> None:
+def test_the_clearance_of_a_turn_is_the_least_of_its_headings(foot, pose, turn, discs, walls):
     x, y, yaw = pose
     bounds = (x - walls[0], y - walls[1], x + walls[2], y + walls[3])
     world = World("turn", bounds, tuple(Disc(*disc) for disc in discs))
@@ -125,7 +115,7 @@ def test_the_clearance_of_a_turn_is_the_least_of_its_headings(
         assert found <= 1e-9
 
 
-def test_many_poses_at_once_give_the_same_distances_as_one_by_one() -> None:
+def test_many_poses_at_once_give_the_same_distances_as_one_by_one():
     """The kernel reuses a list of nearby discs; it must never lack the nearest one, ahead of a long nose either."""
     rng = np.random.default_rng(2)
     discs = tuple(Disc(*rng.uniform(-9, 9, 2), float(rng.uniform(0.05, 0.6))) for _ in range(150))
@@ -139,7 +129,7 @@ def test_many_poses_at_once_give_the_same_distances_as_one_by_one() -> None:
 
 @settings(max_examples=40)
 @given(footprints())
-def test_radii_bounds_depth_and_reach_are_those_of_the_outline(foot: Footprint) -> None:
+def test_radii_bounds_depth_and_reach_are_those_of_the_outline(foot):
     edge = outline(foot, (0.0, 0.0, 0.0))
     xmin, ymin, xmax, ymax = foot.bounds
     assert foot.radius == pytest.approx(np.abs(edge).max(), abs=1e-4)
@@ -156,7 +146,7 @@ def test_radii_bounds_depth_and_reach_are_those_of_the_outline(foot: Footprint) 
 
 
 @pytest.mark.parametrize("foot", [Footprint.disc(0.3), Footprint.rectangle(0.6, 0.4), Footprint(0.2, 0.1, 0.05)])
-def test_what_is_drawn_of_a_centred_footprint_is_its_outline(foot: Footprint) -> None:
+def test_what_is_drawn_of_a_centred_footprint_is_its_outline(foot):
     points = foot.outline(16)
     assert max(abs(foot.depth(x, y)) for x, y in points) < 1e-9
     xs, ys = zip(*points, strict=True)
@@ -166,14 +156,13 @@ def test_what_is_drawn_of_a_centred_footprint_is_its_outline(foot: Footprint) ->
     assert area == pytest.approx(4 * (a * b + (a + b) * r) + math.pi * r**2, rel=2e-3)
 
 
-def _at(angle: float, away: float) -> tuple[float, float]:
+def _at(angle, away):
     return away * math.cos(angle), away * math.sin(angle)
 
 
-def test_a_rectangle_beside_the_axle_is_the_polygon_of_its_corners() -> None:
+def test_a_rectangle_beside_the_axle_is_the_polygon_of_its_corners():
     foot = Footprint.rectangle(0.9, 0.6, (0.15, 0.0))
     assert foot == Footprint.polygon([(0.6, -0.3), (0.6, 0.3), (-0.3, 0.3), (-0.3, -0.3)])
-    assert foot.box is not None
     assert (*foot.box[:2], *foot.box[2]) == pytest.approx((0.9, 0.6, 0.15, 0.0))
     assert Footprint.rectangle(0.9, 0.6).corners == ()
     assert Footprint.rectangle(0.9, 0.6, (0.0, 0.0)) == Footprint.rectangle(0.9, 0.6)
@@ -182,7 +171,7 @@ def test_a_rectangle_beside_the_axle_is_the_polygon_of_its_corners() -> None:
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_a_polygon_is_the_same_either_way_round_and_points_on_its_sides_add_nothing(order: int) -> None:
+def test_a_polygon_is_the_same_either_way_round_and_points_on_its_sides_add_nothing(order):
     points = [(0.5, -0.2), (0.5, 0.1), (0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.1, -0.2)]
     foot = Footprint.polygon(points[::order])
     assert sorted(foot.corners) == [(-0.3, -0.2), (-0.3, 0.2), (0.5, -0.2), (0.5, 0.2)]
@@ -191,7 +180,7 @@ def test_a_polygon_is_the_same_either_way_round_and_points_on_its_sides_add_noth
 
 
 #: A dent, a pentagram, lines, too many corners and one that is nowhere.
-NO_POLYGONS: tuple[list[tuple[float, float]], ...] = (
+NO_POLYGONS = (
     [(0.5, 0.0), (0.1, 0.05), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)],
     [(1, 0), (-0.8, 0.6), (0.3, -0.95), (0.3, 0.95), (-0.8, -0.6)],
     [(0, 0), (1, 0), (2, 0)],
@@ -201,7 +190,7 @@ NO_POLYGONS: tuple[list[tuple[float, float]], ...] = (
 )
 
 
-def test_a_robot_whose_wheels_stand_outside_its_polygon_is_refused(jackal: RobotSpec) -> None:
+def test_a_robot_whose_wheels_stand_outside_its_polygon_is_refused(jackal):
     behind = Footprint.rectangle(0.508, 0.43, (0.2, 0.0))  # 54 mm behind the axle, wheels of 98 mm
     with pytest.raises(FieldError, match=r"wheels of 0\.098 m, 0\.3756 m apart, stand outside it at \(-0\.098, "):
         dataclasses.replace(jackal, footprint=behind)
@@ -215,7 +204,7 @@ def test_a_robot_whose_wheels_stand_outside_its_polygon_is_refused(jackal: Robot
 
 @settings(max_examples=30)
 @given(footprints())
-def test_the_inertia_is_that_of_a_fine_lattice_of_masses(foot: Footprint) -> None:
+def test_the_inertia_is_that_of_a_fine_lattice_of_masses(foot):
     robot = dataclasses.replace(load_robot("warehouse"), footprint=WIDE, mass=7.0)
     object.__setattr__(robot, "footprint", foot)
     xmin, ymin, xmax, ymax = foot.bounds

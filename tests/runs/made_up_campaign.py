@@ -1,7 +1,5 @@
 """Tables of runs that never happened, of planners whose difference is known."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -41,7 +39,7 @@ def made_up_columns(planners, worlds=10, seeds=5, *, spread=0.0, rng_seed=1):
         rng_seed: of everything random
     """
     rng = np.random.default_rng(rng_seed)
-    rows: list[dict[str, Any]] = []
+    rows = []
     named = sorted({option for skill in planners.values() for option in skill.options})
     for w in range(worlds):
         optimum, hard = 4.0 + 16.0 * w / max(1, worlds - 1), float(rng.normal(0, spread))

@@ -1,7 +1,5 @@
 """What is said of wrong questions about many runs: all of it is in `messages.yml`."""
 
-from __future__ import annotations
-
 import json
 import math
 
@@ -9,22 +7,22 @@ import numpy as np
 
 from antdrive import Scenario
 from antdrive.runs.barn import unpacked
-from antdrive.runs.campaigns import read_results, sweep
+from antdrive.runs.campaigns import expand, make_campaign, read_results, sweep
 from antdrive.runs.failures.failure import parse_bound
 from antdrive.runs.failures.hunt import find_failures
-from antdrive.runs.margins.prediction import least_margin, predicted_loss
+from antdrive.runs.margins.choice import least_margin, predicted_loss
 from antdrive.runs.margins.trial import Loss
-from antdrive.runs.statistics.comparison import compare_metric, pairs_of
-from antdrive.runs.statistics.merging import merged
-from antdrive.runs.statistics.noninferiority import not_worse
+from antdrive.runs.statistics.comparison import compare_metric, not_worse, pairs_of
+from antdrive.runs.statistics.intervals import wilson
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.runs.statistics.profiles import distributions, performance_profiles
-from antdrive.runs.statistics.proportions import wilson
-from antdrive.runs.statistics.runs import REQUIRED, RunTable
-from antdrive.runs.suites import Baseline, Demands
+from antdrive.runs.statistics.runs import REQUIRED, RunTable, merged
+from antdrive.runs.statistics.success import distributions, performance_profiles
+from antdrive.runs.suites import Baseline, Demands, load_suite, scenario_of
 from antdrive.runs.suites.strategies import worlds
 from tests.messages import check_messages, numbered
+from tests.runs.campaigns import test_campaign
 from tests.runs.made_up_campaign import Skill, made_up_columns
+from tests.runs.suites import test_suite
 
 BOUNDS = ("clearance < 1", "plan_s < 1", "spl = 1", "spl < much", "spl < 1.2.3", "spl < 1e999")
 DEMANDS = (
@@ -56,9 +54,15 @@ def test_wrong_questions_about_many_runs_are_refused_in_one_line(tmp_path, small
     def sweep_with(**options):
         sweep({"worlds": "empty", "planners": "astar", "run_limit": 9}, tmp_path / "out", **options)
 
+    def grid(*texts, planners=("astar",), worlds=("empty",)):
+        for text in texts:
+            (tmp_path / "mine.py").write_text(text)
+        expand(make_campaign({"worlds": [*worlds], "planners": [*planners]}, tmp_path))
+
     def losses(value):
         return lambda margin: [Loss(value(margin), value(margin))] * 80
 
+    test_campaign.movingai(tmp_path)
     whole = json.loads(Baseline.of(small_run, "small[0]").to_text())
     numbers = {**whole["metrics"]}
     careless = Scenario.of("empty", "astar")
@@ -88,6 +92,29 @@ def test_wrong_questions_about_many_runs_are_refused_in_one_line(tmp_path, small
             },
             "no manifest": results,
             **{text: lambda t=text: results("manifest.json", t) for text in ("{}", "[]", '{"size": "6"}')},
+        },
+        "campaign files": {
+            " ".join(text.split()): lambda t=text: test_campaign.expanded(t, tmp_path)
+            for text in (
+                *test_campaign.WRONG,
+                *(f"{test_campaign.HEAD}{one}\n" for one in test_campaign.WRONG_BELOW_THE_HEAD),
+            )
+        },
+        "campaigns' planners": {
+            "no file": lambda: grid(planners=["mine.py:Mine"]),
+            **{text: lambda t=text: grid(t, planners=["mine.py:Mine"]) for text in test_campaign.WRONG_PLANNERS},
+        },
+        "problems of maps": {
+            str(value): lambda v=value: grid(worlds=[{"import": "m.map", "problem": v}])
+            for value in ("0-", [1, 1], "x", 2.5, -1)
+        },
+        "scenarios": {
+            text: lambda t=text: scenario_of(test_suite.only(tmp_path, t))
+            for text in (*test_suite.WRONG, *(f"world: empty, {one}" for one in test_suite.WRONG_BESIDE_A_WORLD))
+        },
+        "suites": {
+            " ".join(text.split()): lambda t=text: scenario_of(load_suite(test_suite.suite(tmp_path, t))[0])
+            for text in test_suite.WRONG_SUITES
         },
         "barn": {"no worlds": lambda: unpacked(tmp_path, tmp_path / "out")},
         "margins": {

@@ -1,46 +1,66 @@
 """Claims and their verdicts, on trials made up so that the answer is known."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import PLANNERS, History, PlannerError, Query
-from antdrive.runs.papers import candidates
-from antdrive.runs.papers.baselines import FirstTouchDStar, total_cost
-from antdrive.runs.papers.candidates import MoveCount, candidate, move_counts, winding_candidate
-from antdrive.runs.papers.claims import CLAIMS, SMALL_EFFECT, Arm, Claim
+from antdrive.runs.papers import maps
+from antdrive.runs.papers.claims import (
+    CLAIMS,
+    FEWEST,
+    RELATIONS,
+    SMALL_EFFECT,
+    STATISTICS,
+    Arm,
+    Claim,
+    Decision,
+    judge,
+    trials_needed,
+    verdict_facts,
+)
 from antdrive.runs.papers.experiments import PAPERS
-from antdrive.runs.papers.keeping import keep_trials, kept_trials, trials_key
-from antdrive.runs.papers.maps import TWO_WALLS, environments, optimum
-from antdrive.runs.papers.movers import Strollers, drive, drive_among
-from antdrive.runs.papers.reproduce import too_few_seeds
-from antdrive.runs.papers.trials import Trial, concentration, solve
-from antdrive.runs.papers.verdicts import FEWEST, RELATIONS, STATISTICS, Decision, judge, trials_needed, verdict_facts
+from antdrive.runs.papers.maps import (
+    TWO_WALLS,
+    MoveCount,
+    candidate,
+    environments,
+    move_counts,
+    optimum,
+    winding_candidate,
+)
+from antdrive.runs.papers.reproduce import keep_trials, kept_trials, too_few_seeds, trials_key
+from antdrive.runs.papers.trials import (
+    FirstTouchDStar,
+    Strollers,
+    Trial,
+    concentration,
+    drive,
+    drive_among,
+    solve,
+    total_cost,
+)
 from antdrive.worlds import Grid
 
 ONE, TWO = Arm("m", "one"), Arm("m", "two")
 
 
-def trials(values: Any, worlds: int = 0) -> list[Trial]:
+def trials(values, worlds=0):
     """Trials whose gap is the value; nan: no path."""
     made = []
     for seed, value in enumerate(values):
         solved = not math.isnan(value)
         result = SimpleNamespace(solved=solved, line_length=100.0 + value if solved else math.inf)
-        made.append(Trial(seed, seed % worlds if worlds else seed, cast(Any, result), 100.0, 0.1, 0.0))
+        made.append(Trial(seed, seed % worlds if worlds else seed, result, 100.0, 0.1, 0.0))
     return made
 
 
-def claim(statistic: str, relation: str, bound: float = 0.0, *, maps: int = 1, **facts: Any) -> Claim:
+def claim(statistic, relation, bound=0.0, *, maps=1, **facts):
     """A claim on arms ONE and TWO, or on ONE alone where the statistic is of a single planner."""
     arms = (ONE,) if statistic in ("median", "mean", "arrived", "failed") else (ONE, TWO)
     facts = {"cases": (arms,) * maps, **facts}
@@ -52,11 +72,11 @@ LESS, NO_MORE = claim("difference", "<"), claim("difference", "<=")
 OFTENER, NO_WORSE, WIDER = claim("balance", "<"), claim("balance", "<=", SMALL_EFFECT), claim("scatter", ">")
 
 
-def verdict(test: Claim, first: Any, second: Any = (), worlds: int = 0) -> Any:
+def verdict(test, first, second=(), worlds=0):
     return judge(test, {ONE: trials(first, worlds), TWO: trials(second, worlds)})
 
 
-def test_every_claim_names_experiments_of_its_paper() -> None:
+def test_every_claim_names_experiments_of_its_paper():
     for paper, experiments in PAPERS.items():
         known = {Arm(e.map, e.name) for e in experiments() if e.name != "steps"}
         claims = [one for one in CLAIMS if one.paper == paper]
@@ -79,7 +99,7 @@ def test_every_claim_names_experiments_of_its_paper() -> None:
 
 
 @pytest.mark.parametrize(("shift", "decision"), [(-2.0, Decision.HOLDS), (2.0, Decision.REFUTED), (0.0, Decision.OPEN)])
-def test_less_is_decided_by_the_interval_of_the_paired_difference(shift: float, decision: Decision) -> None:
+def test_less_is_decided_by_the_interval_of_the_paired_difference(shift, decision):
     rng = np.random.default_rng(1)
     second = rng.uniform(5, 9, 50)
     first = second + shift + np.resize([-1.0, 1.0], 50) * rng.uniform(0.1, 1, 50)
@@ -89,7 +109,7 @@ def test_less_is_decided_by_the_interval_of_the_paired_difference(shift: float, 
     assert found.value == pytest.approx(np.median(first - second))
 
 
-def test_equal_values_refute_less_but_not_no_more() -> None:
+def test_equal_values_refute_less_but_not_no_more():
     same = np.full(20, 3.0)
     assert verdict(LESS, same, same).decision is Decision.REFUTED
     assert verdict(NO_MORE, same, same).decision is Decision.HOLDS
@@ -97,7 +117,7 @@ def test_equal_values_refute_less_but_not_no_more() -> None:
     assert verdict(claim("difference", "<=", 1.0), same + 1.1, same).decision is Decision.REFUTED
 
 
-def test_oftener_counts_pairs_where_the_median_difference_is_zero() -> None:
+def test_oftener_counts_pairs_where_the_median_difference_is_zero():
     same, other = np.zeros(40), np.r_[np.ones(16), np.zeros(24)]
     assert verdict(LESS, same, other).value == 0.0
     found = verdict(OFTENER, same, other)
@@ -110,7 +130,7 @@ def test_oftener_counts_pairs_where_the_median_difference_is_zero() -> None:
     assert verdict(OFTENER, both, np.zeros(40)).decision is Decision.OPEN
 
 
-def test_a_margin_or_threshold_that_no_paper_prints_is_called_ours() -> None:
+def test_a_margin_or_threshold_that_no_paper_prints_is_called_ours():
     for one in CLAIMS:
         test, needs = (one.statistic, one.relation), []
         if test == ("balance", "<="):
@@ -125,10 +145,10 @@ def test_a_margin_or_threshold_that_no_paper_prints_is_called_ours() -> None:
         assert all(words in one.remark for words in needs), (one.sentence, one.remark)
 
 
-def test_no_worse_lets_a_small_effect_pass_and_no_larger_one() -> None:
+def test_no_worse_lets_a_small_effect_pass_and_no_larger_one():
     same = np.zeros(200)
 
-    def share(longer: int, shorter: int) -> Any:
+    def share(longer, shorter):
         first = np.r_[np.ones(longer), -np.ones(shorter), np.zeros(200 - longer - shorter)]
         return verdict(NO_WORSE, first, same)
 
@@ -142,7 +162,7 @@ def test_no_worse_lets_a_small_effect_pass_and_no_larger_one() -> None:
     assert "does not lie on one side of 12; some" in unclear.why
 
 
-def test_the_gain_of_one_step_is_less_than_that_of_another() -> None:
+def test_the_gain_of_one_step_is_less_than_that_of_another():
     rng = np.random.default_rng(2)
     low, middle, high = (value + rng.normal(0, 1, 50) for value in (36.0, 39.0, 46.0))
     arms = {Arm("m", name): trials(values) for name, values in zip("abc", (high, middle, low), strict=True)}
@@ -156,27 +176,27 @@ def test_the_gain_of_one_step_is_less_than_that_of_another() -> None:
     assert judge(turned, arms).decision is Decision.REFUTED
 
 
-def test_two_quantities_of_the_same_runs_are_compared() -> None:
+def test_two_quantities_of_the_same_runs_are_compared():
     rng = np.random.default_rng(3)
     made = []
     for seed in range(20):
         best = 100 + np.r_[rng.normal(0, 5, 10), rng.normal(0, 1, 30)]
         result = SimpleNamespace(solved=True, line_length=100.0, history=SimpleNamespace(iteration_best=best))
-        made.append(Trial(seed, 0, cast(Any, result), 100.0, 0.1, 0.0))
+        made.append(Trial(seed, 0, result, 100.0, 0.1, 0.0))
     settles = claim("difference", "<", quantity=("unrest", "early_unrest"), cases=((ONE, ONE),))
     assert judge(settles, {ONE: made}).decision is Decision.HOLDS
     back = dataclasses.replace(settles, quantity=("early_unrest", "unrest"))
     assert judge(back, {ONE: made}).decision is Decision.REFUTED
 
 
-def test_what_may_happen_is_borne_out_by_one_run_and_refuted_by_none() -> None:
+def test_what_may_happen_is_borne_out_by_one_run_and_refuted_by_none():
     assert verdict(claim("failed", ">"), [1.0] * 9 + [math.nan]).decision is Decision.HOLDS
     never = verdict(claim("failed", ">"), [1.0] * 50)
     assert never.decision is Decision.OPEN
     assert "does not say that none may" in never.why
 
 
-def test_where_neither_gets_anywhere_nothing_can_be_told() -> None:
+def test_where_neither_gets_anywhere_nothing_can_be_told():
     none = np.full(20, math.nan)
     for test in (NO_MORE, OFTENER, NO_WORSE):
         found = verdict(test, none, none)
@@ -184,7 +204,7 @@ def test_where_neither_gets_anywhere_nothing_can_be_told() -> None:
         assert found.why.startswith("neither ever gets there")
 
 
-def test_an_open_verdict_says_why() -> None:
+def test_an_open_verdict_says_why():
     few = verdict(LESS, np.zeros(5), np.ones(5))
     assert few.decision is Decision.OPEN
     assert few.why.startswith("5 trials, and with fewer than 6")
@@ -198,7 +218,7 @@ def test_an_open_verdict_says_why() -> None:
     assert "20 runs, and the interval of fewer than 35" in short.why
 
 
-def test_the_trials_that_a_test_needs_are_the_fewest_with_which_it_can_hold() -> None:
+def test_the_trials_that_a_test_needs_are_the_fewest_with_which_it_can_hold():
     test = claim("arrived", ">=", 0.9)
     needed = trials_needed(test)
     assert needed == 35  # n / (n + 1.96^2) reaches 0.9
@@ -209,7 +229,7 @@ def test_the_trials_that_a_test_needs_are_the_fewest_with_which_it_can_hold() ->
     assert trials_needed(claim("wins", ">=", 1)) == 1
 
 
-def test_seeds_that_are_too_few_are_told_of_in_one_line() -> None:
+def test_seeds_that_are_too_few_are_told_of_in_one_line():
     assert too_few_seeds(["suganthi2019"], 50) == ""
     line = too_few_seeds(["suganthi2019"], 3)
     assert line.startswith("seeds: 3 are too few to decide ")
@@ -220,14 +240,14 @@ def test_seeds_that_are_too_few_are_told_of_in_one_line() -> None:
     assert too_few_seeds(["lee2008"], 6, quick=True) == ""
 
 
-def test_a_path_is_less_than_none() -> None:
+def test_a_path_is_less_than_none():
     none = np.full(20, math.nan)
     assert verdict(LESS, np.full(20, 500.0), none).decision is Decision.HOLDS
     assert verdict(LESS, none, np.full(20, 500.0)).decision is Decision.REFUTED
     assert "no path" in verdict(claim("median", "<=", 5.0), none).ours
 
 
-def test_runs_of_one_map_do_not_count_as_maps() -> None:
+def test_runs_of_one_map_do_not_count_as_maps():
     rng = np.random.default_rng(0)
     by_map = np.array([-1.0, 2.0, -1.5, 1.0, -0.5])
     first = np.resize(by_map, 100) + rng.normal(0, 0.01, 100)
@@ -238,14 +258,14 @@ def test_runs_of_one_map_do_not_count_as_maps() -> None:
     assert together.decision is Decision.OPEN
 
 
-def test_a_median_is_within_a_bound_or_beyond_it() -> None:
+def test_a_median_is_within_a_bound_or_beyond_it():
     assert verdict(claim("median", "<=", 10.0), np.linspace(4, 8, 30)).decision is Decision.HOLDS
     assert verdict(claim("median", "<=", 10.0), np.linspace(14, 18, 30)).decision is Decision.REFUTED
     assert verdict(claim("median", "<=", 10.0), np.linspace(5, 15, 30)).decision is Decision.OPEN
     assert verdict(claim("median", "<=", 10.0), np.linspace(4, 8, 5)).decision is Decision.OPEN  # too few
 
 
-def test_a_mean_is_the_printed_one_within_its_margin() -> None:
+def test_a_mean_is_the_printed_one_within_its_margin():
     values = np.linspace(-0.5, 0.5, 50)
     assert verdict(claim("mean", "about", 101.0, quantity=("length",)), values).decision is Decision.HOLDS
     assert verdict(claim("mean", "about", 120.0, quantity=("length",)), values).decision is Decision.REFUTED
@@ -253,7 +273,7 @@ def test_a_mean_is_the_printed_one_within_its_margin() -> None:
     assert verdict(claim("mean", "about", 101.0, quantity=("length",)), np.full(9, math.nan)).decision is Decision.OPEN
 
 
-def test_arrivals_are_judged_by_wilsons_interval() -> None:
+def test_arrivals_are_judged_by_wilsons_interval():
     few, most = np.resize([1.0, *[math.nan] * 24], 50), np.resize([math.nan, *[1.0] * 49], 50)
     assert verdict(claim("arrived", "<=", 0.2), few).decision is Decision.HOLDS
     assert verdict(claim("arrived", "<=", 0.2), most).decision is Decision.REFUTED
@@ -262,7 +282,7 @@ def test_arrivals_are_judged_by_wilsons_interval() -> None:
     assert verdict(claim("arrived", "<=", 0.2), few).value == 2 / 50
 
 
-def test_scatter_is_the_range_between_quartiles() -> None:
+def test_scatter_is_the_range_between_quartiles():
     rng = np.random.default_rng(0)
     calm, wild = rng.uniform(4, 6, 50), rng.uniform(0, 40, 50)
     assert verdict(WIDER, wild, calm).decision is Decision.HOLDS
@@ -270,7 +290,7 @@ def test_scatter_is_the_range_between_quartiles() -> None:
     assert verdict(WIDER, calm, calm).decision is not Decision.HOLDS
 
 
-def test_cases_are_counted() -> None:
+def test_cases_are_counted():
     assert verdict(claim("wins", ">=", 2, maps=2), [1.0], [2.0]).decision is Decision.HOLDS
     assert verdict(claim("wins", ">=", 2, maps=2), [2.0], [2.0]).decision is Decision.REFUTED
     assert verdict_facts(verdict(claim("wins", ">=", 2, maps=2), [2.0], [2.0]))["verdict"] == "does not hold"
@@ -294,38 +314,30 @@ def test_cases_are_counted() -> None:
         (123.6102, 4, [(43, 57)]),
     ],
 )
-def test_a_printed_length_tells_the_moves(printed: float, digits: int, expected: list[tuple[int, int]]) -> None:
+def test_a_printed_length_tells_the_moves(printed, digits, expected):
     assert move_counts(printed, digits) == [MoveCount(*pair) for pair in expected]
     for straight, diagonal in expected:
         assert straight + math.sqrt(2) * diagonal == pytest.approx(printed, abs=10.0**-digits)
 
 
-def test_the_lengths_and_cells_that_lee2008_prints_agree() -> None:
+def test_the_lengths_and_cells_that_lee2008_prints_agree():
     tables = {
-        72.0833: 59,
-        83.3970: 67,
-        154.2376: 125,
-        175.2376: 146,
-        168.6518: 139,
-        59.2548: 47,
-        64.0833: 51,
-        123.6102: 101,
-        135.8234: 107,
-        131.6812: 107,
-    }
+        72.0833: 59, 83.3970: 67, 154.2376: 125, 175.2376: 146, 168.6518: 139, 59.2548: 47, 64.0833: 51, 123.6102: 101,
+        135.8234: 107, 131.6812: 107,
+    }  # fmt: skip
     for length, cells in tables.items():
         (moves,) = move_counts(length, 4)
         assert moves.straight + moves.diagonal + 1 == cells
 
 
-def test_moves_that_can_be_monotone() -> None:
+def test_moves_that_can_be_monotone():
     assert MoveCount(6, 16).monotone(19, 19)
     assert MoveCount(43, 57).monotone(99, 58)
     assert not MoveCount(24, 51).monotone(49, 49)  # more diagonal moves than rows
     assert not MoveCount(14, 32).monotone(24, 24)
 
 
-def test_a_candidate_has_the_length_asked_for_and_depends_on_the_seed_alone() -> None:
+def test_a_candidate_has_the_length_asked_for_and_depends_on_the_seed_alone():
     moves = MoveCount(6, 16)
     one, same, other = (candidate((20, 20), (0, 0), (19, 19), moves, seed, blocked=0.15) for seed in (1, 1, 2))
     for query in (one, other):
@@ -335,7 +347,7 @@ def test_a_candidate_has_the_length_asked_for_and_depends_on_the_seed_alone() ->
     assert (one.grid.free != other.grid.free).any()
 
 
-def test_a_winding_candidate_has_the_moves_asked_for_and_turns_back_in_rows_and_columns() -> None:
+def test_a_winding_candidate_has_the_moves_asked_for_and_turns_back_in_rows_and_columns():
     moves = MoveCount(14, 32)  # lee2008's map 1: 78 cells over rows and columns, of which the map has 24 + 24
     for seed in (101, 102):
         query = winding_candidate((25, 25), moves, seed, largest=6)
@@ -349,7 +361,7 @@ def test_a_winding_candidate_has_the_moves_asked_for_and_turns_back_in_rows_and_
         assert (same.start, same.goal) == (query.start, query.goal)
 
 
-def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path: Path) -> None:
+def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
     kinds = (("14 obstacles", "10 ants"), ("one obstacle of radius 5", "3 via points"))
     one, other = (e for e in PAPERS["han2007"]() if (e.map, e.name) in kinds)
     shut = Query(Grid.from_free(np.eye(3)), (0, 0), (2, 0))  # a trial without a path, and one without iterations
@@ -363,21 +375,10 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path: Path) -> 
     path, key = tmp_path / "t.npz", trials_key(one, 4)
     keep_trials(made, path, key)
     read = kept_trials(path, key)
-    assert read is not None
     quantities = (
-        "length",
-        "gap",
-        "steps",
-        "last",
-        "settled",
-        "near",
-        "effort",
-        "unrest",
-        "early_unrest",
-        "work",
-        "cpu_s",
+        "length", "gap", "steps", "last", "settled", "near", "effort", "unrest", "early_unrest", "work", "cpu_s",
         "total",
-    )
+    )  # fmt: skip
     for before, after in zip(made, read, strict=True):
         for name in ("seed", "world", "optimum", "concentration", *quantities):
             np.testing.assert_equal(getattr(after, name), getattr(before, name), err_msg=name)
@@ -390,13 +391,13 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path: Path) -> 
     assert kept_trials(tmp_path / "none.npz", key) is None
 
 
-def test_a_length_that_no_map_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(candidates, "MAPS", 3)
+def test_a_length_that_no_map_has_is_refused(monkeypatch):
+    monkeypatch.setattr(maps, "MAPS", 3)
     with pytest.raises(FieldError, match="no map of 3 x 3 cells"):
         candidate((3, 3), (0, 0), (2, 2), MoveCount(9, 9), 0)
 
 
-def test_a_plan_ends_with_the_iteration_that_uses_up_its_ant_steps() -> None:
+def test_a_plan_ends_with_the_iteration_that_uses_up_its_ant_steps():
     query = candidate((20, 20), (0, 0), (19, 19), MoveCount(6, 16), 1, blocked=0.15)
     whole = solve("as", {"iterations": 40}, query, 3)
     part = solve("as", {"iterations": 40}, query, 3, work=whole.work / 2)
@@ -407,22 +408,22 @@ def test_a_plan_ends_with_the_iteration_that_uses_up_its_ant_steps() -> None:
         solve("astar", {}, query, 3, work=10.0)
 
 
-def test_the_quantities_of_a_trial_are_those_worked_out_by_hand() -> None:
+def test_the_quantities_of_a_trial_are_those_worked_out_by_hand():
     best = np.array([math.inf, 150.0, 124.0, 110.0, 110.0])
     history = History(best, np.array([9.0, 9.0, 9.0, 4.0, 6.0]), best, np.ones(5, dtype=np.int64))
     result = SimpleNamespace(solved=True, history=history, work=50, line_length=110.0)
-    trial = Trial(0, 0, cast(Any, result), 100.0, 0.1, 0.0)
+    trial = Trial(0, 0, result, 100.0, 0.1, 0.0)
     assert (trial.effort, trial.settled, trial.gap) == (30.0, 4.0, pytest.approx(10.0))
     assert trial.near == math.inf
     assert dataclasses.replace(trial, optimum=105.0).near == 4.0  # 110 is within 5 % of 105
     assert trial.last == 6.0
     assert trial.unrest == trial.early_unrest == pytest.approx(np.std([9, 9, 9, 4, 6]))
     assert trial.cpu_ms == 100.0
-    none = dataclasses.replace(trial, result=cast(Any, SimpleNamespace(solved=False, history=history, work=50)))
+    none = dataclasses.replace(trial, result=SimpleNamespace(solved=False, history=history, work=50))
     assert (none.length, none.gap, none.steps, none.settled) == (math.inf,) * 4
 
 
-def test_the_total_cost_is_that_of_hasans_straight_row() -> None:
+def test_the_total_cost_is_that_of_hasans_straight_row():
     # Table 1, 3c: 49 straight moves would cost 1 + 2 + ... + 49 = 1225; the paper prints 1238.6.
     query = environments()["3c vertical rows"]
     assert total_cost(query, PLANNERS["astar"].plan(query, np.random.default_rng(0))) == pytest.approx(1225.0)
@@ -430,7 +431,7 @@ def test_the_total_cost_is_that_of_hasans_straight_row() -> None:
     assert total_cost(diagonal, PLANNERS["astar"].plan(diagonal, np.random.default_rng(0))) == pytest.approx(1.4 + 2.8)
 
 
-def test_a_dstar_that_lowers_no_cost_finds_longer_paths_where_walls_are_concave() -> None:
+def test_a_dstar_that_lowers_no_cost_finds_longer_paths_where_walls_are_concave():
     longer = 0
     for query in environments().values():
         plan = FirstTouchDStar().plan(query, np.random.default_rng(0))
@@ -443,15 +444,15 @@ def test_a_dstar_that_lowers_no_cost_finds_longer_paths_where_walls_are_concave(
     assert not FirstTouchDStar().plan(Query(Grid.from_free(shut), (0, 0), (2, 2)), np.random.default_rng(0)).solved
 
 
-def test_the_concentration_is_the_share_of_the_field_on_the_path() -> None:
+def test_the_concentration_is_the_share_of_the_field_on_the_path():
     field = np.array([[4.0, 1.0], [1.0, 2.0]])
     cells = np.array([[0, 0], [1, 1]])
     plan = SimpleNamespace(solved=True, field=field, cells=cells)
-    assert concentration(cast(Any, plan)) == pytest.approx(6 / 8)
-    assert math.isnan(concentration(cast(Any, SimpleNamespace(solved=True, field=None, cells=cells))))
+    assert concentration(plan) == pytest.approx(6 / 8)
+    assert math.isnan(concentration(SimpleNamespace(solved=True, field=None, cells=cells)))
 
 
-def test_hasans_ant_with_the_papers_exponents_goes_in_no_circle() -> None:
+def test_hasans_ant_with_the_papers_exponents_goes_in_no_circle():
     for experiment in PAPERS["hasan"]():
         if experiment.name == "mmas-dstar":
             assert solve("mmas-dstar", experiment.options, experiment.query(0), 0).result.reason == ""
@@ -459,7 +460,7 @@ def test_hasans_ant_with_the_papers_exponents_goes_in_no_circle() -> None:
             assert "circles" in solve("mmas-dstar", {}, experiment.query(0), 0).result.reason
 
 
-def test_a_drive_among_movers_depends_on_its_seed_alone() -> None:
+def test_a_drive_among_movers_depends_on_its_seed_alone():
     query = environments()["3c vertical rows"]
     one, same, other = (drive_among("dstar", {}, query, seed, 10) for seed in (3, 3, 4))
     assert one.result.solved
@@ -473,27 +474,27 @@ def test_a_drive_among_movers_depends_on_its_seed_alone() -> None:
     assert (never.result.solved, never.total) == (False, math.inf)
 
 
-def test_a_robot_that_goes_into_a_mover_is_blamed() -> None:
+def test_a_robot_that_goes_into_a_mover_is_blamed():
     query = Query(Grid.from_free(np.ones((1, 4))), (0, 0), (0, 3))
     movers = Strollers(query.grid, 1, np.random.default_rng(0), ((0, 0), (0, 1), (0, 3)))
 
     class Blind:
         cell, arrived = (0, 0), False
 
-        def step(self, blocked: Any) -> tuple[int, int]:
+        def step(self, blocked):
             self.cell = (0, 1) if self.cell == (0, 0) else (0, 2)
             return self.cell
 
-    movers.step = lambda robot: None  # type: ignore[method-assign]
+    movers.step = lambda robot: None
     with pytest.raises(PlannerError, match=r"planner blind went from \(0, 1\) to \(0, 2\), into a mover"):
-        drive(cast(Any, Blind()), query, movers, "blind")
+        drive(Blind(), query, movers, "blind")
 
 
-def test_the_two_walls_let_no_line_with_one_bend_pass() -> None:
+def test_the_two_walls_let_no_line_with_one_bend_pass():
     """By sampling all lines over one via point finely, and a line over two of them."""
     discs = np.array(TWO_WALLS)
 
-    def touches(*points: tuple[float, float]) -> bool:
+    def touches(*points):
         line = np.vstack([np.linspace(a, b, 400) for a, b in itertools.pairwise(points)])
         return bool((np.hypot(*(line[:, None] - discs[:, :2]).transpose(2, 0, 1)) < discs[:, 2]).any())
 

@@ -1,6 +1,4 @@
-"""Worker processes: a run that kills its process is recorded and costs no other run; worlds stay with their process."""
-
-from __future__ import annotations
+"""Worker processes: one that is killed costs no other run, worlds stay with theirs, runs are handed out once each."""
 
 import contextlib
 import operator
@@ -10,13 +8,15 @@ from collections import Counter
 from functools import partial
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from antdrive.base.errors import InputError
 from antdrive.runs import pool
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of
-from antdrive.runs.pool import Pool, WorkerDied, call_all, processes_for
+from antdrive.runs.pool import CHUNK_SECONDS, LONGEST_CHUNK, Pool, Waiting, WorkerDied, call_all, processes_for
 from tests.runs.campaigns.works import Deadly, Endless, Listing, Refusing, Unloadable
 
 
@@ -28,15 +28,15 @@ def jobs(worlds=1, seeds=8):
 def made(work, processes, runs=(), **watched):
     """The rows of runs that a pool makes."""
     with Pool(processes, **watched) as workers:
-        done = workers.each(work, runs or jobs(), group=lambda job: job.case.world)
+        done = workers.each(work, runs or jobs(), group=lambda job: job.case.place.world)
         return [finished_of(one, watched.get("limit")).row for one in done]
 
 
 def test_a_run_that_kills_its_process_twice_is_recorded_and_no_other_is_lost():
-    rows = made(Deadly((3, 5)), 2)
+    rows = made(Deadly((3,)), 2)
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs())
     crashed = {row["key"]: row for row in rows if row["outcome"] == "crashed"}
-    assert set(crashed) == {job.key for job in jobs() if job.seed in (3, 5)}
+    assert set(crashed) == {job.key for job in jobs() if job.seed == 3}
     assert {(row["reason"], row["attempts"]) for row in crashed.values()} == {
         ("the process that made it ended by SIGKILL", 2)
     }
@@ -51,10 +51,10 @@ def test_a_run_whose_process_dies_once_is_tried_again(tmp_path):
 
 
 def test_a_run_that_does_not_end_is_ended_and_not_tried_again():
-    rows = made(Endless((2, 6)), 2, limit=1.5)
+    rows = made(Endless((2,)), 2, limit=1.5)
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs())
     slow = {row["key"]: row for row in rows if row["outcome"] != "succeeded"}
-    assert set(slow) == {job.key for job in jobs() if job.seed in (2, 6)}
+    assert set(slow) == {job.key for job in jobs() if job.seed == 2}
     assert {(row["outcome"], row["reason"], row["attempts"]) for row in slow.values()} == {
         ("too_slow", "took longer than the campaign's run_limit of 1.5 s", 1)
     }
@@ -67,7 +67,7 @@ def test_a_run_that_finds_that_nothing_can_be_written_ends_the_campaign():
 
 def test_somebody_else_has_a_turn_while_a_run_takes_long(monkeypatch):
     monkeypatch.setattr(pool, "LOOK", 0.05)
-    turns: list[int] = []
+    turns = []
     rows = made(Deadly(seconds=0.5), 1, jobs(seeds=1), tick=lambda: turns.append(1))
     assert len(rows) == 1
     assert len(turns) > 2
@@ -82,7 +82,7 @@ def test_a_process_stays_with_a_world_while_there_is_one_for_each(tmp_path):
     path = tmp_path / "runs"
     assert len(made(Listing(str(path)), 2, jobs(worlds=2, seeds=30))) == 60
     changes = Counter[str]()
-    last: dict[str, str] = {}
+    last = {}
     for line in path.read_text().splitlines():
         process, world = line.split()
         changes[process] += last.get(process, world) != world
@@ -99,8 +99,7 @@ def test_results_that_nobody_wants_end_the_workers():
 
 def test_results_come_in_the_order_of_the_items_from_the_same_processes():
     with Pool(2) as workers:
-        for work in (abs, operator.neg):
-            assert list(workers.results(work, range(40))) == [work(item) for item in range(40)]
+        assert list(workers.results(operator.neg, range(40))) == [-item for item in range(40)]
         assert len({*workers.results(process, range(20)), *workers.results(process, range(20, 40))}) <= 2
 
 
@@ -116,7 +115,7 @@ def fails(item):
     return item
 
 
-@pytest.mark.parametrize("processes", [0, 2])
+@pytest.mark.parametrize("processes", [0, 1])
 def test_what_the_work_raises_is_raised_here(processes):
     with (
         Pool(processes) as workers,
@@ -141,3 +140,59 @@ def test_one_process_is_this_one_and_so_are_those_of_a_worker():
     assert processes_for(3) == 3
     assert call_all([os.getpid], 1) == [os.getpid()]
     assert call_all([partial(processes_for, 3)] * 2, 2) == [0, 0]
+
+
+Run = tuple[str, int]  # the world, the seed
+
+
+def queue(runs, processes):
+    return Waiting(runs, processes, lambda run: run[0])
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 5)), unique=True, max_size=18),
+    st.integers(1, 4),
+    st.lists(st.tuples(st.sampled_from([None, *"abc"]), st.floats(1e-4, 10), st.booleans()), max_size=40),
+)
+def test_every_run_is_handed_out_once_whatever_is_asked_measured_and_put_back(runs, processes, asked):
+    waiting, made = queue(runs, processes), Counter[Run]()
+    left = len(runs)
+    for world, seconds, back in [*asked, *[(None, 1e-3, False)] * len(runs)]:
+        assert len(waiting) == left
+        chunk = waiting.chunk(world)
+        assert bool(chunk) == bool(left)
+        if back:
+            waiting.put_back(chunk)
+            continue
+        made.update(one.item for one in chunk)
+        left -= len(chunk)
+        if chunk:
+            waiting.measured(seconds * len(chunk), len(chunk))
+    assert made == Counter(runs)
+
+
+def test_chunks_take_two_seconds_and_shrink_at_the_end():
+    waiting = queue((("a", seed) for seed in range(1000)), 2)
+    assert len(waiting.chunk(None)) == 1, "nothing is measured yet"
+    waiting.measured(0.1)
+    assert len(waiting.chunk(None)) == CHUNK_SECONDS / 0.1
+    waiting.measured(1e-5, runs=1000)
+    assert len(waiting.chunk(None)) == min(LONGEST_CHUNK, -(-979 // 4))
+    while len(waiting) > 4:
+        waiting.chunk(None)
+    assert len(waiting.chunk(None)) == 1
+
+
+def test_runs_that_are_put_back_come_one_by_one_before_all_others():
+    waiting = queue((("a", seed) for seed in range(9)), 1)
+    waiting.measured(1e-3)
+    first = waiting.chunk(None)
+    waiting.put_back(first)
+    assert [waiting.chunk(None) for _ in first] == [[one] for one in first]
+
+
+def test_a_process_goes_on_with_its_world_then_takes_a_fresh_one_then_helps():
+    runs = [*(("a", seed) for seed in range(40)), ("b", 0), ("c", 0)]
+    waiting = queue(runs, 40)
+    worlds = [waiting.chunk(world)[0].group for world in (None, "a", None, "b", "b")]
+    assert worlds == ["a", "a", "b", "c", "a"]

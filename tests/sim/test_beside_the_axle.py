@@ -1,23 +1,25 @@
-"""Robots whose footprint is not centred on the axle, from their file to the certificate, the film and the replay."""
+"""Robots whose footprint is not centred on the axle, and robots imported from URDF, drive certified."""
 
 from __future__ import annotations
 
-import dataclasses
+import tarfile
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 
-from antdrive.planners import load_planner
 from antdrive.robots import Footprint, list_robots, load_robot
-from antdrive.sim import Outcome, Rollout, Run, Scenario, certify, run
+from antdrive.robots.importing.urdf import import_urdf
+from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.log.certificate import _between_steps, _clearances
 from antdrive.views.film.meshes import robot_parts
 from antdrive.views.scene import Scene, contact_point
-from antdrive.worlds import Cruising, Disc, Task, World, task_to_dict
+from antdrive.worlds import Cruising, Disc, Task, World, import_barn, task_to_dict
 from benchmarks.second_audit import least_clearance
+from tests.records import changed
+from tools.shared_data import BARN
 
 NOSE = [[0.62, 0.0], [0.45, 0.25], [-0.25, 0.25], [-0.25, -0.25], [0.45, -0.25]]
 WORLD = World(
@@ -29,28 +31,26 @@ WORLD = World(
 TASK = Task(WORLD, (1.2, 3.0, 0.6), (7.6, 3.0), cell=0.1, goal_tolerance=0.2)
 
 
-def drive(**settings: Any) -> Run:
-    robot = dataclasses.replace(load_robot("warehouse"), footprint=Footprint.polygon(NOSE), name="nose")
-    return run(Scenario(task=TASK, planner=load_planner("astar"), planner_name="astar", robot=robot, **settings))
+def drive(**settings):
+    robot = replace(load_robot("warehouse"), footprint=Footprint.polygon(NOSE), name="nose")
+    return run(Scenario.of(TASK, "astar", robot, **settings))
 
 
 @pytest.fixture(scope="module")
-def driven() -> Rollout:
+def driven():
     done = drive(noise=1.0, seed=3)
     assert done.succeeded, (done.reason, done.certificate)
-    assert done.rollout is not None
     return done.rollout
 
 
 @pytest.fixture(scope="module")
-def hit() -> Rollout:
+def hit():
     """An unknown post in the way of the nose: its tip is 0.62 m ahead of the axle."""
     done = drive(unseen=(Disc(4.2, 3.2, 0.15),), avoidance=None, replanning=None)
-    assert done.rollout is not None
     return done.rollout
 
 
-def test_a_polygon_drives_among_obstacles_and_movers_and_is_certified(driven: Rollout, tmp_path: Path) -> None:
+def test_a_polygon_drives_among_obstacles_and_movers_and_is_certified(driven, tmp_path):
     certificate = certify(driven)
     assert certificate.certified, certificate.problems
     assert driven.record.as_dict()["robot"]["footprint"]["corners"] == NOSE
@@ -61,7 +61,7 @@ def test_a_polygon_drives_among_obstacles_and_movers_and_is_certified(driven: Ro
     assert (again.digest, certify(again).bound) == (driven.digest, certificate.bound)
 
 
-def test_the_certificate_promises_no_more_than_a_cloud_of_points_that_is_swept_along_the_arcs(driven: Rollout) -> None:
+def test_the_certificate_promises_no_more_than_a_cloud_of_points_that_is_swept_along_the_arcs(driven):
     """The points are 5 mm apart, so the cloud may be 5 mm too optimistic, and never too pessimistic but for rounding."""
     world = task_to_dict(driven.record.task)
     audit = least_clearance(world, {"polygon": NOSE}, driven.pose, driven.twist, driven.record.physics_hz)
@@ -70,22 +70,22 @@ def test_the_certificate_promises_no_more_than_a_cloud_of_points_that_is_swept_a
     assert certificate.bound - 1e-9 <= audit.between <= certificate.min_clearance + 0.005
 
 
-def test_nothing_comes_nearer_between_two_rows_than_the_bound(driven: Rollout) -> None:
+def test_nothing_comes_nearer_between_two_rows_than_the_bound(driven):
     """Every 40th row is kept, so that much happens between them, and what happens is known from the rows left out."""
-    kept = dataclasses.replace(
+    kept = replace(
         driven,
-        record=dataclasses.replace(driven.record, physics_hz=6, control_hz=6),
+        record=replace(driven.record, physics_hz=6, control_hz=6),
         **{key: getattr(driven, key)[::40] for key in ("t", "pose", "twist", "clearance", "movers")},
     )
     still, moving = _clearances(kept)
     twist = np.array([np.abs(driven.twist[k : k + 41]).max(axis=0) for k in range(0, len(driven.t), 40)])
-    bound = _between_steps(dataclasses.replace(kept, twist=twist), driven.trajectories(), still, moving)
+    bound = _between_steps(replace(kept, twist=twist), driven.trajectories(), still, moving)
     between = [driven.clearance[k : k + 41].min() for k in range(0, len(driven.t) - 40, 40)]
     assert (bound[: len(between)] <= np.array(between) + 1e-9).all()
     assert max(np.array(between) - bound[: len(between)]) > 0.02, "the bound is one that can fail"
 
 
-def test_a_collision_of_the_nose_is_a_collision_in_every_reading(hit: Rollout) -> None:
+def test_a_collision_of_the_nose_is_a_collision_in_every_reading(hit):
     assert hit.outcome is Outcome.COLLIDED
     problems = " ".join(certify(hit).problems)
     assert "physics reports" in problems
@@ -97,26 +97,26 @@ def test_a_collision_of_the_nose_is_a_collision_in_every_reading(hit: Rollout) -
     assert np.hypot(x - hit.pose[row, 0], y - hit.pose[row, 1]) > 0.3, "farther than the rectangle of a centred robot"
 
 
-def test_a_log_whose_polygon_was_made_smaller_is_not_certified(driven: Rollout) -> None:
+def test_a_log_whose_polygon_was_made_smaller_is_not_certified(driven):
     shrunk = Footprint.polygon([[x - 0.01, y] for x, y in NOSE])
-    forged = dataclasses.replace(driven.record, robot=dataclasses.replace(driven.record.robot, footprint=shrunk))
-    problems = " ".join(certify(dataclasses.replace(driven, record=forged)).problems)
+    forged = changed(driven.record, "robot", footprint=shrunk)
+    problems = " ".join(certify(replace(driven, record=forged)).problems)
     assert "clearance: logged" in problems
     assert "record.inflate" in problems
 
 
 @pytest.mark.parametrize("name", [*list_robots(), "nose", "puck"])
-def test_a_robot_is_drawn_within_its_footprint(name: str) -> None:
+def test_a_robot_is_drawn_within_its_footprint(name):
     feet = {"nose": Footprint.polygon(NOSE), "puck": Footprint.disc(0.5, (0.1, 0.05))}
     robot = load_robot(name if name in list_robots() else "warehouse")
-    robot = dataclasses.replace(robot, footprint=feet.get(name, robot.footprint))
+    robot = replace(robot, footprint=feet.get(name, robot.footprint))
     for part in robot_parts(robot):
         if not part.wheel:
             deepest = min(robot.footprint.depth(x, y) for x, y in part.mesh.vertices[:, :2].tolist())
             assert deepest >= -1e-9, part.colour
 
 
-def test_a_robot_file_is_what_the_second_audit_reads() -> None:
+def test_a_robot_file_is_what_the_second_audit_reads():
     for name, path in list_robots().items():
         foot = load_robot(name).footprint
         raw = yaml.safe_load(path.read_text())["footprint"]
@@ -124,3 +124,45 @@ def test_a_robot_file_is_what_the_second_audit_reads() -> None:
         turned = np.array(foot.outline(64)) @ np.array([[np.cos(0.7), np.sin(0.7)], [-np.sin(0.7), np.cos(0.7)]])
         expected = min(2 - turned[:, 0].max(), 3 - turned[:, 1].max())
         assert audit.rows == pytest.approx(expected, abs=2e-3), name
+
+
+URDF = Path(__file__).parents[1] / "robots" / "importing" / "urdf"
+
+needs_barn = pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")
+
+
+@pytest.fixture(scope="module")
+def barn_0(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("barn")
+    with tarfile.open(BARN) as archive:
+        archive.extract("world_0.world", folder, filter="data")
+    return import_barn(folder / "world_0.world")
+
+
+@needs_barn
+@pytest.mark.parametrize(
+    "name",
+    [
+        "pioneer3dx.urdf",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("burger.urdf", "waffle.urdf", "turtlebot4.urdf")),
+    ],
+)
+def test_an_imported_robot_drives_a_barn_world_certified(name, barn_0):
+    robot = import_urdf(URDF / name).robot
+    done = run(Scenario.of(barn_0, "astar", robot))
+    assert done.succeeded, (done.outcome, done.reason, done.certificate)
+
+
+@needs_barn
+def test_a_robot_that_is_too_large_for_a_barn_world_says_where_and_what_it_needs(barn_0):
+    pytest.importorskip("xacrodoc")
+    robot = import_urdf(URDF / "warehouse.urdf.xacro").robot
+    done = run(Scenario.of(barn_0, "astar", robot))
+    assert done.outcome is Outcome.NO_PATH
+    assert (
+        "the widest disc that passes has a radius of 0.511 m, at (-3.15, 5.92), between obstacles[143]" in done.reason
+    )
+    assert done.reason.endswith(
+        "the place is 1.02 m wide, and plans are made for the disc around warehouse, which needs 1.4 m; "
+        "its rectangle of 0.9 x 0.6 m would need 0.66 m straight ahead"
+    )

@@ -8,24 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from antdrive.planners import GridPlanner, PlanResult, PlanStatus, Query, load_planner
-from antdrive.robots import Footprint, RobotSpec
+from antdrive.planners import GridPlanner, PlanResult, PlanStatus
+from antdrive.robots import Footprint
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import Disc, Task, World
+from tests.records import changed
 
 
-def gate(robot: RobotSpec, width: float, *, planner: str = "astar", cell: float = 0.1, **settings: object) -> Scenario:
+def gate(robot, width, *, planner="astar", cell=0.1, **settings):
     """A wall of overlapping cylinders with one opening around (3, 2)."""
     ys = np.arange(2 + width / 2 + 0.25, 4.2, 0.3)
     wall = tuple(Disc(3.0, float(y), 0.25) for y in (*ys, *(4 - ys)))
     task = Task(World("gate", (0.0, 0.0, 6.0, 4.0), wall), (1.0, 2.0, 0.0), (5.0, 2.0), cell=cell)
-    return Scenario(task=task, planner=load_planner(planner), planner_name=planner, robot=robot, **settings)  # type: ignore[arg-type]
+    return Scenario.of(task, planner, robot, **settings)
 
 
 @pytest.mark.parametrize("planner", ["astar", "ants", "tangent"])
-def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_would_do(
-    turtlebot: RobotSpec, planner: str
-) -> None:
+def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_would_do(turtlebot, planner):
     tight = gate(turtlebot, 0.45, planner=planner, margin=0.08)
     done = run(tight)
     assert done.outcome is Outcome.NO_PATH
@@ -38,14 +37,12 @@ def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_wo
     assert run(replace(tight, margin=0.035, cell=0.0125)).succeeded, "the advice is right"
 
 
-def test_a_robot_that_is_wider_than_the_gate_is_told_so(turtlebot: RobotSpec) -> None:
+def test_a_robot_that_is_wider_than_the_gate_is_told_so(turtlebot):
     assert run(gate(turtlebot, 0.3)).reason.endswith("this robot does not fit through")
 
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (0.15, 0.0)])
-def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_need(
-    jackal: RobotSpec, centre: tuple[float, float]
-) -> None:
+def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_need(jackal, centre):
     """A robot of 0.9 x 0.6 m before a door of 0.95 m."""
     robot = replace(jackal, name="cart", footprint=Footprint.rectangle(0.9, 0.6, centre))
     reason = run(gate(robot, 0.95, cell=0.05)).reason
@@ -62,15 +59,13 @@ def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_n
     assert run(gate(robot, 0.62, cell=0.05)).reason.endswith("would not fit either: it needs 0.66 m straight ahead")
 
 
-def test_a_margin_that_would_do_is_named_for_a_rectangle_too(jackal: RobotSpec) -> None:
+def test_a_margin_that_would_do_is_named_for_a_rectangle_too(jackal):
     reason = run(gate(jackal, 0.7, cell=0.05)).reason
     assert reason.endswith("its rectangle of 0.508 x 0.43 m would need 0.49 m straight ahead; "
                            "a margin below 0.0172 m leaves a way, on cells that are fine enough")  # fmt: skip
 
 
-def test_in_a_world_of_very_many_obstacles_the_place_is_found_on_the_cells(
-    jackal: RobotSpec, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_in_a_world_of_very_many_obstacles_the_place_is_found_on_the_cells(jackal, monkeypatch):
     import antdrive.sim.reasons as reasons
 
     monkeypatch.setattr(reasons, "MOST_OBSTACLES", 3)
@@ -84,7 +79,7 @@ def test_in_a_world_of_very_many_obstacles_the_place_is_found_on_the_cells(
     assert run(closed).reason.endswith("no disc of 0.0028 m gets through, on these cells")
 
 
-def test_cells_that_would_do_are_named(turtlebot: RobotSpec) -> None:
+def test_cells_that_would_do_are_named(turtlebot):
     coarse = gate(turtlebot, 0.45, cell=0.6)
     reason = run(coarse).reason
     assert reason.startswith("no path for a disc of 0.21 m (radius 0.18 + margin 0.03) on cells of 0.6 m")
@@ -92,17 +87,15 @@ def test_cells_that_would_do_are_named(turtlebot: RobotSpec) -> None:
     assert run(replace(coarse, cell=float(reason.split()[-2]))).succeeded
 
 
-def test_a_goal_behind_a_closed_wall_is_not_blamed_on_the_margin(turtlebot: RobotSpec) -> None:
+def test_a_goal_behind_a_closed_wall_is_not_blamed_on_the_margin(turtlebot):
     closed = gate(turtlebot, 0.45)
-    task = replace(
-        closed.task, world=replace(closed.task.world, obstacles=(*closed.task.world.obstacles, Disc(3.0, 2.0, 0.4)))
-    )
+    task = changed(closed.task, "world", obstacles=(*closed.task.world.obstacles, Disc(3.0, 2.0, 0.4)))
     assert run(replace(closed, task=task)).reason.endswith("; not even a point gets through")
 
 
-def test_a_start_without_room_for_the_margin_is_the_narrowest_place(turtlebot: RobotSpec) -> None:
+def test_a_start_without_room_for_the_margin_is_the_narrowest_place(turtlebot):
     task = Task(World("corner", (0.0, 0.0, 6.0, 4.0)), (2.0, 2.0, 0.0), (5.7, 2.0), cell=0.1)
-    done = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot, margin=0.5))
+    done = run(Scenario.of(task, "astar", turtlebot, margin=0.5))
     assert done.reason.endswith(
         "has a radius of 0.3 m, at (5.70, 2.00), the goal has no more room; a margin below 0.12 m leaves a way, on cells "
         "that are fine enough"
@@ -113,11 +106,11 @@ def test_a_start_without_room_for_the_margin_is_the_narrowest_place(turtlebot: R
 class GivesUp(GridPlanner):
     """Finds no path, ever."""
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def _plan(self, query, rng):
         return PlanResult(status=PlanStatus.NO_PATH, reason="too tired")
 
 
-def test_a_planner_that_misses_a_path_is_told_from_a_world_without_one(small_scenario: Scenario) -> None:
+def test_a_planner_that_misses_a_path_is_told_from_a_world_without_one(small_scenario):
     done = run(replace(small_scenario, planner=GivesUp(), planner_name="lazy"))
     assert done.reason == (
         "lazy found no path for a disc of 0.21 m (radius 0.18 + margin 0.03): too tired; astar finds one on these cells of 0.2 m"
@@ -125,9 +118,8 @@ def test_a_planner_that_misses_a_path_is_told_from_a_world_without_one(small_sce
 
 
 @pytest.mark.parametrize("margin", [0.035, 0.04])
-def test_a_line_where_the_grid_has_no_path_is_driven_and_recorded(turtlebot: RobotSpec, margin: float) -> None:
+def test_a_line_where_the_grid_has_no_path_is_driven_and_recorded(turtlebot, margin):
     done = run(gate(turtlebot, 0.45, planner="tangent", cell=0.05, margin=margin))
     assert done.succeeded, done.reason
-    assert done.rollout is not None
     assert done.rollout.record.plan.cost_m is None
     assert done.rollout.record.plan.length_m > 4.0 - 1e-9

@@ -8,27 +8,25 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from antdrive.base import FieldError, InputError
-from antdrive.planners import Progress, keep_best, load_planner, watch
+from antdrive.base import FieldError
+from antdrive.planners import keep_best, load_planner, watch
 from antdrive.robots import Footprint, PurePursuit, RobotSpec, load_robot
-from antdrive.sim import Engine, Outcome, Run, Scenario, measure, plan, run
-from antdrive.sim.driving.following import follow
+from antdrive.sim import Engine, Outcome, Scenario, measure, plan, run
+from antdrive.sim.driving.drive import follow
 from antdrive.sim.log import certificate
 from antdrive.sim.log.record import SmoothingRecord
 from antdrive.views.figures.plan_figures import plan_figure
 from antdrive.worlds import Disc, Route, Task, World, list_worlds, load_task, save_task
 
 
-def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:
+def test_a_run_ends_at_the_goal_certified(small_run):
     assert small_run.outcome is Outcome.SUCCEEDED
     assert small_run.succeeded
     log = small_run.rollout
-    assert log is not None
     assert math.dist(log.pose[-1, :2], small_run.scenario.task.goal) < 0.05
     assert len(log.contacts) == 0
     assert log.clearance.min() > 0.3 * small_run.scenario.margin
@@ -37,8 +35,7 @@ def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:
     assert json.dumps(small_run.as_dict())
 
 
-def test_metrics_have_sensible_values(small_run: Run) -> None:
-    assert small_run.rollout is not None
+def test_metrics_have_sensible_values(small_run):
     m = measure(small_run.rollout)
     direct = math.dist((0.6, 1.4), (3.4, 1.6))
     assert direct < m["driven_length_m"] < 1.3 * direct
@@ -57,7 +54,7 @@ STATIC = [name for name in list_worlds() if not name.endswith("-moving")]
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow) if name.startswith("hasan") else name for name in STATIC]
 )
-def test_every_catalogue_world_is_driven(name: str, robot: str, planner: str) -> None:
+def test_every_catalogue_world_is_driven(name, robot, planner):
     if robot == "jackal" and name in TOO_NARROW_FOR_JACKAL:
         with pytest.raises(FieldError, match=f"start: jackal at .* {TOO_NARROW_FOR_JACKAL[name]}"):
             Scenario.of(name, planner, robot)
@@ -73,46 +70,42 @@ def test_every_catalogue_world_is_driven(name: str, robot: str, planner: str) ->
 TOO_NARROW_FOR_JACKAL = {"hasan-3c": "overlaps the upper wall by 0.004", "hasan-5f": r"overlaps obstacles\[116\]"}
 
 
-def test_a_large_world_is_driven_in_the_fast_suite_too() -> None:
+def test_a_large_world_is_driven_in_the_fast_suite_too():
     assert run(Scenario.of("hasan-3c")).succeeded
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", sorted(set(list_worlds()) - set(STATIC)))
-def test_the_outcome_of_every_world_with_movers_is_certain(name: str, seed: int) -> None:
+def test_the_outcome_of_every_world_with_movers_is_certain(name, seed):
     """Not every drive succeeds, but all three readings agree on whether something was touched."""
     result = run(Scenario.of(name, seed=seed))
     assert result.outcome in (Outcome.SUCCEEDED, Outcome.COLLIDED, Outcome.HIT_WHILE_STANDING)
-    assert result.certificate is not None
     assert result.succeeded == (result.outcome is Outcome.SUCCEEDED) == result.certificate.certified
     assert not any("disagree" in problem or "outcome" in problem for problem in result.certificate.problems)
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-def test_avoidance_and_replanning_cross_a_busy_plaza(robot: str) -> None:
+def test_avoidance_and_replanning_cross_a_busy_plaza(robot):
     result = run(Scenario.of("plaza-moving", "dstar-lite", robot))
     assert result.succeeded, (result.outcome, result.reason)
-    assert result.rollout is not None
     assert measure(result.rollout)["replans"] > 0
     assert measure(result.rollout)["avoiding_s"] > 0
     blind = run(Scenario.of("plaza-moving", "dstar-lite", robot, avoidance=None, replanning=None))
     assert blind.outcome is Outcome.COLLIDED
 
 
-def test_the_seed_decides_where_a_wanderer_goes() -> None:
+def test_the_seed_decides_where_a_wanderer_goes():
     logs = [run(Scenario.of("hasan-3c-moving", seed=seed, time_limit=5.0)).rollout for seed in (0, 0, 1)]
     one, again, other = (log for log in logs if log is not None)
     assert one.digest == again.digest
     assert (one.movers != other.movers).any()
 
 
-def test_an_unseen_obstacle_on_the_route_is_hit(collided_run: Run) -> None:
+def test_an_unseen_obstacle_on_the_route_is_hit(collided_run):
     assert collided_run.outcome is Outcome.COLLIDED
     assert not collided_run.succeeded
     log, certificate = collided_run.rollout, collided_run.certificate
-    assert log is not None
-    assert certificate is not None
     assert len(log.contacts) > 0
     step, obstacle, distance, force = log.contacts[0]
     assert len(log.record.task.world.obstacles) == int(obstacle)
@@ -122,56 +115,34 @@ def test_an_unseen_obstacle_on_the_route_is_hit(collided_run: Run) -> None:
     assert not any("disagree" in problem for problem in certificate.problems)
 
 
-def test_half_a_second_of_braking_is_logged_after_a_contact(collided_run: Run) -> None:
-    log = collided_run.rollout
-    assert log is not None
-    rows = len(log.t) - 1 - int(log.contacts[0, 0])
-    period = log.record.physics_hz // log.record.control_hz  # the control period of the contact is logged to its end
-    assert 0 <= rows - 0.5 * log.record.physics_hz < period
-    assert not log.command[-round(0.5 * log.record.physics_hz) :].any()
-
-
-def test_no_path_is_an_outcome_with_a_reason(turtlebot: RobotSpec) -> None:
+def test_no_path_is_an_outcome_with_a_reason(turtlebot):
     wall = tuple(Disc(2, 0.1 + 0.2 * i, 0.11) for i in range(15))
     task = Task(World("cut", (0, 0, 4, 3), wall), (0.6, 1.5, 0), (3.4, 1.5), cell=0.2)
     for planner in ("astar", "aco-han"):
-        result = run(Scenario(task=task, planner=load_planner(planner), robot=turtlebot))
+        result = run(Scenario.of(task, planner, turtlebot))
         assert result.outcome is Outcome.NO_PATH
         assert result.rollout is None
         assert result.plan.reason
 
 
-def test_a_goal_without_room_is_no_path(turtlebot: RobotSpec) -> None:
+def test_a_goal_without_room_is_no_path(turtlebot):
     """The goal lies 2 cm from a disc: the robot fits nowhere within the tolerance."""
     task = Task(World("w", (0, 0, 4, 3), (Disc(3, 1.5, 0.3),)), (0.6, 1.5, 0), (2.68, 1.5), 0.05, 0.2)
-    result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot))
+    result = run(Scenario.of(task, "astar", turtlebot))
     assert result.outcome is Outcome.NO_PATH
     assert "goal" in result.plan.reason
     near = replace(task, goal_tolerance=0.35)
-    assert run(Scenario(task=near, planner=load_planner("astar"), robot=turtlebot)).succeeded
+    assert run(Scenario.of(near, "astar", turtlebot)).succeeded
 
 
-def test_a_planner_that_ends_without_a_path_has_stopped(small_scenario: Scenario) -> None:
+def test_a_planner_that_ends_without_a_path_has_stopped(small_scenario):
     blind = load_planner("aco-han", ants=1, iterations=1, max_steps=2)
     result = run(replace(small_scenario, planner=blind))
     assert result.outcome is Outcome.STOPPED
     assert result.plan.reason
 
 
-def test_a_start_that_overlaps_an_obstacle_is_wrong_input(turtlebot: RobotSpec) -> None:
-    task = Task(World("w", (0, 0, 6, 4), (Disc(2.5, 1.8, 0.4),)), (3.0, 2.0, 0.0), (5.3, 2.0))
-    with pytest.raises(
-        FieldError, match=r"start: turtlebot at \(3, 2\) overlaps obstacles\[0\] .* by 0\.0\d+ m"
-    ) as found:
-        Scenario(task=task, planner=load_planner("astar"), robot=turtlebot)
-    assert found.value.key == "start"
-    away = replace(task, start=(3.2, 2.0, 0.0))
-    free = Scenario(task=away, planner=load_planner("astar"), robot=turtlebot)
-    with pytest.raises(FieldError, match=r"overlaps unseen\[0\]"):
-        replace(free, unseen=(Disc(3.2, 2.3, 0.2),))
-
-
-def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario: Scenario) -> None:
+def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario):
     grid, right = plan(small_scenario)
     wrong = run(small_scenario, planned=(grid, replace(right, cost=right.cost + 0.01)))
     assert (wrong.outcome, wrong.rollout) == (Outcome.INVALID_PLAN, None)
@@ -179,12 +150,12 @@ def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario: Scena
     assert wrong.as_dict()["outcome"] == "invalid_plan"
 
 
-def test_the_default_planner_is_ants() -> None:
+def test_the_default_planner_is_ants():
     assert Scenario.of("empty").planner_name == "ants"
 
 
-def test_ctrl_c_while_planning_keeps_the_best_path_and_does_not_drive(small_scenario: Scenario, tmp_path: Path) -> None:
-    def stop(progress: Progress) -> None:
+def test_ctrl_c_while_planning_keeps_the_best_path_and_does_not_drive(small_scenario, tmp_path):
+    def stop(progress):
         if progress.done == 2:
             raise KeyboardInterrupt
 
@@ -198,69 +169,60 @@ def test_ctrl_c_while_planning_keeps_the_best_path_and_does_not_drive(small_scen
     assert (tmp_path / "p.png").exists()
 
 
-def test_time_runs_out(small_scenario: Scenario) -> None:
+def test_time_runs_out(small_scenario):
     result = run(replace(small_scenario, time_limit=1.0))
     assert result.outcome is Outcome.TIMED_OUT
-    assert result.rollout is not None
     assert result.rollout.t[-1] == pytest.approx(1.0)
-    assert result.certificate is not None
     assert result.certificate.certified  # nothing was touched until then
     assert not result.succeeded
 
 
-def test_a_robot_that_cannot_move_is_stuck(small_scenario: Scenario) -> None:
+def test_a_robot_that_cannot_move_is_stuck(small_scenario):
     powerless = replace(small_scenario.robot, wheel_torque=1e-6)
     result = run(replace(small_scenario, robot=powerless))
     assert result.outcome is Outcome.STUCK
-    assert result.rollout is not None
     assert result.rollout.t[-1] < 12
 
 
-def test_a_robot_that_only_turns_slowly_is_not_stuck(turtlebot: RobotSpec) -> None:
+def test_a_robot_that_only_turns_slowly_is_not_stuck(turtlebot):
     slow = replace(turtlebot, max_yaw_rate=0.25)  # half a turn takes 12 s
     task = Task(World("w", (0, 0, 4, 3)), (3.0, 1.5, 0.0), (1.0, 1.5), cell=0.2)
-    assert run(Scenario(task=task, planner=load_planner("astar"), robot=slow)).succeeded
+    assert run(Scenario.of(task, "astar", slow)).succeeded
 
 
-@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-def test_a_small_tolerance_is_met(robot: str, request: pytest.FixtureRequest) -> None:
+def test_a_small_tolerance_is_met(spec):
     task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.3),)), (0.6, 1.4, 0), (3.4, 1.7), 0.02, 0.2)
-    result = run(Scenario(task=task, planner=load_planner("astar"), robot=request.getfixturevalue(robot)))
+    result = run(Scenario.of(task, "astar", spec))
     assert result.succeeded, result.reason
 
 
-def test_a_robot_that_starts_at_the_goal_need_not_drive(turtlebot: RobotSpec) -> None:
+def test_a_robot_that_starts_at_the_goal_need_not_drive(turtlebot):
     """The robot does not fit at the goal, and the only cell within the tolerance is the one it starts in."""
     task = Task(World("w", (0, 0, 1, 1)), (0.5, 0.5, 0.0), (0.5, 0.3), 0.25, 1.0)
-    result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot, margin=0.15))
+    result = run(Scenario.of(task, "astar", turtlebot, margin=0.15))
     assert result.succeeded
-    assert result.rollout is not None
     assert len(result.rollout.t) == 1
 
 
-def test_no_obstacle_is_too_low_to_be_touched(small_scenario: Scenario, collided_run: Run) -> None:
+def test_no_obstacle_is_too_low_to_be_touched(small_scenario, collided_run):
     low = replace(collided_run.scenario.unseen[0], height=0.003)
     assert run(replace(small_scenario, unseen=(low,))).outcome is Outcome.COLLIDED
 
 
 @pytest.mark.parametrize("gap", [-0.03, -0.08, -0.15])
-def test_a_start_that_touches_is_a_collision_at_once(
-    turtlebot: RobotSpec, gap: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_start_that_touches_is_a_collision_at_once(turtlebot, gap, monkeypatch):
     """Physics and the certificate see it, too, should a scenario ever let it pass."""
     monkeypatch.setattr("antdrive.sim.scenario.overlap_at", lambda *_: "")
     start = (0.6 + 0.1 + turtlebot.radius + gap, 1.5, 0)
     task = Task(World("w", (0, 0, 4, 3), (Disc(0.6, 1.5, 0.1),)), start, (3.4, 1.5), cell=0.2)
-    result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot))
+    result = run(Scenario.of(task, "astar", turtlebot))
     assert result.outcome is Outcome.COLLIDED
-    assert result.rollout is not None
     assert result.rollout.contacts[0, 0] == 0
     assert result.rollout.clearance[0] == pytest.approx(gap, abs=0.005)
-    assert result.certificate is not None
     assert not any("disagree" in problem or "start" in problem for problem in result.certificate.problems)
 
 
-def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: RobotSpec) -> None:
+def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot):
     """The controller does not trust the route: it creeps up to the obstacle."""
     task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.3),)), (0.6, 1.5, 0), (3.4, 1.5))
     controller = PurePursuit()
@@ -270,57 +232,28 @@ def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: Ro
     assert log.outcome in (Outcome.COLLIDED, Outcome.STUCK)
 
 
-@pytest.mark.parametrize(
-    ("rates", "says"),
-    [
-        ({"control_hz": 70}, "control_hz: must divide the physics rate 240, got 70; 60 would do"),
-        ({"control_hz": 5}, "control_hz: must be at least 10, got 5"),
-        ({"control_hz": 480}, "got 480; 240 would do"),
-        ({"physics_hz": 30, "control_hz": 30}, "physics_hz: must be between 60 and 10000, got 30"),
-        ({"physics_hz": 20_000, "control_hz": 50}, "physics_hz: must be between 60 and 10000, got 20000"),
-        ({"physics_hz": 240.0}, "physics_hz: must be a whole number, got 240.0"),
-        ({"control_hz": True}, "control_hz: must be a whole number, got True"),
-    ],
-    ids=str,
-)
-def test_rates_at_which_nothing_can_be_simulated_are_refused(
-    small_scenario: Scenario, rates: dict[str, Any], says: str
-) -> None:
-    with pytest.raises(ValueError, match=says):
-        replace(small_scenario, **rates)
-
-
-def test_other_physics_and_control_rates_work(small_scenario: Scenario) -> None:
+def test_other_physics_and_control_rates_work(small_scenario):
     for physics, control in ((120, 60), (240, 30), (240, 240)):
         assert run(replace(small_scenario, physics_hz=physics, control_hz=control)).succeeded
 
 
-def test_a_robot_that_brakes_hard_is_certified_at_the_slowest_rates() -> None:
+def test_a_robot_that_brakes_hard_is_certified_at_the_slowest_rates():
     for physics, control in ((60, 60), (60, 10), (70, 70), (90, 45)):
         assert run(Scenario.of("slalom", "astar", "jackal", physics_hz=physics, control_hz=control)).succeeded
 
 
-def fast(size: float, speed: float, braking: float, across: float = 6.0, friction: float = 1.3) -> RobotSpec:
+def fast(size, speed, braking, across=6.0, friction=1.3):
     """A disc of this diameter [m] that drives fast and brakes hard."""
+    mass = 50 * size**3 + 0.05
     return RobotSpec(
-        name="fast",
-        footprint=Footprint(0.0, 0.0, size / 2),
-        height=0.6 * size,
-        mass=50 * size**3 + 0.05,
-        wheel_radius=0.15 * size,
-        track=0.7 * size,
-        max_speed=speed,
-        max_yaw_rate=min(50.0, 2 * speed / size),
-        max_acceleration=braking,
-        max_yaw_acceleration=braking / size,
-        max_lateral_acceleration=across,
-        max_wheel_speed=15 * speed / size,
-        wheel_torque=3 * (50 * size**3 + 0.05) * size,
-        wheel_friction=friction,
-    )
+        name="fast", footprint=Footprint(0.0, 0.0, size / 2), height=0.6 * size, mass=mass, wheel_radius=0.15 * size,
+        track=0.7 * size, max_speed=speed, max_yaw_rate=min(50.0, 2 * speed / size), max_acceleration=braking,
+        max_yaw_acceleration=braking / size, max_lateral_acceleration=across, max_wheel_speed=15 * speed / size,
+        wheel_torque=3 * mass * size, wheel_friction=friction,
+    )  # fmt: skip
 
 
-def driven(robot: RobotSpec, physics_hz: int, control_hz: int) -> Run:
+def driven(robot, physics_hz, control_hz):
     """A drive of a robot between four cylinders that are in proportion to it."""
     long, wide = max(40 * robot.radius, 4.0), max(12 * robot.radius, 1.0)
     places = ((0.2, 0.35), (0.4, 0.65), (0.6, 0.35), (0.8, 0.65))
@@ -329,24 +262,17 @@ def driven(robot: RobotSpec, physics_hz: int, control_hz: int) -> Run:
     goal = (long + 3 * robot.radius, wide / 2)
     task = Task(world, (2 * robot.radius, wide / 2, 0.0), goal, cell=wide / 16, goal_tolerance=0.15)
     return run(
-        Scenario(
-            task=task,
-            planner=load_planner("astar"),
-            planner_name="astar",
-            robot=robot,
-            physics_hz=physics_hz,
-            control_hz=control_hz,
-            margin=0.2 * robot.radius + 0.02,
+        Scenario.of(
+            task, "astar", robot, physics_hz=physics_hz, control_hz=control_hz, margin=0.2 * robot.radius + 0.02
         )
     )
 
 
-def motion_problems(found: Run) -> list[str]:
-    assert found.certificate is not None
+def motion_problems(found):
     return [problem for problem in found.certificate.problems if "do not follow from" in problem]
 
 
-def test_a_fast_robot_that_slides_as_physics_has_it_is_not_said_to_be_forged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fast_robot_that_slides_as_physics_has_it_is_not_said_to_be_forged(monkeypatch):
     """While it speeds up at a low rate it slides aside; the check of its motion knows by how much."""
     robots = ((0.5, 2.5, 8.0), (0.35, 4.0, 7.0), (0.6, 4.0, 6.0))
     drives = [driven(fast(*numbers), 60, control) for numbers in robots for control in (10, 60)]
@@ -358,7 +284,7 @@ def test_a_fast_robot_that_slides_as_physics_has_it_is_not_said_to_be_forged(mon
     assert sum("do not follow from" in str(found.problems) for found in refused) >= 2
 
 
-def test_a_robot_that_may_have_slid_is_said_to(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_that_may_have_slid_is_said_to(monkeypatch):
     monkeypatch.setattr(certificate, "SKID", 0.0)
     monkeypatch.setattr(certificate, "SPINNING", 0.0)
     says = "the robot may have slid: 8 m/s2 along and {} m/s2 across are {} % of what a wheel friction of {} holds"
@@ -368,7 +294,7 @@ def test_a_robot_that_may_have_slid_is_said_to(monkeypatch: pytest.MonkeyPatch) 
     assert slides.endswith(says.format(6, 102, 1))
 
 
-def small_copy(robot: RobotSpec, k: float) -> RobotSpec:
+def small_copy(robot, k):
     """A robot `k` times as long that behaves the same: accelerations and friction are equal, speeds go with the root."""
     root = math.sqrt(k)
     return replace(
@@ -387,11 +313,11 @@ def small_copy(robot: RobotSpec, k: float) -> RobotSpec:
 
 
 @pytest.mark.parametrize("k", [0.12, 10.0])
-def test_a_copy_of_another_size_drives_a_world_of_that_size(jackal: RobotSpec, k: float) -> None:
+def test_a_copy_of_another_size_drives_a_world_of_that_size(jackal, k):
     task = load_task("slalom")
     world = World(
         "copy",
-        tuple(k * side for side in task.world.bounds),  # type: ignore[arg-type]
+        tuple(k * side for side in task.world.bounds),
         tuple(Disc(k * disc.x, k * disc.y, k * disc.radius, k * disc.height) for disc in task.world.obstacles),
     )
     x, y, yaw = task.start
@@ -401,37 +327,11 @@ def test_a_copy_of_another_size_drives_a_world_of_that_size(jackal: RobotSpec, k
     lookaheads = ("preferred_lookahead_min", "lookahead_min", "lookahead_max", "goal_distance")
     usual = PurePursuit()
     controller = replace(usual, **{name: k * getattr(usual, name) for name in lookaheads})
-    done = run(
-        Scenario(
-            task=copy,
-            planner=load_planner("astar"),
-            robot=small_copy(jackal, k),
-            margin=0.03 * k,
-            controller=controller,
-        )
-    )
+    done = run(Scenario.of(copy, "astar", small_copy(jackal, k), margin=0.03 * k, controller=controller))
     assert done.succeeded, done.certificate
 
 
-def test_the_same_scenario_gives_the_same_bits_in_any_order(small_scenario: Scenario, small_run: Run) -> None:
-    assert small_run.rollout is not None
-    digest = small_run.rollout.digest
-    ants = replace(small_scenario, planner=load_planner("aco-han", ants=50, iterations=5))
-    first = run(ants).rollout
-    run(replace(small_scenario, unseen=(Disc(1.5, 2.5, 0.2),)))
-    again, second = run(small_scenario).rollout, run(ants).rollout
-    assert again is not None
-    assert first is not None
-    assert second is not None
-    assert again.digest == digest
-    assert first.digest == second.digest
-    other = run(replace(ants, seed=1)).rollout
-    assert other is not None
-    assert other.digest != first.digest
-
-
-def test_the_same_scenario_gives_the_same_bits_in_another_process(small_run: Run, tmp_path: Path) -> None:
-    assert small_run.rollout is not None
+def test_the_same_scenario_gives_the_same_bits_in_another_process(small_run, tmp_path):
     save_task(small_run.scenario.task, tmp_path / "small.yaml")
     code = (
         "import sys; from antdrive.sim import Scenario, run\n"
@@ -442,13 +342,9 @@ def test_the_same_scenario_gives_the_same_bits_in_another_process(small_run: Run
     assert done.stdout.split()[-1] == small_run.rollout.digest
 
 
-def test_noise_is_seeded_logged_and_survived(small_scenario: Scenario, small_run: Run) -> None:
+def test_noise_is_seeded_logged_and_survived(small_scenario, small_run):
     noisy = replace(small_scenario, noise=1.0)
     first, again, other = run(noisy), run(noisy), run(replace(noisy, seed=noisy.seed + 1))
-    assert first.rollout is not None
-    assert again.rollout is not None
-    assert other.rollout is not None
-    assert small_run.rollout is not None
     assert first.succeeded
     assert first.rollout.digest == again.rollout.digest != other.rollout.digest
     error = np.hypot(*(first.rollout.estimate - first.rollout.pose)[:, :2].T)
@@ -458,37 +354,13 @@ def test_noise_is_seeded_logged_and_survived(small_scenario: Scenario, small_run
 
 
 @pytest.mark.parametrize("kind", ["none", "taut", "clearance"])
-def test_every_smoothing_is_driven_and_recorded(kind: str, small_scenario: Scenario) -> None:
+def test_every_smoothing_is_driven_and_recorded(kind, small_scenario):
     result = run(replace(small_scenario, smoothing=kind))
     assert result.succeeded
-    assert result.rollout is not None
     assert result.rollout.record.smoothing == SmoothingRecord(asked=kind, made=kind, note="")
 
 
-def test_settings_out_of_range_are_refused(small_scenario: Scenario) -> None:
-    with pytest.raises(ValueError, match="margin: must be at least 0"):
-        replace(small_scenario, margin=-0.1)
-    with pytest.raises(InputError, match="did you mean"):
-        Scenario.of("empti")
-
-
-@pytest.mark.parametrize(
-    "setting",
-    [
-        {"seed": "a"}, {"seed": -1}, {"seed": 1.5}, {"seed": True}, {"margin": "0.1"}, {"noise": None}, {"cell": "fine"},
-        {"unseen": [Disc(3, 3, 0.2)]}, {"unseen": ((3, 3, 0.2),)}, {"perception": "positions"}, {"avoidance": False},
-        {"replanning": True}, {"controller": None}, {"task": "forest"}, {"robot": "jackal"}, {"time_limit": "long"},
-    ],
-    ids=str,
-)  # fmt: skip
-def test_a_setting_of_the_wrong_type_is_named(small_scenario: Scenario, setting: dict[str, Any]) -> None:
-    with pytest.raises(FieldError) as refused:
-        replace(small_scenario, **setting)
-    assert refused.value.key == next(iter(setting))
-    assert "must" in refused.value.problem
-
-
-def test_a_scenario_is_made_of_names_files_or_objects(tmp_path: Path) -> None:
+def test_a_scenario_is_made_of_names_files_or_objects(tmp_path):
     task, robot, planner = load_task("empty"), load_robot("jackal"), load_planner("astar")
     save_task(task, tmp_path / "copy.yaml")
     of_objects = Scenario.of(task, planner, robot)
@@ -496,31 +368,21 @@ def test_a_scenario_is_made_of_names_files_or_objects(tmp_path: Path) -> None:
     assert of_objects.planner_name == ""
     assert Scenario.of(tmp_path / "copy.yaml", "astar").task.goal == task.goal
     assert Scenario.of("empty", "aco-han", options={"ants": 3}).planner == load_planner("aco-han", ants=3)
-    with pytest.raises(ValueError, match="options: need a planner's name"):
-        Scenario.of("empty", planner, options={"ants": 3})
 
 
-def test_metrics_of_a_run_without_a_rollout_say_why(small_run: Run) -> None:
+def test_metrics_of_a_run_without_a_rollout_say_why(small_run):
     assert small_run.metrics["spl"] == small_run.metric("spl")
-    with pytest.raises(ValueError, match=r"metric: unknown 'speed'; choose from path_length_m, .*spl"):
-        small_run.metric("speed")
     nowhere = run(Scenario.of("no-path", "astar"))
     for ask in (lambda: nowhere.metrics, lambda: nowhere.metric("spl")):
         with pytest.raises(ValueError, match="no rollout: planning ended with no_path: "):
             ask()
 
 
-def test_the_planner_does_not_know_unseen_obstacles(small_run: Run, collided_run: Run) -> None:
+def test_the_planner_does_not_know_unseen_obstacles(small_run, collided_run):
     np.testing.assert_array_equal(small_run.plan.cells, collided_run.plan.cells)
 
 
-def test_scenarios_use_the_catalogue() -> None:
-    assert Scenario.of("empty").task == load_task("empty")
-
-
-def test_a_result_tells_every_setting_and_the_page_documents_every_key(
-    small_scenario: Scenario, tmp_path: Path
-) -> None:
+def test_a_result_tells_every_setting_and_the_page_documents_every_key(small_scenario, tmp_path):
     odd = replace(
         small_scenario,
         planner=load_planner("as", ants=7),
@@ -541,12 +403,7 @@ def test_a_result_tells_every_setting_and_the_page_documents_every_key(
         "controller": {"lookahead_time": 0.7}, "avoidance": None, "unseen": [[3.9, 2.9, 0.05]],
     }  # fmt: skip
     assert small_scenario.as_dict()["settings"] == {}
-    page = (
-        (Path(__file__).parents[2] / "docs" / "reference" / "rollout-format.md")
-        .read_text()
-        .partition("## result.json")[2]
-    )
-    documented = set(
-        re.findall(r"`(\w+)`", " ".join(row.split("|")[1] for row in page.splitlines() if row.startswith("| `")))
-    )
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "rollout-format.md").read_text()
+    rows = [row for row in page.partition("## result.json")[2].splitlines() if row.startswith("| `")]
+    documented = set(re.findall(r"`(\w+)`", " ".join(row.split("|")[1] for row in rows)))
     assert documented == set(run(small_scenario).as_dict()) | {"fingerprint", "files", "command", "frame", "sights"}

@@ -6,7 +6,6 @@ from typing import Annotated, Any
 import pytest
 from annotated_types import Ge, Gt, Le
 
-from antdrive.base.errors import FieldError
 from antdrive.planners import SMOOTHINGS
 from antdrive.runs.campaigns.rows import GRID
 from antdrive.sim import Scenario
@@ -38,14 +37,14 @@ WRITTEN: dict[str, tuple[Any, Any, list[str] | None]] = {
 }  # fmt: skip
 
 
-def test_a_scenario_has_every_setting_and_every_setting_an_example() -> None:
+def test_a_scenario_has_every_setting_and_every_setting_an_example():
     assert {one.key for one in SETTINGS.values()} == set(WRITTEN)
     assert set(SETTINGS) <= {field.name for field in fields(Scenario)}
     assert SETTINGS["smoothing"].setting.choices == SMOOTHINGS
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_what_is_read_is_written_the_same(name: str) -> None:
+def test_what_is_read_is_written_the_same(name):
     one = SETTINGS[name]
     value, cell, words = WRITTEN[one.key]
     read = value if one.key != "unseen" else list(scenario_fields({"unseen": [_Disc(**value[0])]})["unseen"])
@@ -64,7 +63,7 @@ class _Disc:
     height: float
 
 
-def test_later_settings_are_part_of_a_key_only_beyond_their_defaults() -> None:
+def test_later_settings_are_part_of_a_key_only_beyond_their_defaults():
     usual = scenario_fields({})
     assert {"map", "localisation", "odometry"} & set(part_of_key(usual)) == set()
     assert part_of_key({**usual, "odometry": 2.0})["odometry"] == 2.0
@@ -81,27 +80,14 @@ class Made:
     kind: Annotated[str, Setting("a kind", "Robot", choices=("a", "b"))] = "a"
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "says"),
-    [
-        ("share", 1.5, "share: must be between 0 and 1, got 1.5"),
-        ("share", float("nan"), "share: must be between 0 and 1, got nan"),
-        ("share", "x", "share: must be a number, got 'x'"),
-        ("size", 0, "size: must be greater than 0, got 0"),
-        ("size", float("inf"), "size: must be greater than 0, got inf"),
-        ("count", 0, "count: must be at least 1, got 0"),
-        ("count", 1.0, "count: must be a whole number, got 1.0"),
-        ("count", True, "count: must be a whole number, got True"),
-        ("kind", "c", "kind: unknown 'c'; choose from a, b"),
-        ("size", None, ""),
-        ("share", 1, ""),
-    ],
-)
-def test_bounds_and_choices_are_checked_as_declared(name: str, value: Any, says: str) -> None:
+BAD = (
+    ("share", 1.5), ("share", float("nan")), ("share", "x"), ("size", 0), ("size", float("inf")), ("count", 0),
+    ("count", 1.0), ("count", True), ("kind", "c"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "value"), [("size", None), ("share", 1)])
+def test_bounds_and_choices_are_checked_as_declared(name, value):
+    """What they say of others, `tests/sim/test_messages` has."""
     (one,) = (one for one in declared(Made) if one.name == name)
-    if not says:
-        one.check(value)
-        return
-    with pytest.raises(FieldError) as error:
-        one.check(value)
-    assert str(error.value) == says
+    one.check(value)

@@ -1,13 +1,10 @@
 """Mutants: each kind of fault, the choice among them, the tables, and a run on a small project."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -32,39 +29,37 @@ def f(a: int, b: float = 2.0) -> float:
 '''
 
 
-def changes(source: str) -> set[tuple[str, str]]:
+def changes(source):
     return {(mutant.operator, mutant.now) for mutant in mutants_of("f.py", source)}
 
 
-@pytest.mark.parametrize(
-    ("operator", "now"),
-    [
-        ("constant", "LIMIT = 5.0  # [m]"),
-        ("constant", "LIMIT = 0.05  # [m]"),
-        ("constant", "def f(a: int, b: float = 20.0) -> float:"),
-        ("comparison", "if a <= 3 and not b:"),
-        ("comparison", "if a >= 3 and not b:"),
-        ("constant", "if a < 30 and not b:"),
-        ("logic", "if a < 3 or not b:"),
-        ("condition dropped", "if True and not b:"),
-        ("condition dropped", "if a < 3 and True:"),
-        ("sign dropped", "if a < 3 and b:"),
-        ("guard removed", "if False:"),
-        ("condition negated", "if not (a < 3 and not b):"),
-        ("opposite function", "return -max(a, b)"),
-        ("argument alone", "return -a"),
-        ("sign dropped", "return min(a, b)"),
-        ("arithmetic", "out[0] = a / ("),
-        ("arithmetic", "+ 1"),
-        ("term dropped", "out[0] = a"),
-        ("statement deleted", "pass"),
-    ],
-)
-def test_each_kind_of_fault_is_made(operator: str, now: str) -> None:
+KINDS = {
+    "constant": (
+        "LIMIT = 5.0  # [m]",
+        "LIMIT = 0.05  # [m]",
+        "def f(a: int, b: float = 20.0) -> float:",
+        "if a < 30 and not b:",
+    ),
+    "comparison": ("if a <= 3 and not b:", "if a >= 3 and not b:"),
+    "logic": ("if a < 3 or not b:",),
+    "condition dropped": ("if True and not b:", "if a < 3 and True:"),
+    "sign dropped": ("if a < 3 and b:", "return min(a, b)"),
+    "guard removed": ("if False:",),
+    "condition negated": ("if not (a < 3 and not b):",),
+    "opposite function": ("return -max(a, b)",),
+    "argument alone": ("return -a",),
+    "arithmetic": ("out[0] = a / (", "+ 1"),
+    "term dropped": ("out[0] = a",),
+    "statement deleted": ("pass",),
+}
+
+
+@pytest.mark.parametrize(("operator", "now"), [(kind, now) for kind, changed in KINDS.items() for now in changed])
+def test_each_kind_of_fault_is_made(operator, now):
     assert (operator, now) in changes(TEXT)
 
 
-def test_texts_types_and_messages_are_left_alone() -> None:
+def test_texts_types_and_messages_are_left_alone():
     for mutant in mutants_of("f.py", TEXT):
         assert compile(mutant.source, "f.py", "exec")
         assert "A docstring with 1.0 in it." in mutant.source
@@ -74,11 +69,11 @@ def test_texts_types_and_messages_are_left_alone() -> None:
     assert len({mutant.source for mutant in mutants_of("f.py", TEXT)}) == len(mutants_of("f.py", TEXT))
 
 
-def test_letters_of_several_bytes_do_not_shift_an_edit() -> None:
+def test_letters_of_several_bytes_do_not_shift_an_edit():
     assert ("comparison", "x = 'ä≤ö', 1 <= 2") in changes("x = 'ä≤ö', 1 < 2\n")
 
 
-def test_the_choice_is_repeatable_and_gives_every_function_its_share() -> None:
+def test_the_choice_is_repeatable_and_gives_every_function_its_share():
     file = "sim/log/contacts.py"
     first = drawn(file, 12)
     assert first == drawn(file, 12)
@@ -88,12 +83,12 @@ def test_the_choice_is_repeatable_and_gives_every_function_its_share() -> None:
     assert {mutant.function for mutant in first} == everything
 
 
-def test_every_table_speaks_of_code_that_exists() -> None:
+def test_every_table_speaks_of_code_that_exists():
     check_tables()
     assert sum(plan.count for plan in PLANS.values()) + len(named_mutants()) >= 150
 
 
-def test_a_snippet_that_its_file_no_longer_holds_is_an_error(tmp_path: Path) -> None:
+def test_a_snippet_that_its_file_no_longer_holds_is_an_error(tmp_path):
     for mutant in named_mutants():
         target = tmp_path / SOURCE / mutant.file
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -106,14 +101,14 @@ def test_a_snippet_that_its_file_no_longer_holds_is_an_error(tmp_path: Path) -> 
         named_mutants(tmp_path)
 
 
-def test_what_depends_on_a_kernel_is_found_also_through_packages() -> None:
+def test_what_depends_on_a_kernel_is_found_also_through_packages():
     found = dependents(ROOT, "robots/control/_kernels_path.py")
     assert {"robots/control/_kernels_pursuit.py", "robots/control/pursuit.py", "sim/driving/drive.py"} <= found
     assert not {"worlds/_kernels.py", "planners/graph/_kernels_search.py", "robots/_kernels_footprint.py"} & found
     assert "robots/_kernels_footprint.py" in dependents(ROOT, "worlds/_kernels.py")
 
 
-def test_the_score_leaves_equivalent_and_unjudged_mutants_out() -> None:
+def test_the_score_leaves_equivalent_and_unjudged_mutants_out():
     mutant = Mutant("f.py", "constant", "f", 3, "a = 1", "a = 2", "")
     fates = [(mutant, fate) for fate in ("killed", "killed", "timeout", "equivalent", "alive", "unjudged", "unjudged")]
     assert counts(fates)["score"] == 0.75
@@ -124,7 +119,7 @@ def test_the_score_leaves_equivalent_and_unjudged_mutants_out() -> None:
 
 
 @pytest.fixture(scope="module")
-def ends(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
+def ends(tmp_path_factory):
     """How the server says that tests of several kinds ended: its code and what pytest printed."""
     folder = tmp_path_factory.mktemp("tests")
     kinds = {
@@ -156,11 +151,11 @@ def ends(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]
 @pytest.mark.parametrize(
     ("kind", "code"), [("passes", 0), ("fails", 1), ("never ends", -signal.SIGXCPU), ("holds none", 5), ("dies", -9)]
 )
-def test_the_server_tells_a_failure_from_a_time_limit(ends: dict[str, tuple[int, str]], kind: str, code: int) -> None:
+def test_the_server_tells_a_failure_from_a_time_limit(ends, kind, code):
     assert ends[kind][0] == code
 
 
-def test_an_unfit_baseline_says_why(ends: dict[str, tuple[int, str]]) -> None:
+def test_an_unfit_baseline_says_why(ends):
     assert Ended(1, 0.1, ends["fails"][1]).reason.startswith("fail: ")
     assert Ended(1, 0.1, ends["fails"][1]).reason.endswith("test_1.py::test_it")
     assert Ended(5, 0.1, ends["holds none"][1]).reason == "hold no test"
@@ -168,7 +163,7 @@ def test_an_unfit_baseline_says_why(ends: dict[str, tuple[int, str]]) -> None:
     assert Ended(-11, 0.1, "").reason == "end with signal 11"
 
 
-def fates_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, codes: list[int | None]) -> list[str]:
+def fates_of(tmp_path, monkeypatch, codes):
     """What becomes of three mutants of a file when its tests end so: first without a fault, then with each."""
     file = tmp_path / "original" / SOURCE / "sim/log/metrics.py"
     for path in (file, tmp_path / "original" / SOURCE / "base/kernel_cache.py"):
@@ -187,9 +182,7 @@ def fates_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, codes: list[int | 
     return fates
 
 
-def test_a_mutant_is_killed_by_a_failure_a_signal_or_the_time_limit_and_else_alive(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mutant_is_killed_by_a_failure_a_signal_or_the_time_limit_and_else_alive(tmp_path, monkeypatch):
     assert fates_of(tmp_path / "a", monkeypatch, [0, 1, 0, None]) == ["killed", "alive", "timeout"]
     assert fates_of(tmp_path / "b", monkeypatch, [0, -11, 3, 2]) == ["killed"] * 3
     assert (
@@ -198,14 +191,12 @@ def test_a_mutant_is_killed_by_a_failure_a_signal_or_the_time_limit_and_else_ali
 
 
 @pytest.mark.parametrize(("code", "says"), [(1, "fail: tests/test_a.py::test_it"), (None, "do not end within their")])
-def test_tests_that_fail_on_the_unchanged_code_judge_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int | None, says: str
-) -> None:
+def test_tests_that_fail_on_the_unchanged_code_judge_nothing(tmp_path, monkeypatch, code, says):
     with pytest.raises(BaselineUnfit, match=f"metrics.py: on the unchanged code its tests {says}"):
         fates_of(tmp_path, monkeypatch, [code])
 
 
-def test_what_is_known_already_is_not_judged_again(tmp_path: Path) -> None:
+def test_what_is_known_already_is_not_judged_again(tmp_path):
     file, store = "sim/log/metrics.py", tmp_path / "fates.jsonl"
     fates = list(zip(drawn(file, 3), ("killed", "alive", "timeout"), strict=True))
     store.write_text("".join(json.dumps([*mutant.key, stamp(file), fate]) + "\n" for mutant, fate in fates))

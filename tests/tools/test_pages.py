@@ -1,10 +1,7 @@
 """The runner of pages: what runs, what is compared, and what it takes for wrong."""
 
-from __future__ import annotations
-
 import os
 import signal
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +10,7 @@ from tools.pages import agrees, blocks_of, main, run_page
 FENCE = "```"
 
 
-def page(tmp_path: Path, text: str) -> Path:
+def page(tmp_path, text):
     path = tmp_path / "page.md"
     path.write_text(text.replace("'''", FENCE))
     return path
@@ -51,13 +48,13 @@ assert a == 2
 """
 
 
-def test_a_page_runs_from_top_to_bottom_and_wrong_input_is_no_failed_drive(tmp_path: Path) -> None:
+def test_a_page_runs_from_top_to_bottom_and_wrong_input_is_no_failed_drive(tmp_path):
     problems = run_page(page(tmp_path, RIGHT)).problems
     assert len(problems) == 1, "only the command that ends with 2 instead of 1"
     assert "nowhere.yaml" in problems[0]
 
 
-def test_a_page_may_name_the_exit_code_with_which_a_command_must_fail(tmp_path: Path) -> None:
+def test_a_page_may_name_the_exit_code_with_which_a_command_must_fail(tmp_path):
     text = '```console\n$ antdrive schema nonsense || echo "exit code {0}"\n...exit code {0}\n```\n'
     assert run_page(page(tmp_path, text.format(2))).problems == []
     assert len(run_page(page(tmp_path, text.format(3))).problems) == 1
@@ -73,19 +70,19 @@ def test_a_page_may_name_the_exit_code_with_which_a_command_must_fail(tmp_path: 
         ("'''sh\nantdrive schema nonsense\n'''\n", "unknown kind"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, says: str) -> None:
+def test_what_is_wrong_is_told_with_its_line(tmp_path, text, says):
     (problem,) = run_page(page(tmp_path, text)).problems
     assert says in problem
 
 
-def test_update_writes_what_was_printed_and_the_page_is_right_then(tmp_path: Path) -> None:
+def test_update_writes_what_was_printed_and_the_page_is_right_then(tmp_path):
     path = page(tmp_path, "'''python\nprint(1)\nprint(2)\n'''\n\n'''text\nold\n'''\n\nprose\n\n'''console\n$ ls\n'''\n")
     run_page(path).update()
     assert "```text\n1\n2\n```\n\nprose" in path.read_text()
     assert run_page(path).problems == []
 
 
-def test_a_text_that_does_not_follow_is_no_output(tmp_path: Path) -> None:
+def test_a_text_that_does_not_follow_is_no_output(tmp_path):
     assert run_page(page(tmp_path, "'''python\nprint(1)\n'''\n\nA tree:\n\n'''text\nworlds/\n'''\n")).problems == []
 
 
@@ -97,7 +94,7 @@ def test_a_text_that_does_not_follow_is_no_output(tmp_path: Path) -> None:
     ],
     ids=["in this process", "a command"],
 )
-def test_a_page_that_hangs_is_ended_and_named(tmp_path: Path, block: str) -> None:
+def test_a_page_that_hangs_is_ended_and_named(tmp_path, block):
     before, variables = signal.getsignal(signal.SIGALRM), dict(os.environ)
     path = page(tmp_path, f"'''python\nprint(1)\n'''\n\n'''{block}\n'''\n\n'''python\n1 / 0\n'''\n")
     (problem,) = run_page(path, limit=0.5).problems
@@ -106,13 +103,13 @@ def test_a_page_that_hangs_is_ended_and_named(tmp_path: Path, block: str) -> Non
     assert dict(os.environ) == variables
 
 
-def test_three_dots_stand_for_anything_and_nothing_else_does() -> None:
+def test_three_dots_stand_for_anything_and_nothing_else_does():
     assert agrees("took ... s\nend\n", "took 1.25 s\nend\n")
     assert not agrees("took ... s\n", "took 1.25 m\n")
     assert not agrees("a.c\n", "abc\n")
 
 
-def test_longer_fences_and_directives_are_read_as_they_are() -> None:
+def test_longer_fences_and_directives_are_read_as_they_are():
     text = "````{note}\n```python\nno\n```\n````\n\n:::{tip}\n```python\nyes\n```\n:::\n"
     assert [(block.language, block.text) for block in blocks_of(text)] == [
         ("{note}", "```python\nno\n```\n"),
@@ -144,13 +141,13 @@ pip install 'antdrive[campaigns]'
 """
 
 
-def test_what_a_page_needs_is_there_before_its_blocks(tmp_path: Path) -> None:
+def test_what_a_page_needs_is_there_before_its_blocks(tmp_path):
     assert run_page(page(tmp_path, NEEDS)).problems == []
     (problem,) = run_page(page(tmp_path, NEEDS.replace("[campaigns]", "[nothing]"))).problems
     assert "no extra of antdrive" in problem
 
 
-def test_a_page_that_ran_is_left_out_until_it_changes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_page_that_ran_is_left_out_until_it_changes(tmp_path, capsys):
     path, kept = page(tmp_path, "'''python\nprint(1)\n'''\n"), tmp_path / "kept.json"
     words = [str(path), "--kept", str(kept)]
     said = []

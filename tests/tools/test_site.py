@@ -1,18 +1,57 @@
-"""The check of the site that was built finds what is broken, and nothing else."""
+"""The site's checks find what is broken and nothing else; pictures are made and shown; data lie where they are said to."""
 
-from __future__ import annotations
-
+import re
 from pathlib import Path
 
 import pytest
 
+from tools import site as browser
+from tools.pictures import BY_HAND, FROM_PAPERS, MADE, PICTURES, main
+from tools.shared_data import data_folder
 from tools.site import MOST, problems_of
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_the_environment_names_the_folder(monkeypatch, tmp_path):
+    monkeypatch.setenv("ANTDRIVE_DATA", str(tmp_path))
+    assert data_folder() == tmp_path
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("ANTDRIVE_DATA", "~/maps")
+    assert data_folder() == tmp_path / "maps"
+
+
+@pytest.mark.parametrize("value", [None, ""])
+def test_by_default_it_lies_beside_the_checkout(monkeypatch, value):
+    if value is None:
+        monkeypatch.delenv("ANTDRIVE_DATA", raising=False)
+    else:
+        monkeypatch.setenv("ANTDRIVE_DATA", value)
+    assert data_folder().resolve() == ROOT.parent / "shared" / "data"
+
+
+SHOWN = re.compile(r"\]\((?:\.\./|docs/)?pictures/([\w.-]+)\)")
+
+
+def test_every_picture_of_antdrive_is_made_by_a_command_and_shown_on_a_page():
+    made = {f"{name}.webp" for name in MADE} | {*FROM_PAPERS, *BY_HAND}
+    pages = [ROOT / "README.md", *(page for page in (ROOT / "docs").rglob("*.md") if "_gallery" not in page.parts)]
+    shown = {name for page in pages for name in SHOWN.findall(page.read_text())}
+    assert made == shown == {path.name for path in PICTURES.iterdir()}
+
+
+def test_a_picture_that_nothing_makes_is_refused(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["sunset"])
+    assert ended.value.code == 2
+    assert "sunset: no such picture; choose from film, plaza" in capsys.readouterr().err
+
 
 INDEX = '<a href="a/b.html#here">b</a><a href="#top">up</a><a href="https://elsewhere.org">out</a><img src="p.png">'
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Path:
+def site(tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "index.html").write_text(INDEX)
     (tmp_path / "a" / "b.html").write_text('<h1 id="here">b</h1><a href="../index.html">back</a>')
@@ -20,7 +59,7 @@ def site(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_whole_site_has_no_problem(site: Path) -> None:
+def test_a_whole_site_has_no_problem(site):
     assert problems_of(site) == []
 
 
@@ -34,16 +73,70 @@ def test_a_whole_site_has_no_problem(site: Path) -> None:
         ('<script src="https://cdn.org/x.js"></script>', "loads https://cdn.org/x.js from elsewhere"),
     ],
 )
-def test_what_is_broken_is_told(site: Path, element: str, says: str) -> None:
+def test_what_is_broken_is_told(site, element, says):
     (site / "index.html").write_text(INDEX + element)
     assert [one for one in problems_of(site) if says in one]
 
 
-def test_a_heavy_first_page_and_a_heavy_film_are_told(site: Path) -> None:
+def test_a_heavy_first_page_and_a_heavy_film_are_told(site):
     (site / "p.png").write_bytes(bytes(MOST))
     (site / "long.mp4").write_bytes(bytes(MOST + 1))
     assert sorted(one.partition(":")[0] for one in problems_of(site)) == ["index.html", "long.mp4"]
 
 
-def test_a_folder_without_a_site_is_told(tmp_path: Path) -> None:
+def test_a_folder_without_a_site_is_told(tmp_path):
     assert problems_of(tmp_path) == [f"{tmp_path}: has no index.html"]
+
+
+CLEAN = "<!doctype html><html data-theme=light><body style='background:#fff;color:#000'><p>Words to read</p>{}</body></html>"
+FAULTS = {
+    "console.html": ("<script>console.error('thrown')</script>", "console: thrown"),
+    "exception.html": ("<script>null.x</script>", "exception: "),
+    "picture.html": ("<img src=gone.png>", "gone.png: does not load"),
+    "film.html": ("<video src=gone.mp4></video>", "gone.mp4: does not play"),
+    "wide.html": ("<div style='width:3000px'>wide</div>", "is 3"),
+    "pale.html": ("<p style='color:#ddd'>pale</p>", "contrast 1.4: p "),
+    "covered.html": ("<div style='background:#111'><p>dark</p></div>", "contrast 1.1: p "),
+}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """A site's faults by page, and the folder of its pictures."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    site = tmp_path_factory.mktemp("site")
+    shots = tmp_path_factory.mktemp("shots")
+    links = "".join(f"<a href={page}.html>{page}</a>" for page in list(browser.ASKED.values())[:-1])
+    (site / "search.html").write_text(CLEAN.format(f"<div id=search-results>{links}</div>"))
+    (site / "clean.html").write_text(CLEAN.format("<p hidden style='color:#fff'>not shown</p>"))
+    for name, (body, _) in FAULTS.items():
+        (site / name).write_text(CLEAN.format(body))
+    with playwright.sync_playwright() as started:
+        opened = browser.opened(started)
+        looking = browser.Looking(opened, site, shots)
+        result = {name: looking.page(site / name) for name in ("clean.html", *FAULTS)}
+        result["search.html"] = looking.search(wait=300)
+        opened.close()
+    return result, shots
+
+
+def test_a_page_without_faults_has_none(found):
+    assert found[0]["clean.html"] == []
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_found(found, name):
+    assert any(FAULTS[name][1] in line for line in found[0][name]), found[0][name]
+
+
+def test_what_the_search_does_not_find_is_found(found):
+    (last,) = list(browser.ASKED.items())[-1:]
+    assert [line.rpartition(":")[0] for line in found[0]["search.html"]] == [
+        f"search.html: {last[0]!r} does not find {last[1]}"
+    ]
+
+
+def test_pages_have_pictures(found):
+    assert {path.name for path in found[1].glob("clean-*")} == {
+        f"clean-{theme}-{width}.png" for theme, width in browser.KEPT
+    }

@@ -1,5 +1,6 @@
-"""The HTML that notebooks show for worlds, plans and rollouts."""
+"""The HTML that notebooks show for worlds, plans and rollouts; and the colours of planners."""
 
+import itertools
 import pydoc
 import re
 import subprocess
@@ -10,9 +11,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from antdrive.planners import PlanResult, PlanStatus, Query, load_planner
+from antdrive.planners import PLANNERS, PlanResult, PlanStatus, Query, load_planner
 from antdrive.sim import Scenario, certify
+from antdrive.sim.log.outcome import Outcome
+from antdrive.views.colours import PLANNER_COLOURS, PLANNER_STYLES, VERDICTS, planner_style
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, Wandering, World, load_task, rasterise
+from tests.records import changed
 
 TASK = load_task("slalom")
 
@@ -103,7 +107,7 @@ def test_a_run_and_its_log_show_movers(small_run):
     assert len(drawn(small_run._repr_html_())[0]) == 0
     record = small_run.rollout.record
     world = replace(record.task.world, movers=moving().world.movers[:2])
-    log = replace(small_run.rollout, record=replace(record, task=replace(record.task, world=world)))
+    log = replace(small_run.rollout, record=changed(record, "task", world=world))
     assert len(drawn(log._repr_html_())[0]) == 2
 
 
@@ -119,3 +123,24 @@ def test_a_certificate_shows_its_verdict_and_its_problems(small_run):
 def test_the_help_of_a_scenario_begins_with_what_it_is():
     text = pydoc.render_doc(Scenario, renderer=pydoc.plaintext)
     assert text.index("Everything a run depends on") < 900
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_every_planner_has_a_style(name):
+    assert name in PLANNER_STYLES
+
+
+def test_no_two_planners_have_similar_colours():
+    colours = np.array([colour for colour, _ in PLANNER_STYLES.values()], dtype=float)
+    gaps = [np.linalg.norm(one - other) for one, other in itertools.combinations(colours, 2)]
+    assert min(gaps) > 40
+    assert len(PLANNER_COLOURS) == len(PLANNER_STYLES)
+
+
+def test_a_plugins_planner_has_a_style_of_its_name():
+    assert planner_style("somebody-elses") == planner_style("somebody-elses")
+    assert planner_style("somebody-elses")[1] == "dashdot"
+
+
+def test_every_outcome_has_a_label():
+    assert set(VERDICTS) == set(Outcome)

@@ -1,22 +1,20 @@
 """Oracles: slow, simple functions that share no code with the compiled ones; and random worlds to compare them on."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np
 from hypothesis import strategies as st
 
-from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World
+from antdrive.worlds import DIRECTIONS, Disc, World
 
 
-def clearance_of_point(world: World, x: float, y: float) -> float:
+def clearance_of_point(world, x, y):
     xmin, ymin, xmax, ymax = world.bounds
     surfaces = [np.sqrt((x - d.x) ** 2 + (y - d.y) ** 2) - d.radius for d in world.obstacles]
     return min([x - xmin, xmax - x, y - ymin, ymax - y, *surfaces])
 
 
-def clearance_of_segment(world: World, a: tuple[float, float], b: tuple[float, float]) -> float:
+def clearance_of_segment(world, a, b):
     """Ternary search for the closest point: the distance to a disc is convex along a segment."""
     p, q = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     best = min(clearance_of_point(world, *p), clearance_of_point(world, *q))
@@ -32,7 +30,7 @@ def clearance_of_segment(world: World, a: tuple[float, float], b: tuple[float, f
     return float(best)
 
 
-def segment_distances(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def segment_distances(points, a, b):
     """Distances (S, P) from segments to points: perpendicular where the foot lies inside, else to an end."""
     along = (b - a)[:, None, :]
     to_a, to_b = points[None] - a[:, None], points[None] - b[:, None]
@@ -43,7 +41,7 @@ def segment_distances(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.nd
     return np.where(inside, cross / np.where(length > 0, length, 1.0), ends)
 
 
-def moves_by_force(grid: Grid, world: World) -> np.ndarray:
+def moves_by_force(grid, world):
     """Whether each move of each cell is allowed, from the definition (R, C, 8); NaN where rounding could decide."""
     rows, cols = grid.shape
     discs = np.array([(d.x, d.y, d.radius) for d in world.obstacles]).reshape(-1, 3)
@@ -66,7 +64,7 @@ def moves_by_force(grid: Grid, world: World) -> np.ndarray:
     return moves
 
 
-def reachable(grid: Grid, start: tuple[int, int], goal: tuple[int, int]) -> bool:
+def reachable(grid, start, goal):
     """Breadth-first search over `Grid.moves`."""
     queue, seen = deque([start]), {start}
     while queue:
@@ -81,16 +79,16 @@ def reachable(grid: Grid, start: tuple[int, int], goal: tuple[int, int]) -> bool
     return False
 
 
-def passable(task: Task, grid: Grid) -> bool:
+def passable(task, grid):
     return reachable(grid, grid.cell_at(*task.start[:2]), grid.cell_at(*task.goal))
 
 
-def coordinates(low: float = -5.0, high: float = 5.0) -> st.SearchStrategy[float]:
+def coordinates(low=-5.0, high=5.0):
     return st.floats(low, high, allow_nan=False).map(lambda v: round(v, 4))
 
 
 @st.composite
-def worlds(draw: st.DrawFn, max_discs: int = 6) -> World:
+def worlds(draw, max_discs=6):
     discs = draw(
         st.lists(
             st.builds(Disc, coordinates(), coordinates(), st.floats(0.01, 2.0).map(lambda v: round(v, 4))),

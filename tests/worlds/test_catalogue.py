@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from antdrive.runs.papers.maps import environments
-from antdrive.worlds import Disc, Task, Trajectories, forest, list_worlds, load_task, point_clearance, rasterise
+from antdrive.worlds import Disc, Trajectories, forest, list_worlds, load_task, point_clearance, rasterise
 from tests.worlds.oracles import passable
 
 TURTLEBOT, JACKAL = 0.18, 0.333  # radii [m]
@@ -15,29 +15,14 @@ MARGIN = 0.05  # [m]
 
 #: Every world of the catalogue, and whether each robot gets through with the margin.
 PASSABLE = {
-    "empty": (True, True),
-    "forest": (True, True),
-    "gate": (True, True),
-    "han2007-aco": (True, True),
-    "han2007-ga": (True, True),
-    "han2007-single": (True, True),
-    "hasan-1a": (True, True),
-    "hasan-1a-moving": (True, True),
-    "hasan-2b": (True, True),
-    "hasan-2b-moving": (True, True),
-    "hasan-3c": (True, False),
-    "hasan-3c-moving": (True, False),
-    "hasan-4d": (True, True),
-    "hasan-4d-moving": (True, True),
-    "hasan-5e": (True, True),
-    "hasan-5e-moving": (True, True),
-    "hasan-5f": (True, False),
-    "hasan-5f-moving": (True, False),
-    "no-path": (False, False),
-    "plaza-moving": (True, True),
-    "slalom": (True, True),
-    "u-trap": (True, True),
-}
+    "empty": (True, True), "forest": (True, True), "gate": (True, True), "han2007-aco": (True, True),
+    "han2007-ga": (True, True), "han2007-single": (True, True), "hasan-1a": (True, True),
+    "hasan-1a-moving": (True, True), "hasan-2b": (True, True), "hasan-2b-moving": (True, True),
+    "hasan-3c": (True, False), "hasan-3c-moving": (True, False), "hasan-4d": (True, True),
+    "hasan-4d-moving": (True, True), "hasan-5e": (True, True), "hasan-5e-moving": (True, True),
+    "hasan-5f": (True, False), "hasan-5f-moving": (True, False), "no-path": (False, False),
+    "plaza-moving": (True, True), "slalom": (True, True), "u-trap": (True, True),
+}  # fmt: skip
 #: Grid points of the thesis' listings, 0.5 m each.
 ACO = [(4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)]
 ACO += [(8, 14), (13, 14), (4, 10), (16, 14), (10, 16), (17, 10), (19, 18)]
@@ -50,7 +35,7 @@ GA = [(3, 3), (10, 10), (14, 10), (14, 4), (8, 14), (6, 18)]
 
 
 @pytest.fixture(params=PASSABLE)
-def task(request: pytest.FixtureRequest) -> Task:
+def task(request):
     return load_task(request.param)
 
 
@@ -89,11 +74,7 @@ def test_no_obstacle_is_listed_twice(task):
 
 @pytest.mark.parametrize(
     ("name", "points", "radius", "first", "last"),
-    [
-        ("han2007-aco", ACO, 1, 1, 20),
-        ("han2007-ga", GA, 1, 0, 20),
-        ("han2007-single", [(10, 10)], 5, 0, 20),
-    ],
+    [("han2007-aco", ACO, 1, 1, 20), ("han2007-ga", GA, 1, 0, 20), ("han2007-single", [(10, 10)], 5, 0, 20)],
 )
 def test_the_thesis_worlds_stand_on_its_grid_points(name, points, radius, first, last):
     task = load_task(name)

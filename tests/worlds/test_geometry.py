@@ -8,24 +8,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.worlds import Disc, World, point_clearance, polyline_clearance, segment_clearance, swept_clearance
+from antdrive.worlds import Disc, World, point_clearance, polyline_clearance, segment_clearance
 from tests.worlds.oracles import clearance_of_point, clearance_of_segment, coordinates, worlds
 
 points = st.tuples(coordinates(-7, 7), coordinates(-7, 7))
 
 
-def moved(world: World, dx: float, dy: float) -> World:
+def moved(world, dx, dy):
     xmin, ymin, xmax, ymax = world.bounds
     discs = tuple(Disc(d.x + dx, d.y + dy, d.radius) for d in world.obstacles)
     return World(world.name, (xmin + dx, ymin + dy, xmax + dx, ymax + dy), discs)
 
 
-def mirrored(world: World) -> World:
+def mirrored(world):
     xmin, ymin, xmax, ymax = world.bounds
     return World(world.name, (-xmax, ymin, -xmin, ymax), tuple(Disc(-d.x, d.y, d.radius) for d in world.obstacles))
 
 
-def turned(world: World) -> World:
+def turned(world):
     """By a quarter, counter-clockwise."""
     xmin, ymin, xmax, ymax = world.bounds
     return World(world.name, (-ymax, xmin, -ymin, xmax), tuple(Disc(-d.y, d.x, d.radius) for d in world.obstacles))
@@ -87,11 +87,6 @@ def test_a_polyline_is_as_clear_as_its_worst_segment(world, line):
     pairs = list(pairwise(line)) or [(line[0], line[0])]
     worst = min(segment_clearance(world, [a], [b])[0] for a, b in pairs)
     assert polyline_clearance(world, line) == pytest.approx(worst, abs=1e-12)
-
-
-@given(worlds(), points, points, st.floats(0, 2))
-def test_a_robot_takes_its_radius_from_the_clearance(world, a, b, radius):
-    assert swept_clearance(world, [a], [b], radius)[0] == segment_clearance(world, [a], [b])[0] - radius
 
 
 def test_clearance_is_negative_inside_a_disc_and_beyond_a_wall():

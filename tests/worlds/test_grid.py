@@ -1,4 +1,4 @@
-"""Free cells and allowed moves, against their definitions."""
+"""Free cells and allowed moves, against their definitions, and the small kernels and conversions that they are made of."""
 
 import numpy as np
 import pytest
@@ -6,15 +6,39 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antdrive.worlds import DIRECTIONS, Disc, Grid, World, rasterise
+from antdrive.worlds._kernels import DCOL, DROW, doubled, doubled_rows
 from tests.worlds.oracles import clearance_of_point, moves_by_force, worlds
 
 
-def bits(grid: Grid) -> np.ndarray:
+def test_kernels_and_grids_number_the_moves_alike():
+    assert tuple(zip(DROW.tolist(), DCOL.tolist(), strict=True)) == DIRECTIONS
+
+
+def test_a_doubled_array_keeps_what_it_held():
+    for length in (1, 2, 5):
+        vector, table = np.arange(length) + 7, np.arange(3 * length).reshape(length, 3) + 7.0
+        assert doubled(vector).shape == (2 * length,)
+        assert doubled(vector).dtype == vector.dtype
+        np.testing.assert_array_equal(doubled(vector)[:length], vector)
+        assert doubled_rows(table).shape == (2 * length, 3)
+        np.testing.assert_array_equal(doubled_rows(table)[:length], table)
+
+
+def test_fractional_cells_are_the_inverse_of_places():
+    free, moves = np.ones((3, 4), np.bool_), np.zeros((3, 4), np.uint8)
+    cells = np.array([(0.0, 0.0), (1.5, 3.0), (2.0, 0.25)])
+    grid = Grid(free, moves, cell=0.5, origin=(2.0, -1.0))
+    np.testing.assert_allclose(grid.xy(cells), [(2.0, -1.0), (3.5, -0.25), (2.125, 0.0)])
+    np.testing.assert_allclose(grid.fractional(grid.xy(cells)), cells)
+    np.testing.assert_array_equal(Grid(free, moves).xy([(1, 2)]), [(2.0, 1.0)])
+
+
+def bits(grid):
     """The moves as truth values, (R, C, 8)."""
     return (grid.moves[..., None] >> np.arange(8) & 1).astype(bool)
 
 
-def crowd(seed: int, count: int = 30) -> World:
+def crowd(seed, count=30):
     rng = np.random.default_rng(seed)
     discs = tuple(Disc(*rng.uniform(0, 10, 2).tolist(), float(rng.uniform(0.1, 1.0))) for _ in range(count))
     return World("crowd", (0.0, 0.0, 10.0, 10.0), discs)
@@ -108,7 +132,7 @@ def test_removing_an_obstacle_closes_nothing(seed):
     assert not (before.moves & ~after.moves).any()
 
 
-def test_the_order_of_obstacles_changes_nothing() -> None:
+def test_the_order_of_obstacles_changes_nothing():
     """As many in a heap as a lidar's hits on a wall."""
     rng = np.random.default_rng(4)
     x = np.sort(rng.uniform(0.5, 5.5, 200))
@@ -192,13 +216,7 @@ def test_a_grid_cannot_be_written_to():
 
 @pytest.mark.parametrize(
     ("cell", "inflate", "key"),
-    [
-        (0.0, 0.0, "cell"),
-        (-1.0, 0.0, "cell"),
-        (0.5, -0.1, "inflate"),
-        (1e-4, 0.0, "cell"),
-        (float("nan"), 0, "cell"),
-    ],
+    [(0.0, 0.0, "cell"), (-1.0, 0.0, "cell"), (0.5, -0.1, "inflate"), (1e-4, 0.0, "cell"), (float("nan"), 0, "cell")],
 )
 def test_unusable_sizes_are_named(cell, inflate, key):
     with pytest.raises(ValueError, match=f"^{key}: "):

@@ -1,12 +1,10 @@
 """Where movers are: against oracles that share no code, and against the files that declare them."""
 
-import contextlib
 import dataclasses
 import json
 import math
 import subprocess
 import sys
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -27,7 +25,7 @@ from antdrive.worlds import (
     task_from_dict,
     task_to_dict,
 )
-from antdrive.worlds.geometry import swept_clearance
+from antdrive.worlds.geometry import segment_clearance
 
 BOX = (0.0, 0.0, 10.0, 8.0)
 START = (1.0, 1.0)
@@ -211,7 +209,7 @@ def test_a_wanderer_goes_from_cell_to_free_neighbouring_cell(seed):
     assert (steps == 1).mean() > 0.9
     assert len({tuple(step) for step in np.diff(cells.round(), axis=0)}) == 8
     world = World("w", BOX, POSTS)
-    assert (swept_clearance(world, stops[:-1], stops[1:], mover.radius) > 0).all()
+    assert (segment_clearance(world, stops[:-1], stops[1:]) > mover.radius).all()
     assert math.dist(stops[0], START) - mover.radius >= 1.0
     middle = moving.positions([0.2])[0, 0]
     np.testing.assert_allclose(middle, (stops[0] + stops[1]) / 2)
@@ -239,11 +237,6 @@ def test_asking_for_more_of_a_walk_does_not_change_it():
     whole, parts = trajectories(mover, obstacles=POSTS), trajectories(mover, obstacles=POSTS)
     asked = [parts.positions(t)[0] for t in FINE]
     assert (whole.positions(FINE) == np.array(asked)).all()
-
-
-def test_a_wanderer_without_a_free_cell_is_wrong_input():
-    with pytest.raises(InputError, match=r"movers\[0\].walk: found no free cell of 0.5 m"):
-        trajectories(Wandering(radius=3.95, cell=0.5, period=1.0))
 
 
 # All kinds
@@ -357,7 +350,7 @@ def test_keys_that_a_task_does_not_need_are_not_written():
 
 
 #: Movers that cannot be; `test_messages.yml` has what is said of them.
-WRONG: tuple[Callable[[], object], ...] = (
+WRONG = (
     lambda: Keyframed(radius=0.0, keyframes=ELL),
     lambda: Keyframed(radius=0.3, keyframes=ELL, loop="round"),
     lambda: Keyframed(radius=0.3, keyframes=((0, 1, 1), (1, math.nan, 1))),
@@ -370,36 +363,14 @@ WRONG: tuple[Callable[[], object], ...] = (
 )
 
 
-@pytest.mark.parametrize(
-    ("movers", "discs", "problem"),
-    [
-        (
-            [(0.05, 1e4)],
-            0,
-            "movers[0].phase: 10000 s are 200000 steps before the start; the wanderers of this world may",
-        ),
-        (
-            [(1.0, 30.0)] * 400,
-            0,
-            "movers[0].phase: 30 s are 30 steps before the start; the wanderers of this world may",
-        ),
-        ([(1.0, 0.0), (1.0, 2000.0)], 801, "movers[1].phase: 2000 s are 2000 steps"),
-        ([(1.0, 0.0), (1.0, 2000.0)], 800, None),
-        ([(0.05, 0.0)] * 1000, 20_000, None),
-    ],
-)
-def test_the_steps_that_wanderers_have_behind_them_are_bounded(
-    movers: list[tuple[float, float]], discs: int, problem: str | None
-) -> None:
-    """They are drawn one by one: 200,000 of them took 9 s."""
+@pytest.mark.parametrize(("movers", "discs"), [([(1.0, 0.0), (1.0, 2000.0)], 800), ([(0.05, 0.0)] * 1000, 20_000)])
+def test_wanderers_may_have_some_steps_behind_them(movers, discs):
+    """What is refused is in `test_messages.py`."""
     walking = tuple(Wandering(radius=0.1, cell=0.5, period=period, phase=phase) for period, phase in movers)
-    with pytest.raises(FieldError) if problem else contextlib.nullcontext() as caught:
-        World("w", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 0.5),) * discs, None, walking)
-    if problem:
-        assert str(caught.value).startswith(problem)
+    assert len(World("w", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 0.5),) * discs, None, walking).movers) == len(movers)
 
 
-def test_worlds_whose_wanderers_hardly_find_a_free_cell_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_worlds_whose_wanderers_hardly_find_a_free_cell_are_refused(monkeypatch):
     """Posts in every cell but a few: each wanderer alone finds one, all of them together take too many draws."""
     posts = tuple(Disc(x + 0.5, y + 0.5, 0.3) for x in range(20) for y in range(20) if (x + 20 * y) % 50)
     one = Wandering(radius=0.2, cell=1.0, period=1.0)

@@ -16,25 +16,23 @@ SEED = 1
 
 _LOG, _DRIVING, _CONTROL = "tests/sim/log/", "tests/sim/driving/", "tests/robots/control/"
 _COLONIES, _GRAPH, _LINES = "tests/planners/colonies/", "tests/planners/graph/", "tests/planners/anyangle/"
-_CERTIFY = tuple(f"{_LOG}test_certificate{part}.py" for part in ("_faults", "_edges", "_mutants", ""))
+_CERTIFY = tuple(f"{_LOG}test_certificate{part}.py" for part in ("_faults", ""))
 _PARTS = f"{_CONTROL}test_kernel_mutants.py"
 _PURSUE = (_PARTS, *(f"{_CONTROL}test_{name}.py" for name in ("kernel_faults", "rules", "pursuit")))
-_DRIVE = tuple(f"{_DRIVING}test_{name}.py" for name in ("drive_mutants", "drive_faults", "driver", "moving"))
+_DRIVE = tuple(f"{_DRIVING}test_{name}.py" for name in ("driver", "moving"))
 _PLANNERS = "tests/planners/test_kernel_mutants.py"
-_WORLDS = "tests/worlds/test_kernel_mutants.py"
 
 #: The files in the order of the report.
 PLANS: dict[str, Plan] = {
     "sim/log/certificate.py": Plan(_CERTIFY, 50),
     "sim/log/consistency.py": Plan(_CERTIFY, 50),
     "sim/log/contacts.py": Plan((f"{_LOG}test_contacts.py", f"{_DRIVING}test_moving.py"), 40),
-    "sim/log/metrics.py": Plan((f"{_LOG}test_metrics.py", f"{_LOG}test_metrics_faults.py"), 40),
+    "sim/log/metrics.py": Plan((f"{_LOG}test_metrics.py",), 40),
     "sim/driving/drive.py": Plan(_DRIVE, 8),
-    "sim/driving/driver.py": Plan(_DRIVE, 8),
     "sim/driving/rules.py": Plan(_DRIVE, 8),
     "sim/driving/plants.py": Plan(_DRIVE, 8),
-    "sim/driving/leaving.py": Plan((f"{_DRIVING}test_drive_mutants.py", f"{_DRIVING}test_leaving.py"), 8),
-    "sim/driving/blocking.py": Plan((f"{_DRIVING}test_driver.py",), 0),
+    "sim/driving/leaving.py": Plan((f"{_DRIVING}test_leaving.py",), 8),
+    "sim/driving/blockage.py": Plan((f"{_DRIVING}test_driver.py",), 0),
     "views/film/replay.py": Plan(("tests/views/film/test_replay.py",), 0),
     "robots/_kernels_footprint.py": Plan((_PARTS, "tests/robots/test_footprint.py"), 4, plain=True),
     "robots/outline.py": Plan(("tests/robots/test_polygons.py",), 6, plain=True),
@@ -50,7 +48,7 @@ PLANS: dict[str, Plan] = {
     "planners/graph/_kernels_search.py": Plan((f"{_GRAPH}test_search.py",), 4),
     "planners/graph/_kernels_apf.py": Plan((f"{_GRAPH}test_apf.py",), 5, plain=True),
     "planners/graph/_kernels_dstar.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar.py"), 5, plain=True),
-    "planners/graph/_kernels_dstar_lite.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar_lite.py"), 5, plain=True),
+    "planners/graph/_kernels_dstar_lite.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar.py"), 5, plain=True),
     "planners/graph/_kernels_incremental.py": Plan((f"{_GRAPH}test_incremental.py",), 4),
     "planners/graph/_kernels_sipp.py": Plan((f"{_GRAPH}test_sipp.py",), 4),
     "planners/colonies/_kernels_colony.py": Plan(
@@ -58,8 +56,8 @@ PLANS: dict[str, Plan] = {
     ),
     "planners/colonies/_kernels_pfaco.py": Plan((f"{_COLONIES}test_pfaco.py",), 5),
     "planners/colonies/_kernels_mmas_dstar.py": Plan((_PLANNERS, f"{_COLONIES}test_mmas_dstar.py"), 5, plain=True),
-    "planners/colonies/ant_system.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_colony.py"), 0),
-    "planners/colonies/pfaco.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_pfaco.py"), 0),
+    "planners/colonies/ant_system.py": Plan((f"{_COLONIES}test_colony.py",), 0),
+    "planners/colonies/pfaco.py": Plan((f"{_COLONIES}test_colony.py", f"{_COLONIES}test_pfaco.py"), 0),
     "planners/anyangle/_kernels_lines.py": Plan((_PLANNERS, f"{_LINES}test_lines.py"), 5, plain=True),
     "planners/anyangle/_kernels_ga.py": Plan((_PLANNERS, f"{_LINES}test_ga_han.py"), 4),
     "planners/anyangle/_kernels_tangent.py": Plan((f"{_LINES}test_tangent.py",), 4),
@@ -69,9 +67,9 @@ PLANS: dict[str, Plan] = {
     "planners/smoothing/smooth.py": Plan(
         ("tests/planners/smoothing/test_safety_nets.py", "tests/planners/smoothing/test_smooth.py"), 6
     ),
-    "worlds/_kernels.py": Plan((_WORLDS, "tests/worlds/test_grid.py", "tests/worlds/test_geometry.py"), 8, plain=True),
+    "worlds/_kernels.py": Plan(("tests/worlds/test_grid.py", "tests/worlds/test_geometry.py"), 8, plain=True),
     "worlds/geometry.py": Plan(("tests/worlds/test_geometry.py",), 6, plain=True),
-    "worlds/grid.py": Plan((_WORLDS, "tests/worlds/test_grid.py"), 6, plain=True),
+    "worlds/grid.py": Plan(("tests/worlds/test_grid.py",), 6, plain=True),
 }
 
 

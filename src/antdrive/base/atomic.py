@@ -24,9 +24,6 @@ def written_whole(path: str | Path) -> Iterator[Path]:
     """A context with a temporary path, which replaces `path` when the block succeeds and is removed when it fails.
 
     What processes that were killed left of earlier attempts at this file is removed.
-
-    Raises:
-        InputError: the folder cannot be written to.
     """
     target = Path(path)
     try:
@@ -51,13 +48,16 @@ def written_whole(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
+    """Write a text in UTF-8, whole or not at all; its path."""
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline=newline)
+    return Path(path)
+
+
 @contextmanager
 def folder_written_whole(path: str | Path) -> Iterator[Path]:
-    """A context with a temporary folder, which becomes `path` when the block succeeds and is removed when it fails.
-
-    Raises:
-        InputError: there is something, or the folder cannot be written to.
-    """
+    """A context with a temporary folder, which becomes `path` when the block succeeds and is removed when it fails."""
     target = Path(path)
     try:
         if target.is_file() or (target.is_dir() and any(target.iterdir())):
@@ -85,11 +85,7 @@ def _umask() -> int:
 
 @contextmanager
 def claimed(folder: str | Path) -> Iterator[None]:
-    """A context in which no other process may claim the folder. A claim ends with its process, however that ends.
-
-    Raises:
-        InputError: another process has claimed the folder, or it cannot be written to.
-    """
+    """A context in which no other process may claim the folder. A claim ends with its process, however that ends."""
     try:
         import fcntl
     except ImportError:  # no such locks on this system

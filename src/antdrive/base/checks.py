@@ -41,11 +41,7 @@ OneLine = Annotated[str, AfterValidator(_printable)]
 
 
 def check(kind: type[R], document: Document) -> R:
-    """The document as a record: a dataclass or a pydantic model.
-
-    Raises:
-        InputError: something in the document is wrong. Of several faults the first is reported, unknown keys first.
-    """
+    """The document as a record: a dataclass or a pydantic model."""
     schema = schema_of(cast(Hashable, kind))
     if not isinstance(document.data, dict):
         raise document.error((), f"must be {_mapping_of(schema)}, got {show(document.data)}")
@@ -118,9 +114,6 @@ def resolve(kind: str, name: str | os.PathLike[str], known: Mapping[str, Path], 
         name: a name of the catalogue, or a path
         known: the files of the catalogue by name
         folder: where relative paths begin; None: in the working directory
-
-    Raises:
-        FieldError: there is no such file.
     """
     if isinstance(name, str) and name in known:
         return known[name]

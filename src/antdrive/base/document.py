@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.reading import read_bytes
+from antdrive.base.files import read_bytes
 
 Location: TypeAlias = tuple[str | int, ...]  # the path to a value: ("obstacles", 0, "radius")
 
@@ -57,29 +57,17 @@ def count_values(data: Any) -> int:
 
 
 def read_document(path: str | os.PathLike[str]) -> Document:
-    """The YAML file at `path`.
-
-    Raises:
-        InputError: the file cannot be read, is not UTF-8 text, or is not plain YAML.
-    """
+    """The YAML file at `path`."""
     return parse_document(read_yaml(path), os.fspath(path))
 
 
 def read_yaml(path: str | os.PathLike[str]) -> str:
-    """The text of the YAML file at `path`, for `parse_document`.
-
-    Raises:
-        InputError: the file cannot be read, or is not UTF-8 text.
-    """
+    """The text of the YAML file at `path`, for `parse_document`."""
     return _read_text(path, "a YAML file")
 
 
 def read_json(path: str | os.PathLike[str]) -> Document:
-    """The JSON file at `path`, without the lines of its values.
-
-    Raises:
-        InputError: the file cannot be read, is not UTF-8 text, or is not JSON.
-    """
+    """The JSON file at `path`, without the lines of its values."""
     source = os.fspath(path)
     text = _read_text(path, "a JSON file")
     try:
@@ -100,11 +88,7 @@ def _read_text(path: str | os.PathLike[str], kind: str) -> str:
 
 
 def parse_document(text: str, source: str) -> Document:
-    """The YAML in a text: mappings, lists, decimal numbers, text, true, false and null, nothing else.
-
-    Raises:
-        InputError: the text is not YAML, repeats a key, is nested too deeply, or has aliases that stand for too much.
-    """
+    """The YAML in a text: mappings, lists, decimal numbers, text, true, false and null, nothing else."""
     try:
         node, table = _compose_around(text)
     except yaml.MarkedYAMLError as error:

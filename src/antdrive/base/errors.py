@@ -47,20 +47,31 @@ def input_error(*parts: str) -> InputError:
 
 
 def require_positive(key: str, value: float) -> None:
-    """Refuse a value that is not a finite number above 0.
-
-    Raises:
-        FieldError: the value is 0, negative, infinite or not a number.
-    """
+    """Refuse a value that is not a finite number above 0."""
     if not 0 < value < math.inf:
         raise FieldError(key, f"must be greater than 0, got {value:g}")
 
 
 def require_finite(key: str, value: float) -> None:
-    """Refuse a value that is infinite or not a number.
-
-    Raises:
-        FieldError: the value is not finite.
-    """
+    """Refuse a value that is infinite or not a number."""
     if not math.isfinite(value):
         raise FieldError(key, f"must be a finite number, got {value}")
+
+
+def require(
+    key: str,
+    value: float,
+    *,
+    at_least: float = -math.inf,
+    above: float = -math.inf,
+    at_most: float = math.inf,
+    below: float = math.inf,
+) -> None:
+    """Refuse a number outside its range."""
+    bounds = [
+        f"{word} {bound:.12g}"
+        for word, bound in (("at least", at_least), ("above", above), ("at most", at_most), ("below", below))
+        if math.isfinite(bound)
+    ]
+    if not (at_least <= value <= at_most and above < value < below):
+        raise FieldError(key, f"must be {' and '.join(bounds) or 'finite'}, got {value:g}")

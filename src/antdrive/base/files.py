@@ -1,13 +1,16 @@
-"""Names of files that every system takes, and JSON that every reader accepts."""
+"""Files read and written whole, names of files that every system takes, and JSON that every reader accepts."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text
+from antdrive.base.errors import InputError, input_error
 
 
 def file_name(name: str, keep: str = "-_.", *, ascii_only: bool = False) -> str:
@@ -21,13 +24,17 @@ def as_json(value: Any) -> str:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as JSON, whole or not at all.
+    """Write a value as JSON, whole or not at all."""
+    write_text(path, as_json(value) + "\n")
 
-    Raises:
-        InputError: the file cannot be written.
-    """
-    with written_whole(path) as temporary:
-        temporary.write_text(as_json(value) + "\n", encoding="utf-8")
+
+def known_suffix(path: Path, choices: Collection[str]) -> str:
+    """The suffix of a path in lower case; one that is not among the choices is refused."""
+    suffix = path.suffix.lower()
+    if suffix not in choices:
+        several = f"one of {', '.join(choices)}" if len(choices) > 2 else " or ".join(choices)
+        raise InputError(f"{path}: unknown suffix {path.suffix!r}; choose {several}")
+    return suffix
 
 
 def _json_value(value: Any) -> Any:
@@ -40,3 +47,27 @@ def _json_value(value: Any) -> Any:
     if hasattr(value, "item"):
         return _json_value(value.item())
     return value
+
+
+def read_bytes(path: str | os.PathLike[str], max_bytes: int, kind: str = "a file") -> bytes:
+    """The content of a file that people name."""
+    source = os.fspath(path)
+    try:
+        with Path(path).open("rb") as stream:
+            content = stream.read(max_bytes + 1)
+    except FileNotFoundError:
+        raise input_error(source, "no such file") from None
+    except IsADirectoryError:
+        raise input_error(source, f"is a directory; give {kind}") from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        raise input_error(source, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(content) > max_bytes:
+        raise input_error(source, f"is too large; the limit is {max_bytes // 1_000_000} MB")
+    return content
+
+
+def require_new(files: Iterable[Path], *, replace: bool) -> None:
+    """Refuse to write over files that exist."""
+    taken = None if replace else next((file for file in files if file.exists()), None)
+    if taken is not None:
+        raise input_error(str(taken), "exists; name another file, or replace it with --force")

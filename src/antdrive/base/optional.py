@@ -9,11 +9,7 @@ from antdrive.base.errors import InputError
 
 
 def optional(module: str, extra: str, purpose: str) -> Any:
-    """A module of an optional package.
-
-    Raises:
-        InputError: it is not installed.
-    """
+    """A module of an optional package."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
@@ -22,20 +18,12 @@ def optional(module: str, extra: str, purpose: str) -> Any:
 
 
 def parquet_library() -> Any:
-    """The module `pyarrow`, with `pyarrow.parquet` loaded.
-
-    Raises:
-        InputError: it is not installed.
-    """
+    """The module `pyarrow`, with `pyarrow.parquet` loaded."""
     purpose = "a campaign's table is kept as Parquet"
     optional("pyarrow.parquet", "campaigns", purpose)
     return optional("pyarrow", "campaigns", purpose)
 
 
 def statistics_library(name: str) -> Any:
-    """A module of scipy or statsmodels.
-
-    Raises:
-        InputError: it is not installed.
-    """
+    """A module of scipy or statsmodels."""
     return optional(name, "campaigns", "statistics of campaigns are computed with it")

@@ -1,4 +1,4 @@
-"""Angles and polylines in the plane. Needs numpy alone: logs are read without the compiler."""
+"""Angles, polylines and frames in the plane. Needs numpy alone: logs are read without the compiler."""
 
 from __future__ import annotations
 
@@ -73,3 +73,18 @@ def place_name(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
         return here
     there = in_map(frame, [(x, y)])[0].tolist()
     return f"{here} in the world, ({there[0]:{digits}}, {there[1]:{digits}}) in its map"
+
+
+def frame_at(inner: Floats, outer: Floats) -> Floats:
+    """Where a frame lies in another one, if something has a pose in each: x, y and yaw of its origin (N, 3) [m, rad]."""
+    turn = outer[:, 2] - inner[:, 2]
+    cos, sin = np.cos(turn), np.sin(turn)
+    x, y = inner[:, 0], inner[:, 1]
+    return np.column_stack([outer[:, 0] - (cos * x - sin * y), outer[:, 1] - (sin * x + cos * y), turn])
+
+
+def laid(points: Floats, frames: Floats) -> Floats:
+    """Where points of frames lie in the frame around them (N, 2) [m]."""
+    cos, sin = np.cos(frames[:, 2]), np.sin(frames[:, 2])
+    x, y = points[:, 0], points[:, 1]
+    return frames[:, :2] + np.column_stack([cos * x - sin * y, sin * x + cos * y])

@@ -45,11 +45,7 @@ def _number(limit: Any) -> float:
 
 
 def require_ranges(record: Any) -> None:
-    """Refuse a record with a value outside the range of its field.
-
-    Raises:
-        FieldError: a value is outside.
-    """
+    """Refuse a record with a value outside the range of its field."""
     for key, (low, high) in ranges_of(cast(Hashable, type(record))).items():
         value = getattr(record, key)
         if not low <= value <= high:

@@ -25,7 +25,12 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _terminate)
     words = [word for word in sys.argv[1:] if word != DEBUG]
     try:
-        code = _show_help(words) if words in ([], ["-h"], ["--help"]) else _exit_code_of(words)
+        if words in ([], ["-h"], ["--help"]):
+            code = _show_help(words)
+        else:
+            from antdrive.cli.groups import exit_code_of
+
+            code = exit_code_of(words)
     except BrokenPipeError as error:
         unread = [stream for stream in (sys.__stdout__, sys.__stderr__) if stream is not None and _is_unread(stream)]
         for stream in unread:  # what it still holds goes nowhere, or Python would try again at its end
@@ -53,12 +58,6 @@ def _show_help(words: list[str]) -> int:
     sys.stdout.write(f"Usage: antdrive [OPTIONS] COMMAND [ARGS]...\n\n{about}\n{OPTIONS}\nCommands:\n{table}")
     sys.stdout.flush()
     return SUCCEEDED if words else WRONG_INPUT
-
-
-def _exit_code_of(words: list[str]) -> int:
-    from antdrive.cli.groups import exit_code_of
-
-    return exit_code_of(words)
 
 
 def _is_unread(stream: TextIO) -> bool:

@@ -1,54 +1,85 @@
 """`antdrive report` and `antdrive compare` for the folder of a campaign."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from antdrive.base.errors import InputError
-from antdrive.cli.console import print_files, print_json, print_line, print_table
-from antdrive.cli.exits import SUCCEEDED
+from antdrive.cli.console import file_lines, show, table
+from antdrive.cli.options import option
 
 if TYPE_CHECKING:
-    from antdrive.views.pages.texts import TextTable
-
-Metrics = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--metric",
-        metavar="NAME",
-        help="Metric to compare besides success, of a campaign. May be repeated.  "
-        "[default: driven_length_m, duration_s, plan_s]",
-    ),
-]
-Against = Annotated[
-    str | None,
-    typer.Option(metavar="PLANNER", help="Compare this planner with each other one only, of a campaign."),
-]
-
-Where = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="COLUMN=VALUE",
-        help="Take only some runs of a campaign, such as noise=1, noise=0,1 or duration_s=10..20. May be repeated.",
-    ),
-]
-
-Allow = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="MEASURE=DIFFERENCE",
-        help="By how much a planner may be worse than --against and still count as not worse, such as success=0.02 or "
-        "duration_s=1, of a campaign. May be repeated.",
-    ),
-]
-
-COMPARE_OPTIONS = ("worlds", "planner", "metric", "against", "allow", "where", "json")
-
+    from antdrive.views.pages.summary import CampaignSummary
 
 #: Files of a campaign's folder, as `runs/campaigns/store` names them; that module would load much more.
 MARKS = ("manifest.json", "grid.parquet")
+
+
+@dataclass(frozen=True)
+class Questions:
+    """The options that say what is asked about a campaign."""
+
+    metric: Annotated[
+        list[str] | None,
+        option(
+            "NAME",
+            "Metric to compare besides success, of a campaign. May be repeated.  "
+            "[default: driven_length_m, duration_s, plan_s]",
+            "--metric",
+        ),
+    ] = None
+    against: Annotated[
+        str | None, option("PLANNER", "Compare this planner with each other one only, of a campaign.")
+    ] = None
+    allow: Annotated[
+        list[str] | None,
+        option(
+            "MEASURE=DIFFERENCE",
+            "By how much a planner may be worse than --against and still count as not worse, such as success=0.02 or "
+            "duration_s=1, of a campaign. May be repeated.",
+        ),
+    ] = None
+    where: Annotated[
+        list[str] | None,
+        option(
+            "COLUMN=VALUE",
+            "Take only some runs of a campaign, such as noise=1, noise=0,1 or duration_s=10..20. May be repeated.",
+        ),
+    ] = None
+
+    @property
+    def given(self) -> list[str]:
+        """The names of the options that were given."""
+        return [name for name, value in vars(self).items() if value]
+
+    @property
+    def words(self) -> dict[str, Any]:
+        """The questions as the library takes them."""
+        allowed: dict[str, float] = {}
+        for text in self.allow or ():
+            if self.against is None:
+                raise InputError(f"--allow {text}: needs --against PLANNER, the one that others may not be worse than")
+            measure, _, value = text.partition("=")
+            try:
+                allowed[measure] = float(value)
+            except ValueError:
+                raise InputError(f"--allow {text}: must be MEASURE=DIFFERENCE, such as success=0.02") from None
+        conditions: dict[str, list[str]] = {}  # a run has one of the values named for a column
+        for text in self.where or ():
+            column, mark, value = text.partition("=")
+            if not mark:
+                raise InputError(f"--where {text}: must be COLUMN=VALUE, such as noise=1")
+            conditions.setdefault(column, []).append(value)
+        where = {column: ",".join(values) for column, values in conditions.items()}
+        return {"metrics": self.metric or None, "against": self.against, "allow": allowed, "where": where}
+
+
+#: The options of `antdrive compare` that a campaign's folder takes.
+COMPARE_OPTIONS = ("worlds", "planner", *(one.name for one in dataclasses.fields(Questions)), "json")
 
 
 def is_campaign(folder: Path) -> bool:
@@ -56,108 +87,57 @@ def is_campaign(folder: Path) -> bool:
     return all((folder / name).is_file() for name in MARKS)
 
 
-def campaigns_of_words(words: Sequence[str], context: typer.Context) -> list[Path]:
-    """The campaigns' folders that `antdrive compare` was given, if they are.
+def refuse_questions(names: Iterable[str], folder: str | Path) -> None:
+    """Refuse options about campaigns for a folder that is none."""
+    for name in names:
+        raise InputError(f"--{name}: is for the folder of a campaign; {folder} is none")
 
-    Raises:
-        InputError: options that do not go together.
-    """
-    folders = [word for word in words if is_campaign(Path(word))]
-    given = {name for name in context.params if _is_given(context, name)}
+
+def campaigns_of_words(words: Sequence[str], context: typer.Context, asked: Questions) -> list[Path]:
+    """The campaigns' folders that `antdrive compare` was given, if they are."""
+    folders = [Path(word) for word in words if is_campaign(Path(word))]
     if not folders:
-        for name in sorted(given & {"metric", "against", "allow", "where"}):
-            raise InputError(f"--{name}: is for the folder of a campaign; {words[0]} is none")
+        refuse_questions(sorted(asked.given), words[0])
         return []
     if len(folders) < len(words):
         raise InputError(f"{' '.join(words)}: name folders of campaigns, or worlds")
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
     for name in sorted(given - set(COMPARE_OPTIONS)):
-        option = name.replace("_", "-")
         raise InputError(
-            f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against, --allow, --where and --json"
+            f"--{name.replace('_', '-')}: is for drives; a campaign's folder takes --planner, --metric, --against, --allow, "
+            "--where and --json"
         )
-    return [Path(folder) for folder in folders]
+    return folders
 
 
-def _is_given(context: typer.Context, name: str) -> bool:
-    source = context.get_parameter_source(name)
-    return source is not None and source.name == "COMMANDLINE"
-
-
-def compare_campaigns(
-    folders: Sequence[Path],
-    planners: Sequence[str],
-    metrics: Sequence[str] | None,
-    against: str | None,
-    allow: Sequence[str] | None,
-    where: Sequence[str] | None,
-    json: bool,
-) -> int:
+def compare_campaigns(folders: Sequence[Path], planners: Sequence[str], asked: Questions, json: bool) -> None:
     """Print success of each planner and the comparison of each pair."""
     from antdrive.views.pages.campaign import summarise_campaign
 
-    words: dict[str, Any] = {"allow": _allowed(allow, against), "where": _conditions(where), "strict": True}
-    summary = summarise_campaign(folders, metrics=metrics or None, against=against, planners=planners, **words)
-    if json:
-        print_json(summary.as_dict())
-        return SUCCEEDED
+    summary = summarise_campaign(folders, planners=planners, strict=True, **asked.words)
+    show(json, summary.as_dict(), _tables(summary))
+
+
+def _tables(summary: "CampaignSummary") -> Iterator[str]:
     from antdrive.views.pages.tables import all_cells
 
-    for table in all_cells(summary):
-        _print_table(table)
-        print_line()
-    for note in (*summary.notes, f"Medians are over the {summary.common} instances that every planner solved."):
-        print_line(note)
-    return SUCCEEDED
+    for one in all_cells(summary):
+        yield one.title
+        yield from table(one.headings, one.rows)
+        yield ""
+    yield from summary.notes
+    yield f"Medians are over the {summary.common} instances that every planner solved."
 
 
 def report_campaigns(
-    folders: Sequence[Path],
-    out: Path,
-    json: bool,
-    allow: Sequence[str] | None,
-    where: Sequence[str] | None,
-    against: str | None,
-    **words: Any,
-) -> int:
+    folders: Sequence[Path], out: Path, json: bool, title: str | None, planners: Sequence[str], asked: Questions
+) -> None:
     """Write the report of a campaign, or of several."""
     from antdrive.views.pages.campaign import report_campaign
 
-    words |= {"allow": _allowed(allow, against), "where": _conditions(where), "against": against}
-    files = report_campaign(folders, out, **words)
+    files = report_campaign(folders, out, title=title, planners=planners, **asked.words)
     size = sum(path.stat().st_size for path in files)
-    if json:
-        print_json({"file": str(files[0]), "files": [str(path) for path in files], "bytes": size})
-    else:
-        print_line(f"{size / 1e6:.2f} MB")
-        print_files(dict(zip(("report", "pairs"), map(str, files), strict=False)))
-    return SUCCEEDED
-
-
-def _allowed(allow: Sequence[str] | None, against: str | None) -> dict[str, float]:
-    """What `--allow` says, by measure."""
-    found = {}
-    for text in allow or ():
-        if against is None:
-            raise InputError(f"--allow {text}: needs --against PLANNER, the one that others may not be worse than")
-        measure, _, value = text.partition("=")
-        try:
-            found[measure] = float(value)
-        except ValueError:
-            raise InputError(f"--allow {text}: must be MEASURE=DIFFERENCE, such as success=0.02") from None
-    return found
-
-
-def _conditions(where: Sequence[str] | None) -> dict[str, str]:
-    """What `--where` says, by column: a run has one of the values named for it."""
-    for text in where or ():
-        if "=" not in text:
-            raise InputError(f"--where {text}: must be COLUMN=VALUE, such as noise=1")
-    found: dict[str, str] = {}
-    for column, _, value in (text.partition("=") for text in where or ()):
-        found[column] = f"{found[column]},{value}" if column in found else value
-    return found
-
-
-def _print_table(table: "TextTable") -> None:
-    print_line(table.title)
-    print_table(table.headings, table.rows)
+    facts = {"file": str(files[0]), "files": [str(path) for path in files], "bytes": size}
+    names = dict(zip(("report", "pairs"), files, strict=False))
+    show(json, facts, [f"{size / 1e6:.2f} MB", *file_lines(names)])

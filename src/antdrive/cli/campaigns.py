@@ -1,39 +1,28 @@
-"""From the words of `antdrive sweep` to a campaign, and what it prints of one."""
+"""From the words of `antdrive sweep` to a campaign, and to the command that goes on with it."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError
-from antdrive.cli.console import print_line, print_table
+from antdrive.cli.console import print_error
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     from antdrive.runs.campaigns.campaign import Campaign
-    from antdrive.runs.campaigns.expanding import Expansion
-    from antdrive.runs.campaigns.results import SweepResults
 
-MEDIANS = {
-    "driven_length_m": "length m",
-    "duration_s": "duration s",
-    "min_clearance_m": "least clearance m",
-    "plan_s": "planning ms",
-}
 #: The options that a campaign's keys come from, in errors.
-OPTIONS = {"robots": "--robot"} | {one.setting.axis or one.key: one.flag for one in SETTINGS.values() if one.flag}
-OPTIONS["seeds"] = "--seeds"
+OPTIONS = {one.key: one.flag for one in SETTINGS.values() if one.flag} | {"robots": "--robot", "seeds": "--seeds"}
 SOURCE = "the options"  # what errors call a campaign that no file describes
 
 
 def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) -> Campaign:
-    """The campaign in a file, with the keys that options give in place of the file's.
-
-    Raises:
-        InputError: something is wrong; the message names the file and the key, or the option.
-    """
+    """The campaign in a file, with the keys that options give in place of the file's."""
     from antdrive.runs.campaigns.campaign import load_campaign, make_campaign
 
     given = _keys(words, settings)
@@ -51,51 +40,26 @@ def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) 
     for key in ("worlds", "robots"):
         given[key] = _absolute(given[key]) if key in given else file.document.data.get(key)
     if "settings" in given:
-        given["settings"] = _with_settings(file.document.data.get("settings", {}), given["settings"])
+        own, others = file.document.data.get("settings", {}), given["settings"]
+        given["settings"] = [{**one, **others} for one in own] if isinstance(own, list) else {**own, **others}
     merged = {**file.document.data, **{key: value for key, value in given.items() if value is not None}}
     return make_campaign(merged, file.folder, str(path))
 
 
 def _keys(words: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """The campaign's keys that options give."""
-    axes = {one.key: one.setting.axis for one in SETTINGS.values()}
-    found = {axes[key]: value for key, value in settings.items() if axes[key]}
-    if words["robots"]:
-        found["robots"] = words["robots"]
-    worlds = [*(words["worlds"] or ()), *(_generated(text) for text in words["generate"] or ())]
-    if worlds:
-        found["worlds"] = worlds
-    if words["planners"]:
-        found["planners"] = [_planner(text) for text in words["planners"]]
-    if others := {key: value for key, value in settings.items() if not axes[key]}:
-        found["settings"] = others
-    if words["seeds"] is not None:
-        found["seeds"] = _seeds(words["seeds"])
-    if words["run_limit"] is not None:
-        found["run_limit"] = words["run_limit"]
-    if words["tasks"] is not None:
-        found["tasks"] = _tasks(words["tasks"])
-    return found
-
-
-def _with_settings(of_file: Any, given: dict[str, Any]) -> Any:
-    """A file's settings with those that options give in the place of the file's."""
-    if isinstance(of_file, list):
-        return [{**one, **given} for one in of_file]
-    return {**of_file, **given}
-
-
-def size_lines(expansion: Expansion, missing: int) -> Iterator[str]:
-    """How large a campaign is, in words."""
-    counts = expansion.counts.items()
-    yield " x ".join(f"{count} {name if count != 1 else _one(name)}" for name, count in counts)
-    left_out = f"; {expansion.duplicates} combinations that mean the same as others are left out"
-    yield f"{len(expansion.jobs)} runs, {missing} of them missing{left_out if expansion.duplicates else ''}"
-
-
-def _one(name: str) -> str:
-    """The singular of what is counted."""
-    return name if " " in name or name == "settings" else name.removesuffix("s")
+    axes = {one.key for one in SETTINGS.values() if one.setting.axis}
+    found = {key: value for key, value in settings.items() if key in axes}
+    found |= {
+        "robots": words["robots"],
+        "worlds": [*(words["worlds"] or ()), *(_generated(text) for text in words["generate"] or ())],
+        "planners": [_planner(text) for text in words["planners"] or ()],
+        "settings": {key: value for key, value in settings.items() if key not in axes},
+        "seeds": None if words["seeds"] is None else _seeds(words["seeds"]),
+        "run_limit": words["run_limit"],
+        "tasks": None if words["tasks"] is None else _tasks(words["tasks"]),
+    }
+    return {key: value for key, value in found.items() if value not in (None, [], {})}
 
 
 def _tasks(text: str) -> Any:
@@ -130,7 +94,7 @@ def _seeds(text: str) -> Any:
         return int(text)
     if "-" in text:
         return text
-    return [_whole("--seeds", word) for word in text.split(",")]
+    return [_number("--seeds", word, whole=True) for word in text.split(",")]
 
 
 def _generated(text: str) -> dict[str, Any]:
@@ -160,47 +124,29 @@ def _planner(text: str) -> Any:
     return entry if options else name
 
 
-def _whole(option: str, text: str) -> int:
+def _number(option: str, text: str, *, whole: bool = False) -> float | int:
     try:
-        return int(text)
+        return int(text) if whole or text.lstrip("+-").isdigit() else float(text)
     except ValueError:
-        raise InputError(f"{option} {text}: must be a whole number") from None
+        raise InputError(f"{option} {text}: must be a {'whole ' if whole else ''}number") from None
 
 
-def _number(option: str, text: str) -> float | int:
+@contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """A context that says, when it is interrupted, how the campaign in a folder goes on."""
     try:
-        return int(text) if text.lstrip("+-").isdigit() else float(text)
-    except ValueError:
-        raise InputError(f"{option} {text}: must be a number") from None
+        yield
+    except KeyboardInterrupt:
+        command = shlex.join(["antdrive", *_without_again(sys.argv[1:])])
+        print_error(f"{folder}: what is done is kept; go on with: {command}")
+        raise
 
 
-def print_sweep(results: SweepResults, reports: Sequence[str] = ()) -> None:
-    """Print how the runs of a campaign ended, what was measured in those that succeeded, and where more is said."""
-    print_line(f"{results.size} runs, {results.made} of them made now; {results.succeeded} succeeded, certified")
-    print_table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
-    print_line()
-    print_line("medians of the runs that succeeded (least to most)")
-    print_table(("planner", "runs", *MEDIANS.values()), _medians(results))
-    print_line(f"  table    {results.path}")
-    for file in reports:
-        print_line(f"  report   {file}")
-    if reports:
-        return
-    report = shlex.join(["antdrive", "report", str(results.folder), "-o", str(results.folder / "report.html")])
-    print_line(f"  charts, intervals and all runs: {report}")
-
-
-def _medians(results: SweepResults) -> Iterator[tuple[str, ...]]:
-    """For each planner the number of runs that succeeded, and median and extremes of what was measured in them."""
-    import numpy as np
-
-    rows = [row for row in results.table.select(["planner", "succeeded", *MEDIANS]).to_pylist() if row["succeeded"]]
-    for planner in dict.fromkeys(row["planner"] for row in rows):
-        own = [row for row in rows if row["planner"] == planner]
-        factors = [1000.0 if unit.endswith(" ms") else 1.0 for unit in MEDIANS.values()]
-        columns = [
-            factor * np.array([row[name] for row in own], dtype=float)
-            for name, factor in zip(MEDIANS, factors, strict=True)
-        ]
-        told = (f"{np.median(found):.3g} ({found.min():.3g} to {found.max():.3g})" for found in columns)
-        yield planner, str(len(own)), *told
+def _without_again(words: list[str]) -> Iterator[str]:
+    """The words of a command without --again: what it made again is not to be made a third time."""
+    rest = iter(words)
+    for word in rest:
+        if word == "--again":
+            next(rest, None)
+        elif not word.startswith("--again="):
+            yield word

@@ -7,7 +7,7 @@ import shlex
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -119,22 +119,30 @@ def print_json(value: Any) -> None:
     typer.echo(as_json(value))
 
 
-def print_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print aligned columns on stdout. On a terminal, lines are cut at its width; elsewhere they are complete."""
+def show(json: bool, facts: Any, lines: Iterable[str]) -> None:
+    """Print facts as one JSON object, or lines for people, on stdout."""
+    if json:
+        print_json(facts)
+    else:
+        for line in lines:
+            print_line(line)
+
+
+def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Lines of aligned columns. On a terminal, they are cut at its width; elsewhere they are complete."""
     lines = [tuple(headers), *(tuple(row) for row in rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(headers) - 1)]
     columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for line in lines:
         aligned = [cell.ljust(width) for cell, width in zip(line, widths, strict=False)]
         text = "  ".join([*aligned, line[-1]]).rstrip()
-        print_line(text if columns is None or len(text) <= columns else text[: columns - 1] + "…")
+        yield text if columns is None or len(text) <= columns else text[: columns - 1] + "…"
 
 
-def print_files(files: dict[str, str]) -> None:
-    """Print the written files, one line each: what a file is, and its path."""
+def file_lines(files: Mapping[str, object]) -> Iterator[str]:
+    """A line for each written file: what it is, and its path."""
     width = max([8, *map(len, files)])
-    for name, path in files.items():
-        print_line(f"  {name:{width}} {path}")
+    return (f"  {name:{width}} {path}" for name, path in files.items())
 
 
 def this_command() -> str:

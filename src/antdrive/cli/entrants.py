@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from antdrive.base.errors import FieldError, InputError
-from antdrive.cli.parse import pair
-from antdrive.cli.scenario import GROUPS
+from antdrive.cli.scenario import GROUPS, grouped
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -28,11 +27,7 @@ class Entrant:
 
 
 def check_worlds(words: Sequence[str]) -> None:
-    """Check that there are worlds of these names, before anything is said about planners, which a campaign needs none of.
-
-    Raises:
-        InputError: there is no such world.
-    """
+    """Check that there are worlds of these names, before anything is said about planners, which a campaign needs none of."""
     from antdrive.base.checks import resolve
     from antdrive.worlds.files.world_file import list_worlds
 
@@ -47,11 +42,7 @@ def check_worlds(words: Sequence[str]) -> None:
 
 
 def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:
-    """The planners of `--planner NAME` or `--planner LABEL=NAME`, with the options of `--set GROUP.KEY=VALUE`.
-
-    Raises:
-        InputError: not two to six different labels, or a group that is none.
-    """
+    """The planners of `--planner NAME` or `--planner LABEL=NAME`, with the options of `--set GROUP.KEY=VALUE`."""
     words, labels = planners or (), dict[str, str]()
     for word in words:
         label, mark, name = word.partition("=")
@@ -67,10 +58,7 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
         )
     own: dict[str, list[str]] = {label: [] for label in labels}
     for text in settings or ():
-        key, value = pair(text)
-        group, _, name = key.partition(".")
-        if not name or group not in (*labels, *GROUPS):
-            raise InputError(f"--set {text}: write GROUP.KEY=VALUE with a group of {', '.join([*labels, *GROUPS])}")
+        group, name, value = grouped(text, (*labels, *GROUPS))
         for label in labels if group in GROUPS else [group]:
             own[label].append(f"{group if group == 'controller' else 'planner'}.{name}={value}")
     return [Entrant(label, name, tuple(own[label])) for label, name in labels.items()]

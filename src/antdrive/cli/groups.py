@@ -16,23 +16,22 @@ import typer.main
 from antdrive.base.errors import FieldError, InputError, Terminated, input_error
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line
-from antdrive.cli.exits import FAULT, INTERRUPTED, SUCCEEDED, WRONG_INPUT
+from antdrive.cli.exits import FAILED, FAULT, INTERRUPTED, SUCCEEDED, WRONG_INPUT
 from antdrive.sim.settings import PANELS
 
 SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
+
+#: Letters that stand for the same option in every command.
+SHORT = {"out": "-o", "planner": "-p", "robot": "-r", "world": "-w", "jobs": "-j"}
 
 # typer exports only descendants of the error that it raises for every wrong word.
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 
 
 def exit_code_of(words: list[str]) -> int:
-    """Run the command that words name; its exit code.
-
-    Raises:
-        BrokenPipeError: the other end of a pipe is closed, such as that of stdout.
-    """
+    """Run the command that words name; its exit code."""
     try:
-        code = application()(args=words, prog_name="antdrive", standalone_mode=False)
+        code = _code_of(application()(args=words, prog_name="antdrive", standalone_mode=False))
     except (InputError, FieldError) as error:
         print_error(str(error))
         code = WRONG_INPUT
@@ -58,7 +57,14 @@ def exit_code_of(words: list[str]) -> int:
         code = FAULT
     if code == INTERRUPTED:  # typer turns Ctrl-C within a command into this code
         print_error("interrupted")
-    return code if isinstance(code, int) else SUCCEEDED
+    return code
+
+
+def _code_of(verdict: bool | int | None) -> int:
+    """The exit code for what a command returns: its verdict, nothing where it has none, or the code itself."""
+    if isinstance(verdict, bool):
+        return SUCCEEDED if verdict else FAILED
+    return verdict or SUCCEEDED
 
 
 class _Commands(UserDict[str, Any]):
@@ -75,6 +81,9 @@ class _Commands(UserDict[str, Any]):
             alone = typer.Typer(**SETTINGS)
             alone.command(name, cls=_Panelled)(getattr(module, found.function))
             found = self.data[name] = typer.main.get_command(alone)
+            for one in found.params:
+                if one.param_type_name == "option" and one.name in SHORT:
+                    one.opts.append(SHORT[one.name])
         return found
 
 
@@ -178,12 +187,5 @@ def _print_usage_error(error: Any) -> None:
     if type(error).__name__ == "NoArgsIsHelpError":
         print_line(error.format_message())
     else:
-        command = " ".join(["antdrive", *_command_words(error.ctx)])
+        command = error.ctx.command_path if error.ctx else "antdrive"
         print_error(f"{error.format_message()} (see {command} --help)")
-
-
-def _command_words(context: Any) -> list[str]:
-    """The words that name the command that was called, below the program's own name."""
-    if context is None or context.parent is None:
-        return []
-    return [*_command_words(context.parent), context.info_name]

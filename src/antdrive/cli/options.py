@@ -3,8 +3,7 @@
 Each help text states the unit, and the default where typer cannot show it.
 """
 
-from __future__ import annotations
-
+import dataclasses
 import functools
 import inspect
 from collections.abc import Callable, Iterable
@@ -17,11 +16,28 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.cli.parse import disc
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
 
-Command = Callable[..., int]
+Command = Callable[..., Any]
 
 
-def with_settings(names: Iterable[str], *, many: bool = False, **defaults: Any) -> Callable[[Command], Command]:
+def argument(metavar: str, text: str) -> Any:
+    """A command's argument: what `--help` calls it and says of it."""
+    return typer.Argument(metavar=metavar, help=text)
+
+
+def option(metavar: str, text: str, *flags: str, panel: str | None = None, **rest: Any) -> Any:
+    """A command's option: what `--help` calls its value, says of it and where; its flags, where its name gives others."""
+    return typer.Option(*flags, metavar=metavar or None, help=text, rich_help_panel=panel, **rest)
+
+
+def flag(text: str, *flags: str, panel: str | None = None) -> Any:
+    """An option without a value."""
+    return option("", text, *flags, panel=panel)
+
+
+def with_settings(names: Iterable[str] = (), *, many: bool = False, **defaults: Any) -> Callable[[Command], Command]:
     """Give a command an option for each of these settings, whose values it takes by key, as files write them.
+
+    A parameter whose type is a record stands for an option for each of its fields.
 
     Args:
         names: fields of a scenario
@@ -31,19 +47,36 @@ def with_settings(names: Iterable[str], *, many: bool = False, **defaults: Any) 
     chosen = {SETTINGS[name].key: SETTINGS[name] for name in names}
 
     def decorated(command: Command) -> Command:
-        @functools.wraps(command)
-        def called(**values: Any) -> int:
-            given = {key: _value(one, values.pop(key), many) for key, one in chosen.items()}
-            return command(**values, **{key: value for key, value in given.items() if not many or value})
-
         own = inspect.signature(command)
         parameters = [one for one in own.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
-        parameters += [_parameter(one, many, defaults) for one in chosen.values()]
-        called.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-        called.__annotations__ = {one.name: one.annotation for one in parameters}
+        records = {one.name: _fields(one) for one in parameters if dataclasses.is_dataclass(one.annotation)}
+
+        @functools.wraps(command)
+        def called(**values: Any) -> Any:
+            given = {key: _value(one, values.pop(key), many) for key, one in chosen.items()}
+            for name, fields in records.items():
+                record = own.parameters[name].annotation
+                values[name] = record(**{one.name: values.pop(one.name) for one in fields})
+            return command(**values, **{key: value for key, value in given.items() if not many or value})
+
+        flat = [one for each in parameters for one in records.get(each.name, [each])]
+        flat += [_parameter(one, many, defaults) for one in chosen.values()]
+        called.__signature__ = own.replace(  # type: ignore[attr-defined]
+            parameters=[one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in flat]
+        )
+        called.__annotations__ = {one.name: one.annotation for one in flat}
         return called
 
     return decorated
+
+
+def _fields(record: inspect.Parameter) -> list[inspect.Parameter]:
+    """A parameter for each field of a record; what the record is by default gives their defaults."""
+    usual = record.annotation() if record.default is record.empty else record.default
+    return [
+        record.replace(name=one.name, annotation=one.type, default=getattr(usual, one.name))
+        for one in dataclasses.fields(usual)
+    ]
 
 
 def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> inspect.Parameter:
@@ -51,10 +84,10 @@ def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> in
     setting = one.setting
     text = setting.help[0].upper() + setting.help[1:]
     kind: Any = one.kind
-    flag = one.flag
+    flags = one.flag
     default: Any = None
     if setting.form in ("avoidance", "replanning"):
-        kind, default, flag, text = bool, True, f"{flag}/--no-{flag[2:]}", text.partition(": ")[0]
+        kind, default, flags, text = bool, True, f"{flags}/--no-{flags[2:]}", text.partition(": ")[0]
     elif setting.form == "margin":
         kind, default = str, str(one.default)
     elif setting.form == "plain":
@@ -65,10 +98,8 @@ def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> in
         kind, default = list[kind], None
     repeated = " May be repeated." if many or setting.form == "discs" else ""
     usual = f"  [default: {setting.usual}]" if setting.usual and not many else ""
-    option = typer.Option(
-        flag, metavar=setting.metavar or None, help=f"{text}.{repeated}{usual}", rich_help_panel=setting.group
-    )
-    annotation: Any = Annotated[kind | None if default is None else kind, option]
+    made = option(setting.metavar, f"{text}.{repeated}{usual}", flags, panel=setting.group)
+    annotation: Any = Annotated[kind | None if default is None else kind, made]
     return inspect.Parameter(one.key, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
@@ -95,108 +126,27 @@ def _margin(text: str) -> float | str:
         raise InputError(f"--margin: write a number of metres, or auto; got {text}") from None
 
 
-World = Annotated[str, typer.Argument(metavar="WORLD", help="Name of a world in the catalogue, or a world file.")]
-TaskName = Annotated[
-    str | None,
-    typer.Option(
-        "--task",
-        metavar="NAME",
-        help="One of the world file's tasks.  [default: its own start and goal]",
-        rich_help_panel="World",
-    ),
-]
-Start = Annotated[
-    str | None,
-    typer.Option(
-        metavar="X,Y,YAW",
-        help="Another start, in the frame of the world file [m, m, rad].  [default: the task's]",
-        rich_help_panel="World",
-    ),
-]
-Goal = Annotated[
-    str | None,
-    typer.Option(
-        metavar="X,Y",
-        help="Another goal, in the frame of the world file [m].  [default: the task's]",
-        rich_help_panel="World",
-    ),
-]
-Frame = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME",
-        help="world, or map: --start and --goal are places in the map that the world was made from, as exports have them.",
-        rich_help_panel="World",
-    ),
-]
-Planner = Annotated[
-    str,
-    typer.Option(
-        "--planner",
-        "-p",
-        metavar="NAME",
-        help="Planner, or FILE.py:CLASS; `antdrive planners` lists names.",
-        rich_help_panel="Planner",
-    ),
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        "-s",
-        metavar="GROUP.KEY=VALUE",
-        help="Set an option of the planner or the controller, such as planner.ants=50 or "
-        "controller.lookahead_time=0.5. May be repeated.",
-        rich_help_panel="Planner",
-    ),
-]
-Robot = Annotated[
-    str,
-    typer.Option(
-        "--robot",
-        "-r",
-        metavar="NAME",
-        help="Name of a robot in the catalogue, or a robot file.",
-        rich_help_panel="Robot",
-    ),
-]
+World = Annotated[str, argument("WORLD", "Name of a world in the catalogue, or a world file.")]
+Log = Annotated[Path, argument("ROLLOUT", "Log of a drive, or the folder of a run.")]
+Robot = Annotated[str, option("NAME", "Name of a robot in the catalogue, or a robot file.", panel="Robot")]
+Planner = Annotated[str, option("NAME", "Planner, or FILE.py:CLASS; `antdrive planners` lists names.", panel="Planner")]
 Out = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        "-o",
-        metavar="FOLDER",
-        help="Folder for the results.  [default: a folder below out/]",
-        rich_help_panel="Output",
-    ),
+    Path | None, option("FOLDER", "Folder for the results.  [default: a folder below out/]", panel="Output")
 ]
 Prelude = Annotated[
     float,
-    typer.Option(
-        "--prelude",
+    option(
+        "SECONDS",
+        "Begin the film with this many seconds of planning [s]; needs a planner with iterations.",
+        panel="Output",
         min=0.0,
         max=60.0,
-        metavar="SECONDS",
-        help="Begin the film with this many seconds of planning [s]; needs a planner with iterations.",
-        rich_help_panel="Output",
     ),
 ]
 Speed = Annotated[
-    float,
-    typer.Option(
-        min=0.01,
-        max=100,
-        metavar="FACTOR",
-        help="Speed of the film; 2 is twice as fast as real time.",
-        rich_help_panel="Output",
-    ),
+    float, option("FACTOR", "Speed of the film; 2 is twice as fast as real time.", panel="Output", min=0.01, max=100)
 ]
-Vector = Annotated[bool, typer.Option("--vector", help="Write figures as PDF too.", rich_help_panel="Output")]
-Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Write figures.", rich_help_panel="Output")]
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
-]
-Json = Annotated[
-    bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.", rich_help_panel="Output")
-]
+Vector = Annotated[bool, flag("Write figures as PDF too.", "--vector", panel="Output")]
+Figures = Annotated[bool, flag("Write figures.", "--figures/--no-figures", panel="Output")]
+Jobs = Annotated[int | None, option("NUMBER", "Processes.  [default: one per core]", min=1, max=256)]
+Json = Annotated[bool, flag("Print one JSON object on stdout and nothing else.", "--json", panel="Output")]

@@ -54,17 +54,23 @@ def size(text: str) -> tuple[int, int]:
 
 
 def log_at(path: Path) -> Path:
-    """The log that a path means: the file itself, or the log in the folder of a run.
-
-    Raises:
-        InputError: a folder without a log; the message says how its run ended, if it did.
-    """
+    """The log that a path means: the file itself, or the log in the folder of a run."""
     if not path.is_dir():
         return path
     log = path / "rollout.npz"
     if log.exists():
         return log
-    ended = (
-        "the run there ended before the robot drove" if (path / "result.json").exists() else "antdrive run writes it"
-    )
+    ran = (path / "result.json").exists()
+    ended = "the run there ended before the robot drove" if ran else "antdrive run writes it"
     raise InputError(f"{path}: no rollout.npz in this folder; {ended}")
+
+
+def import_target(source: Path, out: Path | None, usual: Path, what: str) -> Path:
+    """The file that an import writes: never its source, and another existing file only if named."""
+    target = out or usual
+    if target.exists():
+        if source.exists() and target.samefile(source):
+            raise InputError(f"{target}: is the file to import; give another with --out")
+        if out is None:
+            raise InputError(f"{target}: exists; give --out to say where the {what} goes")
+    return target

@@ -1,7 +1,7 @@
 """Compile every kernel once, into the cache that `antdrive.base.kernel_cache` describes.
 
 Compiling takes about half a minute on two idle cores. The command line does it before the first command that plans, drives or
-films (`is_warm` tells it whether that is due), and `antdrive warm` does it on request.
+films (`compile_once`), and `antdrive warm` does it on request.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import hashlib
 import importlib.metadata
 import os
 import platform
+import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from antdrive.base.kernel_cache import cache_folder, sources_stamp
-from antdrive.runs.pool import Pool, cores
+from antdrive.base import kernel_cache
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -32,6 +32,44 @@ TOGETHER = (
     ("dstar-lite", "dstar"),
     ("apf", "mmas-dstar"),
 )
+LOCK = "antdrive-compiling.lock"
+NOTE = "compiling the planners, once for this installation; this takes a minute or two"
+
+
+def compile_once(say: Callable[[str], None] | None = None) -> None:
+    """Compile every kernel if this installation has not done so yet; processes that come at the same time wait for one of them.
+
+    A bar shows it on a terminal, a line elsewhere; `say` prints the line in any case. Nothing is done where no cache can be
+    kept. Each kernel is then compiled when it is first called, which for a single command is quicker than compiling all.
+    """
+    folder = kernel_cache.cache_folder()
+    if is_warm() or folder is None:
+        return
+    with _turn(folder):
+        if is_warm():
+            return
+        if say is not None:
+            say(NOTE)
+            warm()
+            return
+        from antdrive.cli.console import bar, print_error
+
+        if not sys.stderr.isatty():
+            print_error(NOTE)
+        with bar("compiling the planners, once") as progress:
+            warm(progress=progress)
+
+
+@contextlib.contextmanager
+def _turn(folder: Path) -> Iterator[None]:
+    """A context that one process is in at a time; any number of them where the system or the folder has no locks."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(ImportError, OSError):
+            import fcntl
+
+            file = stack.enter_context((folder / LOCK).open("a"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def is_warm() -> bool:
@@ -43,6 +81,7 @@ def is_warm() -> bool:
 def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
     """Plan with every planner, drive once and film it, so that every kernel is in the cache."""
     from antdrive.planners import PLANNERS
+    from antdrive.runs.pool import Pool, cores
 
     # The second round reads the cache, and compiles what two processes wrote at the same moment and one of them lost.
     first = [TOGETHER[0], None, *TOGETHER[1:]]
@@ -135,12 +174,12 @@ def _sense() -> None:
 
 def _marker() -> Path | None:
     """The file whose presence says that the kernels are compiled; None where nothing can be kept."""
-    folder = cache_folder()
+    folder = kernel_cache.cache_folder()
     if folder is None:
         return None
     numba = importlib.metadata.version("numba")
     facts = (
-        sources_stamp(),
+        kernel_cache.sources_stamp(),
         platform.python_version(),
         platform.machine(),
         numba,

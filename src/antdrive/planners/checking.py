@@ -17,9 +17,18 @@ import numpy as np
 from antdrive.base import Floats
 from antdrive.base.errors import InputError, Terminated
 from antdrive.base.plane import polyline_length, segment_lengths, wrap_angle
-from antdrive.planners.graph.sipp import TimedPlan
-from antdrive.planners.plan import Cell, History, Planner, PlannerError, PlanResult, PlanStatus, Query, path_cost
-from antdrive.worlds.ends import end_reach, longest_line
+from antdrive.planners.plan import (
+    Cell,
+    History,
+    Planner,
+    PlannerError,
+    PlanResult,
+    PlanStatus,
+    Query,
+    TimedPlan,
+    path_cost,
+)
+from antdrive.worlds.route import end_reach, longest_line
 
 RELATIVE = 1e-9  # how far a cost may be off, as a fraction
 NEAR = 1e-6  # m: how far a waypoint may be off, and how much a line may come too close

@@ -16,7 +16,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import require
 from antdrive.planners.graph.search import NO_WAY, reachable
 from antdrive.planners.plan import (
     Capabilities,
@@ -220,26 +220,3 @@ class IterativePlanner(GridPlanner):
 def as_iterative(planner: Planner) -> IterativePlanner | None:
     """The planner itself if it declares that it plans in iterations, else None."""
     return cast(IterativePlanner, planner) if capabilities_of(planner).iterative else None
-
-
-def require(
-    key: str,
-    value: float,
-    *,
-    at_least: float = -math.inf,
-    above: float = -math.inf,
-    at_most: float = math.inf,
-    below: float = math.inf,
-) -> None:
-    """Refuse an option outside its range.
-
-    Raises:
-        ValueError: the value is out of range; the message names the key and the range.
-    """
-    bounds = [
-        f"{word} {bound:.12g}"
-        for word, bound in (("at least", at_least), ("above", above), ("at most", at_most), ("below", below))
-        if math.isfinite(bound)
-    ]
-    if not (at_least <= value <= at_most and above < value < below):
-        raise FieldError(key, f"must be {' and '.join(bounds) or 'finite'}, got {value:g}")

@@ -80,7 +80,5 @@ def tiny_query(made_of: type[Query], motions: bool, task: bool, writeable: bool 
         grid = dataclasses.replace(grid, free=grid.free.copy(), moves=grid.moves.copy())
     query = made_of.between(grid, made)
     return dataclasses.replace(
-        query,
-        task=made if task else None,
-        motions=Trajectories.of(world, made.start[:2], 0).motions if motions else (),
+        query, task=made if task else None, motions=Trajectories.of(world, made.start[:2], 0).motions if motions else ()
     )

@@ -58,11 +58,7 @@ class OwnCodeError(InputError):
 
 
 def own_object(name: str) -> Any:
-    """What a file or module of people's own calls by the name behind the last colon.
-
-    Raises:
-        InputError: there is no such file, module or class, or it cannot be imported.
-    """
+    """What a file or module of people's own calls by the name behind the last colon."""
     source, _, word = name.rpartition(":")
     return object_in(source, word, is_file=source.endswith(".py"))
 
@@ -71,9 +67,6 @@ def object_in(source: str, word: str, folder: Path | None = None, *, is_file: bo
     """What a file or module of people's own calls by a name.
 
     A file is read again when its content has changed. Folders may have modules of the same name.
-
-    Raises:
-        OwnCodeError: there is no such file, module or name, or it cannot be imported.
     """
     try:
         module = _from_file(source, folder) if is_file else _from_module(source, folder)
@@ -96,11 +89,7 @@ def is_importable_elsewhere(planner: object) -> bool:
 
 
 def own_version(name: str) -> str:
-    """What the code of a file or module is: its name and the beginning of its hash.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
+    """What the code of a file or module is: its name and the beginning of its hash."""
     source = name.rpartition(":")[0]
     if source.endswith(".py"):
         return f"{Path(source).name} {_hash(_content(Path(source)))}"

@@ -7,8 +7,8 @@ import dataclasses
 import enum
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -18,7 +18,7 @@ from antdrive.base import Floats, Point
 from antdrive.base.errors import FieldError, input_error
 from antdrive.planners.loading import kernels_loaded
 from antdrive.worlds import MoverMotion, Task
-from antdrive.worlds.ends import cells_beside
+from antdrive.worlds.route import cells_beside
 
 if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
     from antdrive.worlds import Grid
@@ -225,6 +225,57 @@ class PlanResult:
             "time": f"{1000 * self.wall_s:.1f} ms",
         }
         return card(picture, self.status.value + (f": {self.reason}" if self.reason else ""), facts)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TimedPlan(PlanResult):
+    """A plan with times: each cell is reached at `arrive` and left at `leave`; the robot waits in between.
+
+    From one cell to the next it drives straight at the plan's speed.
+
+    Attributes:
+        arrive: when each cell is reached (N,) [s]
+        leave: when each cell is left (N,) [s]
+        xy: centres of the cells (N, 2) [m]
+    """
+
+    arrive: Floats = field(default_factory=lambda: np.empty(0))
+    leave: Floats = field(default_factory=lambda: np.empty(0))
+    xy: Floats = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def duration(self) -> float:
+        """Time from the departure to the arrival [s]; infinite without a path."""
+        return float(self.arrive[-1] - self.arrive[0]) if len(self.arrive) else math.inf
+
+    @property
+    def waited(self) -> float:
+        """The total time that the robot waits on its way [s]."""
+        return float((self.leave - self.arrive).sum())
+
+    def at(self, t: npt.ArrayLike) -> Floats:
+        """Where the robot is (T, 2) [m] at times `t` (T,) [s]; before the plan begins and after it ends, at its ends.
+
+        Raises:
+            ValueError: the plan has no path.
+        """
+        if not self.solved:
+            raise FieldError("plan", "has no path to follow")
+        knots = np.stack([self.arrive, self.leave], axis=1).ravel()
+        when = np.asarray(t, dtype=np.float64)
+        return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
+
+    def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
+        """The least distance between the robot's centre and a mover's surface [m], sampled every `step` seconds.
+
+        Args:
+            movers: the motions of the movers
+            step: time between two samples [s]
+        """
+        ticks = max(1, math.ceil(self.duration / step))
+        t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
+        robot = self.at(t)
+        return min((float(np.hypot(*(robot - m.at(t)).T).min()) - m.radius for m in movers), default=math.inf)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,8 +20,7 @@ from antdrive.planners.anyangle.hybrid import Hybrid
 from antdrive.planners.anyangle.tangent import Tangent
 from antdrive.planners.colonies.catalog import ANT_PLANNERS
 from antdrive.planners.graph.apf import PotentialField
-from antdrive.planners.graph.dstar import DStar
-from antdrive.planners.graph.dstar_lite import DStarLite
+from antdrive.planners.graph.incremental import DStar, DStarLite
 from antdrive.planners.graph.search import AStar, Dijkstra
 from antdrive.planners.graph.sipp import SafeIntervals
 from antdrive.planners.own_code import is_own, module_hash, own_object, own_version
@@ -70,11 +69,7 @@ def load_planner(name: str, /, **options: Any) -> Planner:
 
 
 def make_planner(made: Any, name: str, /, **options: Any) -> Planner:
-    """The planner that people's own code defines, with options set.
-
-    Raises:
-        InputError: it is no planner, its class cannot be called without arguments, or an option is wrong.
-    """
+    """The planner that people's own code defines, with options set."""
     return _with_options(name, _instance(made, f"planner {name!r}"), options)
 
 
@@ -124,11 +119,7 @@ def describe(planner: Planner) -> str:
 
 
 def parse(key: str, kind: Any, value: Any) -> Any:
-    """The value of an option of a given type.
-
-    Raises:
-        InputError: the value, or the text for it, is not of that type.
-    """
+    """The value of an option of a given type."""
     origin, members = typing.get_origin(kind), typing.get_args(kind)
     if origin in (Union, types.UnionType) and type(None) in members:
         if value is None or (isinstance(value, str) and value.strip().lower() in ("none", "null", "")):
@@ -171,16 +162,9 @@ def _truth(value: Any) -> bool:
         return value
     if not isinstance(value, str):
         raise ValueError
-    return {
-        "true": True,
-        "yes": True,
-        "on": True,
-        "1": True,
-        "false": False,
-        "no": False,
-        "off": False,
-        "0": False,
-    }[value.strip().lower()]
+    return {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}[
+        value.strip().lower()
+    ]
 
 
 def _text(value: Any) -> str:
@@ -235,8 +219,7 @@ def _plugins() -> dict[str, importlib.metadata.EntryPoint]:
         if entry.name in PLANNERS or (entry.name in found and found[entry.name].value != entry.value):
             taken = "antdrive" if entry.name in PLANNERS else _maker(found[entry.name])
             warnings.warn(
-                f"planner {entry.name!r} of {_maker(entry)} is left out: {taken} has one of that name",
-                stacklevel=3,
+                f"planner {entry.name!r} of {_maker(entry)} is left out: {taken} has one of that name", stacklevel=3
             )
             continue
         found.setdefault(entry.name, entry)

@@ -11,11 +11,11 @@ from .files import list_robots as list_robots
 from .files import load_robot as load_robot
 from .files import robot_schema as robot_schema
 from .files import robot_to_dict as robot_to_dict
-from .footprint import footprint_clearance as footprint_clearance
 from .lidar import Lidar as Lidar
 from .noise import NoiseModel as NoiseModel
-from .odometry import Odometry as Odometry
+from .placing import footprint_clearance as footprint_clearance
 from .placing import overlap_at as overlap_at
 from .spec import Footprint as Footprint
 from .spec import Noise as Noise
+from .spec import Odometry as Odometry
 from .spec import RobotSpec as RobotSpec

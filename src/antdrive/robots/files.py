@@ -15,9 +15,8 @@ from antdrive.base.document import Document, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.records import STRICT
 from antdrive.base.reuse import reused
-from antdrive.robots.feasible import require_feasible
 from antdrive.robots.outline import MOST_CORNERS
-from antdrive.robots.spec import Footprint, RobotSpec
+from antdrive.robots.spec import Footprint, RobotSpec, require_feasible
 
 _CATALOG = Path(__file__).with_name("catalog")
 
@@ -59,11 +58,7 @@ class FootprintEntry(BaseModel):
         return self
 
     def footprint(self) -> Footprint:
-        """The footprint that this entry describes.
-
-        Raises:
-            FieldError: the polygon is not convex.
-        """
+        """The footprint that this entry describes."""
         centre = self.centre or (0.0, 0.0)
         if self.polygon is not None:
             try:
@@ -120,11 +115,7 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
 
 
 def robot_from_text(text: str, source: str, stem: str) -> RobotSpec:
-    """The robot in the text of a robot file.
-
-    Raises:
-        InputError: something in it is wrong.
-    """
+    """The robot in the text of a robot file."""
     return _robot_in(text, source, stem)
 
 

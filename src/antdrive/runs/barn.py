@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 WORLDS = "world_*.world"
 FIELD = (-4.425, 5.175)  # cell (0, 0) of a reference path [m]
 MAX_MEMBERS, MAX_BYTES = 2000, 500_000_000  # of an archive of worlds
+HEADS = ("world", "runs", "certified", "mean time [s]", "mean score")
+PUBLISHED_HEADS = ("published", "success [%]", "mean time [s]", "mean score", "where")
 #: What our figures are not.
 OURS = "This is our simulator on the challenge's public worlds, no official score."
 
@@ -37,6 +39,15 @@ class Published:
     score: float  # mean score
     success: float = math.nan  # share of runs that arrived; not a number where it is not known
     seconds: float = math.nan  # mean time of a run that arrived [s]; not a number where it is not known
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of a table, under `PUBLISHED_HEADS`."""
+        return self.who, _cell(100 * self.success, 0), _cell(self.seconds, 2), _cell(self.score, 4), self.where
+
+
+def _cell(value: float, digits: int) -> str:
+    return "–" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 COPIED = "the organisers' report on the BARN challenge at ICRA 2026, which we have not read"
@@ -62,13 +73,14 @@ class BarnLine:
     seconds: float  # mean time of those [s], by the challenge's clock; not a number where there are none
     score: float  # mean score of all runs
 
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of a table, under `HEADS`."""
+        return self.world, str(self.runs), str(self.arrived), _cell(self.seconds, 2), _cell(self.score, 4)
+
 
 def unpacked(source: Path, folder: Path) -> Path:
-    """The folder with the worlds of a folder, or of an archive, which is unpacked.
-
-    Raises:
-        InputError: there are no worlds.
-    """
+    """The folder with the worlds of a folder, or of an archive, which is unpacked."""
     archives = [source] if source.is_file() else sorted(source.glob("*.tar.*")) if source.is_dir() else []
     if not archives or (source.is_dir() and any(source.rglob(WORLDS))):
         found = source

@@ -17,8 +17,7 @@ from typing import Any
 
 from antdrive.base.errors import input_error
 from antdrive.base.optional import optional
-from antdrive.runs.pool import ATTEMPTS, Done, Item, Result
-from antdrive.runs.waiting import Ticket, Waiting
+from antdrive.runs.pool import ATTEMPTS, Done, Item, Result, Ticket, Waiting
 
 CHUNKS_EACH = 3  # chunks that are at a worker or on their way to it
 PATIENCE = 10.0  # how long a scheduler may be away before the campaign ends [s]
@@ -35,12 +34,7 @@ def run_on_cluster(
     limit: float | None = None,
     tick: Callable[[], None] = lambda: None,
 ) -> Generator[Done[Item, Result], None, None]:
-    """Do the work for each item on a cluster; what comes of it, in order of arrival.
-
-    Raises:
-        InputError: the address is wrong, or the scheduler cannot be reached or is gone.
-        Exception: what the work raised.
-    """
+    """Do the work for each item on a cluster; what comes of it, in order of arrival."""
     distributed = optional("distributed", "cluster", "--dask spreads runs over machines with it")
     with _client(distributed, address) as client:
         waiting, at_work, asked = Waiting(items, 1), dict[Any, list[Ticket[Item]]](), -math.inf
@@ -173,11 +167,7 @@ def _workers(client: Any, address: str) -> int:
 
 
 def _require_scheduler(client: Any, address: str) -> None:
-    """Wait for a connection that was lost.
-
-    Raises:
-        InputError: it does not come back.
-    """
+    """Wait for a connection that was lost."""
     deadline = time.monotonic() + PATIENCE
     while client.status == "connecting" and time.monotonic() < deadline:
         time.sleep(TICK)

@@ -38,13 +38,14 @@ class Compared:
     plan: bytes  # the planned line as bytes
 
     @classmethod
-    def of(cls, label: str, run: Run) -> Compared:
-        """What a comparison keeps of a run."""
+    def of(cls, label: str, run: Run, folder: str) -> Compared:
+        """What a comparison keeps of a run whose results are in a folder."""
         s, log = run.scenario, run.rollout
         # `drive_digest` covers the planned cells, too, which smoothing may make one route of.
         driven = () if log is None else (log.pose, log.twist, log.command, log.contacts, log.route)
         drive = hashlib.sha256(b"".join(array.tobytes() for array in driven)).hexdigest() if driven else ""
-        return cls(label, s.task.world.name, s.seed, run.as_dict(), drive, run.plan.line.tobytes())
+        facts = {**run.as_dict(), "folder": folder}
+        return cls(label, s.task.world.name, s.seed, facts, drive, run.plan.line.tobytes())
 
     @property
     def cells(self) -> tuple[str, ...]:

@@ -34,9 +34,6 @@ def opened(folder: Path, manifest: str, facts: Mapping[str, Any] | None = None, 
         manifest: the name of its manifest
         facts: what the manifest says; None: it is written later
         kind: what it is a folder of; a folder of other files is refused then
-
-    Raises:
-        InputError: another process writes into it, it cannot be written to, or it holds something else.
     """
     if (
         kind

@@ -1,57 +1,54 @@
-"""Compose the parts of a scenario's drive. Only this module asks for map, localisation, perception, replanning and capabilities.
+"""Compose the parts of a scenario's drive. Only this module chooses parts by map, localisation, perception and replanning.
 
-| run | localiser | map | guide | others | rules, in order |
+| run | localiser | scans | guide | others | rules, in order |
 |---|---|---|---|---|---|
-| given map, nothing moves | Exact, Fixes, TruePose, Reckoned | GivenMap | OneRoute | - | Pursuit |
-| among movers | the same | GivenMap or Lookout | Replanning or OneRoute | Told or Tracked | Pursuit, Avoid |
-| planner in space and time | the same | GivenMap | Replanning | Told | Pursuit, KeepToSchedule, Avoid |
-| cell by cell | the same | GivenMap or Lookout | CellByCell | Told or Tracked | Pursuit, Avoid |
+| given map, nothing moves | Exact, Fixes, TruePose, Reckoned | - | OneRoute | - | Pursuit |
+| among movers | the same | - or Lookout | Replanning or OneRoute | Told or Tracked | Pursuit, Avoid |
+| planner in space and time | the same | - | Replanning | Told | Pursuit, KeepToSchedule, Avoid |
+| cell by cell | the same | - or Lookout | CellByCell | Told or Tracked | Pursuit, Avoid |
 | no map | the same | Survey | Exploration | Told or Tracked | Pursuit, LookRound, Avoid, StayInSight |
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from typing import NamedTuple
 
-from antdrive.planners import capabilities_of
+from antdrive.planners import GridPlanner, capabilities_of
 from antdrive.robots import LIMITERS, Avoidance
-from antdrive.sim.driving.cellwise import CellByCell
-from antdrive.sim.driving.driver import full_turn
+from antdrive.robots.lidar import Lidar
+from antdrive.sim.driving.drive import full_turn, unscanned
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.given import Exact, GivenMap
-from antdrive.sim.driving.localising import Fixes, localiser_of
-from antdrive.sim.driving.lookout import Lookout
+from antdrive.sim.driving.localising import localiser_of
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import Localiser, Logs, Map, Others, RouteGuide, Rule
-from antdrive.sim.driving.perception import Told
-from antdrive.sim.driving.replanning import Replanning
+from antdrive.sim.driving.others import Others, Told, Tracked
+from antdrive.sim.driving.parts import Localiser, Logs, RouteGuide, Rule, Scanning
+from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.rules import (
-    EXPLORING_LIMITERS,
-    GOAL_SHARE,
-    Avoid,
-    KeepToSchedule,
-    LookRound,
-    Pursuit,
-    StayInSight,
-)
-from antdrive.sim.driving.stopping_constraint import Caution
-from antdrive.sim.driving.survey import Senses, Survey
-from antdrive.sim.driving.watching import Tracked, Watch
-from antdrive.sim.policy import Perception, ReplanPolicy
+from antdrive.sim.driving.rules import EXPLORING_LIMITERS, GOAL_SHARE, Avoid, KeepToSchedule, LookRound, Pursuit
+from antdrive.sim.driving.stopping_constraint import StayInSight
+from antdrive.sim.driving.survey import Lookout, Senses, Survey, Watch
+from antdrive.sim.policy import OBSTRUCTED, Perception, ReplanPolicy
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.sensing.ground import KnownGround
-from antdrive.worlds import Task, World
+from antdrive.sim.sensing.tracking import KnownGround
+from antdrive.worlds import Cruising, Disc, Task, World
 
 DRIFTING_SHARE = 0.6  # of the goal's tolerance, as `GOAL_SHARE`, of a robot that finds movers and its way by its lidar
 BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
 
+_rehearsed: set[str] = set()  # how replanning has been rehearsed in this process
 
-class Composition(NamedTuple):
-    """What the record says of a composition; None: the robot has no use for it."""
 
+class Parts(NamedTuple):
+    """The parts of one drive, and what its record says of them; None: the robot has no use for it."""
+
+    localiser: Localiser
+    scan: Scanning
+    guide: RouteGuide
+    rules: tuple[Rule, ...]  # in the order in which they apply
+    logs: tuple[Logs, ...]
     perception: Perception | None  # what the robot perceives of movers
     avoidance: Avoidance | None  # how it avoids them
     replanning: ReplanPolicy | None  # when it looks for a new route
@@ -59,68 +56,52 @@ class Composition(NamedTuple):
     mapped: bool  # whether its plans are those of the world's map
 
 
-class Parts(NamedTuple):
-    """The parts of one drive. The rules apply in their order."""
-
-    localiser: Localiser
-    map: Map
-    guide: RouteGuide
-    rules: tuple[Rule, ...]
-    logs: tuple[Logs, ...]
-    declared: Composition
-
-
 def compose(s: Scenario) -> Parts:
     """The parts of a scenario's drive."""
-    localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / s.control_hz, s.task.start, s.seed)
-    return _without_map(s, localiser) if s.exploring else _with_map(s, localiser)
-
-
-def _with_map(s: Scenario, localiser: Exact | Fixes) -> Parts:
-    """A robot that knows the world's map."""
-    lookout = _lookout(s) if s.watching else None
-    others = _others(s, lookout.watch if lookout else None)
-    guide = _guide(s, others)
-    rules: list[Rule] = [_pursuit(s)]
-    if isinstance(guide, Replanning) and capabilities_of(s.planner).needs_motions:
-        rules.append(KeepToSchedule(guide, s.robot, s.control_hz))
-    avoidance = avoidance_of(s)
-    if s.among_movers and avoidance is not None:
-        rules.append(Avoid(avoidance, others, guide, s.task, s.robot, s.control_hz))
-    logs = (localiser, lookout, lookout.watch) if lookout else (localiser,)
-    return Parts(localiser, lookout or GivenMap(), guide, tuple(rules), logs, _declared(s, LIMITERS))
-
-
-def _without_map(s: Scenario, localiser: Exact | Fixes) -> Parts:
-    """A robot that knows what its lidar has seen."""
-    lidar, hz = s.robot.lidar, s.control_hz
-    assert lidar is not None  # a scenario without a map has one
-    survey = Survey.of(
-        s.robot,
-        s.task,
-        Senses.of(lidar, s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=hz),
-        matching=s.localisation == "matching",
-        watch=Watch(lidar, hz) if s.watching else None,
-    )
-    watch, others = survey.watch, _others(s, survey.watch)
-    planner, policy = route_planner(s), s.replanning or ReplanPolicy()
-    ahead = None
-    if watch is not None and s.replanning is not None and policy.around_movers:
-        tracked = Tracked(watch, s.effective_perception, hz)
-        ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, hz)
-    guide = Exploration(planner, survey, policy, ahead)
-    rules: list[Rule] = [_pursuit(s), LookRound(guide, s.robot, hz)]
-    avoidance = avoidance_of(s)
-    if s.among_movers and avoidance is not None:
-        drifts = watch is not None
+    perception, avoidance, hz = perceived(s), avoidance_of(s), s.control_hz
+    watching, mapped = perception.kind == "lidar", s.map == "given"
+    moving = watching or bool(s.driven_world.movers)
+    localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, s.task.start, s.seed)
+    survey = None if mapped else _survey(s, watching)
+    scans = _lookout(s) if mapped and watching else survey
+    watch = scans.watch if scans else None
+    others: Others = Tracked(watch, perception, hz) if watch else Told(s.trajectories, perception, hz)
+    rules: list[Rule] = [Pursuit(s.controller, full_turn(s.robot, hz))]
+    guide: RouteGuide
+    if survey:
+        guide = exploration = _exploration(s, survey)
+        rules.append(LookRound(exploration, s.robot, hz))
+    else:
+        guide = _guide(s, others, moving)
+    if capabilities_of(s.planner).needs_motions:
+        rules.append(KeepToSchedule(guide, s.robot, hz))
+    if moving and avoidance is not None:
+        drifts = survey is not None and watching
         share = DRIFTING_SHARE if drifts else GOAL_SHARE
-        backwards = BLIND_SHARE * s.robot.max_speed if drifts and not lidar.full_circle else math.inf
+        blind = drifts and not _lidar(s).full_circle
+        backwards = BLIND_SHARE * s.robot.max_speed if blind else math.inf
         rules.append(Avoid(avoidance, others, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards))
-    # One scan may be as old as their period, and commands are late.
-    reaction = 1 / hz + 1 / lidar.rate + s.robot.noise.scaled(s.noise).delay
-    rules.append(StayInSight(Caution(survey, s.robot, hz, reaction), guide))
-    logs = (localiser, survey, guide, watch) if watch else (localiser, survey, guide)
-    return Parts(localiser, survey, guide, tuple(rules), logs, _declared(s, EXPLORING_LIMITERS))
+    if survey:
+        # One scan may be as old as their period, and commands are late.
+        reaction = 1 / hz + 1 / survey.lidar.rate + s.robot.noise.scaled(s.noise).delay
+        rules.append(StayInSight(survey, s.robot, hz, reaction, exploration.note_sight))
+    return Parts(
+        localiser,
+        scans.scan if scans else unscanned,
+        guide,
+        tuple(rules),
+        tuple(part for part in (localiser, guide, scans, watch) if part is not None),
+        perception=perception if moving else None,
+        avoidance=avoidance if moving else None,
+        replanning=s.replanning if moving or survey else None,
+        limiters=EXPLORING_LIMITERS if survey else LIMITERS,
+        mapped=mapped,
+    )
+
+
+def perceived(s: Scenario) -> Perception:
+    """What the robot perceives of movers: their motions, if the planner is given them."""
+    return Perception(kind="motions") if s.timed else s.known_perception
 
 
 def route_planner(s: Scenario) -> RoutePlanner:
@@ -128,7 +109,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
     return RoutePlanner(
         planner=s.planner,
         planner_label=s.planner_label,
-        task=told(s.task) if s.exploring else s.task,
+        task=s.task if s.map == "given" else told(s.task),
         robot=s.robot,
         controller=s.controller,
         margin=s.margin,
@@ -137,6 +118,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
         hz=s.control_hz,
         seed=s.seed,
         motions=s.trajectories.motions if s.timed else (),
+        mapped=s.map == "given",
     )
 
 
@@ -153,48 +135,71 @@ def avoidance_of(s: Scenario) -> Avoidance | None:
     Movers whose motions are known do not reverse unexpectedly, so reversals are not considered. A plan in
     space and time avoids the movers already, so the horizon is short.
     """
-    if s.avoidance is None or s.effective_perception.kind != "motions":
+    if s.avoidance is None or perceived(s).kind != "motions":
         return s.avoidance
     horizon = min(s.avoidance.horizon, 1.0) if s.timed else s.avoidance.horizon
     return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=horizon)
 
 
-def _guide(s: Scenario, others: Others) -> OneRoute:
+def _guide(s: Scenario, others: Others, moving: bool) -> RouteGuide:
     """What plans the routes of a robot with a map."""
     policy, avoidance = s.replanning, avoidance_of(s)
-    if policy is None or not s.among_movers:
+    if policy is None or not moving:
         return OneRoute(route_planner(s))
     kind = CellByCell if capabilities_of(s.planner).cell_by_cell and policy.around_movers else Replanning
     return kind(route_planner(s), policy, others, s.robot.radius + avoidance.min_clearance if avoidance else 0.0)
 
 
-def _others(s: Scenario, watch: Watch | None) -> Others:
-    """The movers as the robot perceives them."""
-    perception = s.effective_perception
-    return Tracked(watch, perception, s.control_hz) if watch else Told(s.trajectories, perception, s.control_hz)
+def _exploration(s: Scenario, survey: Survey) -> Exploration:
+    """What finds the routes of a robot without a map; around the movers that it tracks, if it is to."""
+    policy, ahead = s.replanning or ReplanPolicy(), None
+    if survey.watch is not None and s.replanning is not None and policy.around_movers:
+        tracked = Tracked(survey.watch, perceived(s), s.control_hz)
+        ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, s.control_hz)
+    return Exploration(route_planner(s), survey, policy, ahead)
+
+
+def _survey(s: Scenario, watching: bool) -> Survey:
+    """What a robot without a map knows of the world."""
+    watch = Watch(_lidar(s), s.control_hz) if watching else None
+    return Survey.of(s.robot, s.task, _senses(s), matching=s.localisation == "matching", watch=watch)
 
 
 def _lookout(s: Scenario) -> Lookout:
     """What looks for movers, and for obstacles that are not on the given map."""
-    lidar = s.robot.lidar
-    assert lidar is not None  # a scenario in which a lidar sees has one
-    noise = s.robot.noise.scaled(s.noise)
+    noise, lidar = s.robot.noise.scaled(s.noise), _lidar(s)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
     ground = KnownGround(lidar, s.task.world, math.inf, *errors)
-    senses = Senses.of(lidar, s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)
-    return Lookout(senses, ground, Watch(lidar, s.control_hz, *errors))
+    return Lookout(_senses(s), ground, Watch(lidar, s.control_hz, *errors))
 
 
-def _pursuit(s: Scenario) -> Pursuit:
-    return Pursuit(s.controller, full_turn(s.robot, s.control_hz))
+def _lidar(s: Scenario) -> Lidar:
+    assert s.robot.lidar is not None  # a scenario in which a lidar sees has one
+    return s.robot.lidar
 
 
-def _declared(s: Scenario, limiters: tuple[str, ...]) -> Composition:
-    moving = s.among_movers
-    return Composition(
-        perception=s.effective_perception if moving else None,
-        avoidance=avoidance_of(s) if moving else None,
-        replanning=s.replanning if moving or s.exploring else None,
-        limiters=limiters,
-        mapped=not s.exploring,
-    )
+def _senses(s: Scenario) -> Senses:
+    """The lidar in the world that the robot drives in."""
+    return Senses.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)
+
+
+def load_replanning(s: Scenario) -> None:
+    """Replan twice in a tiny world, once per process and planner, so that the times of replans hold no loading of kernels."""
+    if not s.driven_world.movers or s.replanning is None or not isinstance(s.planner, GridPlanner):
+        return
+    planner = s.planner.rehearsal()
+    key = f"{type(planner).__module__}.{planner!r} {s.smoothing} {s.known_perception.kind} {s.replanning}"
+    if key in _rehearsed:
+        return
+    _rehearsed.add(key)
+    unit, hz = s.inflate, s.control_hz
+    mover = Cruising(radius=unit, position=(8 * unit, 11 * unit), velocity=(0.1 * unit, 0.0))
+    world = World("tiny", (0.0, 0.0, 24 * unit, 24 * unit), (Disc(12 * unit, 12 * unit, 2 * unit),), movers=(mover,))
+    task = Task(world, (4 * unit, 4 * unit, 0.0), (20 * unit, 20 * unit), goal_tolerance=unit, cell=unit)
+    with contextlib.suppress(Exception):  # a planner that fails here fails where it is timed
+        guide = compose(dataclasses.replace(s, task=task, planner=planner, cell=None, unseen=())).guide
+        grid, answer = guide.first()
+        if answer.solved:
+            guide.route(grid, answer)
+            for tick in (0, 5 * hz):
+                guide.replan(tick, task.start, OBSTRUCTED)

@@ -40,11 +40,7 @@ def _switch(value: Any) -> Any:
 
 
 def seed_list(value: Any) -> list[int]:
-    """The seeds that people write as [0, 1, 2] or 0-9.
-
-    Raises:
-        ValueError: it is neither; the text says what would be right.
-    """
+    """The seeds that people write as [0, 1, 2] or 0-9."""
     if isinstance(value, str) and (match := _SEEDS.fullmatch(value)):
         first, last = int(match[1]), int(match[2])
         if first <= last < first + MAX_SEEDS:
@@ -82,11 +78,7 @@ class Form:
     usual: Any = None  # the value in a file that means the default; None: the default itself
 
     def read(self, key: str, value: Any) -> Any:
-        """The field's value that a file's value means.
-
-        Raises:
-            FieldError: it means none.
-        """
+        """The field's value that a file's value means."""
         return value
 
     def write(self, value: Any) -> Any:
@@ -252,11 +244,7 @@ def written_default(one: DeclaredSetting) -> Any:
 
 
 def scenario_fields(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a scenario that values of files mean, by name; defaults for what is not given.
-
-    Raises:
-        FieldError: a value that means nothing.
-    """
+    """The fields of a scenario that values of files mean, by name; defaults for what is not given."""
     return {
         one.name: form_of(one).read(one.key, given[one.key]) if one.key in given else one.default
         for one in SETTINGS.values()
@@ -283,11 +271,7 @@ def setting_words(given: Mapping[str, Any]) -> list[str] | None:
 
 
 def written(values: Callable[[str], Any]) -> dict[str, Any]:
-    """The settings that differ from their defaults as files write them, by key.
-
-    Args:
-        values: the value of a field
-    """
+    """The settings that differ from their defaults as files write them, by key; from a function of the values by field."""
     differing = (one for one in SETTINGS.values() if values(one.name) != one.default)
     return {one.key: form_of(one).write(values(one.name)) for one in differing}
 

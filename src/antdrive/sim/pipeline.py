@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import dataclasses
 import time
 from dataclasses import dataclass
 from typing import Any
 
 from antdrive.base.errors import FieldError
-from antdrive.planners import GridPlanner, PlanResult, PlanStatus
-from antdrive.sim.compose import compose
-from antdrive.sim.driving.drive import Progress, drive, unheard
-from antdrive.sim.driving.driver import Driver
+from antdrive.planners import PlanResult, PlanStatus
+from antdrive.sim.compose import compose, load_replanning
+from antdrive.sim.driving.drive import Driver, Progress, drive, unheard
 from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.driving.replan_causes import OBSTRUCTED
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS, measure
 from antdrive.sim.log.outcome import Outcome
@@ -24,9 +20,9 @@ from antdrive.sim.log.sights import passed
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import rollout_of
 from antdrive.sim.recording import versions as versions
-from antdrive.sim.scenario import Scenario
-from antdrive.worlds import Cruising, Disc, Grid, Task, World
-from antdrive.worlds.drawing import LINE, card, world_svg
+from antdrive.sim.scenario import Scenario, picture_of
+from antdrive.worlds import Grid
+from antdrive.worlds.drawing import LINE, card
 
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
 ENDED_BY = {
@@ -116,7 +112,6 @@ class Run:
 
     def _repr_html_(self) -> str:
         s = self.scenario
-        task = s.task
         facts: dict[str, object] = {"planner": s.planner_label, "robot": s.robot.name}
         lines = []
         if self.rollout is not None:
@@ -126,11 +121,7 @@ class Run:
             facts["certified"] = "yes" if self.certificate and self.certificate.certified else "no"
         if self.reason:
             facts["reason"] = self.reason
-        goal = (*task.goal, task.goal_tolerance)
-        world = s.driven_world
-        movers = world.ways(task.start[:2], s.seed)
-        picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
-        return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
+        return card(picture_of(s, lines), f"{s.task.world.name}: {self.outcome.value}", facts)
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
@@ -170,37 +161,12 @@ def run(
         return Run(s, grid, answer)
     route, path = parts.guide.route(grid, answer)
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
-    _load_replanning(s)
+    load_replanning(s)
     started = time.perf_counter()
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)
     with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:
         plant = Bullet(engine, s.task.start, s.control_hz)
-        ending = drive(plant, driver, parts.localiser, parts.map, hz=s.control_hz, limit=limit, progress=progress)
+        ending = drive(plant, driver, parts.localiser, parts.scan, hz=s.control_hz, limit=limit, progress=progress)
         log = plant.finish(ending)
     rollout = rollout_of(s, parts, grid, answer, route, log, limit, time.perf_counter() - started)
     return Run(s, grid, answer, rollout, certify(rollout))
-
-
-_rehearsed: set[str] = set()  # how replanning has been rehearsed in this process
-
-
-def _load_replanning(s: Scenario) -> None:
-    """Replan twice in a tiny world, once per process and planner, so that the times of replans hold no loading of kernels."""
-    if not s.driven_world.movers or s.replanning is None or not isinstance(s.planner, GridPlanner):
-        return
-    planner = s.planner.rehearsal()
-    key = f"{type(planner).__module__}.{planner!r} {s.smoothing} {s.effective_perception.kind} {s.replanning}"
-    if key in _rehearsed:
-        return
-    _rehearsed.add(key)
-    unit, hz = s.inflate, s.control_hz
-    mover = Cruising(radius=unit, position=(8 * unit, 11 * unit), velocity=(0.1 * unit, 0.0))
-    world = World("tiny", (0.0, 0.0, 24 * unit, 24 * unit), (Disc(12 * unit, 12 * unit, 2 * unit),), movers=(mover,))
-    task = Task(world, (4 * unit, 4 * unit, 0.0), (20 * unit, 20 * unit), goal_tolerance=unit, cell=unit)
-    with contextlib.suppress(Exception):  # a planner that fails here fails where it is timed
-        guide = compose(dataclasses.replace(s, task=task, planner=planner, cell=None, unseen=())).guide
-        grid, answer = guide.first()
-        if answer.solved:
-            guide.route(grid, answer)
-            for tick in (0, 5 * hz):
-                guide.replan(tick, task.start, OBSTRUCTED)

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from antdrive.base.plane import place_name
-from antdrive.planners import PLANNERS, Query
-from antdrive.planners.anyangle.passage import MOST_OBSTACLES, widest_passage
-from antdrive.planners.anyangle.tangent import shortest
+from antdrive.planners import AStar, Query
+from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible, widest_passage
 from antdrive.planners.graph.search import reachable
 from antdrive.robots.placing import name_of
 from antdrive.worlds import Grid, Task, point_clearance, rasterise
@@ -32,7 +31,7 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
     start = f"no path for {disc} on cells of {grid.cell:g} m{says}"
     if len(s.task.world.obstacles) > MOST_OBSTACLES:
         return f"{start}; {_narrowest_cell(s, grid)}"
-    if shortest(s.task.world.discs, s.task.world.bounds, s.inflate, s.task.start[:2], s.task.goal) is not None:
+    if feasible(s.task, s.inflate):
         finer = next((grid.cell / k for k in FINER if _has_path(s.task, grid.cell / k, s.inflate)), None)
         return f"{start}; there is one on {f'cells of {finer:g} m' if finer else 'finer cells'}"
     return f"{start}; {_narrowest_place(s)}"
@@ -80,7 +79,7 @@ def _narrowest_cell(s: RoutePlanner, grid: Grid) -> str:
     if low == 0:
         return f"no disc of {high:.2g} m gets through, on these cells"
     free = rasterise(s.task.world, grid.cell, low)
-    cells = PLANNERS["astar"].plan(Query.between(free, s.task), np.random.default_rng(0)).cells
+    cells = AStar().plan(Query.between(free, s.task), np.random.default_rng(0)).cells
     room = point_clearance(s.task.world, free.xy(cells))
     at = place_name(s.task.frame, *free.xy(cells)[int(room.argmin())].tolist())
     return (

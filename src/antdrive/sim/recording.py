@@ -7,20 +7,15 @@ import platform
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from antdrive.base.reuse import Keyed, reused
-from antdrive.planners import PLANNERS, PlanResult, Query
+from antdrive.planners import AStar, PlanResult, Query, Tangent
 from antdrive.sim.driving.plants import Drive
-from antdrive.sim.driving.replanning import Replan
 from antdrive.sim.driving.routes import by_contents, grid_of
 from antdrive.sim.log.record import (
     ComponentRecord,
     DriveRecord,
-    MarginRecord,
     PerceptionRecord,
     PlanRecord,
-    ReplanRecord,
     SmoothingRecord,
     TimesRecord,
     finite_or_none,
@@ -39,20 +34,14 @@ if TYPE_CHECKING:
 def rollout_of(
     s: Scenario, parts: Parts, grid: Grid, answer: PlanResult, route: Route, log: Drive, limit: float, wall: float
 ) -> Rollout:
-    """The log of a scenario's drive.
-
-    Args:
-        limit: the time limit [s]
-        wall: wall time of the drive [s]
-    """
-    declared, replans = parts.declared, parts.guide.log
-    perception, avoidance, replanning = declared.perception, declared.avoidance, declared.replanning
+    """The log of a scenario's drive, with its time limit [s] and the wall time that it took [s]."""
+    perception, avoidance, replanning = parts.perception, parts.avoidance, parts.replanning
     record = DriveRecord(
         task=s.task,
         unseen=s.unseen,
         seed=s.seed,
         planner=ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
-        plan=_plan_record(s, grid, answer, declared.mapped),
+        plan=_plan_record(s, grid, answer, parts.mapped),
         robot=s.robot,
         controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
@@ -61,11 +50,11 @@ def rollout_of(
         else None,
         avoidance=settings_of(avoidance) if avoidance else None,
         replanning=settings_of(replanning) if replanning else None,
-        replans=tuple(_replan_record(replan) for replan in replans),
-        limiters=declared.limiters,
+        replans=tuple(parts.guide.log),
+        limiters=parts.limiters,
         noise=s.noise,
         margin=s.margin,
-        margin_choice=_margin_record(s),
+        margin_choice=s.chosen.record if s.chosen is not None else None,
         sensing=s.sensing,
         settings=s.other_settings,
         inflate=s.inflate,
@@ -76,22 +65,10 @@ def rollout_of(
         outcome=log.outcome,
         reason=log.reason,
         versions=versions(),
-        times=TimesRecord(
-            plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(replan.wall_s for replan in replans)
-        ),
+        times=TimesRecord(plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(parts.guide.walls)),
     )
-    arrays: dict[str, Any] = {
-        "t": log.t,
-        "pose": log.pose,
-        "twist": log.twist,
-        "command": log.command,
-        "clearance": log.clearance,
-        "limiter": log.limiter,
-        "movers": log.movers,
-        "contacts": log.contacts,
-        "route": route.xy,
-        "cells": answer.cells,
-    }
+    driven = {name: array for name, array in vars(log).items() if name not in ("outcome", "reason", "actuated")}
+    arrays: dict[str, Any] = {**driven, "route": route.xy, "cells": answer.cells}
     for part in parts.logs:
         arrays |= part.logged(log, s.physics_hz // s.control_hz)
     return Rollout(**arrays, record=record)
@@ -115,28 +92,8 @@ def _plan_record(s: Scenario, grid: Grid, answer: PlanResult, mapped: bool) -> P
 def _optima(asked: Keyed[tuple[Grid, Task]]) -> tuple[float | None, float | None]:
     """The lengths of the shortest path on the grid and of that among the inflated discs [m]; both searches draw nothing."""
     query, rng = Query.between(*asked.value), random_stream(0, "optimum")
-    on_grid, free = PLANNERS["astar"].plan(query, rng), PLANNERS["tangent"].plan(query, rng)
+    on_grid, free = AStar().plan(query, rng), Tangent().plan(query, rng)
     return finite_or_none(on_grid.cost), finite_or_none(free.line_length)
-
-
-def _margin_record(s: Scenario) -> MarginRecord | None:
-    chosen = s.chosen
-    if chosen is None:
-        return None
-    return MarginRecord(
-        loss_m=chosen.loss, reserve_m=chosen.reserve, probability=chosen.probability, drives=chosen.drives
-    )
-
-
-def _replan_record(replan: Replan) -> ReplanRecord:
-    return ReplanRecord(
-        t=replan.t,
-        trigger=replan.trigger,
-        solved=replan.solved,
-        cost_m=finite_or_none(replan.cost),
-        work=replan.work,
-        route=tuple((x, y) for x, y in np.round(replan.route, 4).tolist()),
-    )
 
 
 def versions() -> dict[str, str]:

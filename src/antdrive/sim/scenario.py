@@ -1,4 +1,4 @@
-"""A scenario: everything that a run depends on."""
+"""A scenario: task, planner, robot, seed and the settings of `antdrive.sim.settings`, checked together."""
 
 from __future__ import annotations
 
@@ -7,50 +7,55 @@ import hashlib
 import inspect
 import json
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 import numpy as np
 
+from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import place_name
-from antdrive.planners import Planner, capabilities_of, load_planner, record_name
-from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot, overlap_at
-from antdrive.robots.odometry import Odometry
-from antdrive.sim.log.binding import canonical_hash
-from antdrive.sim.log.record import DriveRecord, SensingRecord, changes, settings_of
+from antdrive.planners import Planner, capabilities_of
+from antdrive.robots import RobotSpec, overlap_at
+from antdrive.robots.spec import Odometry
+from antdrive.sim.log.record import DriveRecord, MarginRecord, SensingRecord, canonical_hash, changes, settings_of
 from antdrive.sim.log.streams import random_stream
-from antdrive.sim.policy import Perception, ReplanPolicy, usual_perception
+from antdrive.sim.policy import Perception, usual_perception
 from antdrive.sim.settings import SETTINGS, SLOWEST_CONTROL, Settings, part_of_key
-from antdrive.worlds import Disc, Task, Trajectories, World, load_task
+from antdrive.worlds import Disc, Task, Trajectories, World
 from antdrive.worlds.drawing import card, world_svg
 
 DRIFTING = "odometry", "matching"  # localisation without fixes
 FINE = 0.05  # without a map, plans are made on cells of this side at most [m]
 NO_LIDAR = "has no lidar; add one to its file, or drive jackal or turtlebot4"
 
-_KINDS: Mapping[str, Any] = {
-    "task": Task,
-    "robot": RobotSpec,
-    "controller": PurePursuit,
-    "perception": Perception | None,
-    "avoidance": Avoidance | None,
-    "replanning": ReplanPolicy | None,
-    "unseen": tuple,
-}
+if TYPE_CHECKING:
+    from antdrive.robots import PurePursuit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """What the loss of margin depends on, as far as a calibration takes it into account."""
+
+    robot: RobotSpec  # drives
+    controller: PurePursuit  # follows the route
+    noise: float  # the factor on the robot's documented noise
+    smoothing: str  # how plans become routes
+    physics_hz: int = 240  # physics steps per simulated second
+    control_hz: int = 60  # control periods per simulated second
+
+    def __post_init__(self) -> None:
+        SETTINGS["smoothing"].check(self.smoothing)
 
 
 @dataclass(frozen=True, kw_only=True)
 class MarginChoice:
-    """What a margin was chosen by, see `antdrive.runs.margins.with_chosen_margin`."""
+    """What a margin was chosen by, see `antdrive.runs.margins.choice.with_chosen_margin`."""
 
     margin: float  # the margin that was chosen [m]
-    loss: float  # how much of it a drive is predicted to use up [m]
-    reserve: float  # what the predicted loss leaves of it, at least [m]
-    probability: float  # of a larger loss than predicted
-    drives: int  # number of drives that the prediction rests on
-    conditions: tuple[Any, ...]  # what the loss depends on, as `Scenario.loss_conditions`
+    record: MarginRecord  # what records say of the choice
+    conditions: Conditions  # what the loss depends on
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,11 +99,13 @@ class Scenario(Settings):
 
     def _check_kinds(self) -> None:
         """Refuse objects of the wrong type here, where the field can be named, and not deep in a run."""
-        for name, kind in _KINDS.items():
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                wanted = str(getattr(kind, "__name__", kind)).replace("antdrive.", "").rpartition(".")[2]
-                raise FieldError(name, f"must be a {wanted.replace(' | ', ' or ')}, got {value!r:.60}")
+        kinds: dict[str, type] = {"task": Task, "robot": RobotSpec, "perception": Perception, "unseen": tuple}
+        kinds |= {name: type(SETTINGS[name].default) for name in ("controller", "avoidance", "replanning")}
+        for name, kind in kinds.items():
+            value, optional = getattr(self, name), name in ("perception", "avoidance", "replanning")
+            if not isinstance(value, kind) and not (optional and value is None):
+                wanted = f"{kind.__name__} or None" if optional else kind.__name__
+                raise FieldError(name, f"must be a {wanted}, got {value!r:.60}")
         if not all(isinstance(disc, Disc) for disc in self.unseen):
             raise FieldError("unseen", f"must hold Disc objects, got {self.unseen!r:.60}")
 
@@ -157,6 +164,10 @@ class Scenario(Settings):
             InputError: there is no such world, planner, option or robot, or a file is wrong.
             ValueError: a setting is out of range, the robot does not fit, or `options` are given for a planner object.
         """
+        from antdrive.planners import load_planner, record_name  # names need the catalogues
+        from antdrive.robots import load_robot
+        from antdrive.worlds import load_task
+
         if not isinstance(planner, str) and options:
             raise FieldError("options", "need a planner's name; set the options of a planner object itself")
         return cls(
@@ -181,10 +192,16 @@ class Scenario(Settings):
         return hashlib.sha256(repr((text, *more)).encode()).hexdigest()
 
     @property
-    def loss_conditions(self) -> tuple[RobotSpec, PurePursuit, float, str, int, int]:
-        """What the loss of margin depends on: robot, controller, noise, smoothing, and the rates of physics and control."""
-        smoothing = "none" if self.timed else self.smoothing
-        return self.robot, self.controller, float(self.noise), smoothing, self.physics_hz, self.control_hz
+    def loss_conditions(self) -> Conditions:
+        """What the loss of margin depends on."""
+        return Conditions(
+            robot=self.robot,
+            controller=self.controller,
+            noise=float(self.noise),
+            smoothing="none" if self.timed else self.smoothing,
+            physics_hz=self.physics_hz,
+            control_hz=self.control_hz,
+        )
 
     @property
     def chosen(self) -> MarginChoice | None:
@@ -250,16 +267,11 @@ class Scenario(Settings):
         return Trajectories.of(self.driven_world, self.task.start[:2], self.seed)
 
     @property
-    def exploring(self) -> bool:
-        """Whether the robot has no map."""
-        return self.map == "none"
-
-    @property
     def planning_cell(self) -> float:
         """The side of the cells that routes are planned on [m]; without a map fine ones: coarse ones close gaps."""
         if self.cell is not None:
             return self.cell
-        return min(self.task.cell, FINE) if self.exploring else self.task.cell
+        return min(self.task.cell, FINE) if self.map == "none" else self.task.cell
 
     @property
     def sensing(self) -> SensingRecord | None:
@@ -282,21 +294,6 @@ class Scenario(Settings):
         return bool(self.driven_world.movers) and capabilities_of(self.planner).needs_motions
 
     @property
-    def among_movers(self) -> bool:
-        """Whether there are movers, or the robot looks for some."""
-        return bool(self.driven_world.movers) or self.watching
-
-    @property
-    def watching(self) -> bool:
-        """Whether the robot looks for movers with its lidar, and is told nothing of them."""
-        return self.effective_perception.kind == "lidar"
-
-    @property
-    def effective_perception(self) -> Perception:
-        """What the robot perceives of movers: their motions, if the planner is given them."""
-        return Perception(kind="motions") if self.timed else self.known_perception
-
-    @property
     def known_perception(self) -> Perception:
         """What the robot perceives of movers as asked for; the usual where nobody asked."""
         return self.perception or usual_perception(self.map, movers=bool(self.task.world.movers))
@@ -317,32 +314,26 @@ class Scenario(Settings):
         }
         if self.driven_world.movers:
             facts["movers"] = len(self.driven_world.movers)
-        world = self.driven_world
-        goal, movers = (*task.goal, task.goal_tolerance), world.ways(task.start[:2], self.seed)
-        picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, movers=movers)
-        return card(picture, task.world.name, facts)
+        return card(picture_of(self), task.world.name, facts)
+
+
+def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:
+    """The driven world as SVG, with start, goal, the ways of movers, and lines: points, colour, whether dashed."""
+    world, task = s.driven_world, s.task
+    goal, movers = (*task.goal, task.goal_tolerance), world.ways(task.start[:2], s.seed)
+    return world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
 
 
 def identity_text(
-    task: str,
-    planner: str,
-    options: Any,
-    robot: str,
-    fields: Mapping[str, Any],
-    without: Collection[str] = (),
-    **more: str,
+    task: str,  # the canonical hash of the world with start and goal
+    planner: str,  # the planner's name
+    options: Any,  # the planner, or its options as plain values
+    robot: str,  # the robot's canonical hash
+    fields: Mapping[str, Any],  # the values of `SETTINGS` by field
+    without: Collection[str] = (),  # fields to leave out
+    **more: str,  # what else the drive depends on
 ) -> str:
-    """A scenario as JSON text, for hashes.
-
-    Args:
-        task: the canonical hash of the world with start and goal
-        planner: the planner's name
-        options: the planner, or its options as plain values
-        robot: the robot's canonical hash
-        fields: the values of `SETTINGS` by field
-        without: fields to leave out
-        more: what else the drive depends on
-    """
+    """A scenario as JSON text, for hashes."""
     plain = settings_of(options) if isinstance(options, Mapping) or dataclasses.is_dataclass(options) else {}
     parts = {"task": task, "planner": planner, "options": plain, "robot": robot, **more}
     parts["settings"] = settings_of(part_of_key(fields, without))

@@ -1,6 +1,7 @@
 """The settings of a scenario, each declared once: type, bounds, default, help, and how people write it.
 
-Files, options, tables, keys, records and reference pages are read from `SETTINGS`. Imports nothing heavy: the command line does.
+A new setting is a field of `Settings`; one that is neither a number nor a word needs a form in `antdrive.sim.forms`, too. Files,
+options, tables, keys, records and reference pages are read from `SETTINGS`. Imports nothing heavy: the command line does.
 """
 
 import dataclasses
@@ -42,7 +43,7 @@ class Setting:
     flag: str | None = None  # the option; None: the key with `--`; empty: there is none
     form: str = "plain"  # how values are written, see `antdrive.sim.forms`
     choices: tuple[str, ...] = ()  # the words that the field can be
-    axis: str = ""  # the key of a campaign file that lists values; empty: one of its `settings`
+    axis: bool = False  # whether a campaign file lists values under its key; else it is one of the `settings`
     column: str = ""  # the column in a campaign's table; empty: the key
     usual: str = ""  # what the default None means, for `--help`
     # the format of a campaign's keys that the setting joined in; later ones are left out at their default
@@ -73,14 +74,14 @@ class Settings:
             "Planner",
             "KIND",
             choices=SMOOTHINGS,
-            axis="routes",
+            axis=True,
         ),
     ] = "clearance"
     noise: Annotated[
         float,
         Ge(0),
         Setting(
-            "factor on the noise that the robot's file documents; 0 is a perfect robot", "Robot", "FACTOR", axis="noise"
+            "factor on the noise that the robot's file documents; 0 is a perfect robot", "Robot", "FACTOR", axis=True
         ),
     ] = 0.0
     margin: Annotated[
@@ -92,7 +93,7 @@ class Settings:
             "Planner",
             "METRES|auto",
             form="margin",
-            axis="margin",
+            axis=True,
             column="margin_asked",
         ),
     ] = 0.03
@@ -190,9 +191,7 @@ class Settings:
         Ge(SLOWEST_CONTROL),
         Setting("control periods per simulated second, at least 10; must divide physics_hz", "Robot", flag=""),
     ] = 60
-    seed: Annotated[
-        int, Ge(0), Le(2**63 - 1), Setting("seed of all random numbers", "World", "NUMBER", axis="seeds")
-    ] = 0
+    seed: Annotated[int, Ge(0), Le(2**63 - 1), Setting("seed of all random numbers", "World", "NUMBER", axis=True)] = 0
 
     def __post_init__(self) -> None:
         for one in SETTINGS.values():
@@ -237,11 +236,7 @@ class DeclaredSetting:
         return self.field.default if made is dataclasses.MISSING else made()
 
     def check(self, value: Any) -> None:
-        """Refuse a number of another kind or beyond its bounds, and a word that is none of the choices.
-
-        Raises:
-            FieldError: the value is refused.
-        """
+        """Refuse a number of another kind or beyond its bounds, and a word that is none of the choices."""
         if self.kind not in (int, float, str) or (value is None and self.optional):
             return
         choices = self.setting.choices

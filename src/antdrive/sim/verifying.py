@@ -1,16 +1,86 @@
-"""Everything that a log proves or contradicts, as plain values."""
+"""Everything that a log proves or contradicts, as plain values; the log is believed, a run's `result.json` is a claim."""
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from antdrive.base.errors import input_error
 from antdrive.robots.spec import RobotSpec
-from antdrive.sim.log.binding import differences, hashes_of
 from antdrive.sim.log.certificate import certify
-from antdrive.sim.log.claims import false_claims, read_result
+from antdrive.sim.log.record import differences, hashes_of, plain_value
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Task
+
+MAX_RESULT_BYTES = 10_000_000  # of a result.json
+SAME = 1e-9  # numbers that are written twice agree to this share
+
+
+def read_result(path: Path) -> Mapping[str, Any]:
+    """The content of a `result.json`; empty if it is no object."""
+    if not path.is_file():
+        raise input_error(str(path), "cannot be read (no regular file)")
+    if path.stat().st_size > MAX_RESULT_BYTES:
+        raise input_error(str(path), f"cannot be read (larger than {MAX_RESULT_BYTES // 1_000_000} MB)")
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise input_error(str(path), f"cannot be read ({error})") from None
+    return content if isinstance(content, dict) else {}
+
+
+def false_claims(result: Mapping[str, Any], rollout: Rollout, digest: str) -> Iterator[str]:
+    """A sentence for everything in a `result.json` that its log contradicts. Keys that it lacks are no contradiction."""
+    if result.get("digest") != digest:
+        yield "result.json is about another log: its digest differs"
+        return
+    for key, logged in logged_settings(rollout).items():
+        if key in result and not _agree(result[key], logged):
+            yield f"result.json: {key}: differs from the log, which says {_short(logged)}"
+
+
+def logged_settings(rollout: Rollout) -> dict[str, Any]:
+    """What a log says about its run, by the keys of `result.json`."""
+    record = rollout.record
+    task = record.task
+    return {
+        "world": task.world.name,
+        "planner": record.planner.name,
+        "robot": record.robot.name,
+        "seed": record.seed,
+        "outcome": record.outcome.key,
+        "options": dict(record.planner.settings),
+        "smoothing": record.smoothing.asked,
+        "noise": record.noise,
+        "margin_m": record.margin,
+        "margin_auto": record.margin_choice is not None,
+        "cell_m": record.cell,
+        "physics_hz": record.physics_hz,
+        "control_hz": record.control_hz,
+        **({"frame": list(task.frame)} if any(task.frame) else {}),
+        "task": plain_value({"start": task.start, "goal": task.goal, "goal_tolerance_m": task.goal_tolerance}),
+    }
+
+
+def _agree(a: Any, b: Any) -> bool:
+    """Whether two plain values are the same, numbers up to rounding."""
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(_agree(a[key], b[key]) for key in a)
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(map(_agree, a, b))
+    numbers = [isinstance(value, int | float) and not isinstance(value, bool) for value in (a, b)]
+    if all(numbers):
+        return a == b or (abs(a) < 1e300 and math.isclose(a, b, rel_tol=SAME, abs_tol=SAME))
+    return type(a) is type(b) and bool(a == b)
+
+
+def _short(value: Any) -> str:
+    text = " ".join(repr(value)[:400].split())
+    text = "".join(c if c.isprintable() else " " for c in text)
+    return text if len(text) <= 100 else f"{text[:100]}…"
 
 
 def verified(

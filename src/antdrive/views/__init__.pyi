@@ -5,7 +5,7 @@ from .figures.run_figures import certificate_figure as certificate_figure
 from .figures.run_figures import comparison_figure as comparison_figure
 from .figures.run_figures import overview as overview
 from .figures.sight_figure import sight_figure as sight_figure
-from .film.video import FilmInfo as FilmInfo
+from .film.options import FilmInfo as FilmInfo
 from .film.video import film as film
 from .film.video import still as still
 from .pages.campaign import report_campaign as report_campaign

@@ -16,16 +16,14 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text
 from antdrive.base.files import write_json
-from antdrive.base.types import Floats
-from antdrive.robots.placing import gaps
 from antdrive.runs.suites.baseline import Baseline
-from antdrive.runs.suites.divergence import divergence
+from antdrive.runs.suites.judging import divergence
 from antdrive.runs.suites.suite import SUFFIX
+from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
-from antdrive.worlds.world import Disc
 
 #: Of which tests a film is made.
 Films: TypeAlias = Literal["never", "failed", "always"]
@@ -121,7 +119,7 @@ def write_artefacts(
     picture_of(run, files["overview"])
     if rollout is not None:
         files |= _comparison(rollout, baseline, folder, film)
-    _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
+    write_text(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
     result = {**run.as_dict(), "files": files, "command": commands[0] if commands else "", "faults": list(faults)}
     write_json(folder / "result.json", result)
     return files
@@ -130,8 +128,8 @@ def write_artefacts(
 def write_traceback(folder: Path, error: BaseException, commands: Sequence[str]) -> dict[str, str]:
     """Write where an error arose, in place of what an earlier run wrote about the test; the files by what they are."""
     remove_artefacts(folder)
-    _write(folder / "traceback.txt", "".join(traceback.format_exception(error)))
-    _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
+    write_text(folder / "traceback.txt", "".join(traceback.format_exception(error)))
+    write_text(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
     return {"traceback": str(folder / "traceback.txt")}
 
 
@@ -154,7 +152,7 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
         from antdrive.views.film.video import film as make_film
 
         return {"film": str(make_film(rollout, folder / "film.mp4", **options).path)}
-    from antdrive.views.figures.then_and_now import then_and_now
+    from antdrive.views.figures.run_figures import then_and_now
 
     then, found = drive_of(baseline, rollout), divergence(baseline, rollout)
     place = None if found is None else (found.t, *found.then)
@@ -183,13 +181,12 @@ def drive_of(baseline: Baseline, now: Rollout) -> Rollout:
     length = baseline.metric("path_length_m")
     plan = dataclasses.replace(now.record.plan, length_m=length if math.isfinite(length) else 0.0)
     record = dataclasses.replace(now.record, outcome=baseline.outcome, reason=baseline.reason, replans=(), plan=plan)
-    return dataclasses.replace(
+    then = dataclasses.replace(
         now,
         t=times,
         pose=pose,
         twist=twist,
         command=twist,
-        clearance=_clearance(now, pose, movers),
         limiter=np.minimum(samples[:, 3], len(record.limiters) - 1).astype(np.uint8),
         movers=movers,
         contacts=np.empty((0, 4)),
@@ -198,23 +195,4 @@ def drive_of(baseline: Baseline, now: Rollout) -> Rollout:
         actuated=np.empty((0, 2)),
         record=record,
     )
-
-
-def _clearance(now: Rollout, pose: Floats, movers: Floats) -> Floats:
-    """The distance from the robot at poses (T, 3) to the nearest obstacle, mover or wall (T,) [m]."""
-    record = now.record
-    still = dataclasses.replace(record.world, movers=())
-    least = gaps(still, record.robot, pose).min(axis=1)
-    for row in range(len(pose)) if movers.shape[1] else ():
-        discs = tuple(
-            Disc(float(x), float(y), mover.radius)
-            for (x, y), mover in zip(movers[row], record.world.movers, strict=True)
-        )
-        around = dataclasses.replace(still, obstacles=discs)
-        least[row] = min(least[row], gaps(around, record.robot, pose[row : row + 1])[0, : len(discs)].min())
-    return np.asarray(least)
-
-
-def _write(path: Path, text: str) -> None:
-    with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    return dataclasses.replace(then, clearance=closed_form_clearance(then))

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
-    from antdrive.views.film.video import FilmInfo
 
 FIGURES = ("overview", "certificate", "sight", "plan", "tour", "history", "field-bars", "field-contours")
 #: Every file that `write_run` may write into a folder.
@@ -22,11 +21,7 @@ RUN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES f
 
 
 def check_folder(folder: Path) -> None:
-    """Make a folder and try to write into it, before any work is done for it.
-
-    Raises:
-        InputError: the folder cannot be written to.
-    """
+    """Make a folder and try to write into it, before any work is done for it."""
     from antdrive.base.atomic import written_whole
 
     probe = folder / ".antdrive"
@@ -39,12 +34,8 @@ def check_folder(folder: Path) -> None:
 
 
 def check_film(path: Path) -> None:
-    """Check that a film can be written to `--film PATH`, before any work is done for it.
-
-    Raises:
-        InputError: an unknown suffix, or a path that cannot be written to.
-    """
-    from antdrive.views.film.encoder import ENCODERS
+    """Check that a film can be written to `--film PATH`, before any work is done for it."""
+    from antdrive.views.film.options import ENCODERS
 
     if path.suffix.lower() not in ENCODERS:
         raise InputError(f"--film {path}: films are written as {', '.join(ENCODERS)}")
@@ -84,33 +75,31 @@ def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = T
         log = str(run.rollout.save(folder / "rollout.npz"))
         files |= _write_figures(run, folder, log, suffixes(vector)) if figures else {"rollout": log}
     elif figures:
-        from antdrive.views.figures.plan_figures import plan_figure
+        from antdrive.views.figures.run_figures import picture_of
 
-        s = run.scenario
-        plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png", mapped=not s.exploring)
         files["figure"] = str(folder / "overview.png")
+        picture_of(run, files["figure"])
     return files
 
 
-def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> dict[str, str]:
+def _write_figures(run: Run, folder: Path, log: str, kinds: Sequence[str]) -> dict[str, str]:
+    from antdrive.views.figures.canvas import endings
     from antdrive.views.figures.plan_figures import plan_figures
     from antdrive.views.figures.run_figures import certificate_figure, overview
+    from antdrive.views.figures.sight_figure import sight_figure
 
     assert run.rollout is not None
     s, files = run.scenario, {"rollout": log}
-    for suffix in endings:
-        end = "" if suffix == endings[0] else f" {suffix[1:]}"
+    for suffix, end in endings(kinds):
         files["figure" + end] = str(folder / f"overview{suffix}")
         overview(run.rollout, files["figure" + end])
         if run.certificate is not None:
             files["certificate" + end] = str(folder / f"certificate{suffix}")
             certificate_figure(run.rollout, run.certificate, files["certificate" + end])
         if run.rollout.record.exploring and len(run.rollout.scans):
-            from antdrive.views.figures.sight_figure import sight_figure
-
             files["sight" + end] = str(folder / f"sight{suffix}")
             sight_figure(run.rollout, files["sight" + end])
-    known: dict[str, Any] = {"name": s.planner_name, "suffixes": endings, "mapped": not s.exploring}
+    known: dict[str, Any] = {"name": s.planner_name, "suffixes": kinds, "mapped": s.map == "given"}
     made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, **known)
     return files | {name: str(path) for name, path in made.items()}
 
@@ -127,18 +116,9 @@ def write_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str,
     from antdrive.views.film.compare import compare_film
     from antdrive.views.film.video import film
 
-    if len(logs) > 1:
-        return _film_facts(compare_film(logs, path, **options))
-    return _film_facts(film(logs[0], path, note=caption(logs[0]), **options))
-
-
-def _film_facts(info: FilmInfo) -> dict[str, Any]:
-    return {
-        "file": str(info.path),
-        "frames": info.frames,
-        "size": list(info.size),
-        "fps": info.fps,
-    }
+    several = len(logs) > 1
+    info = compare_film(logs, path, **options) if several else film(logs[0], path, note=caption(logs[0]), **options)
+    return {"file": str(info.path), "frames": info.frames, "size": list(info.size), "fps": info.fps}
 
 
 def caption(log: Rollout) -> str:

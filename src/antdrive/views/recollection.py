@@ -7,11 +7,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.types import Floats, Pose
-from antdrive.sim.driving.own_map import MAP_CELL, RECENT, forgetting_ticks, horizon_of, turning_room
-from antdrive.sim.log.frames import frame_at
-from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.log.scans import ranges_of
+from antdrive.base.plane import frame_at
+from antdrive.base.types import Flags, Floats, Pose
+from antdrive.sim.driving.survey import MAP_CELL, RECENT, forgetting_ticks, horizon_of, turning_room
+from antdrive.sim.log.rollout import Rollout, ranges_of
 from antdrive.sim.log.sights import lidar_of, meet
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import SKIN
@@ -53,16 +52,9 @@ class Recollection:
         return float(np.count_nonzero(self.seen)) * self.map.cell**2
 
     @property
-    def seen(self) -> npt.NDArray[np.bool_]:
+    def seen(self) -> Flags:
         """Which cells of the map were seen free or hit (rows, cols)."""
         return np.asarray(self.map.seen_free | self.map.occupied)
-
-    def known(self, points: Floats) -> npt.NDArray[np.bool_]:
-        """Whether places lie on ground that was seen free or hit (N,)."""
-        cols, rows = np.floor((points - self.map.origin) / self.map.cell).astype(np.int64).T
-        high, wide = self.map.occupied.shape
-        within = (rows >= 0) & (rows < high) & (cols >= 0) & (cols < wide)
-        return np.asarray(within & self.seen[np.where(within, rows, 0), np.where(within, cols, 0)])
 
     def advance(self, at: float) -> None:
         """Enter all scans up to a moment."""
@@ -104,7 +96,7 @@ class Recollection:
         if self._meeting:
             meet(self._rollout, k, self.met)
 
-    def _of_movers(self, row: int, ranges: Floats) -> npt.NDArray[np.bool_] | None:
+    def _of_movers(self, row: int, ranges: Floats) -> Flags | None:
         """Which beams of a scan met movers that the robot followed, and left out of its map (beams,); None: no such movers."""
         tracks = self._rollout.tracks
         movers = tracks[slice(*np.searchsorted(tracks[:, 0], (row, row + 1)))].astype(np.float64)

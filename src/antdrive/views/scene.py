@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.types import Bounds, Point, Pose
+from antdrive.base.types import Bounds, Flags, Floats, Point, Pose
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Task, World
-
-Floats = npt.NDArray[np.float64]
 
 MIN_JUMP = 0.05  # the least distance between two rows that counts as a mover's jump [m]
 PLANNED_TRACK = 30.0  # a plan's figure shows the movers' tracks for this long [s]
@@ -30,7 +28,7 @@ class Scene:
     name: str  # the world's name
     bounds: Bounds  # xmin, ymin, xmax, ymax [m]
     obstacles: Floats  # x, y, radius and height of each cylinder (N, 4) [m]
-    unseen: npt.NDArray[np.bool_]  # whether each obstacle was placed after planning (N,)
+    unseen: Flags  # whether each obstacle was placed after planning (N,)
     start: Pose  # x, y [m] and heading [rad]
     goal: Point  # x, y [m]
     goal_tolerance: float  # how far from the goal the robot may stop [m]
@@ -152,7 +150,7 @@ def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats)
     return ox + radius * (nx - ox) / gap, oy + radius * (ny - oy) / gap
 
 
-def jumps(movers: Floats) -> npt.NDArray[np.bool_]:
+def jumps(movers: Floats) -> Flags:
     """Whether movers at positions (T, M, 2) jump between consecutive rows, shape (T - 1, M).
 
     A jump is a step longer than `MIN_JUMP` that is also more than three times the steps before and after it: a fast

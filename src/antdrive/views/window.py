@@ -11,12 +11,12 @@ import numpy as np
 from antdrive.base.errors import InputError
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.bullet import bullet
+from antdrive.views.colours import KERB, OBSTACLE, UNSEEN, Colour
 from antdrive.views.film.compositor import drawn_height, part_pose
 from antdrive.views.film.ground import kerb_width
 from antdrive.views.film.meshes import Mesh, cylinder, join, kerb, robot_parts
 from antdrive.views.film.replay import Replay
 from antdrive.views.scene import Scene
-from antdrive.views.style import KERB, OBSTACLE, UNSEEN, Colour
 
 AT_ONCE = 400  # meshes in one body: PyBullet takes at most 131072 vertices
 

@@ -31,7 +31,6 @@ from .generators.generate import generate as generate
 from .geometry import point_clearance as point_clearance
 from .geometry import polyline_clearance as polyline_clearance
 from .geometry import segment_clearance as segment_clearance
-from .geometry import swept_clearance as swept_clearance
 from .grid import DIRECTIONS as DIRECTIONS
 from .grid import Grid as Grid
 from .grid import rasterise as rasterise

@@ -42,18 +42,6 @@ def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) 
     return out
 
 
-def swept_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike, radius: float) -> Floats:
-    """The gap left by a disc that is swept along each segment, shape (N,) [m]; the disc touches where it is <= 0.
-
-    Args:
-        world: the obstacles and walls; movers do not count
-        starts: the segments' first points (N, 2) [m]
-        ends: the segments' last points (N, 2) [m]
-        radius: the disc's radius [m]
-    """
-    return segment_clearance(world, starts, ends) - radius
-
-
 def polyline_clearance(world: World, xy: npt.ArrayLike) -> float:
     """The clearance of a whole polyline [m].
 

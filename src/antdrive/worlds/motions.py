@@ -78,11 +78,7 @@ class Motion(ABC):
 
 
 def require_few_draws(motions: Iterable[Motion]) -> None:
-    """Refuse wanderers that took too many draws together to find free first cells.
-
-    Raises:
-        FieldError: there were more than MAX_DRAWS.
-    """
+    """Refuse wanderers that took too many draws together to find free first cells."""
     if sum(motion.draws for motion in motions) > MAX_DRAWS:
         raise FieldError(
             "walk.start", f"missing; finding free first cells takes more than {MAX_DRAWS} draws in this world"
@@ -90,11 +86,7 @@ def require_few_draws(motions: Iterable[Motion]) -> None:
 
 
 def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, robot: Point, seed: int) -> Motion:
-    """The motion of one mover of a world.
-
-    Raises:
-        FieldError: a wanderer has no room in its first cell, or there is no free first cell.
-    """
+    """The motion of one mover of a world."""
     if isinstance(mover, Keyframed):
         return _KeyframedMotion(mover)
     if isinstance(mover, Cruising):
@@ -287,11 +279,7 @@ class _WanderingMotion(Motion):
 
 
 def first_cell(mover: Wandering, bounds: Bounds, discs: Floats) -> Point:
-    """The centre of the cell that holds the start of a wanderer that has one.
-
-    Raises:
-        FieldError: the start is out of bounds, or the mover would touch an obstacle or a wall there.
-    """
+    """The centre of the cell that holds the start of a wanderer that has one."""
     assert mover.start is not None
     (x, y), (xmin, ymin, xmax, ymax), cell = mover.start, bounds, mover.cell
     if not (xmin <= x <= xmax and ymin <= y <= ymax):

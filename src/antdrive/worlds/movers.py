@@ -162,11 +162,7 @@ _KEYS_BY_KIND = {
 
 
 def mover_from_dict(entry: Mapping[str, Any]) -> Mover:
-    """The mover in plain data, as in a world file.
-
-    Raises:
-        FieldError: a key is missing, does not belong to this kind of mover, or has a wrong value.
-    """
+    """The mover in plain data, as in a world file."""
     given = {key: value for key, value in entry.items() if value is not None}
     kinds = [kind for kind in _KEYS_BY_KIND if kind in given]
     if not kinds:

@@ -159,11 +159,7 @@ class PointWorld(World):
 
     @classmethod
     def of(cls, name: str, bounds: Bounds, discs: Floats) -> PointWorld:
-        """The world of so many cylinders.
-
-        Raises:
-            FieldError: a value is not finite, or a radius is not positive.
-        """
+        """The world of so many cylinders."""
         if not (np.isfinite(discs).all() and (discs[:, 2] > 0).all()):
             row = np.flatnonzero(~(np.isfinite(discs).all(axis=1) & (discs[:, 2] > 0)))[0]
             Disc(*discs[row].tolist())

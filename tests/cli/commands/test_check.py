@@ -1,16 +1,15 @@
 """`antdrive check` and `antdrive accept`: what they print, write and return."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
 
-from antdrive import Run, Scenario, run
+from antdrive import Run, run
+from antdrive.cli.commands import check
 from antdrive.cli.testing import checking
-from tests.cli.calling import Call
 
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
@@ -22,7 +21,7 @@ HIT = "  hit: {unseen: [{x: 2, y: 1, radius: 0.2}]}\n"
 
 
 @pytest.fixture
-def suite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def suite(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "small.yaml").write_text(
@@ -33,7 +32,7 @@ def suite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def test_a_suite_is_accepted_and_then_passes(antdrive: Call, suite: Path) -> None:
+def test_a_suite_is_accepted_and_then_passes(antdrive, suite):
     code, out, _ = antdrive("check", "a.drive.yaml::closed", "--jobs", "1", "--film", "never")
     assert code == 1
     assert "is missing; accept this drive with antdrive accept 'a.drive.yaml::closed[0]'" in out
@@ -47,7 +46,7 @@ def test_a_suite_is_accepted_and_then_passes(antdrive: Call, suite: Path) -> Non
     assert {path: path.read_bytes() for path in files} == files
 
 
-def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive: Call, suite: Path) -> None:
+def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive, suite):
     suite.write_text(SUITE + HIT)
     code, out, _ = antdrive("accept", "a.drive.yaml", "--only", "hit", "--film", "never", "--results", "first")
     assert code == 1
@@ -67,7 +66,7 @@ def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive: Call, suit
     assert "collided" in Path("report.md").read_text()
 
 
-def test_the_command_in_a_message_repeats_the_drive(antdrive: Call, suite: Path) -> None:
+def test_the_command_in_a_message_repeats_the_drive(antdrive, suite):
     import shlex
 
     suite.write_text(SUITE + HIT)
@@ -92,7 +91,7 @@ class Wrong:
 
 
 @pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
-def test_a_broken_test_hides_no_other(antdrive: Call, suite: Path, jobs: str) -> None:
+def test_a_broken_test_hides_no_other(antdrive, suite, jobs):
     """A damaged baseline, a setting that no drive takes, a planner that raises and one that is none, before a good test."""
     (suite.parent / "mine.py").write_text(BROKEN)
     suite.write_text(
@@ -117,7 +116,7 @@ def test_a_broken_test_hides_no_other(antdrive: Call, suite: Path, jobs: str) ->
     assert code == 2, "of the worst: input is wrong"
 
 
-def test_a_test_that_kills_its_process_is_named(antdrive: Call, suite: Path) -> None:
+def test_a_test_that_kills_its_process_is_named(antdrive, suite):
     (suite.parent / "mine.py").write_text(
         "import os\nfrom antdrive.planners import AStar\nclass Deadly(AStar):\n    def plan(self, *_): os._exit(3)\n"
     )
@@ -129,10 +128,8 @@ def test_a_test_that_kills_its_process_is_named(antdrive: Call, suite: Path) -> 
     assert deadly["faults"] == ["internal error: the process that made it ended with exit code 3"]
 
 
-def test_a_fault_of_the_program_is_told_with_its_traceback(
-    antdrive: Call, suite: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(scenario: object) -> None:
+def test_a_fault_of_the_program_is_told_with_its_traceback(antdrive, suite, monkeypatch):
+    def broken(scenario):
         raise IndexError("of another's replanner")
 
     monkeypatch.setattr(checking, "drive", broken)
@@ -141,11 +138,11 @@ def test_a_fault_of_the_program_is_told_with_its_traceback(
     assert "in broken" in Path("res/a/closed-0/traceback.txt").read_text()
 
 
-def test_results_are_printed_as_they_come(antdrive: Call, suite: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_are_printed_as_they_come(antdrive, suite, monkeypatch):
     """Ctrl-C in the second test leaves the first one's result."""
     made: list[Run] = []
 
-    def interrupted(scenario: Scenario) -> Run:
+    def interrupted(scenario):
         if made:
             raise KeyboardInterrupt
         made.append(run(scenario))
@@ -156,7 +153,7 @@ def test_results_are_printed_as_they_come(antdrive: Call, suite: Path, monkeypat
     assert (code, out.splitlines()[0]) == (130, "a.drive.yaml::clear[0]: FAILED")
 
 
-def test_results_of_suites_of_one_name_are_kept_apart(antdrive: Call, suite: Path) -> None:
+def test_results_of_suites_of_one_name_are_kept_apart(antdrive, suite):
     for name, bound in (("x", "< 1"), ("y", "> 1")):
         folder = suite.parent / name
         folder.mkdir()
@@ -168,7 +165,7 @@ def test_results_of_suites_of_one_name_are_kept_apart(antdrive: Call, suite: Pat
     assert (suite.parent / "res" / "x" / "s" / "one-0" / "rollout.npz").exists()
 
 
-def test_results_that_cannot_be_written_do_not_hide_the_fault(antdrive: Call, suite: Path) -> None:
+def test_results_that_cannot_be_written_do_not_hide_the_fault(antdrive, suite):
     (suite.parent / "res").mkdir()
     (suite.parent / "res" / "a").write_text("a file where a folder is due")
     suite.write_text(SUITE + HIT)
@@ -178,9 +175,7 @@ def test_results_that_cannot_be_written_do_not_hide_the_fault(antdrive: Call, su
     assert "  results: " in out
 
 
-def test_ci_gets_junit_a_summary_and_unused_baselines(
-    antdrive: Call, suite: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ci_gets_junit_a_summary_and_unused_baselines(antdrive, suite, monkeypatch):
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", "page.md")
     suite.write_text(SUITE + HIT)
     gone = suite.parent / "baselines" / "a" / "gone-0.json"
@@ -202,34 +197,27 @@ def test_ci_gets_junit_a_summary_and_unused_baselines(
     assert antdrive("check", "a.drive.yaml::closed", "--strict")[0] == 1
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["check", "b.drive.yaml"], "b.drive.yaml: cannot be read (No such file or directory)"),
-        (["check", "a.drive.yaml::x"], "a.drive.yaml: no test 'x'; choose from clear[0], clear[1], closed[0]"),
-        (
-            ["check", "a.drive.yaml::"],
-            "a.drive.yaml::: names no test; write a.drive.yaml for all, or a.drive.yaml::SCENARIO",
-        ),
-        (["check", "a.drive.yaml", "--film", "often"], "--film often: unknown; choose from never, failed, always"),
-        (["accept", "a.drive.yaml", "--film", "no"], "--film no: unknown; choose from never, failed, always"),
-        (["check", "small.yaml"], "small.yaml: is no suite; the name of a suite ends in .drive.yaml"),
-    ],
-)
-def test_wrong_input_is_one_line(antdrive: Call, suite: Path, words: list[str], message: str) -> None:
-    code, _, err = antdrive(*words)
-    assert (code, err) == (2, f"antdrive: {message}\n")
-
-
 @pytest.mark.slow
-def test_processes_change_nothing(antdrive: Call, suite: Path) -> None:
+def test_processes_change_nothing(antdrive, suite):
     antdrive("accept", ".", "--jobs", "1")
     alone = {path.name: path.read_bytes() for path in (suite.parent / "baselines" / "a").iterdir()}
     antdrive("accept", ".", "--jobs", "2")
     assert {path.name: path.read_bytes() for path in (suite.parent / "baselines" / "a").iterdir()} == alone
 
 
-def test_the_schema_of_suites_is_printed(antdrive: Call) -> None:
-    code, out, _ = antdrive("schema", "suite")
-    schema = json.loads(out)
-    assert (code, schema["required"]) == (0, ["schema", "scenarios"])
+@pytest.mark.parametrize(("cores", "asked", "started"), [(3, None, 3), (3, 2, 2), (64, None, 10)])
+def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeypatch):
+    """joblib counts those of a container; the operating system says how many its host has."""
+    found: list[int] = []
+    case = SimpleNamespace(given={"margin": 0.03})
+
+    def check_cases(cases, *, jobs, **others):
+        found.append(jobs)
+        return []
+
+    monkeypatch.setattr("joblib.cpu_count", lambda: cores)
+    monkeypatch.setattr("antdrive.runs.suites.select", lambda words, only: [case] * 10)
+    monkeypatch.setattr("antdrive.cli.testing.check_cases", check_cases)
+    monkeypatch.setattr(check, "compile_once", lambda: None)
+    assert check.drive_suites(["a"], None, asked, "", None, "never", json=True) == []
+    assert found == [started]

@@ -9,12 +9,11 @@ from pathlib import Path
 import pytest
 
 from antdrive import robots
-from tests.cli.calling import Call, Refused
 
 CATALOGUE = Path(robots.__path__[0]) / "catalog"
 
 
-def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive: Call, small: Path, tmp_path: Path) -> None:
+def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive, small, tmp_path):
     words = ("--out", "c", "--film", "c.mp4", "--speed", "20")
     code, out, err = antdrive("compare", small, "-p", "astar", "-p", "tangent", *words, "--json")
     facts = json.loads(out)
@@ -30,14 +29,14 @@ def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive: Call, sm
     assert Path("again.gif").exists()
 
 
-def test_fewer_than_two_paths_are_nothing_to_compare(antdrive: Call, tmp_path: Path) -> None:
+def test_fewer_than_two_paths_are_nothing_to_compare(antdrive, tmp_path):
     words = ["compare", "no-path", "-p", "astar", "-p", "dijkstra", "--out", str(tmp_path / "c"), "--no-figures"]
     code, _, err = antdrive(*words)
     assert code == 1
     assert "nothing to compare" in err
 
 
-def test_the_command_that_repeats_a_run_names_the_robot_as_it_was_given(antdrive: Call, small: Path) -> None:
+def test_the_command_that_repeats_a_run_names_the_robot_as_it_was_given(antdrive, small):
     Path("mine.yaml").write_text((CATALOGUE / "turtlebot.yaml").read_text().replace("name: turtlebot", "name: mine"))
     words = ["-p", "astar", "-p", "dijkstra", "--robot", "mine.yaml", "--no-figures", "--out", "c"]
     assert antdrive("compare", small, *words)[0] == 0
@@ -46,44 +45,11 @@ def test_the_command_that_repeats_a_run_names_the_robot_as_it_was_given(antdrive
     assert antdrive(*command[1:], "--no-figures", "--out", "again")[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["compare", "empty", "-p", "astar"], "two to six different planners"),
-        (["compare", "empty"], "two to six different planners"),
-        (["compare", "empty", "-p", "astar", "-p", "astar"], "gets a label, such as --planner few=aco-han"),
-        (["compare", "empty", "-p", "a/b=astar", "-p", "ants"], "write NAME or LABEL=NAME"),
-        (["compare", "empty", "-p", "planner=astar", "-p", "ants"], "write NAME or LABEL=NAME"),
-        (
-            ["compare", "empty", "-p", "astar", "-p", "ants", "--set", "mmas.ants=3"],
-            "a group of astar, ants, planner, controller",
-        ),
-        (
-            ["compare", "empty", "-p", "astar", "-p", "ants", "--set", "astar.ants=3"],
-            "no option of astar is called 'ants'",
-        ),
-        (["compare", "empty", "empty", "-p", "astar", "-p", "ants"], "name worlds with different names"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str) -> None:
-    assert says in refused(*words)
-
-
-def test_planners_have_options_of_their_own_and_are_paired_over_worlds_and_seeds(antdrive: Call, small: Path) -> None:
+def test_planners_have_options_of_their_own_and_are_paired_over_worlds_and_seeds(antdrive, small):
     Path("other.yaml").write_text(small.read_text().replace("name: small", "name: other"))
     words = [
-        "-p",
-        "few=aco-han",
-        "-p",
-        "aco-han",
-        "-p",
-        "astar",
-        "--set",
-        "few.ants=3",
-        "--set",
-        "aco-han.iterations=4",
-    ]
+        "-p", "few=aco-han", "-p", "aco-han", "-p", "astar", "--set", "few.ants=3", "--set", "aco-han.iterations=4"
+    ]  # fmt: skip
     words += ["--set", "controller.lookahead_time=0.6", "--seeds", "2", "--no-figures"]
     code, out, err = antdrive("compare", small, "other.yaml", *words, "--json")
     facts = json.loads(out)
@@ -114,27 +80,18 @@ def test_planners_have_options_of_their_own_and_are_paired_over_worlds_and_seeds
     assert "few      4/4        4" in table
 
 
-def test_one_route_of_several_plans_is_told_as_the_same_drive(antdrive: Call, small: Path) -> None:
+def test_one_route_of_several_plans_is_told_as_the_same_drive(antdrive, small):
     words = [
-        "compare",
-        small,
-        "-p",
-        "astar",
-        "-p",
-        "dijkstra",
-        "-p",
-        "few=aco-han",
-        "--set",
-        "few.iterations=1",
-        "--no-figures",
-    ]
+        "compare", small, "-p", "astar", "-p", "dijkstra", "-p", "few=aco-han", "--set", "few.iterations=1",
+        "--no-figures"
+    ]  # fmt: skip
     smooth = antdrive(*words)[1]
     assert "the same drive" in smooth
     rough = json.loads(antdrive(*words, "--smoothing", "none", "--json")[1])
     assert not any("few" in sentence for sentence in rough["same"]), "plans of other cells are other drives"
 
 
-def test_the_default_folder_is_never_that_of_another_comparison(antdrive: Call, small: Path) -> None:
+def test_the_default_folder_is_never_that_of_another_comparison(antdrive, small):
     words = ["compare", small, "-p", "astar", "-p", "dijkstra", "--no-figures"]
     assert antdrive(*words)[0] == 0
     first = Path("out/compare-small/astar/result.json")
@@ -146,7 +103,7 @@ def test_the_default_folder_is_never_that_of_another_comparison(antdrive: Call, 
     assert len(list(Path("out").iterdir())) == 2, "the same comparison has the same folder"
 
 
-def test_a_second_comparison_in_the_same_folder_is_told(refused: Refused, small: Path) -> None:
+def test_a_second_comparison_in_the_same_folder_is_told(refused, small):
     script = "from antdrive.base.atomic import claimed\nwith claimed('c'):\n print('claimed', flush=True)\n input()"
     with subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout is not None
@@ -156,11 +113,3 @@ def test_a_second_comparison_in_the_same_folder_is_told(refused: Refused, small:
         other.communicate(b"\n")
     assert "is writing into this folder" in says
     assert "is writing into this folder" in planning
-
-
-def test_a_mistyped_folder_is_named(refused: Refused, tmp_path: Path) -> None:
-    (tmp_path / "runs").mkdir()
-    assert refused("compare", "slalon") == (
-        "antdrive: slalon: no such file, nor a world of the catalogue; did you mean slalom?\n"
-    )
-    assert "runs: neither a world file nor the folder of a campaign" in refused("compare", "runs")

@@ -8,12 +8,11 @@ import pytest
 
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import load_suite
-from tests.cli.calling import Call, Refused
 
 CARELESS = ["-p", "astar", "-r", "jackal", "--margin", "0", "--noise", "6", "--smoothing", "none"]
 
 
-def test_failures_are_handed_over_as_a_suite(antdrive: Call) -> None:
+def test_failures_are_handed_over_as_a_suite(antdrive):
     words = ["falsify", *CARELESS, "--budget", "2", "--seed", "3", "--method", "random", "--shrink", "0", "--no-film"]
     for name in ("failure-9/result.json", "failure-9/film.mp4", "failure-8/mine.txt"):
         path = Path("found") / name
@@ -39,14 +38,14 @@ def test_failures_are_handed_over_as_a_suite(antdrive: Call) -> None:
     assert antdrive("report", "found", "-o", "page.html")[0] == 0
 
 
-def test_a_set_up_without_failures_is_exit_code_0(antdrive: Call) -> None:
+def test_a_set_up_without_failures_is_exit_code_0(antdrive):
     code, out, err = antdrive("falsify", "-p", "astar", "--budget", "1", "--out", "none")
     assert (code, err) == (0, "")
     assert out == "after 1 runs, 1 of them with a path on the grid: 0 failures, 0 of them different\n"
     assert [path.name for path in Path("none").iterdir()] == ["falsify.json"]
 
 
-def test_other_searches_have_other_folders(antdrive: Call) -> None:
+def test_other_searches_have_other_folders(antdrive):
     search = ("falsify", "-p", "astar", "--budget", "1", "--margin")
     for margin in ("0.03", "0.04", "0.03"):
         assert antdrive(*search, margin)[0] == 0
@@ -55,7 +54,7 @@ def test_other_searches_have_other_folders(antdrive: Call) -> None:
     assert re.fullmatch(f"{first}-[0-9a-f]{{8}}", second)
 
 
-def test_nothing_of_an_earlier_search_is_left(antdrive: Call) -> None:
+def test_nothing_of_an_earlier_search_is_left(antdrive):
     Path("none/failure-1").mkdir(parents=True)
     for name in ("failures.drive.yaml", "failure-1/rollout.npz"):
         (Path("none") / name).touch()
@@ -63,21 +62,8 @@ def test_nothing_of_an_earlier_search_is_left(antdrive: Call) -> None:
     assert [path.name for path in Path("none").iterdir()] == ["falsify.json"]
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["--method", "wise"], "choose from guided, random"),
-        (["-p", "nobody"], "no planner is called 'nobody'"),
-        (["-p", "mine.py:Mine"], "which know registered planners only; register the class"),
-    ],
-    ids=["method", "planner", "own"],
-)
-def test_wrong_input_is_one_line(refused: Refused, words: list[str], says: str) -> None:
-    assert says in refused("falsify", *words)
-
-
 @pytest.mark.slow
-def test_failures_are_shrunk_and_filmed(antdrive: Call) -> None:
+def test_failures_are_shrunk_and_filmed(antdrive):
     code, out, _ = antdrive(
         "falsify", *CARELESS, "--budget", "2", "--seed", "3", "--method", "random", "--out", "found"
     )

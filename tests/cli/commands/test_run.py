@@ -1,20 +1,16 @@
-"""`antdrive run`."""
+"""`antdrive run` and `antdrive plan`."""
 
 import json
 import re
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from antdrive.base.atomic import claimed
 from antdrive.robots import list_robots
-from antdrive.sim import Run
 from antdrive.worlds import Disc, Task, World, save_task
-from tests.cli.calling import Call, Refused
 
 
-def test_a_run_writes_the_files_it_lists_and_verify_agrees(antdrive: Call, small: Path, tmp_path: Path) -> None:
+def test_a_run_writes_the_files_it_lists_and_verify_agrees(antdrive, small, tmp_path):
     code, out, err = antdrive("run", small, "--out", tmp_path / "r", "--json")
     facts = json.loads(out)
     assert (code, err) == (0, "")
@@ -28,7 +24,7 @@ def test_a_run_writes_the_files_it_lists_and_verify_agrees(antdrive: Call, small
     assert "certified collision-free" in out
 
 
-def test_a_run_reports_its_outcome_and_certificate(antdrive: Call, small: Path) -> None:
+def test_a_run_reports_its_outcome_and_certificate(antdrive, small):
     code, out, _ = antdrive("run", small, "--planner", "aco-han", "--set", "planner.ants=50", "--seed", "3")
     assert code == 0
     assert "stopped at the goal without contact" in out
@@ -36,20 +32,20 @@ def test_a_run_reports_its_outcome_and_certificate(antdrive: Call, small: Path) 
     assert Path("out/small-aco-han-turtlebot-3/rollout.npz").exists()
 
 
-def test_a_collision_is_exit_code_1_and_verify_refuses_the_log(antdrive: Call, small: Path, collided_run: Run) -> None:
+def test_a_collision_is_exit_code_1_and_verify_refuses_the_log(antdrive, small, collided_run):
     disc = collided_run.scenario.unseen[0]
     hidden = f"{disc.x},{disc.y},{disc.radius}"
     code, out, _ = antdrive("run", small, "-p", "astar", "--unseen", hidden, "--json", "--out", "r")
     facts = json.loads(out)
     assert code == 1
     assert facts["outcome"] == "collided"
-    assert facts["digest"] == collided_run.rollout.digest  # type: ignore[union-attr]
+    assert facts["digest"] == collided_run.rollout.digest
     code, out, _ = antdrive("verify", "r/rollout.npz")
     assert code == 1
     assert "NOT certified" in out
 
 
-def test_no_path_is_exit_code_1_with_a_reason(antdrive: Call) -> None:
+def test_no_path_is_exit_code_1_with_a_reason(antdrive):
     code, out, _ = antdrive("run", "no-path", "--json")
     facts = json.loads(out)
     assert (code, facts["outcome"]) == (1, "no_path")
@@ -57,14 +53,14 @@ def test_no_path_is_exit_code_1_with_a_reason(antdrive: Call) -> None:
     assert antdrive("plan", "no-path")[0] == 1
 
 
-def test_a_run_without_a_path_removes_the_log_of_an_earlier_run(antdrive: Call) -> None:
+def test_a_run_without_a_path_removes_the_log_of_an_earlier_run(antdrive):
     antdrive("run", "empty", "-p", "astar", "--no-figures", "--out", "r")
     assert Path("r/rollout.npz").exists()
     antdrive("run", "no-path", "-p", "astar", "--no-figures", "--out", "r")
     assert not Path("r/rollout.npz").exists()
 
 
-def test_a_run_replaces_the_files_of_an_earlier_run_and_no_others(antdrive: Call, small: Path, tmp_path: Path) -> None:
+def test_a_run_replaces_the_files_of_an_earlier_run_and_no_others(antdrive, small, tmp_path):
     antdrive(
         "run", small, "-p", "aco-han", "-s", "planner.ants=50", "-s", "planner.iterations=5", "--vector", "--out", "o"
     )
@@ -73,7 +69,7 @@ def test_a_run_replaces_the_files_of_an_earlier_run_and_no_others(antdrive: Call
     assert {path.name for path in (tmp_path / "o").iterdir()} == {"result.json", "overview.png", "mine.txt"}
 
 
-def test_a_run_reports_replans_and_avoidance_which_can_be_switched_off(antdrive: Call, tmp_path: Path) -> None:
+def test_a_run_reports_replans_and_avoidance_which_can_be_switched_off(antdrive, tmp_path):
     world = tmp_path / "crossing.yaml"
     world.write_text(
         "schema: 1\nname: crossing\nbounds: [0, 0, 6, 4]\nstart: [1, 2, 0]\ngoal: [5, 2]\ncell: 0.25\n"
@@ -92,7 +88,7 @@ def test_a_run_reports_replans_and_avoidance_which_can_be_switched_off(antdrive:
     assert json.loads(out)["metrics"]["replans"] == json.loads(out)["metrics"]["avoiding_s"] == 0
 
 
-def test_noise_of_a_robot_whose_file_has_none_is_said_to_change_nothing(antdrive: Call, small: Path) -> None:
+def test_noise_of_a_robot_whose_file_has_none_is_said_to_change_nothing(antdrive, small):
     text = antdrive("robots", "turtlebot")[1]
     Path("bare.yaml").write_text("".join(line for line in text.splitlines(True) if not line.startswith("noise")))
     words = ("run", small, "-p", "astar", "--no-figures", "--out", "o", "--noise", "1")
@@ -102,79 +98,14 @@ def test_noise_of_a_robot_whose_file_has_none_is_said_to_change_nothing(antdrive
     assert "changes nothing" not in antdrive(*words)[1]
 
 
-def test_without_figures_a_run_writes_its_log_and_result(antdrive: Call, small: Path) -> None:
+def test_without_figures_a_run_writes_its_log_and_result(antdrive, small):
     assert antdrive("run", small, "-p", "astar", "--no-figures", "--out", "bare")[0] == 0
     assert sorted(path.name for path in Path("bare").iterdir()) == ["result.json", "rollout.npz"]
 
 
-def test_a_prelude_needs_a_film(refused: Refused) -> None:
-    assert "give --film" in refused("run", "empty", "-p", "as", "--prelude", "2")
-
-
-def test_a_prelude_needs_a_planner_with_iterations(refused: Refused) -> None:
-    words = ["-p", "astar", "--prelude", "2", "--film", "a.mp4"]
-    assert "astar does not plan in iterations" in refused("run", "empty", *words)
-
-
-def test_a_window_needs_a_display(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("DISPLAY", raising=False)
-    assert "no display" in refused("run", "empty", "--gui")
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["run", "emty"], "did you mean empty"),
-        (["run", "empty", "--planner", "asta"], "astar"),
-        (["run", "empty", "--robot", "jackel"], "did you mean jackal"),
-        (["run", "empty", "--set", "ants=50"], "GROUP.KEY=VALUE"),
-        (["run", "empty", "--set", "planner.ants"], "KEY=VALUE"),
-        (["run", "empty", "-p", "aco-han", "--set", "planner.ant=50"], "ants"),
-        (["run", "empty", "-p", "aco-han", "--set", "planner.ants=many"], "whole number"),
-        (["run", "empty", "-p", "aco-han", "--set", "planner.ants=0"], "at least 1"),
-        (["run", "empty", "--set", "controller.lookahead=1"], "controller.lookahead: unknown setting"),
-        (["run", "empty", "--set", "controller.lookahead_margin=7"], "between 0 and 1"),
-        (["run", "empty", "--margin", "-1"], "--margin"),
-        (["run", "empty", "--cell", "nan"], "cell"),
-        (["run", "empty", "--cell", "1e-5"], "cell"),
-        (["run", "empty", "--cell", "inf"], "--cell"),
-        (["run", "empty", "--margin", "inf"], "--margin"),
-        (["run", "empty", "--time-limit", "inf"], "--time-limit"),
-        (["run", "empty", "--set", "controller.lookahead_max=inf"], "finite"),
-        (["run", "empty", "--set", "controller.lookahead_max=1e9"], "between 0.001 and 100"),
-        (["run", "empty", "--set", "controller.lookahead_margin=abc"], "must be a finite number"),
-        (["run", "empty", "--unseen", "1e300,1,1"], "none beyond a million"),
-        (["run", "empty", "--unseen", "1,2"], "3 numbers"),
-        (
-            ["run", "empty", "--sees", "all"],
-            "--sees: unknown kind 'all'; choose from positions, velocities, motions",
-        ),
-        (["run", "empty", "--sees", "positions:far"], "--sees: write KIND or KIND:METRES"),
-        (["run", "empty", "--sees", "positions:-1"], "with a range greater than 0"),
-        (["run", "empty", "--unseen", "1,2,-3"], "radius: must be greater than 0"),
-        (["run", "empty", "--film", "film.avi"], ".mp4"),
-        (["run", "empty", "--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),
-        (["run", "empty", "--film", "folder.mp4"], "--film folder.mp4: is a directory"),
-        (
-            ["run", "empty", "--smoothing", "straight"],
-            "smoothing: unknown 'straight'; choose from none, taut, clearance",
-        ),
-        (["run", "empty", "--noise", "60"], "noise: 60 times the robot's own is too much: encoder"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str, tmp_path: Path) -> None:
-    (tmp_path / "folder.mp4").mkdir()
-    assert says in refused(*words)
-
-
-def test_a_start_that_overlaps_an_obstacle_is_refused_by_name(refused: Refused, antdrive: Call, tmp_path: Path) -> None:
+def test_a_start_that_overlaps_an_obstacle_is_shown(antdrive, tmp_path):
     world = World("tight", (0, 0, 6, 4), (Disc(2.5, 1.8, 0.4),))
     save_task(Task(world, (3.0, 2.0, 0.0), (5.3, 2.0)), tmp_path / "tight.yaml")
-    for command in (["run"], ["plan"], ["compare", "-p", "dijkstra"]):
-        line = refused(command[0], "tight.yaml", "-p", "astar", *command[1:])
-        assert line.startswith("antdrive: tight.yaml: start: turtlebot at (3, 2) overlaps obstacles[0] at (2.5, 1.8)")
-    assert "overlaps unseen[0]" in refused("run", "empty", "--unseen", "1,1,0.5", "--unseen", "3,3,0.5")
     _, out, _ = antdrive("worlds", "show", "tight.yaml")
     assert "passable           no" in out
     assert "start for turtlebot overlaps obstacles[0] at" in out
@@ -187,12 +118,12 @@ def test_a_start_that_overlaps_an_obstacle_is_refused_by_name(refused: Refused, 
     assert starts == dict.fromkeys(list_robots(), "")
 
 
-def test_runs_that_differ_have_folders_of_their_own(antdrive: Call, small_run: Run, tmp_path: Path) -> None:
+def test_runs_that_differ_have_folders_of_their_own(antdrive, small_run, tmp_path):
     task = small_run.scenario.task
     save_task(task, tmp_path / "a.yaml")
     save_task(replace(task, goal_tolerance=0.3), tmp_path / "b.yaml")  # of the same name
 
-    def folder(*words: str) -> Path:
+    def folder(*words):
         return Path(
             json.loads(antdrive("run", *words, "-p", "astar", "--no-figures", "--json")[1])["files"]["result"]
         ).parent
@@ -211,7 +142,16 @@ def test_runs_that_differ_have_folders_of_their_own(antdrive: Call, small_run: R
     assert json.loads((first / "result.json").read_text())["digest"] == digest
 
 
-def test_two_runs_do_not_write_into_one_folder_at_once(refused: Refused, small: Path) -> None:
+def test_two_runs_do_not_write_into_one_folder_at_once(refused, small):
     with claimed("r"):
         line = refused("run", small, "-p", "astar", "--out", "r")
     assert line.startswith("antdrive: r: another run (process ")
+
+
+def test_a_plan_is_drawn_and_printed_without_a_drive(antdrive, tmp_path):
+    code, out, _ = antdrive("plan", "han2007-aco", "--planner", "aco-han", "--json", "--out", tmp_path / "p")
+    facts = json.loads(out)
+    assert code == 0
+    assert facts["status"] == "solved"
+    assert len(facts["cells"]) > 10
+    assert Path(facts["files"]["plan"]).read_bytes().startswith(b"\x89PNG")

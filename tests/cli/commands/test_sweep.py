@@ -1,7 +1,5 @@
 """`antdrive sweep`: from a file, from options, again, interrupted."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import subprocess
@@ -11,10 +9,9 @@ from pathlib import Path
 import pytest
 
 from antdrive.base.atomic import claimed
-from antdrive.cli.commands.sweep import _without_again
+from antdrive.cli.campaigns import _without_again
 from antdrive.cli.console import duration
 from antdrive.runs.campaigns import canonical_bytes, read_results
-from tests.cli.calling import Call, Refused
 
 CAMPAIGN = (
     "schema: 1\nworlds: [small.yaml]\nplanners:\n  - astar\n  - {name: aco-han, ants: [5, 10]}\nrollouts: failed\n"
@@ -22,20 +19,20 @@ CAMPAIGN = (
 
 
 @pytest.fixture
-def campaign(small: Path) -> Path:
+def campaign(small):
     path = small.with_name("campaign.yaml")
     path.write_text(CAMPAIGN)
     return path
 
 
-def test_a_dry_run_says_how_many_runs_there_are_and_writes_nothing(antdrive: Call, campaign: Path) -> None:
+def test_a_dry_run_says_how_many_runs_there_are_and_writes_nothing(antdrive, campaign):
     code, out, err = antdrive("sweep", campaign, "-o", "out", "--seeds", "0-4", "--dry-run")
     assert (code, err) == (0, "")
     assert out.splitlines()[-1] == "15 runs, 15 of them missing"
     assert not Path("out").exists()
 
 
-def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive: Call, campaign: Path) -> None:
+def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive, campaign):
     code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
     assert code == 0
     lines = out.splitlines()
@@ -68,7 +65,7 @@ def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive: Call
     assert canonical_bytes("out") == made
 
 
-def test_options_mean_what_a_file_means(antdrive: Call, campaign: Path) -> None:
+def test_options_mean_what_a_file_means(antdrive, campaign):
     words = ["--world", "*.yaml", "-p", "astar", "-p", "aco-han:ants=5,10"]
     campaign.rename("campaign.txt")
     _, out, _ = antdrive("sweep", *words, "-o", "flags", "--jobs", "1", "--json")
@@ -77,7 +74,7 @@ def test_options_mean_what_a_file_means(antdrive: Call, campaign: Path) -> None:
     assert json.loads(out)["made"] == 0
 
 
-def test_what_robots_know_is_an_option(antdrive: Call, campaign: Path) -> None:
+def test_what_robots_know_is_an_option(antdrive, campaign):
     words = ["--map", "none", "--localisation", "odometry", "--odometry", "1", "--odometry", "5", "-r", "jackal"]
     code, out, _ = antdrive("sweep", campaign, *words, "--dry-run", "--json")
     assert (code, json.loads(out)["runs"], json.loads(out)["counts"]["settings"]) == (0, 6, 2)
@@ -86,7 +83,7 @@ def test_what_robots_know_is_an_option(antdrive: Call, campaign: Path) -> None:
     assert json.loads(out)["counts"]["settings"] == 2
 
 
-def test_the_command_in_a_row_repeats_the_run(antdrive: Call, campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_in_a_row_repeats_the_run(antdrive, campaign, monkeypatch):
     words = ["--tasks", "2", "--noise", "1", "--smoothing", "taut", "--margin", "0.05", "--seeds", "3,7"]
     antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "aco-han:ants=5:shortcut=true", *words)
     row = read_results("out").table.to_pylist()[-1]
@@ -97,9 +94,7 @@ def test_the_command_in_a_row_repeats_the_run(antdrive: Call, campaign: Path, mo
     assert json.loads(Path("again/result.json").read_text())["digest"] == row["digest"]
 
 
-def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(
-    antdrive: Call, campaign: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(antdrive, campaign, monkeypatch):
     lines = ["from dataclasses import dataclass", "from antdrive.planners import AStar", "@dataclass(frozen=True)"]
     Path("mine.py").write_text("\n".join([*lines, "class Mine(AStar):", "    width: int = 3", ""]))
     code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "mine.py:Mine:width=4", "--json")
@@ -112,7 +107,7 @@ def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(
     assert (found["digest"], found["planner"]) == (row["digest"], "Mine")
 
 
-def test_runs_that_are_asked_for_again_count_as_missing(antdrive: Call, campaign: Path) -> None:
+def test_runs_that_are_asked_for_again_count_as_missing(antdrive, campaign):
     antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
     _, out, _ = antdrive(
         "sweep", campaign, "-o", "out", "--dry-run", "--again", "aco-han", "--again", "no_path", "--json"
@@ -120,56 +115,24 @@ def test_runs_that_are_asked_for_again_count_as_missing(antdrive: Call, campaign
     assert json.loads(out)["missing"] == 2
 
 
-def test_the_command_that_goes_on_does_not_make_runs_a_third_time() -> None:
+def test_the_command_that_goes_on_does_not_make_runs_a_third_time():
     words = ["sweep", "c.yaml", "--again", "astar", "-o", "out", "--again=crashed"]
     assert list(_without_again(words)) == ["sweep", "c.yaml", "-o", "out"]
 
 
-def test_two_commands_on_one_folder_do_not_mix(refused: Refused, campaign: Path) -> None:
+def test_two_commands_on_one_folder_do_not_mix(refused, campaign):
     with claimed("out"):
         assert "is writing into this folder; wait for it" in refused("sweep", campaign, "-o", "out", "--jobs", "1")
 
 
-def test_a_folder_with_other_files_is_left_alone(refused: Refused, campaign: Path) -> None:
-    line = refused("sweep", campaign, "-o", ".", "--jobs", "1")
-    assert "holds other files and no manifest.json; name a new folder" in line
-
-
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (["campaign.yaml"], "--out: missing; name the folder"),
-        (["-o", "out", "-p", "astar"], "--world: missing; name a campaign file, or at least one world and one planner"),
-        (["campaign.yaml", "-o", "out", "--keep", "some"], "--keep some: unknown; choose from none, failed, all"),
-        (
-            ["campaign.yaml", "-o", "out", "-p", "as:ants"],
-            "--planner as:ants: write NAME:KEY=VALUE, such as aco-han:ants",
-        ),
-        (["campaign.yaml", "-o", "out", "-p", "as:ants=1..x..2"], "--planner x: must be a number"),
-        (["campaign.yaml", "-o", "out", "--seeds", "1,b"], "--seeds b: must be a whole number"),
-        (["campaign.yaml", "-o", "out", "--dask", "host"], "--dask: host: write local:N with a number of processes"),
-        (["campaign.yaml", "-o", "out", "--dask", "local:0"], "--dask: local:0: write local:N"),
-        (["campaign.yaml", "-o", "out", "--dask", "local:2", "-j", "2"], "--jobs: has no effect with --dask"),
-        (["campaign.yaml", "-o", "out", "--again", "x"], "--again x: no such planner or outcome; choose from astar"),
-        (["campaign.yaml", "-o", "out", "--run-limit", "0"], "run_limit: must be greater than 0, got 0"),
-        (["campaign.yaml", "-o", "out", "--report", "all.doc"], "all.doc"),
-        (["campaign.yaml", "-o", "out", "--report", "a.md", "--dry-run"], "--report: has no effect with --dry-run"),
-        (["nowhere.yaml", "-o", "out"], "nowhere.yaml: no such file"),
-    ],
-)
-def test_wrong_words_are_named(words: list[str], line: str, refused: Refused, campaign: Path) -> None:
-    assert line in refused("sweep", *words)
-
-
-def test_without_parquet_the_extra_is_named(refused: Refused, campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_parquet_the_extra_is_named(refused, campaign, monkeypatch):
     for name in ("pyarrow", "pyarrow.parquet"):
         monkeypatch.setitem(sys.modules, name, None)
     assert "pip install 'antdrive[campaigns]'" in refused("sweep", campaign, "-o", "out")
 
 
 @pytest.mark.parametrize(
-    ("seconds", "words"),
-    [(7, "7 s"), (89, "89 s"), (600, "10 min"), (12000, "3 h 20 min"), (187200, "2 d 4 h")],
+    ("seconds", "words"), [(7, "7 s"), (89, "89 s"), (600, "10 min"), (12000, "3 h 20 min"), (187200, "2 d 4 h")]
 )
-def test_times_are_told_in_fitting_units(seconds: float, words: str) -> None:
+def test_times_are_told_in_fitting_units(seconds, words):
     assert duration(seconds) == words

@@ -1,7 +1,3 @@
-from __future__ import annotations
-
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,7 +13,7 @@ RNG = np.random.default_rng(0)
 coordinate = st.floats(-20.0, 20.0)
 
 
-def is_a_path(query: Query, cells: np.ndarray) -> bool:
+def is_a_path(query, cells):
     ends_match = tuple(cells[0]) == query.start and tuple(cells[-1]) == query.goal
     moves = (
         int(query.grid.moves[tuple(here)]) >> DIRECTIONS.index(tuple(step)) & 1
@@ -26,23 +22,16 @@ def is_a_path(query: Query, cells: np.ndarray) -> bool:
     return ends_match and all(moves)
 
 
-def picture(*rows: str) -> Query:
+def picture(*rows):
     """A bare grid drawn with '#' for blocked cells, its first row at the bottom."""
     free = np.array([[c != "#" for c in row] for row in rows])
     return Query(Grid.from_free(free), (0, 0), (len(rows) - 1, len(rows[0]) - 1))
 
 
-@given(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=5))
-def test_fractional_is_the_inverse_of_xy(points: list[tuple[float, float]]) -> None:
-    grid = Grid.from_free(np.ones((4, 5)), cell=0.3, origin=(-1.0, 2.0))
-    np.testing.assert_allclose(grid.xy(grid.fractional(points)), points, atol=1e-12)
-    np.testing.assert_allclose(grid.fractional(grid.xy([(2, 3)])), [(2, 3)], atol=1e-12)
-
-
 # -- straight lines
 
 
-def test_contact_with_a_disc_or_a_wall_is_too_close() -> None:
+def test_contact_with_a_disc_or_a_wall_is_too_close():
     task = Task(World("w", (0, 0, 10, 10), (Disc(5, 5, 1),)), (1, 1, 0), (9, 9))
     query = Query.between(rasterise(task.world, 0.5, 0.5), task)
     assert not clear_line(query, (1, 6.5), (9, 6.5))
@@ -51,10 +40,9 @@ def test_contact_with_a_disc_or_a_wall_is_too_close() -> None:
     assert clear_line(query, (0.5001, 1), (0.5001, 9))
 
 
-def test_a_line_is_clear_if_its_clearance_exceeds_the_inflation() -> None:
+def test_a_line_is_clear_if_its_clearance_exceeds_the_inflation():
     rng = np.random.default_rng(3)
     query = catalogue()["forest"]
-    assert query.task is not None
     lines = rng.uniform(0, 10, (500, 2, 2))
     room = segment_clearance(query.task.world, lines[:, 0], lines[:, 1])
     found = [clear_line(query, tuple(a), tuple(b)) for a, b in lines]
@@ -62,7 +50,7 @@ def test_a_line_is_clear_if_its_clearance_exceeds_the_inflation() -> None:
     assert found == list(room > query.grid.inflate)
 
 
-def test_on_a_bare_grid_a_clear_line_touches_no_blocked_cell_not_even_at_a_corner() -> None:
+def test_on_a_bare_grid_a_clear_line_touches_no_blocked_cell_not_even_at_a_corner():
     query = picture(".....", "..#..", ".....")
     assert clear_line(query, (0, 0), (4, 0))
     assert clear_line(query, (0, 0), (1.4, 2))
@@ -73,7 +61,7 @@ def test_on_a_bare_grid_a_clear_line_touches_no_blocked_cell_not_even_at_a_corne
     assert not clear_line(query, (0, 0), (5, 0))  # out of the grid
 
 
-def test_on_a_bare_grid_every_allowed_move_is_a_clear_line() -> None:
+def test_on_a_bare_grid_every_allowed_move_is_a_clear_line():
     rng = np.random.default_rng(4)
     for _ in range(20):
         query = random_query(rng, largest=10)
@@ -88,19 +76,19 @@ def test_on_a_bare_grid_every_allowed_move_is_a_clear_line() -> None:
 # -- ends
 
 
-def task_query(start: tuple[float, float], goal: tuple[float, float], tolerance: float = 0.25) -> Query:
+def task_query(start, goal, tolerance=0.25):
     world = World("w", (0, 0, 10, 10), (Disc(2, 2, 0.5), Disc(8, 8, 0.5)))
     task = Task(world, (*start, 0.0), goal, goal_tolerance=tolerance)
     return Query.between(rasterise(world, 0.5, 0.4), task)
 
 
-def test_ends_are_those_of_the_task_or_the_centres_of_cells() -> None:
+def test_ends_are_those_of_the_task_or_the_centres_of_cells():
     assert route_ends(task_query((1.1, 5.0), (9.0, 5.1)))[:2] == ((1.1, 5.0), (9.0, 5.1))
     bare = picture("...", "...")
     assert route_ends(bare) == ((0.0, 0.0), (2.0, 1.0), (), ())
 
 
-def test_ends_without_room_are_replaced_by_the_centres_of_their_cells() -> None:
+def test_ends_without_room_are_replaced_by_the_centres_of_their_cells():
     query = task_query((2.6, 2.0), (7.4, 7.8), tolerance=0.8)
     ends = route_ends(query)
     np.testing.assert_allclose([ends.start, ends.goal], query.grid.xy([query.start, query.goal]))
@@ -109,10 +97,9 @@ def test_ends_without_room_are_replaced_by_the_centres_of_their_cells() -> None:
     assert len(ends.with_leads([ends.start, ends.goal])) == 3
 
 
-def test_a_goal_with_just_the_clearance_is_reached() -> None:
+def test_a_goal_with_just_the_clearance_is_reached():
     goal = (7.1 + 2e-10, 8.0)
     query = task_query((1.0, 5.0), goal)
-    assert query.task is not None
     ends = route_ends(query)
     assert ends.lead_out == (goal,)
     assert route_ends(query, touching=True).goal == goal
@@ -122,7 +109,7 @@ def test_a_goal_with_just_the_clearance_is_reached() -> None:
 
 
 @pytest.mark.parametrize("world", catalogue())
-def test_cells_along_a_path_are_allowed_moves_close_to_it(world: str) -> None:
+def test_cells_along_a_path_are_allowed_moves_close_to_it(world):
     query = catalogue()[world]
     cells = AStar().plan(query, RNG).cells
     along = cells_along(query, cells)
@@ -130,7 +117,7 @@ def test_cells_along_a_path_are_allowed_moves_close_to_it(world: str) -> None:
     assert path_cost(along, query.grid.cell) == pytest.approx(optimum(query))
 
 
-def test_cells_pass_obstacles_on_the_same_side_as_the_line() -> None:
+def test_cells_pass_obstacles_on_the_same_side_as_the_line():
     query = picture(*["." * 21] * 8, "." * 3 + "#" * 15 + "." * 3, *["." * 21] * 8)
     for row in (2.0, 14.0):
         along = cells_along(query, [(0, 0), (row, 1), (row, 19), (16, 20)])
@@ -139,7 +126,7 @@ def test_cells_pass_obstacles_on_the_same_side_as_the_line() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 11), st.integers(0, 15)), min_size=1, max_size=6))
-def test_cells_are_as_long_as_a_line_with_loops(via: list[tuple[int, int]]) -> None:
+def test_cells_are_as_long_as_a_line_with_loops(via):
     query = Query(Grid.from_free(np.ones((12, 16)), cell=0.5), (1, 1), (10, 14))
     line = [query.start, *via, query.goal]
     along = cells_along(query, line)
@@ -147,7 +134,7 @@ def test_cells_are_as_long_as_a_line_with_loops(via: list[tuple[int, int]]) -> N
     assert polyline_length(along) >= polyline_length(line) - 3.0
 
 
-def test_a_line_with_loops_passes_blocked_and_isolated_cells_by() -> None:
+def test_a_line_with_loops_passes_blocked_and_isolated_cells_by():
     query = picture("." * 12, "." * 12, ".....###....", ".....#.#....", ".....###....", "." * 12, "." * 12)
     loops = [(0, 0), (6, 11), (3, 6), (0, 11), (6, 0), (3, 5), (0, 11), (6, 11)]
     along = cells_along(query, loops)
@@ -155,21 +142,15 @@ def test_a_line_with_loops_passes_blocked_and_isolated_cells_by() -> None:
     assert {(6, 11), (0, 11), (6, 0)} <= {tuple(cell) for cell in along.tolist()}
 
 
-def test_the_corridor_widens_until_it_contains_a_path() -> None:
+def test_the_corridor_widens_until_it_contains_a_path():
     query = picture("....#....", "....#....", "....#....", ".........")
     assert is_a_path(query, cells_along(query, [(0, 0), (0, 8), (3, 8)]))
     assert len(cells_along(sealed(), [(1, 1), (6, 6)])) == 0
 
 
-def test_cells_under_a_line_are_consecutive_neighbours_and_need_not_be_free() -> None:
+def test_cells_under_a_line_are_consecutive_neighbours_and_need_not_be_free():
     query = sealed()
     under = cells_under(query, [(1.2, 0.8), (6.0, 3.0), (6.0, 6.0)])
     assert tuple(under[0]) == query.start
     assert tuple(under[-1]) == query.goal
     assert np.abs(np.diff(under, axis=0)).max() == 1
-
-
-def test_the_length_of_a_polyline() -> None:
-    assert polyline_length([(0, 0), (3, 4), (3, 5)]) == 6.0
-    assert polyline_length([(1, 1)]) == 0.0
-    assert math.isclose(polyline_length(np.zeros((4, 2))), 0.0)

@@ -1,21 +1,19 @@
-from __future__ import annotations
-
 import heapq
 import math
 
 import numpy as np
 import pytest
 
-from antdrive.planners import MaxMinDStar, PlanResult, Query
+from antdrive.planners import MaxMinDStar, Query
 from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query
 
 
-def solve(planner: MaxMinDStar, query: Query) -> PlanResult:
+def solve(planner, query):
     return planner.plan(query, np.random.default_rng(0))
 
 
-def environment_5f() -> Query:
+def environment_5f():
     """As hasan's: a horizontal wall, closed on the left and open on the right, between start and goal on the left."""
     free = np.random.default_rng(5).random((50, 50)) >= 0.06
     free[23:26] = True
@@ -23,7 +21,7 @@ def environment_5f() -> Query:
     return Query(Grid.from_free(free), (23, 16), (25, 15))
 
 
-def pheromone_by_heap(query: Query) -> dict[tuple[int, int], float]:
+def pheromone_by_heap(query):
     """Cost of the path to the goal, at 1 or 1.4 per move, times 0.98."""
     cost, queue = {query.goal: 0.0}, [(0.0, query.goal)]
     while queue:
@@ -37,7 +35,7 @@ def pheromone_by_heap(query: Query) -> dict[tuple[int, int], float]:
     return {cell: 0.98 * value for cell, value in cost.items()}
 
 
-def test_pheromone_is_cost_times_the_share_retained() -> None:
+def test_pheromone_is_cost_times_the_share_retained():
     rng = np.random.default_rng(4)
     for _ in range(20):
         query = random_query(rng, largest=15)
@@ -55,7 +53,7 @@ def test_pheromone_is_cost_times_the_share_retained() -> None:
 
 
 @pytest.mark.parametrize("alpha_max", [26.0, 1.0])
-def test_circles_in_front_of_a_wall_are_noticed_and_left(alpha_max: float) -> None:
+def test_circles_in_front_of_a_wall_are_noticed_and_left(alpha_max):
     query = environment_5f()
     result = solve(MaxMinDStar(alpha_max=alpha_max), query)
     assert result.solved
@@ -66,15 +64,14 @@ def test_circles_in_front_of_a_wall_are_noticed_and_left(alpha_max: float) -> No
     assert result.work_unit == "cells propagated"
 
 
-def test_on_an_empty_grid_the_exponents_stay_the_same() -> None:
+def test_on_an_empty_grid_the_exponents_stay_the_same():
     result = solve(MaxMinDStar(), catalogue()["empty"])
     assert result.reason == ""
     assert result.cost == pytest.approx(optimum(catalogue()["empty"]))
-    assert result.field is not None
     assert np.isfinite(result.field).all()
 
 
-def test_gate_cells_are_closed_unless_there_is_no_other_way() -> None:
+def test_gate_cells_are_closed_unless_there_is_no_other_way():
     free = np.fliplr(~np.eye(9, dtype=np.bool_))  # a wall from corner to corner
     free[4, 4] = True  # between two of its cells: a gate
     gate = Query(Grid.from_free(free), (1, 1), (7, 7))
@@ -89,14 +86,14 @@ def test_gate_cells_are_closed_unless_there_is_no_other_way() -> None:
     assert solve(MaxMinDStar(gates=False), wide).cost == pytest.approx(optimum(wide))
 
 
-def test_it_always_arrives() -> None:
+def test_it_always_arrives():
     rng = np.random.default_rng(8)
     for _ in range(60):
         query = random_query(rng)
         assert solve(MaxMinDStar(), query).solved == math.isfinite(optimum(query))
 
 
-def test_without_distance_the_path_is_the_cheapest_at_one_and_one_point_four() -> None:
+def test_without_distance_the_path_is_the_cheapest_at_one_and_one_point_four():
     rng = np.random.default_rng(9)
     for _ in range(20):
         query = random_query(rng)
@@ -107,13 +104,7 @@ def test_without_distance_the_path_is_the_cheapest_at_one_and_one_point_four() -
             assert 0.98 * np.where(steps == 2, 1.4, 1.0).sum() == pytest.approx(expected[query.start])
 
 
-@pytest.mark.parametrize(("key", "value"), [("alpha", 0.0), ("beta", -1.0), ("alpha_max", 0.5), ("evaporation", 1.0)])
-def test_options_out_of_range_are_refused_by_name(key: str, value: float) -> None:
-    with pytest.raises(ValueError, match=f"^{key}: must be"):
-        MaxMinDStar(**{key: value})
-
-
-def test_closing_cells_leaves_the_moves_of_a_grid_with_these_cells_blocked() -> None:
+def test_closing_cells_leaves_the_moves_of_a_grid_with_these_cells_blocked():
     from antdrive.planners.colonies._kernels_mmas_dstar import close_cells
 
     rng = np.random.default_rng(6)

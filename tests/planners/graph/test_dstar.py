@@ -1,18 +1,107 @@
-from __future__ import annotations
+"""D* and D* Lite: the costs that they keep, the queue, and what they repair."""
+
+import heapq
+import itertools
+import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from antdrive.planners import DStar, Query
-from antdrive.planners.graph._kernels_incremental import COST, NEVER, STRAIGHT
-from antdrive.planners.graph.dstar import DStarSearch
+from antdrive.planners import DStar, DStarLite, Query
+from antdrive.planners.graph import _kernels_incremental as kernels
+from antdrive.planners.graph._kernels_incremental import COST, DIAGONAL, NEVER, STRAIGHT
 from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.replanning.agreement import World, agree
 
 RNG = np.random.default_rng(0)
 
 
-def corridor() -> DStarSearch:
+def test_integer_costs_solve_pells_equation():
+    assert abs(DIAGONAL**2 - 2 * STRAIGHT**2) == 1
+
+
+whole = st.integers(0, 10**8)
+
+
+@given(whole, whole, whole, whole)
+def test_integer_costs_compare_as_the_lengths_do(a, b, c, d):
+    """a + b sqrt(2) against c + d sqrt(2), decided exactly by squaring."""
+    p, q = a - c, b - d  # the sign of p + q sqrt(2)
+    sign = (p > 0) - (p < 0) if p * p > 2 * q * q else (q > 0) - (q < 0)
+    cost = p * STRAIGHT + q * DIAGONAL
+    assert (cost > 0) - (cost < 0) == sign
+
+
+@given(st.lists(st.tuples(st.integers(0, 19), st.integers(0, 5), st.integers(0, 5)), max_size=80))
+def test_the_heap_keeps_its_order_after_any_insertions_and_removals(operations):
+    heap, place = np.empty((20, 3), dtype=np.int64), np.full(20, -1, dtype=np.int32)
+    keys = {}
+    size = 0
+    for cell, first, second in operations:
+        if first == 5 and cell in keys:
+            size = kernels.take(heap, place, size, cell)
+            del keys[cell]
+        else:
+            size = kernels.put(heap, place, size, cell, first, second)
+            keys[cell] = first, second
+        assert size == len(keys)
+        if keys:
+            assert tuple(heap[0, :2]) == min(keys.values())
+    drained = []
+    while size:
+        drained.append(tuple(map(int, heap[0, :2])))
+        size = kernels.take(heap, place, size, int(heap[0, 2]))
+    assert drained == heapq.nsmallest(len(keys), keys.values())
+    assert (place == -1).all()
+
+
+def test_it_expands_cells_towards_the_robot_only():
+    query = Query(Grid.from_free(np.ones((60, 60))), (30, 5), (30, 50))
+    lite, plain = (planner.plan(query, RNG).work for planner in (DStarLite(), DStar()))
+    assert lite <= 60 < plain
+
+
+def test_keys_stay_right_through_a_long_drive_with_changes_behind_and_ahead():
+    """Thousands of moves between few repairs, which is the case that k_m exists for."""
+    rng = np.random.default_rng(4)
+    query = Query(Grid.from_free(rng.random((30, 30)) >= 0.15), (0, 0), (29, 29))
+    replanner, world = DStarLite().replanner(query, np.random.default_rng(0)), World(query.grid)
+    free = np.argwhere(query.grid.free)
+    for turn in range(300):
+        for r, c in rng.choice(free, size=5):
+            replanner.move((int(r), int(c)))
+        cells = rng.integers(0, 30, (3, 2))
+        edit = replanner.block if turn % 2 else replanner.clear
+        edit(cells)
+        world.free[tuple(cells.T)] = turn % 2 == 0
+        agree(replanner, world)
+
+
+def test_equally_long_paths_do_not_lead_in_circles():
+    """An empty grid has many shortest paths, and every repair leaves cells with outdated costs behind."""
+    query = Query(Grid.from_free(np.ones((25, 25))), (12, 0), (12, 24))
+    replanner, world = DStarLite().replanner(query, np.random.default_rng(0)), World(query.grid)
+    for row, column in itertools.product((12, 11, 13, 10), (12, 8, 16)):
+        for tell, value in ((replanner.block, False), (replanner.clear, True)):
+            tell([(row, column)])
+            world.free[row, column] = value
+            assert agree(replanner, world)
+    assert replanner.result().cost == 24
+
+
+def test_the_cost_of_thousands_of_steps_is_exact():
+    free = np.ones((81, 81), dtype=np.bool_)
+    free[1::4, :-1] = False
+    free[3::4, 1:] = False
+    query = Query(Grid.from_free(free), (0, 0), (80, 80))
+    result = DStarLite().plan(query, RNG)
+    assert abs(result.cost - World(query.grid).optimum(query.start, query.goal)) < 1e-9
+    assert math.isfinite(result.cost)
+
+
+def corridor():
     """Two ways to the goal: a short one along row 1, a long one along row 5."""
     free = np.zeros((7, 12), dtype=np.bool_)
     free[1, 1:11] = free[5, 1:11] = True
@@ -20,7 +109,7 @@ def corridor() -> DStarSearch:
     return DStar().replanner(Query(Grid.from_free(free), (1, 1), (1, 10)), RNG)
 
 
-def test_a_blocked_corridor_raises_the_costs_of_paths_through_it() -> None:
+def test_a_blocked_corridor_raises_the_costs_of_paths_through_it():
     repair = corridor()
     assert repair.result().cost == 9
     repair.block([(1, 6)])
@@ -33,7 +122,7 @@ def test_a_blocked_corridor_raises_the_costs_of_paths_through_it() -> None:
     assert repair.result().cost == 17 + 4
 
 
-def test_a_new_gap_lowers_the_costs_of_cells_behind_it() -> None:
+def test_a_new_gap_lowers_the_costs_of_cells_behind_it():
     repair = corridor()
     repair.block([(1, 6)])
     repair.result()
@@ -42,14 +131,14 @@ def test_a_new_gap_lowers_the_costs_of_cells_behind_it() -> None:
     assert repair._h.reshape(7, 12)[1, 5] == 5 * STRAIGHT
 
 
-def test_a_change_away_from_the_path_is_not_processed() -> None:
+def test_a_change_away_from_the_path_is_not_processed():
     repair = corridor()
     repair.result()
     repair.block([(3, 1)])  # farther from the goal than the robot
     assert repair.result().work == 0
 
 
-def test_backpointers_of_processed_states_lead_to_the_goal() -> None:
+def test_backpointers_of_processed_states_lead_to_the_goal():
     rng = np.random.default_rng(5)
     query = Query(Grid.from_free(rng.random((30, 30)) >= 0.2), (0, 0), (29, 29))
     repair, world = DStar().replanner(query, RNG), World(query.grid)
@@ -70,6 +159,6 @@ def test_backpointers_of_processed_states_lead_to_the_goal() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 2])
-def test_grids_of_a_few_cells_are_solved(size: int) -> None:
+def test_grids_of_a_few_cells_are_solved(size):
     query = Query(Grid.from_free(np.ones((size, size))), (0, 0), (size - 1, size - 1))
     assert DStar().plan(query, RNG).cost == pytest.approx((size - 1) * 2**0.5)

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -16,7 +14,7 @@ RNG = np.random.default_rng(0)  # searches draw nothing from it
 SEARCHES = [Dijkstra(), AStar()]
 
 
-def check(query: Query) -> None:
+def check(query):
     floor = optimum(query)
     assert reachable(query) == math.isfinite(floor)
     for search in SEARCHES:
@@ -27,28 +25,28 @@ def check(query: Query) -> None:
             assert result.cost == pytest.approx(path_cost(result.cells, query.grid.cell), abs=1e-9)
 
 
-def test_costs_equal_the_oracle_on_random_grids() -> None:
+def test_costs_equal_the_oracle_on_random_grids():
     rng = np.random.default_rng(1)
     for _ in range(300):
         check(random_query(rng))
 
 
-def test_costs_equal_the_oracle_among_random_discs() -> None:
+def test_costs_equal_the_oracle_among_random_discs():
     rng = np.random.default_rng(2)
     for _ in range(100):
         check(random_discs(rng))
 
 
 @pytest.mark.slow
-def test_costs_equal_the_oracle_on_thousands_of_grids() -> None:
+def test_costs_equal_the_oracle_on_thousands_of_grids():
     rng = np.random.default_rng(3)
-    for _ in range(3000):
+    for _ in range(1000):
         check(random_query(rng, largest=40))
         check(random_discs(rng, count=int(rng.integers(1, 60))))
 
 
 @pytest.mark.parametrize("side", [9, 40])
-def test_costs_equal_the_oracle_for_any_set_of_two_way_moves(side: int) -> None:
+def test_costs_equal_the_oracle_for_any_set_of_two_way_moves(side):
     """The search may not rely on how the moves of neighbouring cells are related."""
     rng = np.random.default_rng(4)
     for _ in range(200):
@@ -58,23 +56,13 @@ def test_costs_equal_the_oracle_for_any_set_of_two_way_moves(side: int) -> None:
             assert search.plan(query, RNG).cost == pytest.approx(floor, abs=1e-9)
 
 
-def test_the_first_path_that_closes_the_goal_may_not_be_the_shortest() -> None:
+def test_the_first_path_that_closes_the_goal_may_not_be_the_shortest():
     """Two corridors of 24 straight (24) and 17 diagonal moves (24.04): both end in one bucket of the open list."""
     rows_of_diagonals = [20, 21, 22, 21, 20, 21, 22, 21, 20, 21, 20, 19, 20, 19, 18, 17, 16, 15]
     diagonals = [(row, 5 + i) for i, row in enumerate(rows_of_diagonals)]
     turns = [
-        (20, 5),
-        (18, 5),
-        (18, 6),
-        (17, 6),
-        (17, 10),
-        (16, 10),
-        (16, 14),
-        (15, 14),
-        (15, 17),
-        (16, 17),
-        (16, 19),
-    ]
+        (20, 5), (18, 5), (18, 6), (17, 6), (17, 10), (16, 10), (16, 14), (15, 14), (15, 17), (16, 17), (16, 19),
+    ]  # fmt: skip
     straights = _corridor([*turns, (15, 19), (15, 22)])
     tail = [(15, 22), (15, 23), (15, 24), (16, 25), (17, 26), (18, 27), (19, 28), (20, 29)]
     assert (len(straights), len(diagonals)) == (25, 18)
@@ -90,7 +78,7 @@ def test_the_first_path_that_closes_the_goal_may_not_be_the_shortest() -> None:
         assert search.plan(query, RNG).cost == pytest.approx(26 + 5 * math.sqrt(2), abs=1e-9)
 
 
-def test_grid_paths_are_longer_than_the_exact_shortest_as_the_docstring_says() -> None:
+def test_grid_paths_are_longer_than_the_exact_shortest_as_the_docstring_says():
     gaps = []
     for query in catalogue().values():
         exact = PLANNERS["tangent"].plan(query, RNG)
@@ -101,7 +89,7 @@ def test_grid_paths_are_longer_than_the_exact_shortest_as_the_docstring_says() -
     assert AStar().plan(ground, RNG).cost / math.hypot(82, 198) == pytest.approx(1.0824, abs=1e-4)
 
 
-def _corridor(turns: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _corridor(turns):
     cells = [turns[0]]
     for row, col in turns[1:]:
         while cells[-1] != (row, col):
@@ -110,14 +98,14 @@ def _corridor(turns: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return cells
 
 
-def test_the_ring_of_buckets_suffices_for_a_long_maze() -> None:
+def test_the_ring_of_buckets_suffices_for_a_long_maze():
     free = np.ones((61, 61), dtype=np.bool_)
     free[1::4, :-1] = False
     free[3::4, 1:] = False
     check(Query(Grid.from_free(free), (0, 0), (60, 60)))
 
 
-def test_the_open_list_grows() -> None:
+def test_the_open_list_grows():
     """From the middle of an empty grid, the open list needs more than the 1024 entries it begins with."""
     query = Query(Grid.from_free(np.ones((701, 701))), (350, 350), (700, 699))
     result = Dijkstra().plan(query, RNG)
@@ -125,7 +113,7 @@ def test_the_open_list_grows() -> None:
     assert result.work > 480_000
 
 
-def test_astar_expands_no_more_cells_than_dijkstra_on_an_empty_grid() -> None:
+def test_astar_expands_no_more_cells_than_dijkstra_on_an_empty_grid():
     query = Query(Grid.from_free(np.ones((50, 50))), (25, 5), (30, 45))
     informed, blind = (s.plan(query, RNG).work for s in (AStar(), Dijkstra()))
     assert informed <= 41 < blind
@@ -140,13 +128,13 @@ pictures = st.integers(2, 12).flatmap(
 )
 
 
-def cost(free: np.ndarray, start: tuple[int, int], goal: tuple[int, int]) -> float:
+def cost(free, start, goal):
     return AStar().plan(Query(Grid.from_free(free), start, goal), RNG).cost
 
 
 @settings(max_examples=150, deadline=None)
 @given(pictures, st.data())
-def test_the_cost_is_the_same_in_a_turned_or_mirrored_world(free: np.ndarray, data: st.DataObject) -> None:
+def test_the_cost_is_the_same_in_a_turned_or_mirrored_world(free, data):
     cells = [tuple(map(int, c)) for c in np.argwhere(free)]
     start, goal = data.draw(st.sampled_from(cells)), data.draw(st.sampled_from(cells))
     rows, cols = free.shape
@@ -162,7 +150,7 @@ def test_the_cost_is_the_same_in_a_turned_or_mirrored_world(free: np.ndarray, da
 
 @settings(max_examples=80, deadline=None)
 @given(pictures, st.data())
-def test_freeing_a_cell_never_lengthens_a_path(free: np.ndarray, data: st.DataObject) -> None:
+def test_freeing_a_cell_never_lengthens_a_path(free, data):
     cells = [tuple(map(int, c)) for c in np.argwhere(free)]
     start, goal = data.draw(st.sampled_from(cells)), data.draw(st.sampled_from(cells))
     freed = free.copy()

@@ -1,22 +1,18 @@
 """An oracle for replanners that shares no code with them: scipy's Dijkstra on a graph built here."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from antdrive.planners import Query, Replanner
 from antdrive.worlds import Grid
 
 Cell = tuple[int, int]
 HALF = {0: (0, 1), 1: (1, 1), 2: (1, 0), 3: (1, -1)}  # bit: (row, column); each two-way move once
 
 
-def ends(shape: tuple[int, int], dr: int, dc: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+def ends(shape, dr, dc):
     """Where a move starts and where it ends, for all cells at once."""
     rows, cols = shape
     here = (slice(0, rows - dr), slice(max(0, -dc), cols - max(0, dc)))
@@ -24,7 +20,7 @@ def ends(shape: tuple[int, int], dr: int, dc: int) -> tuple[tuple[slice, slice],
     return here, there
 
 
-def pictured(free: np.ndarray) -> dict[int, np.ndarray]:
+def pictured(free):
     """The moves that free cells allow, by direction."""
     able = {}
     for k, (dr, dc) in HALF.items():
@@ -36,17 +32,17 @@ def pictured(free: np.ndarray) -> dict[int, np.ndarray]:
 class World:
     """Free cells and closed moves, kept by the test."""
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid):
         self.reset(grid)
 
-    def reset(self, grid: Grid) -> None:
+    def reset(self, grid):
         self.cell, self.free = grid.cell, grid.free.copy()
         self.closed = {}
         for k, able in pictured(self.free).items():
             here, _ = ends(grid.shape, *HALF[k])
             self.closed[k] = able & ((grid.moves[here] >> k & 1) == 0)
 
-    def optimum(self, start: Cell, goal: Cell) -> float:
+    def optimum(self, start, goal):
         if not (self.free[start] and self.free[goal]):
             return math.inf
         index = np.arange(self.free.size).reshape(self.free.shape)
@@ -61,7 +57,7 @@ class World:
         return self.cell * float(dijkstra(graph.tocsr(), directed=False, indices=index[start])[index[goal]])
 
 
-def agree(replanner: Replanner, world: World) -> bool:
+def agree(replanner, world):
     """Assert that the result is a path of the oracle's length; returns whether there is one."""
     query, result = replanner.query, replanner.result()
     floor = world.optimum(query.start, query.goal)
@@ -80,7 +76,7 @@ def agree(replanner: Replanner, world: World) -> bool:
     return True
 
 
-def change_at_random(make: Callable[[Query], Replanner], query: Query, rng: np.random.Generator, turns: int) -> int:
+def change_at_random(make, query, rng, turns):
     """Report random changes to a replanner and compare it with the oracle after each; how often there was a path."""
     world, replanner = World(query.grid), make(query)
     shape = query.grid.shape

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.base import Floats
 from antdrive.planners.smoothing.smooth import SHRINK, _clears, _fault, _pulled, _runs, _smoothed
 from antdrive.worlds import Disc, World
 
@@ -15,22 +14,21 @@ ABOVE = np.array([(1.0, 3.0), (4.0, 4.2), (7.0, 3.0)])
 BELOW = ABOVE * (1, -1) + (0, 6)
 
 
-def fault(xy: Floats, line: Floats = ABOVE, longest: float = math.inf) -> str:
+def fault(xy, line=ABOVE, longest=math.inf):
     string = _pulled(line, WORLD.discs, INFLATE)
-    assert string is not None
     return _fault(string, xy, line, WORLD, INFLATE, longest)
 
 
-def length(xy: Floats) -> float:
+def length(xy):
     return float(np.hypot(*np.diff(xy, axis=0).T).sum())
 
 
-def over(top: float) -> Floats:
+def over(top):
     """A line straight over the disc at some height, with steep ends."""
     return np.array([(1.0, 3.0), (1.5, top), (6.5, top), (7.0, 3.0)])
 
 
-def test_a_line_on_the_other_side_is_refused() -> None:
+def test_a_line_on_the_other_side_is_refused():
     assert fault(ABOVE) == ""
     assert "on its other side" in fault(BELOW)
     assert "on its other side" in fault(ABOVE, line=BELOW)
@@ -38,7 +36,7 @@ def test_a_line_on_the_other_side_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("closer", "refused"), [(0.0, False), (5e-10, False), (1e-7, True), (0.005, True)])
-def test_a_line_that_comes_closer_than_the_clearance_is_refused(closer: float, refused: bool) -> None:
+def test_a_line_that_comes_closer_than_the_clearance_is_refused(closer, refused):
     xy = over(3.7 - closer)
     assert ("closer than the clearance" in fault(xy)) is refused
     assert (not _clears(xy, WORLD.discs, WORLD.bounds, INFLATE)) is (closer > 1e-9)
@@ -48,17 +46,16 @@ def test_a_line_that_comes_closer_than_the_clearance_is_refused(closer: float, r
 @pytest.mark.parametrize(
     ("spare", "refused"), [(1e-8, False), (0.0, False), (-5e-10, False), (-1e-8, True), (-0.01, True)]
 )
-def test_a_line_that_is_longer_than_allowed_is_refused(spare: float, refused: bool) -> None:
+def test_a_line_that_is_longer_than_allowed_is_refused(spare, refused):
     assert ("longer than the plan's" in fault(ABOVE, longest=length(ABOVE) + spare)) is refused
 
 
-def test_a_string_that_comes_too_close_is_refused_though_its_drawing_does_not() -> None:
+def test_a_string_that_comes_too_close_is_refused_though_its_drawing_does_not():
     narrow = _pulled(ABOVE, WORLD.discs, INFLATE - 0.005)
-    assert narrow is not None
     assert "closer than the clearance" in _fault(narrow, over(3.8), ABOVE, WORLD, INFLATE, math.inf)
 
 
-def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners() -> None:
+def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners():
     """The shortest line around the disc, whose corners stand off by less than those of the usual drawing."""
     radius = 0.7 + SHRINK
     side = math.acos(radius / 3.0)
@@ -68,7 +65,6 @@ def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners() ->
     line = np.vstack([(1.0, 3.0), arc, (7.0, 3.0)])
     bulge = 5e-4
     string = _pulled(line, WORLD.discs, INFLATE)
-    assert string is not None
     assert length(string.drawn(WORLD, INFLATE, bulge)[0]) > length(line) + 1e-6, "the usual drawing is longer"
     piece = _smoothed(line, WORLD, INFLATE, 0.0, 0.03, 0.0, bulge)
     assert (piece.kind, piece.note) == ("taut", "")

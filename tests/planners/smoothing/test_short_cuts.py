@@ -1,20 +1,17 @@
 """What the kernels of smoothing leave out changes nothing: the oracles look at everything, with numpy."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.base import Floats
 from antdrive.planners.smoothing import _kernels_smooth as kernels
 
 seeds = st.integers(0, 10_000)
 
 
-def winding(loop: Floats, points: Floats) -> Floats:
+def winding(loop, points):
     """How often a closed polyline goes around points: the sum of the angles at which its sides are seen."""
     ends = loop[None] - points[:, None]
     angles = np.arctan2(ends[..., 1], ends[..., 0])
@@ -24,7 +21,7 @@ def winding(loop: Floats, points: Floats) -> Floats:
 
 @settings(max_examples=25, deadline=None)
 @given(seeds, st.floats(0.1, 3.0))
-def test_a_loop_encloses_what_it_winds_around(seed: int, height: float) -> None:
+def test_a_loop_encloses_what_it_winds_around(seed, height):
     rng = np.random.default_rng(seed)
     scale = np.array([4.0, height])
     there, back = (rng.uniform(-1, 1, (size, 2)) * scale for size in (9, 6))
@@ -37,7 +34,7 @@ def test_a_loop_encloses_what_it_winds_around(seed: int, height: float) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(seeds, st.booleans())
-def test_discs_within_others_are_left_out(seed: int, tall: bool) -> None:
+def test_discs_within_others_are_left_out(seed, tall):
     rng = np.random.default_rng(seed)
     discs = np.column_stack(
         (rng.uniform(0, 1, (40, 2)) * ((0.3, 2.0) if tall else (2.0, 0.3)), rng.uniform(0, 0.3, 40))
@@ -51,7 +48,7 @@ def test_discs_within_others_are_left_out(seed: int, tall: bool) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(seeds)
-def test_a_gap_that_the_line_passes_is_shared(seed: int) -> None:
+def test_a_gap_that_the_line_passes_is_shared(seed):
     """Each disc may grow by its share of the narrowest gap that the line passes, whatever lies beside which."""
     rng = np.random.default_rng(seed)
     discs = np.column_stack((rng.uniform(-2, 2, 30), rng.uniform(-9, 9, 30), rng.uniform(0.2, 0.5, 30)))
@@ -72,7 +69,7 @@ def test_a_gap_that_the_line_passes_is_shared(seed: int) -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(seeds, st.floats(0.0, 4.0), st.sampled_from([1.0, -1.0]))
-def test_no_direction_that_an_arc_sweeps_is_left_out(seed: int, sweep: float, turn: float) -> None:
+def test_no_direction_that_an_arc_sweeps_is_left_out(seed, sweep, turn):
     rng = np.random.default_rng(seed)
     begin, (x, y) = rng.uniform(0, 2 * np.pi), rng.uniform(-1, 1, 2).tolist()
     bx, by = 0.4 * math.cos(begin), 0.4 * math.sin(begin)

@@ -1,12 +1,9 @@
 """Smoothed routes keep the exact clearance and the plan's corridor, are never longer, and are optimal in the best corridor."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math
 import tarfile
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -15,14 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.base import Floats
 from antdrive.planners import AStar, PlanResult, PlanStatus, Query, load_planner, path_cost, route_along
-from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
+from antdrive.planners.anyangle.tangent import Arc, Line, shortest
 from antdrive.planners.smoothing.smooth import SMOOTHINGS, pull_taut, smooth
 from antdrive.robots import load_robot
 from antdrive.worlds import (
     Disc,
-    Grid,
     Route,
     Task,
     World,
@@ -44,12 +39,12 @@ SMOOTHED = ("taut", "clearance")
 # -- oracles that share no code with the smoothing
 
 
-def word(xy: Floats, centres: Floats) -> list[tuple[int, bool]]:
+def word(xy, centres):
     """The homotopy class of a line among points, as the rays from the points that it crosses, in order and reduced."""
     angle = 0.7390851  # no ray may pass through another point
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     line, points = xy @ turn.T, np.unique(centres @ turn.T, axis=0)
-    reduced: list[tuple[int, bool]] = []
+    reduced = []
     for a, b in itertools.pairwise(line):
         k = np.flatnonzero((a[0] < points[:, 0]) != (b[0] < points[:, 0]))
         t = (points[k, 0] - a[0]) / (b[0] - a[0])
@@ -62,7 +57,7 @@ def word(xy: Floats, centres: Floats) -> list[tuple[int, bool]]:
     return reduced
 
 
-def sampled(path: TangentPath, count: int = 60) -> Floats:
+def sampled(path, count=60):
     points = []
     for piece in path.pieces:
         if isinstance(piece, Arc):
@@ -73,7 +68,7 @@ def sampled(path: TangentPath, count: int = 60) -> Floats:
     return np.array(points)
 
 
-def wander(seed: int) -> tuple[Task, Grid, PlanResult]:
+def wander(seed):
     """A plan through random places of a random world of overlapping discs: loops, spirals, dead ends."""
     rng = np.random.default_rng(seed)
     while True:
@@ -100,20 +95,19 @@ def wander(seed: int) -> tuple[Task, Grid, PlanResult]:
         return task, grid, PlanResult(status=PlanStatus.SOLVED, cells=cells.astype(np.int32), cost=cost)
 
 
-def check(route: Route, line: Route, task: Task, inflate: float, *, longest: float = math.inf) -> None:
+def check(route, line, task, inflate, *, longest=math.inf):
     world = task.world
     np.testing.assert_allclose(route.xy[[0, -1]], line.xy[[0, -1]], atol=1e-9)
     assert route.length <= min(max(line.length, longest if route.kind == "clearance" else 0.0), longest) + 1e-9
     assert polyline_clearance(world, route.xy) >= min(inflate, polyline_clearance(world, line.xy)) - 1e-9
     assert word(route.xy, world.discs[:, :2]) == word(line.xy, world.discs[:, :2])
-    assert route.curvature is not None
     assert len(route.curvature) == len(route.xy)
 
 
 # -- by hand
 
 
-def one_disc(side: float) -> tuple[Task, Grid, PlanResult]:
+def one_disc(side):
     """The radius-5 world of Han's thesis (2007), its disc passed on one side."""
     task = Task(World("han", (-2, -2, 22, 22), (Disc(10, 10, 5),)), (0.0, 0.0, 0.0), (20.0, 20.0))
     grid = rasterise(task.world, 0.5)
@@ -123,19 +117,17 @@ def one_disc(side: float) -> tuple[Task, Grid, PlanResult]:
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_one_disc_has_its_closed_form(side: int) -> None:
+def test_one_disc_has_its_closed_form(side):
     task, grid, plan = one_disc(side)
     route = smooth(plan, grid, task)
     to_centre = math.hypot(10, 10)
     by_hand = 2 * math.sqrt(to_centre**2 - 25) + 5 * (math.pi - 2 * math.acos(5 / to_centre))
     path = pull_taut(grid.xy(plan.line), task.world.discs, task.world.bounds, 0.0)
-    assert path is not None
     assert [type(piece) for piece in path.pieces] == [Line, Arc, Line]
     assert path.length == pytest.approx(by_hand, abs=1e-9)
     assert route.length == pytest.approx(by_hand, rel=1e-4)
     assert route.kind == "taut"
     assert route.note == ""
-    assert route.curvature is not None
     np.testing.assert_allclose(route.curvature[1:-2], -side / 5)
     np.testing.assert_allclose(route.curvature[[0, -2, -1]], 0.0)
     assert route.xy[len(route.xy) // 2] @ (-1, 1) * side > 0
@@ -144,14 +136,14 @@ def test_one_disc_has_its_closed_form(side: int) -> None:
     assert off.max() <= 5e-4 + 1e-9
 
 
-def test_clearance_keeps_the_preferred_clearance_where_there_is_room() -> None:
+def test_clearance_keeps_the_preferred_clearance_where_there_is_room():
     task, grid, plan = one_disc(1)
     route = smooth(plan, grid, task, kind="clearance", clearance=0.4)
     assert route.kind == "clearance"
     assert polyline_clearance(task.world, route.xy) == pytest.approx(0.4, abs=1e-9)
     assert route.length == pytest.approx(
         shortest([(10, 10, 5.4)], task.world.bounds, 0, (0, 0), (20, 20)).length, rel=1e-4
-    )  # type: ignore[union-attr]
+    )
     short = smooth(plan, grid, task, kind="clearance", clearance=0.4, stretch=0.01)
     taut = smooth(plan, grid, task)
     assert taut.length < short.length <= 1.01 * taut.length + 1e-3
@@ -159,7 +151,7 @@ def test_clearance_keeps_the_preferred_clearance_where_there_is_room() -> None:
     assert (smooth(plan, grid, task, kind="clearance", clearance=0.0).xy == taut.xy).all()
 
 
-def test_clearance_takes_the_middle_of_a_gap_between_discs_and_of_one_at_a_wall() -> None:
+def test_clearance_takes_the_middle_of_a_gap_between_discs_and_of_one_at_a_wall():
     gap = (Disc(5, 3.7, 1.0), Disc(5, 6.5, 1.0))  # 0.8 m between them, middle at y = 5.1
     task = Task(World("gap", (0, 0, 10, 10), gap), (1.0, 2.0, 0.0), (9.0, 2.0))
     grid = rasterise(task.world, 0.25, 0.3)
@@ -174,17 +166,15 @@ def test_clearance_takes_the_middle_of_a_gap_between_discs_and_of_one_at_a_wall(
     assert np.interp(5.0, *route.xy.T) == pytest.approx(9.5, abs=0.01)
 
 
-def test_a_string_around_a_disc_more_than_once_keeps_its_windings() -> None:
+def test_a_string_around_a_disc_more_than_once_keeps_its_windings():
     angles = np.linspace(0, 2 * math.tau + math.pi / 2, 60)
     loops = np.stack((5 + 3 * np.cos(angles), 5 + 3 * np.sin(angles)), axis=1)
     path = pull_taut(loops, [(5, 5, 1)], (0, 0, 10, 10), 0.5)
-    assert path is not None
     (arc,) = (piece for piece in path.pieces if isinstance(piece, Arc))
     by_hand = 2 * math.tau + math.pi / 2 - 2 * math.acos(1.5 / 3)
     assert arc.sweep == pytest.approx(by_hand, abs=1e-9)
     assert path.length == pytest.approx(1.5 * by_hand + 2 * math.sqrt(9 - 2.25), abs=1e-9)
     unwound = pull_taut(np.vstack([loops, loops[-2::-1] + 1e-3]), [(5, 5, 1)], (0, 0, 10, 10), 0.5)
-    assert unwound is not None
     assert unwound.length == pytest.approx(math.hypot(1e-3, 1e-3))
 
 
@@ -193,7 +183,7 @@ def test_a_string_around_a_disc_more_than_once_keeps_its_windings() -> None:
 
 @settings(max_examples=120)
 @given(st.integers(0, 10**6))
-def test_any_plan_in_any_forest_is_smoothed(seed: int) -> None:
+def test_any_plan_in_any_forest_is_smoothed(seed):
     task, grid, plan = wander(seed)
     world, inflate = task.world, grid.inflate
     line = smooth(plan, grid, task, kind="none")
@@ -207,16 +197,12 @@ def test_any_plan_in_any_forest_is_smoothed(seed: int) -> None:
         return
     there, back = (pull_taut(xy, world.discs, world.bounds, inflate) for xy in (line.xy, line.xy[::-1]))
     optimum = shortest(world.discs, world.bounds, inflate, tuple(line.xy[0]), tuple(line.xy[-1]))
-    assert there is not None
-    assert back is not None
-    assert optimum is not None
     assert point_clearance(world, sampled(there)).min() >= inflate - 1e-9
     for before, after in itertools.pairwise(there.pieces):
         assert math.dist(before.end, after.start) < 1e-9
     assert back.length == pytest.approx(there.length, abs=1e-7)
     assert there.length >= optimum.length - 1e-7
     best = pull_taut(optimum.polyline(1e-3, world.discs, world.bounds, inflate), world.discs, world.bounds, inflate)
-    assert best is not None
     assert best.length == pytest.approx(optimum.length, abs=1e-7)
     if word(sampled(there), world.discs[:, :2]) == word(sampled(optimum), world.discs[:, :2]):
         assert there.length == pytest.approx(optimum.length, abs=1e-7)
@@ -224,14 +210,12 @@ def test_any_plan_in_any_forest_is_smoothed(seed: int) -> None:
 
 @settings(max_examples=40)
 @given(st.integers(0, 10**6), st.floats(0, math.tau), st.booleans(), st.sampled_from(SMOOTHED))
-def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(
-    seed: int, angle: float, mirror: bool, kind: str
-) -> None:
+def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(seed, angle, mirror, kind):
     task, grid, plan = wander(seed)
     flip = -1.0 if mirror else 1.0
     turn = np.array([[math.cos(angle), -flip * math.sin(angle)], [math.sin(angle), flip * math.cos(angle)]])
 
-    def smoothed(matrix: Floats) -> Route:
+    def smoothed(matrix):
         discs = tuple(Disc(*map(float, matrix @ (d.x, d.y)), d.radius) for d in task.world.obstacles)
         ends = [matrix @ np.array(end) for end in (task.start[:2], task.goal)]
         far = Task(World("far", (-99, -99, 99, 99), discs), (*ends[0], 0.0), tuple(ends[1]))  # walls do not turn
@@ -246,26 +230,15 @@ def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(
 
 
 PLANNERS = (
-    "dijkstra",
-    "astar",
-    "dstar-lite",
-    "aco-han",
-    "as",
-    "pfaco",
-    "mmas",
-    "mmas-dstar",
-    "ants",
-    "ga-han",
-    "hybrid",
+    "dijkstra", "astar", "dstar-lite", "aco-han", "as", "pfaco", "mmas", "mmas-dstar", "ants", "ga-han", "hybrid",
     "tangent",
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_every_planners_plans_are_smoothed(name: str) -> None:
+def test_every_planners_plans_are_smoothed(name):
     solved = 0
     for query in small_worlds().values():
-        assert query.task is not None
         plan = load_planner(name).plan(query, np.random.default_rng(1))
         if not plan.solved:
             continue
@@ -278,13 +251,12 @@ def test_every_planners_plans_are_smoothed(name: str) -> None:
         assert (taut.kind, taut.note, wide.note) == ("taut", "", "")
         assert taut.length <= wide.length + 1e-9
         if name == "tangent":
-            assert plan.length is not None
             assert taut.length == pytest.approx(plan.length, rel=5e-4)
     assert solved
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-def test_the_catalogue_is_smoothed_for_both_robots(robot: str) -> None:
+def test_the_catalogue_is_smoothed_for_both_robots(robot):
     for path in list_worlds().values():
         task = load_task(path)
         grid = rasterise(task.world, task.cell, load_robot(robot).radius + 0.03)
@@ -305,22 +277,22 @@ def test_the_catalogue_is_smoothed_for_both_robots(robot: str) -> None:
 
 
 @cache
-def barn() -> tuple[Task, ...]:
+def barn():
     return tuple(_barn())
 
 
-def _barn() -> Iterator[Task]:
+def _barn():
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder, tarfile.open(BARN) as archive:
         archive.extractall(folder, filter="data")
-        for n in range(0, 300, 6):
+        for n in range(0, 300, 18):
             yield import_barn(Path(folder) / f"world_{n}.world")
 
 
 @pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")
 @pytest.mark.parametrize("cell", [0.15, 0.05])
-def test_barn_in_the_best_corridor_is_the_optimum(cell: float) -> None:
+def test_barn_in_the_best_corridor_is_the_optimum(cell):
     """With 0.363 m of clearance: Jackal's radius and 3 cm."""
     gaps = []
     for task in barn():
@@ -335,18 +307,17 @@ def test_barn_in_the_best_corridor_is_the_optimum(cell: float) -> None:
             if kind == "clearance":
                 continue
             best = shortest(task.world.discs, task.world.bounds, 0.363, task.start[:2], task.goal)
-            assert best is not None
             gap = route.length / best.length - 1
             same = word(route.xy, task.world.discs[:, :2]) == word(sampled(best), task.world.discs[:, :2])
             assert gap <= (1.5e-4 if same else 0.02)
             gaps.append((gap, same))
-    assert sum(same for _, same in gaps) >= 45
+    assert sum(same for _, same in gaps) >= 0.9 * len(gaps)
 
 
 # -- what cannot be smoothed, and misuse
 
 
-def test_a_start_with_too_little_room_is_left_as_planned() -> None:
+def test_a_start_with_too_little_room_is_left_as_planned():
     task = Task(World("w", (0, 0, 10, 10), (Disc(2, 2, 0.5), Disc(5, 5, 1.0))), (2.6, 2.0, 0.0), (8.0, 8.0))
     grid = rasterise(task.world, 0.5, 0.4)
     query = Query.between(grid, task)
@@ -358,7 +329,7 @@ def test_a_start_with_too_little_room_is_left_as_planned() -> None:
     assert route.length == pytest.approx(load_planner("tangent").plan(query, RNG).length, rel=1e-3)
 
 
-def test_a_route_to_a_goal_with_too_little_room_ends_where_the_plan_ends() -> None:
+def test_a_route_to_a_goal_with_too_little_room_ends_where_the_plan_ends():
     task = Task(World("w", (0, 0, 10, 10), (Disc(8, 8, 0.5),)), (2.0, 2.0, 0.0), (7.4, 7.8), goal_tolerance=0.7)
     grid = rasterise(task.world, 0.5, 0.3)
     query = Query.between(grid, task)
@@ -367,7 +338,7 @@ def test_a_route_to_a_goal_with_too_little_room_ends_where_the_plan_ends() -> No
     assert polyline_clearance(task.world, route.xy) >= 0.3 - 1e-9
 
 
-def test_a_plan_that_comes_too_close_is_kept_there_with_a_note() -> None:
+def test_a_plan_that_comes_too_close_is_kept_there_with_a_note():
     task = Task(World("w", (0, 0, 10, 10), (Disc(5, 5, 1.0),)), (1.0, 5.0, 0.0), (9.0, 5.0))
     grid = rasterise(task.world, 0.5, 0.3)
     over = [(1.0, 5.0), (1.0, 8.0), (4.0, 6.2), (6.0, 6.2), (9.0, 8.0), (9.0, 5.0)]
@@ -380,7 +351,7 @@ def test_a_plan_that_comes_too_close_is_kept_there_with_a_note() -> None:
     assert pull_taut(over, task.world.discs, task.world.bounds, 0.3) is None
 
 
-def test_spare_length_is_spent_only_once() -> None:
+def test_spare_length_is_spent_only_once():
     """Two parts of a line, between them one with too little room, and a centimetre to spare for all of them."""
     posts = ((5.0, -0.5, 0.5), (5.0, 2.6, 0.5), (10.0, 0.45, 0.3), (15.0, -0.5, 0.5), (15.0, 2.6, 0.5))
     task = Task(
@@ -397,7 +368,7 @@ def test_spare_length_is_spent_only_once() -> None:
     assert route.length <= cost + 1e-9
 
 
-def test_without_room_for_more_clearance_the_line_stays_taut() -> None:
+def test_without_room_for_more_clearance_the_line_stays_taut():
     """A plan whose own line is taut has no length to spare for more clearance."""
     task, grid, plan = one_disc(1)
     taut = smooth(plan, grid, task)
@@ -406,7 +377,7 @@ def test_without_room_for_more_clearance_the_line_stays_taut() -> None:
     assert route.length <= taut.length + 1e-9
 
 
-def test_none_is_the_plans_own_line_and_misuse_is_refused() -> None:
+def test_none_is_the_plans_own_line_and_misuse_is_refused():
     task, grid, plan = one_disc(1)
     route = smooth(plan, grid, task, kind="none")
     assert (route.xy == route_along(plan, grid, task).xy).all()
@@ -421,10 +392,9 @@ def test_none_is_the_plans_own_line_and_misuse_is_refused() -> None:
     assert SMOOTHINGS == ("none", "taut", "clearance")
 
 
-def test_a_routes_curvature_follows_its_points() -> None:
+def test_a_routes_curvature_follows_its_points():
     route = Route([[0, 0], [0, 0], [1, 0], [1, 0], [2, 0]], [1.0, 2.0, 3.0, 4.0, 5.0])
     np.testing.assert_allclose(route.xy, [[0, 0], [1, 0], [2, 0]])
-    assert route.curvature is not None
     np.testing.assert_allclose(route.curvature, [2.0, 4.0, 5.0])
     assert not route.curvature.flags.writeable
     for wrong in ([1.0], [1.0, math.inf]):
@@ -432,7 +402,7 @@ def test_a_routes_curvature_follows_its_points() -> None:
             Route([[0, 0], [1, 0]], wrong)
 
 
-def test_a_forest_of_400_discs_is_smoothed() -> None:
+def test_a_forest_of_400_discs_is_smoothed():
     import time
 
     task = forest(

@@ -1,15 +1,13 @@
 """The search for the best candidate leaves out most of them: it must find what judging each of them in turn finds."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.base import Floats
-from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, TrackedPath, load_robot
+from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, load_robot
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control.avoidance import _weights
 from antdrive.worlds import Disc, Route, World
@@ -21,13 +19,13 @@ speed = st.floats(-0.9, 0.9)
 
 
 @pytest.fixture(scope="module")
-def tracked() -> TrackedPath:
+def tracked():
     x = np.linspace(-6, 6, 49)
     world = World("bends", (-8, -8, 8, 8), (Disc(1.2, 1.3, 0.3), Disc(-1.0, -0.9, 0.2)))
     return PurePursuit().prepare(Route(np.stack([x, 0.4 * np.sin(2 * x)], axis=1)), world, ROBOT, 0.05, 1 / 60)
 
 
-def in_turn(situation: tuple[Any, ...], contact_distances: Floats, near: Floats) -> tuple[int, float]:
+def in_turn(situation, contact_distances, near):
     """The choice and its contact: each candidate followed and judged, in their order."""
     x, y, yaw, v, w, s, _, candidates, path, obstacles, limits, tuning, weights, places, radii = situation
     steps = len(places) - 1
@@ -64,9 +62,7 @@ def in_turn(situation: tuple[Any, ...], contact_distances: Floats, near: Floats)
     w=st.floats(-1.5, 1.5),
     movers=st.lists(st.tuples(near, near, speed, speed, st.floats(0.1, 0.5)), min_size=1, max_size=8),
 )
-def test_no_candidate_that_is_left_out_is_better(
-    tracked: TrackedPath, yaw: float, aside: float, v: float, w: float, movers: list[tuple[float, ...]]
-) -> None:
+def test_no_candidate_that_is_left_out_is_better(tracked, yaw, aside, v, w, movers):
     table = np.array(movers)
     table[:, :2] += np.where(np.hypot(*table[:, :2].T) < 0.6, 1.0, 0.0)[:, None]
     places = table[:, :2] + AVOIDANCE.prediction_times[:, None, None] * table[:, 2:4]
@@ -82,7 +78,7 @@ def test_no_candidate_that_is_left_out_is_better(
         assert kernels.choose(*situation) == (0, math.inf)
 
 
-def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked: TrackedPath) -> None:
+def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked):
     weights = _weights(AVOIDANCE, tracked.tuning.robot_radius, ROBOT.footprint)
     tuning, rng = tracked.tuning._replace(period=AVOIDANCE.step), np.random.default_rng(0)
     steps = len(AVOIDANCE.prediction_times) - 1
@@ -105,7 +101,7 @@ def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked: TrackedPa
     assert tight > 50  # the limits are worth having
 
 
-def test_no_candidate_goes_backwards_faster_than_it_may() -> None:
+def test_no_candidate_goes_backwards_faster_than_it_may():
     whole = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf)
     for share in (0.0, 0.3, 0.6, 1.0):
         table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, share * ROBOT.max_speed)

@@ -19,7 +19,7 @@ NO_DISCS = np.empty((0, 3))
 
 
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (1.0, 0.8), (0.6, -1.5), (2.0, 1e-9), (0.3, 3.0)])
-def test_the_stopping_arc_is_that_of_a_period_and_of_braking(v: float, w: float) -> None:
+def test_the_stopping_arc_is_that_of_a_period_and_of_braking(v, w):
     """Against the arc in a thousand small steps, from a rest of v dt + v^2 / 2a metres."""
     period, deceleration = 0.1, 1.0
     length = v * period + v**2 / (2 * deceleration)
@@ -44,14 +44,7 @@ def test_the_stopping_arc_is_that_of_a_period_and_of_braking(v: float, w: float)
     discs=st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.02, 0.3)), max_size=4),
     walls=st.tuples(*[st.floats(0.1, 1.5)] * 4),
 )
-def test_the_clearance_of_a_turn_is_the_least_of_its_headings(
-    yaw: float,
-    turn: float,
-    half: tuple[float, float],
-    rounding: float,
-    discs: list[tuple[float, float, float]],
-    walls: tuple[float, float, float, float],
-) -> None:
+def test_the_clearance_of_a_turn_is_the_least_of_its_headings(yaw, turn, half, rounding, discs, walls):
     """Against the footprint's distances at 2000 headings, between which no corner moves farther than half a millimetre."""
     at, left, low, right, high = (3.0, 2.0), *walls
     bounds = (at[0] - left, at[1] - low, at[0] + right, at[1] + high)
@@ -66,7 +59,7 @@ def test_the_clearance_of_a_turn_is_the_least_of_its_headings(
         assert found <= 1e-9
 
 
-def test_between_two_samples_the_shorter_lookahead_counts() -> None:
+def test_between_two_samples_the_shorter_lookahead_counts():
     """The robot is 2 cm beside a straight route; the arc to a carrot at 0.2 m has a curvature of 1/m."""
     xy, arc = np.array([(0.0, 0.0), (4.0, 0.0)]), np.array([0.0, 4.0])
     count = 202
@@ -79,7 +72,7 @@ def test_between_two_samples_the_shorter_lookahead_counts() -> None:
         assert w / v == pytest.approx(-2 * 0.02 / 0.2**2, rel=1e-6)
 
 
-def test_the_discs_near_a_place_are_all_those_that_come_within_the_distance() -> None:
+def test_the_discs_near_a_place_are_all_those_that_come_within_the_distance():
     rng = np.random.default_rng(4)
     bounds = np.array([-3.0, 2.0, 5.0, 8.0])
     discs = rng.uniform((-3, 2, 0.01), (5, 8, 1.5), (40, 3))
@@ -93,7 +86,7 @@ def test_the_discs_near_a_place_are_all_those_that_come_within_the_distance() ->
             assert all(gap[k] <= distance + side * math.sqrt(2) for k in range(40) if tuple(discs[k].tolist()) in here)
 
 
-def room_to_stop(v: float, w: float, disc: np.ndarray) -> float:
+def room_to_stop(v, w, disc):
     """The clearance of a robot at the origin that drives for a period, then brakes on its curve; in small steps."""
     length = v * TUNING.period + v * v / (2 * LIMITS.acceleration)
     s = np.linspace(0, length, 2001)
@@ -110,8 +103,8 @@ def room_to_stop(v: float, w: float, disc: np.ndarray) -> float:
     required=st.floats(0.0, 0.4),
 )
 def test_a_braking_robot_leaves_its_curve_only_where_that_is_not_clear_and_only_for_a_clearer_one(
-    v: float, bend: float, curvature: float, disc: tuple[float, float, float], required: float
-) -> None:
+    v, bend, curvature, disc, required
+):
     discs, w = np.array([disc]), bend * v
     new_v, new_w = full_braking(0, 0, 0, v, w, curvature, required, discs, WIDE, LIMITS, TUNING)
     assert new_v == v - LIMITS.acceleration * TUNING.period
@@ -122,7 +115,7 @@ def test_a_braking_robot_leaves_its_curve_only_where_that_is_not_clear_and_only_
     assert abs(new_w - w) <= LIMITS.yaw_acceleration * TUNING.period + 1e-12 or new_w == pytest.approx(bend * new_v)
 
 
-def test_a_braking_robot_whose_curve_leads_into_a_pillar_steers_away_from_it() -> None:
+def test_a_braking_robot_whose_curve_leads_into_a_pillar_steers_away_from_it():
     """On the bend to the left it stops 225 mm from the pillar's surface, straight ahead 314 mm."""
     pillar = np.array([[0.6, 0.4, 0.1]])
     clear = full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.2, pillar, WIDE, LIMITS, TUNING)

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.base import Floats
-from antdrive.robots import Footprint, PurePursuit, RobotSpec, footprint_clearance
+from antdrive.robots import Footprint, PurePursuit, footprint_clearance
 from antdrive.robots.control._kernels_avoidance import AvoidanceWeights, Encounter, among_movers, progress_by_distance
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs
 from antdrive.robots.control._kernels_path import PathSamples, clear_lookaheads, project
@@ -19,14 +18,14 @@ WIDE = np.array([-50.0, -50.0, 50.0, 50.0])
 STRAIGHT = np.array([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)])
 
 
-def samples(xy: Floats) -> PathSamples:
+def samples(xy):
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
     empty = np.empty(0)
     return PathSamples(xy, arc, empty, empty, empty, empty)
 
 
 @pytest.mark.parametrize("progress", [0.0, 0.5, 1.0, 1.5, 2.5, 3.0])
-def test_a_projection_never_goes_back(progress: float) -> None:
+def test_a_projection_never_goes_back(progress):
     """The robot stands behind its progress, beside an earlier segment."""
     path = samples(STRAIGHT)
     for x in (0.0, 0.7, 1.4, 2.2):
@@ -35,7 +34,7 @@ def test_a_projection_never_goes_back(progress: float) -> None:
         assert path.arc[k] <= s <= path.arc[k + 1]
 
 
-def test_lookaheads_end_where_the_line_to_the_carrot_would_come_too_close() -> None:
+def test_lookaheads_end_where_the_line_to_the_carrot_would_come_too_close():
     """Round a corner with a pillar in it; the route itself keeps 0.3 m, lines across the corner come nearer."""
     path, disc = samples(np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])), np.array([[1.5, 0.5, 0.2]])
     obstacles = ObstacleIndex(*index_discs(disc, WIDE, 100.0, 5.0), WIDE, 100.0)
@@ -44,7 +43,7 @@ def test_lookaheads_end_where_the_line_to_the_carrot_would_come_too_close() -> N
     clear_lookaheads(path.xy, path.arc, obstacles, required, spacing, low, high, found)
     shares = np.linspace(0, 1, 2001)[:, None]
 
-    def keeps(s: float, length: float) -> bool:
+    def keeps(s, length):
         ends = [np.array([np.interp(at, path.arc, values) for values in path.xy.T]) for at in (s, min(s + length, 4.0))]
         line = ends[0] + shares * (ends[1] - ends[0])
         return bool(np.hypot(*(line - disc[0, :2]).T).min() - 0.2 > required - 1e-6)
@@ -61,7 +60,7 @@ def test_lookaheads_end_where_the_line_to_the_carrot_would_come_too_close() -> N
         assert length == pytest.approx(expected), i * spacing
 
 
-def test_an_arc_is_as_far_from_large_discs_as_its_points_are() -> None:
+def test_an_arc_is_as_far_from_large_discs_as_its_points_are():
     rng = np.random.default_rng(8)
     for _ in range(60):
         curvature, sweep = rng.uniform(0.2, 2.0) * rng.choice([-1, 1]), rng.uniform(0.05, 3.0)
@@ -76,13 +75,13 @@ def test_an_arc_is_as_far_from_large_discs_as_its_points_are() -> None:
         assert found == pytest.approx(expected, abs=1e-5)
 
 
-def test_a_route_is_as_long_as_its_segments(turtlebot: RobotSpec) -> None:
+def test_a_route_is_as_long_as_its_segments(turtlebot):
     world = World("open", (-5.0, -5.0, 5.0, 5.0))
     tracked = PurePursuit().prepare(Route(STRAIGHT), world, turtlebot, 0.1, 1 / 60)
     assert tracked.length == pytest.approx(3.0)
 
 
-def test_lookaheads_and_braking_keep_their_shares_of_the_margin(turtlebot: RobotSpec) -> None:
+def test_lookaheads_and_braking_keep_their_shares_of_the_margin(turtlebot):
     world = World("open", (-5.0, -5.0, 5.0, 5.0))
     controller = PurePursuit(lookahead_margin=0.7, stopping_margin=0.4)
     tuning = controller.prepare(Route(STRAIGHT), world, turtlebot, 0.1, 1 / 60).tuning
@@ -90,19 +89,19 @@ def test_lookaheads_and_braking_keep_their_shares_of_the_margin(turtlebot: Robot
     assert tuning.stopping_clearance == pytest.approx(turtlebot.radius + 0.04)
 
 
-def test_the_yaw_rate_of_a_profile_turns_the_heading(turtlebot: RobotSpec) -> None:
+def test_the_yaw_rate_of_a_profile_turns_the_heading(turtlebot):
     angles = np.linspace(0, 2.0, 200)
     profile = speed_profile(Route(0.8 * np.stack([np.sin(angles), 1 - np.cos(angles)], axis=1)), turtlebot)
     turned = np.diff(profile.time) * (profile.yaw_rate[1:] + profile.yaw_rate[:-1]) / 2
     assert turned.sum() == pytest.approx(profile.heading[-1] - profile.heading[0], rel=0.01)
 
 
-def weights(**changes: float) -> AvoidanceWeights:
+def weights(**changes):
     values = dict.fromkeys(AvoidanceWeights._fields, 0.0)
     return AvoidanceWeights(**{**values, **changes})
 
 
-def test_a_candidate_is_worth_less_the_nearer_it_comes_to_movers() -> None:
+def test_a_candidate_is_worth_less_the_nearer_it_comes_to_movers():
     near = weights(reversal_weight=2.0, clearance_weight=3.0, preferred_clearance=0.5)
     assert among_movers(7.0, Encounter(math.inf, 1.0, 0.0), near) == 7.0
     assert among_movers(7.0, Encounter(math.inf, 0.5, 0.25), near) == pytest.approx(6.5)
@@ -110,7 +109,7 @@ def test_a_candidate_is_worth_less_the_nearer_it_comes_to_movers() -> None:
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.9, math.pi / 2, 2.5, -2.0])
-def test_progress_is_at_most_the_way_in_the_routes_direction(turn: float) -> None:
+def test_progress_is_at_most_the_way_in_the_routes_direction(turn):
     """On a straight route in any direction, for a robot a metre from its start and one that is behind."""
     cos, sin = math.cos(turn), math.sin(turn)
     path = samples(STRAIGHT @ np.array([[cos, sin], [-sin, cos]]))
@@ -121,20 +120,20 @@ def test_progress_is_at_most_the_way_in_the_routes_direction(turn: float) -> Non
         assert off == pytest.approx(0.4)
 
 
-def test_a_centre_within_a_rectangle_is_as_deep_as_its_nearest_side() -> None:
+def test_a_centre_within_a_rectangle_is_as_deep_as_its_nearest_side():
     foot = Footprint.rectangle(1.0, 0.6)
     for dx, dy, depth in ((0.0, 0.0, 0.3), (0.4, 0.1, 0.1), (-0.1, -0.25, 0.05)):
         world = World("w", (-50.0, -50.0, 50.0, 50.0), (Disc(dx, dy, 0.1),))
         assert footprint_clearance(world, foot, [(0.0, 0.0, 0.0)])[0] == pytest.approx(-depth - 0.1)
 
 
-def test_a_bend_to_the_right_slows_like_one_to_the_left() -> None:
+def test_a_bend_to_the_right_slows_like_one_to_the_left():
     for lateral, yaw_rate, speed in ((1.0, 9.0, 0.5**0.5), (9.0, 1.0, 0.5)):
         assert slow_for_curvature(2.0, lateral, yaw_rate) == pytest.approx(speed)
         assert slow_for_curvature(-2.0, lateral, yaw_rate) == pytest.approx(speed)
 
 
-def test_before_it_rotates_a_robot_brakes_on_its_curve() -> None:
+def test_before_it_rotates_a_robot_brakes_on_its_curve():
     fast = TUNING.creep_speed * 2
     assert rotation(fast, 2 * fast, 0.6, 1.0, LIMITS, TUNING) == pytest.approx(0.3)
     assert rotation(fast, 2 * fast, -0.6, 1.0, LIMITS, TUNING) == pytest.approx(-0.3)

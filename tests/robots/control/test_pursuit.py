@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.robots import LIMITERS, PurePursuit, PursuitState, RobotSpec, Twist
+from antdrive.robots import LIMITERS, PurePursuit, PursuitState, Twist
 from antdrive.robots.control._kernels_path import clearance_below
 from antdrive.worlds import Disc, Route, World, point_clearance
 from antdrive.worlds._kernels import segment_clearance
@@ -17,13 +17,7 @@ OPEN = World("open", (-20, -20, 20, 20))
 DT = 1 / 60
 
 
-def follow(
-    robot: RobotSpec,
-    route: Route,
-    pose: tuple[float, float, float],
-    world: World = OPEN,
-    margin: float = 0.05,
-) -> tuple[np.ndarray, np.ndarray, list[PursuitState]]:
+def follow(robot, route, pose, world=OPEN, margin=0.05):
     controller = PurePursuit()
     tracked = controller.prepare(route, world, robot, margin, DT)
     pose = (float(pose[0]), float(pose[1]), float(pose[2]))  # for whole numbers the kernel would be compiled again
@@ -51,10 +45,8 @@ STAIRCASE = Route(np.array([(0.5 * ((i + 1) // 2), 0.5 * (i // 2)) for i in rang
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 2, math.pi, -2.5])
-def test_the_robot_arrives_from_any_heading_within_its_limits(
-    robot: str, yaw: float, request: pytest.FixtureRequest
-) -> None:
-    spec: RobotSpec = request.getfixturevalue(robot)
+def test_the_robot_arrives_from_any_heading_within_its_limits(robot, yaw, request):
+    spec = request.getfixturevalue(robot)
     poses, commands, states = follow(spec, STAIRCASE, (0, 0, yaw))
     assert math.dist(poses[-1][:2], STAIRCASE.xy[-1]) < 0.06
     v, w = commands.T
@@ -69,20 +61,20 @@ def test_the_robot_arrives_from_any_heading_within_its_limits(
     assert arcs == sorted(arcs)
 
 
-def test_the_robot_rotates_in_place_if_the_route_starts_behind_it(turtlebot: RobotSpec) -> None:
+def test_the_robot_rotates_in_place_if_the_route_starts_behind_it(turtlebot):
     poses, _, states = follow(turtlebot, Route(np.array([(0.0, 0.0), (-3.0, 0.0)])), (0, 0, 0))
     assert states[1].turning
     assert poses[:, 0].max() < 0.01  # it does not drive a curve
     assert poses[-1, 0] == pytest.approx(-3, abs=0.02)
 
 
-def test_the_robot_converges_to_a_straight_route(jackal: RobotSpec) -> None:
+def test_the_robot_converges_to_a_straight_route(jackal):
     poses, commands, _ = follow(jackal, Route(np.array([(0.0, 0.0), (10.0, 0.0)])), (0, 0.1, 0))
     assert np.abs(poses[len(poses) // 2 :, 1]).max() < 0.005
     assert commands[:, 0].max() == pytest.approx(2.0)
 
 
-def test_corners_are_cut_only_where_there_is_room(jackal: RobotSpec) -> None:
+def test_corners_are_cut_only_where_there_is_room(jackal):
     """The same corner without and with a thin post on its inside."""
     route = Route(np.array([(0.0, 0.0), (3.0, 0.0), (5.0, 2.0)]))
     margin = 0.05
@@ -96,7 +88,7 @@ def test_corners_are_cut_only_where_there_is_room(jackal: RobotSpec) -> None:
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_robot_far_from_its_route_does_not_creep_back_to_a_corner(side: float, turtlebot: RobotSpec) -> None:
+def test_a_robot_far_from_its_route_does_not_creep_back_to_a_corner(side, turtlebot):
     """The route stops at its corner; the robot beside it can drive back at speed and still brake before the corner."""
     route = Route(np.array([(0.0, 0.0), (2.0, 0.0), (0.0, -0.8 * side)]))
     controller = PurePursuit()
@@ -119,7 +111,7 @@ def test_a_robot_far_from_its_route_does_not_creep_back_to_a_corner(side: float,
     assert fastest > 0.3
 
 
-def bends(radius: float, bulge: float = 5e-4) -> Route:
+def bends(radius, bulge=5e-4):
     """A straight line, half a circle to the left, half to the right and a straight line, as in smoothed routes."""
     points, curvature = [(0.0, 0.0)], [0.0]
     for centre, begin, turn in (((3.0, radius), -math.pi / 2, 1), ((3.0, 3 * radius), -math.pi / 2, -1)):
@@ -134,7 +126,7 @@ def bends(radius: float, bulge: float = 5e-4) -> Route:
     return Route(np.array(points), np.array(curvature))
 
 
-def cross_track(poses: np.ndarray, route: Route) -> np.ndarray:
+def cross_track(poses, route):
     a, along = route.xy[:-1], np.diff(route.xy, axis=0)
     offset = poses[:, None, :2] - a
     f = np.clip((offset * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
@@ -142,7 +134,7 @@ def cross_track(poses: np.ndarray, route: Route) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("radius", "speed"), [(0.5, 1.0), (2.0, 2.0)])
-def test_bends_of_known_curvature_are_followed_and_not_cut(radius: float, speed: float, jackal: RobotSpec) -> None:
+def test_bends_of_known_curvature_are_followed_and_not_cut(radius, speed, jackal):
     """Their speed is what the lateral acceleration allows. Steering for the carrot alone cuts them."""
     route = bends(radius)
     poses, commands, _ = follow(jackal, route, (0, 0, 0))
@@ -154,7 +146,7 @@ def test_bends_of_known_curvature_are_followed_and_not_cut(radius: float, speed:
     assert float(np.percentile(cross_track(cut[commands[:, 0] > 0.4], route), 95)) > 2 * error
 
 
-def test_a_drive_takes_as_long_as_its_speed_profile_predicts(jackal: RobotSpec) -> None:
+def test_a_drive_takes_as_long_as_its_speed_profile_predicts(jackal):
     from antdrive.robots import speed_profile
 
     route = bends(0.8)
@@ -162,7 +154,7 @@ def test_a_drive_takes_as_long_as_its_speed_profile_predicts(jackal: RobotSpec) 
     assert len(commands) * DT == pytest.approx(speed_profile(route, jackal, braking=0.7).duration, rel=0.05)
 
 
-def test_a_standing_robot_turns_to_the_route_first_and_a_moving_one_does_not_stop_for_it(jackal: RobotSpec) -> None:
+def test_a_standing_robot_turns_to_the_route_first_and_a_moving_one_does_not_stop_for_it(jackal):
     straight = Route(np.array([(0.0, 0.0), (5.0, 0.0)]))
     poses, _, states = follow(jackal, straight, (0, 0, 0.5))
     assert states[1].turning
@@ -173,7 +165,7 @@ def test_a_standing_robot_turns_to_the_route_first_and_a_moving_one_does_not_sto
     assert not state.turning
 
 
-def test_the_robot_is_slow_between_close_obstacles_and_the_limiter_is_clearance(jackal: RobotSpec) -> None:
+def test_the_robot_is_slow_between_close_obstacles_and_the_limiter_is_clearance(jackal):
     gate = World("gate", OPEN.bounds, tuple(Disc(5, side * (jackal.radius + 0.02 + 0.3), 0.3) for side in (1, -1)))
     poses, commands, states = follow(
         jackal, Route(np.array([(0.0, 0.0), (10.0, 0.0)]), np.zeros(2)), (0, 0, 0), gate, 0.02
@@ -189,7 +181,7 @@ def test_the_robot_is_slow_between_close_obstacles_and_the_limiter_is_clearance(
     turns=st.lists(st.sampled_from([-135, -90, -45, 0, 45, 90, 135]), min_size=1, max_size=6),
     step=st.sampled_from([0.15, 0.4, 1.0]),
 )
-def test_any_grid_like_route_is_driven_to_its_end(turns: list[int], step: float) -> None:
+def test_any_grid_like_route_is_driven_to_its_end(turns, step):
     from antdrive.robots import load_robot
 
     heading, xy = 0.0, [(0.0, 0.0), (step, 0.0)]
@@ -210,12 +202,12 @@ def test_any_grid_like_route_is_driven_to_its_end(turns: list[int], step: float)
         ("rotate_in_place_above", 3.0, "between rotate_in_place_until and pi/2"),
     ],
 )
-def test_settings_out_of_range_are_refused_by_name(key: str, value: float, message: str) -> None:
+def test_settings_out_of_range_are_refused_by_name(key, value, message):
     with pytest.raises(ValueError, match=f"{key}: .*{message}"):
         PurePursuit(**{key: value})
 
 
-def test_a_path_may_be_sampled_more_coarsely(turtlebot: RobotSpec) -> None:
+def test_a_path_may_be_sampled_more_coarsely(turtlebot):
     world = World("post", (-20, -20, 20, 20), (Disc(1.6, 0.9, 0.2),))
     fine = PurePursuit().prepare(STAIRCASE, world, turtlebot, 0.05, DT)
     coarse = PurePursuit().prepare(STAIRCASE, world, turtlebot, 0.05, DT, spacing=0.06)
@@ -228,7 +220,7 @@ def test_a_path_may_be_sampled_more_coarsely(turtlebot: RobotSpec) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000))
-def test_obstacles_that_are_not_sorted_by_place_prepare_the_same_path(turtlebot: RobotSpec, seed: int) -> None:
+def test_obstacles_that_are_not_sorted_by_place_prepare_the_same_path(turtlebot, seed):
     rng = np.random.default_rng(seed)
     posts = tuple(Disc(*rng.uniform(-3, 5, 2).tolist(), 0.1) for _ in range(60))
     world = World("posts", (-20, -20, 20, 20), posts)
@@ -238,7 +230,7 @@ def test_obstacles_that_are_not_sorted_by_place_prepare_the_same_path(turtlebot:
 
 
 @given(st.integers(0, 10_000))
-def test_discs_that_are_left_out_change_no_clearance(seed: int) -> None:
+def test_discs_that_are_left_out_change_no_clearance(seed):
     """The oracle samples the segment, and is too large by half the distance between samples at most."""
     rng = np.random.default_rng(seed)
     discs, bounds = (
@@ -256,7 +248,7 @@ def test_discs_that_are_left_out_change_no_clearance(seed: int) -> None:
         assert below == found if found < most else below >= most
 
 
-def test_driving_backwards_is_driving_forwards_seen_from_behind(turtlebot: RobotSpec) -> None:
+def test_driving_backwards_is_driving_forwards_seen_from_behind(turtlebot):
     controller = PurePursuit()
     tracked = controller.prepare(STAIRCASE, OPEN, turtlebot, 0.05, DT)
     ahead, _ = controller.step(tracked, (0.2, 0.1, 0.4), Twist(0.1, 0.2), PursuitState())

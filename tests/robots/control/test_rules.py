@@ -8,8 +8,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from antdrive.robots import list_robots, load_robot
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs, nearby
-from antdrive.robots.control._kernels_path import brake_backwards, carrot_at, clear_lookaheads, point_at, project
+from antdrive.robots.control._kernels_obstacles import arc_clearance
+from antdrive.robots.control._kernels_path import brake_backwards, carrot_at, point_at, project
 from antdrive.robots.control._kernels_pursuit import (
     CREEP,
     CRUISE,
@@ -38,7 +38,7 @@ CORNER_ARC = np.array([0.0, 1.0, 2.0])
 
 
 @given(v=st.floats(-3, 3), w=st.floats(-6, 6), half_track=st.floats(0.05, 0.4), fastest=st.floats(0.1, 2))
-def test_saturated_wheels_keep_the_curvature(v: float, w: float, half_track: float, fastest: float) -> None:
+def test_saturated_wheels_keep_the_curvature(v, w, half_track, fastest):
     limits = LIMITS._replace(half_track=half_track, rim_speed=fastest)
     new_v, new_w = keep_wheels_within(v, w, 0.0, 0.1, limits)
     assert abs(new_v) + abs(new_w) * half_track <= fastest * (1 + 1e-12)
@@ -47,9 +47,7 @@ def test_saturated_wheels_keep_the_curvature(v: float, w: float, half_track: flo
         assert (new_v, new_w) == (v, w)
 
 
-def saturated(
-    share: float, turn: float, wanted: float, limits: MotionLimits, period: float
-) -> tuple[float, float, float]:
+def saturated(share, turn, wanted, limits, period):
     """The speed before, and speed and yaw rate after, of a robot that turns in with wheels at `share` of what they reach."""
     w = turn * share * limits.rim_speed / limits.half_track
     v = share * limits.rim_speed - abs(w) * limits.half_track
@@ -62,8 +60,8 @@ def saturated(
 )  # fmt: skip
 @example(share=1.0, turn=0.0, wanted=9.0, half_track=0.2, acceleration=1.0, yaw_acceleration=8.0)
 def test_wheels_at_their_limit_do_not_make_a_robot_brake_harder_than_certificates_allow(
-    share: float, turn: float, wanted: float, half_track: float, acceleration: float, yaw_acceleration: float
-) -> None:
+    share, turn, wanted, half_track, acceleration, yaw_acceleration
+):
     limits = LIMITS._replace(
         half_track=half_track, acceleration=acceleration, yaw_acceleration=yaw_acceleration, yaw_rate=99.0
     )
@@ -76,9 +74,7 @@ def test_wheels_at_their_limit_do_not_make_a_robot_brake_harder_than_certificate
     name=st.sampled_from(sorted(list_robots())), share=st.floats(0, 1), turn=st.floats(-1, 1), wanted=st.floats(-9, 9)
 )
 @example(name="turtlebot3-waffle", share=1.0, turn=0.0, wanted=9.0)  # of all of them it has the least room
-def test_the_catalogues_robots_turn_in_with_both_speeds_scaled_together(
-    name: str, share: float, turn: float, wanted: float
-) -> None:
+def test_the_catalogues_robots_turn_in_with_both_speeds_scaled_together(name, share, turn, wanted):
     """Bit for bit: their wheels leave room enough for that, and so their drives are as they were."""
     robot = load_robot(name)
     limits = MotionLimits(
@@ -95,62 +91,40 @@ def test_the_catalogues_robots_turn_in_with_both_speeds_scaled_together(
     assert found == scaled
 
 
-def test_speed_in_curves_is_limited_by_lateral_acceleration_and_yaw_rate() -> None:
+def test_speed_in_curves_is_limited_by_lateral_acceleration_and_yaw_rate():
     assert slow_for_curvature(0.5, 2.0, 4.0) == pytest.approx(2.0)  # v^2 * 0.5 = 2
     assert slow_for_curvature(8.0, 9.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s
     assert slow_for_curvature(0.0, 2.0, 4.0) == math.inf
 
 
-def test_the_robot_can_brake_within_what_remains() -> None:
+def test_the_robot_can_brake_within_what_remains():
     assert brake_for_goal(1.0, 2.0) == pytest.approx(2.0)
     assert brake_for_goal(-0.1, 2.0) == 0.0
 
 
-def test_a_yaw_rate_out_of_reach_limits_the_speed() -> None:
+def test_a_yaw_rate_out_of_reach_limits_the_speed():
     # 0.1 s at 8 rad/s^2 from standing: 0.8 rad/s; on a curve of 4 / m that is 0.2 m/s
     assert slow_for_yaw_rate(4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
     assert slow_for_yaw_rate(-4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
     assert slow_for_yaw_rate(4.0, -2.0, 8.0, 0.1) == 0.0  # it turns the other way and must stop first
 
 
-def test_close_obstacles_limit_the_speed() -> None:
+def test_close_obstacles_limit_the_speed():
     assert slow_for_clearance(0.0, 0.5, 0.05) == 0.5
     assert slow_for_clearance(0.05, 0.5, 0.05) == pytest.approx(1.5)
     assert slow_for_clearance(-0.1, 0.5, 0.05) == 0.5
 
 
 LIMITS = MotionLimits(
-    speed=1.0,
-    yaw_rate=3.0,
-    acceleration=1.0,
-    yaw_acceleration=8.0,
-    lateral_acceleration=1.0,
-    half_track=0.1,
+    speed=1.0, yaw_rate=3.0, acceleration=1.0, yaw_acceleration=8.0, lateral_acceleration=1.0, half_track=0.1,
     rim_speed=2.0,
-)
+)  # fmt: skip
 TUNING = PursuitTuning(
-    period=0.1,
-    spacing=0.02,
-    lookahead_clearance=0.2,
-    stopping_clearance=0.2,
-    robot_radius=0.2,
-    half_length=0.0,
-    half_width=0.0,
-    rounding=0.2,
-    corners=np.empty((0, 2)),
-    lookahead_time=0.25,
-    lookahead_min=0.1,
-    lookahead_max=1.0,
-    preferred_lookahead_min=0.3,
-    rotate_above=1.0,
-    rotate_above_at_rest=0.2,
-    rotate_until=0.1,
-    braking=0.5,
-    creep_speed=0.04,
-    goal_distance=0.02,
-    min_speed_near_obstacles=0.5,
-    clearance_time=0.05,
-)
+    period=0.1, spacing=0.02, lookahead_clearance=0.2, stopping_clearance=0.2, robot_radius=0.2, half_length=0.0,
+    half_width=0.0, rounding=0.2, corners=np.empty((0, 2)), lookahead_time=0.25, lookahead_min=0.1, lookahead_max=1.0,
+    preferred_lookahead_min=0.3, rotate_above=1.0, rotate_above_at_rest=0.2, rotate_until=0.1, braking=0.5,
+    creep_speed=0.04, goal_distance=0.02, min_speed_near_obstacles=0.5, clearance_time=0.05,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -164,9 +138,7 @@ TUNING = PursuitTuning(
         (0.0, 2.0, 10.0, False, 0.04, CREEP),
     ],
 )
-def test_the_lowest_rule_limits_the_speed(
-    curvature: float, route_speed: float, remaining: float, clear: bool, speed: float, limiter: int
-) -> None:
+def test_the_lowest_rule_limits_the_speed(curvature, route_speed, remaining, clear, speed, limiter):
     allowed, rule = speed_limit(0.0, curvature, route_speed, 1.0, remaining, clear, LIMITS, TUNING)
     assert allowed == pytest.approx(speed)
     assert rule == limiter
@@ -184,25 +156,23 @@ def test_the_lowest_rule_limits_the_speed(
         (True, 0.0, 0.05, False, False),
     ],
 )
-def test_a_robot_rotates_in_place_for_a_large_bearing_until_it_is_small(
-    rotating: bool, speed: float, bearing: float, clear: bool, rotates: bool
-) -> None:
+def test_a_robot_rotates_in_place_for_a_large_bearing_until_it_is_small(rotating, speed, bearing, clear, rotates):
     assert should_rotate(rotating, speed, Carrot(0.3, 0.0, 0.3, bearing, clear), TUNING) is rotates
 
 
-def test_a_command_changes_no_faster_than_the_robot_can() -> None:
+def test_a_command_changes_no_faster_than_the_robot_can():
     assert reachable_twist(1.0, 2.0, 0.2, -0.5, 0.1, LIMITS) == pytest.approx((0.3, 0.3))
     assert reachable_twist(-1.0, 0.1, 0.2, 0.0, 0.1, LIMITS) == pytest.approx((0.1, 0.1))
 
 
-def test_speeds_are_lowered_backwards_by_braking_distance() -> None:
+def test_speeds_are_lowered_backwards_by_braking_distance():
     limit = np.array([2.0, 2.0, 2.0, 0.0])
     brake_backwards(limit, 0.5, 1.0)
     np.testing.assert_allclose(limit, [math.sqrt(3), math.sqrt(2), 1.0, 0.0])
 
 
 @given(x=st.floats(-0.3, 1.3), y=st.floats(-0.3, 1.3), look=st.floats(0.1, 0.6))
-def test_the_carrot_is_at_the_true_lookahead_distance(x: float, y: float, look: float) -> None:
+def test_the_carrot_is_at_the_true_lookahead_distance(x, y, look):
     s, segment = project(x, y, 0.0, 10.0, CORNER, CORNER_ARC)
     px, py, _ = point_at(s, segment, CORNER, CORNER_ARC)
     cx, cy = carrot_at(x, y, look, s, segment, CORNER, CORNER_ARC)
@@ -215,7 +185,7 @@ def test_the_carrot_is_at_the_true_lookahead_distance(x: float, y: float, look: 
         assert (cx, cy) == pytest.approx((px, py))
 
 
-def test_projection_never_moves_back_and_never_jumps_across_a_hairpin() -> None:
+def test_projection_never_moves_back_and_never_jumps_across_a_hairpin():
     hairpin = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.4], [0.0, 0.4]])
     arc = np.array([0.0, 3.0, 3.4, 6.4])
     s, _ = project(1.0, 0.25, 0.9, 1.0, hairpin, arc)  # closer to the second leg, 4.4 m later
@@ -224,11 +194,10 @@ def test_projection_never_moves_back_and_never_jumps_across_a_hairpin() -> None:
     assert s == pytest.approx(0.9)
 
 
-def sampled_arc(yaw: float, curvature: float, sweep: float) -> np.ndarray:
+def sampled_arc(yaw, curvature, sweep):
     turn = np.linspace(0, sweep, 4001)
     return np.stack(
-        [(np.sin(yaw + turn) - math.sin(yaw)) / curvature, (math.cos(yaw) - np.cos(yaw + turn)) / curvature],
-        axis=1,
+        [(np.sin(yaw + turn) - math.sin(yaw)) / curvature, (math.cos(yaw) - np.cos(yaw + turn)) / curvature], axis=1
     )
 
 
@@ -238,9 +207,7 @@ def sampled_arc(yaw: float, curvature: float, sweep: float) -> np.ndarray:
     angle=st.floats(0.01, 2.8),
     disc=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 0.5)),
 )
-def test_an_arcs_clearance_is_that_of_its_points(
-    yaw: float, curvature: float, angle: float, disc: tuple[float, float, float]
-) -> None:
+def test_an_arcs_clearance_is_that_of_its_points(yaw, curvature, angle, disc):
     sweep = math.copysign(angle, curvature)
     points = sampled_arc(yaw, curvature, sweep)
     discs, bounds = np.array([disc]), np.array([-3.0, -3.0, 3.0, 3.0])
@@ -252,30 +219,3 @@ def test_an_arcs_clearance_is_that_of_its_points(
     exact = arc_clearance(0.0, 0.0, yaw, curvature, sweep, points[-1, 0], points[-1, 1], discs, bounds)
     assert exact == pytest.approx(brute, abs=5e-3)
     assert exact <= brute + 1e-9
-
-
-def test_lookahead_is_short_only_where_the_straight_line_is_blocked() -> None:
-    inner = np.array([[0.9, 0.2, 0.05]])  # on the inside of the corner, where a line that cuts it comes too close
-    starts = np.array([0, 1])
-    out = np.empty(21)
-    clear_lookaheads(CORNER, CORNER_ARC, ObstacleIndex(inner, starts, BOUNDS, 1000.0), 0.1, 0.1, 0.1, 1.0, out)
-    assert out[0] == pytest.approx(1.0, abs=0.06)
-    assert out[7] < 0.7
-    free = np.empty(21)
-    clear_lookaheads(
-        CORNER, CORNER_ARC, ObstacleIndex(NO_DISCS, np.array([0, 0]), BOUNDS, 1000.0), 0.1, 0.1, 0.1, 1.0, free
-    )
-    assert (free == 1.0).all()
-
-
-@given(
-    st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4), st.floats(0.05, 1)), max_size=20),
-    st.integers(0, 10**6),
-)
-def test_a_square_lists_every_disc_within_the_distance(discs: list[tuple[float, float, float]], seed: int) -> None:
-    table = np.array(discs).reshape(-1, 3)
-    bounds = np.array([-4.0, -4.0, 4.0, 4.0])
-    rows, starts = index_discs(table, bounds, 0.7, 0.9)
-    x, y = np.random.default_rng(seed).uniform(-4, 4, 2)
-    near = {tuple(row) for row in nearby(x, y, ObstacleIndex(rows, starts, bounds, 0.7))}
-    assert {d for d in discs if math.hypot(d[0] - x, d[1] - y) - d[2] <= 0.9} <= near

@@ -1,7 +1,5 @@
 """Speed profiles: results worked out by hand, and the robot's limits on random routes."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -10,17 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.base import Floats
-from antdrive.robots import RobotSpec
-from antdrive.robots.control.speed_limits import SpeedProfile, speed_profile, turning_time
+from antdrive.robots.control.speed_limits import speed_profile, turning_time
 from antdrive.worlds import Route
 
 
-def straight(length: float) -> Route:
+def straight(length):
     return Route([[0.0, 0.0], [length, 0.0]])
 
 
-def around(radius: float, sweep: float, bulge: float = 5e-4) -> Route:
+def around(radius, sweep, bulge=5e-4):
     """An arc as smoothed routes contain it: a polyline whose vertices lie outside the arc."""
     count = math.ceil(abs(sweep) / (2 * math.acos(radius / (radius + bulge))))
     half = sweep / count / 2
@@ -31,7 +27,7 @@ def around(radius: float, sweep: float, bulge: float = 5e-4) -> Route:
     return Route(np.stack((reach * np.cos(angles), reach * np.sin(angles)), axis=1), curvature)
 
 
-def test_speeds_on_a_straight_line_form_a_trapezoid(turtlebot: RobotSpec) -> None:
+def test_speeds_on_a_straight_line_form_a_trapezoid(turtlebot):
     """0.7 m/s at 1 m/s^2: 0.7 s and 0.245 m to accelerate, and the same to brake."""
     p = speed_profile(straight(2.0), turtlebot, step=0.005)
     assert p.duration == pytest.approx(2.0 / 0.7 + 0.7, abs=1e-4)
@@ -43,7 +39,7 @@ def test_speeds_on_a_straight_line_form_a_trapezoid(turtlebot: RobotSpec) -> Non
     assert not p.curvature.any()
 
 
-def test_speeds_on_a_short_line_form_a_triangle_whose_peak_depends_on_the_braking(turtlebot: RobotSpec) -> None:
+def test_speeds_on_a_short_line_form_a_triangle_whose_peak_depends_on_the_braking(turtlebot):
     p = speed_profile(straight(0.32), turtlebot, step=0.0025)
     assert p.duration == pytest.approx(2 * math.sqrt(0.32), abs=1e-4)
     assert p.speed.max() == pytest.approx(math.sqrt(0.32), abs=1e-3)
@@ -53,8 +49,8 @@ def test_speeds_on_a_short_line_form_a_triangle_whose_peak_depends_on_the_brakin
     assert speed_profile(straight(1e-4), turtlebot).duration == pytest.approx(0.02, rel=0.01)
 
 
-def test_a_long_arc_is_driven_at_the_lowest_of_its_speed_limits(turtlebot: RobotSpec, jackal: RobotSpec) -> None:
-    def cruise(robot: RobotSpec, radius: float) -> float:
+def test_a_long_arc_is_driven_at_the_lowest_of_its_speed_limits(turtlebot, jackal):
+    def cruise(robot, radius):
         p = speed_profile(around(radius, 3.0), robot)
         return float(np.interp(p.arc[-1] / 2, p.arc, p.speed))
 
@@ -66,7 +62,7 @@ def test_a_long_arc_is_driven_at_the_lowest_of_its_speed_limits(turtlebot: Robot
     assert cruise(weak, 0.5) == pytest.approx(0.784 / 1.3756, rel=1e-3)
 
 
-def test_acceleration_on_an_arc_respects_the_yaw_acceleration(jackal: RobotSpec) -> None:
+def test_acceleration_on_an_arc_respects_the_yaw_acceleration(jackal):
     sluggish = dataclasses.replace(jackal, max_yaw_acceleration=1.0)
     p = speed_profile(around(2.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
     a = np.diff(p.speed**2) / 2 / np.diff(p.arc)
@@ -78,7 +74,7 @@ def test_acceleration_on_an_arc_respects_the_yaw_acceleration(jackal: RobotSpec)
     np.testing.assert_allclose(a[middle], 1.0, rtol=2e-3)
 
 
-def test_at_a_sharp_corner_the_robot_stops_and_rotates_in_place(turtlebot: RobotSpec) -> None:
+def test_at_a_sharp_corner_the_robot_stops_and_rotates_in_place(turtlebot):
     route = Route([[0, 0], [1, 0], [1, 1]])
     p = speed_profile(route, turtlebot, step=0.005)
     leg = 1.0 / 0.7 + 0.7
@@ -96,7 +92,7 @@ def test_at_a_sharp_corner_the_robot_stops_and_rotates_in_place(turtlebot: Robot
     assert through.duration < p.duration
 
 
-def test_a_slight_corner_is_rounded_within_the_blend(turtlebot: RobotSpec) -> None:
+def test_a_slight_corner_is_rounded_within_the_blend(turtlebot):
     route = Route([[0, 0], [2, 0], [2 + math.cos(0.5), math.sin(0.5)]])
     p = speed_profile(route, turtlebot, blend=0.25, step=0.005)
     peak = np.interp(2.0, p.arc, p.curvature)
@@ -107,7 +103,7 @@ def test_a_slight_corner_is_rounded_within_the_blend(turtlebot: RobotSpec) -> No
     assert p.speed[200:-200].min() > 0.4
 
 
-def test_the_curvature_of_an_arc_is_exact_and_constant() -> None:
+def test_the_curvature_of_an_arc_is_exact_and_constant():
     from antdrive.robots.files import load_robot
 
     p = speed_profile(around(0.44, -2.5), load_robot("jackal"), blend=0.1)
@@ -116,7 +112,7 @@ def test_the_curvature_of_an_arc_is_exact_and_constant() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0.05, 1.5), st.floats(-1.5, 1.5)), min_size=1, max_size=8), st.booleans())
-def test_all_limits_hold_on_random_routes(legs: list[tuple[float, float]], fast_robot: bool) -> None:
+def test_all_limits_hold_on_random_routes(legs, fast_robot):
     from antdrive.robots.files import load_robot
 
     robot = load_robot("jackal" if fast_robot else "turtlebot")
@@ -128,7 +124,7 @@ def test_all_limits_hold_on_random_routes(legs: list[tuple[float, float]], fast_
     check(p, robot)
 
 
-def check(p: SpeedProfile, robot: RobotSpec) -> None:
+def check(p, robot):
     v, k = p.speed, np.abs(p.curvature)
     assert np.isfinite(p.time).all()
     assert (np.diff(p.time) > 0).all()
@@ -139,13 +135,13 @@ def check(p: SpeedProfile, robot: RobotSpec) -> None:
     assert (v + v * k * robot.track / 2 <= robot.max_wheel_speed * robot.wheel_radius + 1e-9).all()
     ds = np.diff(p.arc)
     moving = ds > 0
-    a: Floats = (np.diff(v**2)[moving] / 2) / ds[moving]
+    a = (np.diff(v**2)[moving] / 2) / ds[moving]
     assert (np.abs(a) <= robot.max_acceleration + 1e-6).all()
     yaw = np.diff(p.yaw_rate)[moving] / np.diff(p.time)[moving]
     assert (np.abs(yaw) <= 1.25 * robot.max_yaw_acceleration).all()  # the curvature is not quite linear between samples
 
 
-def test_smoothed_routes_respect_the_limits_and_are_faster_than_cell_paths(jackal: RobotSpec) -> None:
+def test_smoothed_routes_respect_the_limits_and_are_faster_than_cell_paths(jackal):
     from antdrive.planners import AStar, Query
     from antdrive.planners.smoothing.smooth import smooth
     from antdrive.worlds import forest, rasterise
@@ -162,7 +158,7 @@ def test_smoothed_routes_respect_the_limits_and_are_faster_than_cell_paths(jacka
             assert p.duration < slow.duration
 
 
-def test_settings_out_of_range_are_refused(turtlebot: RobotSpec) -> None:
+def test_settings_out_of_range_are_refused(turtlebot):
     for wrong in (
         {"blend": 0.0},
         {"step": -1.0},

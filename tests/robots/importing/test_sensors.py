@@ -1,14 +1,12 @@
 """The lidar of a robot out of URDF: what its Gazebo sensor says, where it is, and why one cannot be used."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
 import pytest
 
 from antdrive.robots import Lidar
-from antdrive.robots.importing.urdf import ImportedRobot, import_urdf
+from antdrive.robots.importing.urdf import import_urdf
 
 BURGER = (Path(__file__).parent / "urdf" / "burger.urdf").read_text()
 SENSOR = (
@@ -23,7 +21,7 @@ USUAL = {
 }  # fmt: skip
 
 
-def imported(tmp_path: Path, *sensors: str, joint: str = 'xyz="-0.032 0 0.167"') -> ImportedRobot:
+def imported(tmp_path, *sensors, joint='xyz="-0.032 0 0.167"'):
     path = tmp_path / "burger.urdf"
     text = BURGER.replace('<origin xyz="-0.032 0 0.167"/>', f"<origin {joint}/>")
     assert joint in text
@@ -31,12 +29,12 @@ def imported(tmp_path: Path, *sensors: str, joint: str = 'xyz="-0.032 0 0.167"')
     return import_urdf(path)
 
 
-def sensor(**changes: str) -> str:
+def sensor(**changes):
     return SENSOR.format(**USUAL | changes)
 
 
 @pytest.mark.parametrize(("kind", "tag"), [("ray", "ray"), ("gpu_ray", "ray"), ("gpu_lidar", "lidar")])
-def test_a_lidar_is_read_where_it_is(tmp_path: Path, kind: str, tag: str) -> None:
+def test_a_lidar_is_read_where_it_is(tmp_path, kind, tag):
     found = imported(tmp_path, sensor(kind=kind, tag=tag))
     assert found.robot.lidar == Lidar(
         beams=360, field_of_view=6.283185, min_range=0.12, max_range=3.5, rate=5.0, resolution=0.015, sigma=0.01,
@@ -57,11 +55,10 @@ def test_a_lidar_is_read_where_it_is(tmp_path: Path, kind: str, tag: str) -> Non
         ("0 0 1.5707963", "<pose>0.05 0.02 0.03 0 0 -1.5707963</pose>", math.pi / 4),
     ],
 )
-def test_a_lidar_looks_where_the_middle_of_its_view_is(tmp_path: Path, joint: str, pose: str, heading: float) -> None:
+def test_a_lidar_looks_where_the_middle_of_its_view_is(tmp_path, joint, pose, heading):
     found = imported(
         tmp_path, sensor(high="1.5707963", pose=pose), joint=f'xyz="0 0.01 0.167" rpy="{joint}"'
     ).robot.lidar
-    assert found is not None
     assert found.yaw == pytest.approx(heading, abs=1e-5)
     assert (found.field_of_view, found.beams) == (pytest.approx(math.pi / 2, abs=1e-6), 360)
     spot = (-0.02, 0.06, 0.207) if pose else (0.0, 0.01, 0.177)  # the pose is in the turned link
@@ -84,27 +81,23 @@ def test_a_lidar_looks_where_the_middle_of_its_view_is(tmp_path: Path, joint: st
         ({"tag": "beam"}, "scan: has no horizontal samples"),
     ],
 )
-def test_a_lidar_that_cannot_be_used_is_left_out_with_the_reason(
-    tmp_path: Path, changes: dict[str, str], says: str
-) -> None:
+def test_a_lidar_that_cannot_be_used_is_left_out_with_the_reason(tmp_path, changes, says):
     found = imported(tmp_path, sensor(**changes))
     assert found.robot.lidar is None
     assert f"# no lidar: sensor lds of link scan is not used: {says}" in found.text.splitlines()
     other = imported(tmp_path, sensor(**changes), sensor(name="second"), sensor(name="third"))
-    assert other.robot.lidar is not None
     assert (
         f"# read: sensor second of link scan; sensor lds of link scan is not used: {says}; sensor third of link scan is not used"
     ) in other.text.splitlines()
 
 
-def test_what_is_no_lidar_is_none(tmp_path: Path) -> None:
+def test_what_is_no_lidar_is_none(tmp_path):
     found = imported(tmp_path, sensor(kind="camera"), sensor().replace('reference="scan"', 'reference="nowhere"'))
     assert found.robot.lidar is None
     assert "lidar" not in found.text
 
 
-def test_a_rate_that_is_missing_is_assumed(tmp_path: Path) -> None:
+def test_a_rate_that_is_missing_is_assumed(tmp_path):
     found = imported(tmp_path, sensor().replace("<update_rate>5</update_rate>", ""))
-    assert found.robot.lidar is not None
     assert found.robot.lidar.rate == 10.0
     assert "# read: sensor lds of link scan; rate of 10 Hz assumed" in found.text

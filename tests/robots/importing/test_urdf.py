@@ -1,13 +1,10 @@
 """Robots out of URDF: what public dimensions say is what is imported, and what is no differential drive is refused."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.base import InputError
-from antdrive.robots import Footprint, RobotSpec, load_robot
+from antdrive.robots import Footprint, load_robot
 from antdrive.robots.files import footprint_to_dict as written
 from antdrive.robots.importing.hull import convex_hull, fewer_corners, footprint_around
-from antdrive.robots.importing.urdf import ImportedRobot, import_urdf
+from antdrive.robots.importing.urdf import import_urdf
 from benchmarks.robots import SPECIFICATIONS, values_of
 
 FIXTURES = Path(__file__).parent / "urdf"
@@ -29,21 +26,18 @@ KINDS = {
     "warehouse.urdf.xacro": "rectangle",
 }  # fmt: skip
 CATALOGUE = {
-    "burger.urdf": "turtlebot3-burger",
-    "waffle.urdf": "turtlebot3-waffle",
-    "turtlebot4.urdf": "turtlebot4",
-    "pioneer3dx.urdf": "pioneer3dx",
-    "warehouse.urdf.xacro": "warehouse",
-}
+    "burger.urdf": "turtlebot3-burger", "waffle.urdf": "turtlebot3-waffle", "turtlebot4.urdf": "turtlebot4",
+    "pioneer3dx.urdf": "pioneer3dx", "warehouse.urdf.xacro": "warehouse",
+}  # fmt: skip
 
 
-def imported(name: str, **settings: Any) -> ImportedRobot:
+def imported(name, **settings):
     if name.endswith(".xacro"):
         pytest.importorskip("xacrodoc")
     return import_urdf(FIXTURES / name, **settings)
 
 
-def comments(found: ImportedRobot) -> dict[str, str]:
+def comments(found):
     """What the file says of each value, beside it or above it."""
     lines = found.text.splitlines()
     beside = {line.split(":")[0]: line.partition("  # ")[2] for line in lines if "  # " in line}
@@ -51,7 +45,7 @@ def comments(found: ImportedRobot) -> dict[str, str]:
     return beside | above
 
 
-def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> Path:
+def changed(tmp_path, name, *changes):
     """A fixture with changes. The burger loses its drive plugin, so that its wheels and limits are those of the geometry."""
     text = (FIXTURES / name).read_text()
     if name == "burger.urdf":
@@ -65,7 +59,7 @@ def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> Path:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_what_is_imported_is_within_a_hundredth_of_all_public_values(name: str) -> None:
+def test_what_is_imported_is_within_a_hundredth_of_all_public_values(name):
     found, specified = imported(name), SPECIFICATIONS[name]
     robot, values = found.robot, values_of(found.robot)
     assert {key: values[key] for key in specified} == pytest.approx(specified, rel=0.01)
@@ -82,7 +76,7 @@ def test_what_is_imported_is_within_a_hundredth_of_all_public_values(name: str) 
     assert outside <= 1e-8, "no footprint is smaller than the collision geometry"
 
 
-def test_the_file_says_of_each_value_where_it_comes_from(tmp_path: Path) -> None:
+def test_the_file_says_of_each_value_where_it_comes_from(tmp_path):
     found = imported("pioneer3dx.urdf", given={"mass": 9.5})
     path = tmp_path / "pioneer.yaml"
     path.write_text(found.text)
@@ -99,19 +93,19 @@ def test_the_file_says_of_each_value_where_it_comes_from(tmp_path: Path) -> None
     assert set(yaml.safe_load(found.text)) == {"schema", "name", "source", "footprint", "noise", *kinds}
 
 
-def test_the_noise_is_assumed_as_in_the_catalogue() -> None:
+def test_the_noise_is_assumed_as_in_the_catalogue():
     found = imported("burger.urdf")
     assert found.robot.noise == load_robot("turtlebot3-burger").noise
     assert "# assumed: as in the catalogue; measure the robot's own\nnoise: {pose_xy" in found.text
 
 
-def test_limits_come_from_the_drive_plugin_where_there_is_one() -> None:
+def test_limits_come_from_the_drive_plugin_where_there_is_one():
     found = imported("waffle.urdf")
     assert (found.robot.max_speed, found.robot.max_yaw_rate) == (0.26, 1.82)
     assert comments(found)["max_speed"] == "read: <max_linear_velocity> of the drive plugin"
 
 
-def test_limits_that_contradict_each_other_are_resolved_or_refused(tmp_path: Path) -> None:
+def test_limits_that_contradict_each_other_are_resolved_or_refused(tmp_path):
     slow = ('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><limit effort="2" velocity="5"/>')
     found = import_urdf(changed(tmp_path, "waffle.urdf", slow))
     assert found.robot.max_speed == pytest.approx(5 * 0.033)
@@ -124,7 +118,7 @@ def test_limits_that_contradict_each_other_are_resolved_or_refused(tmp_path: Pat
         imported("burger.urdf", given={"max_speed": 9.0})
 
 
-def limited(tmp_path: Path, words: str) -> ImportedRobot:
+def limited(tmp_path, words):
     """The burger with a limit on both wheels."""
     path = changed(tmp_path, "burger.urdf")
     path.write_text(path.read_text().replace('<axis xyz="0 0 1"/>', f'<axis xyz="0 0 1"/><limit {words}/>'))
@@ -153,9 +147,7 @@ def limited(tmp_path: Path, words: str) -> ImportedRobot:
         ('effort="0.01"', "max_acceleration", 0.545455, "computed: nine tenths of what motors and grip reach"),
     ],
 )  # fmt: skip
-def test_no_limit_of_a_joint_is_left_out_without_a_word(
-    tmp_path: Path, words: str, key: str, value: float, says: str
-) -> None:
+def test_no_limit_of_a_joint_is_left_out_without_a_word(tmp_path, words, key, value, says):
     found = limited(tmp_path, words)
     assert getattr(found.robot, key) == pytest.approx(value, rel=1e-4)
     assert comments(found)[key].startswith(says)
@@ -175,9 +167,7 @@ def test_no_limit_of_a_joint_is_left_out_without_a_word(
          "is above the 50 rad/s that a robot's file may say, and is not used"),
     ],
 )  # fmt: skip
-def test_a_speed_that_stands_for_no_limit_is_not_used_but_named(
-    tmp_path: Path, tag: str, told: float, velocity: str, key: str, value: float, says: str
-) -> None:
+def test_a_speed_that_stands_for_no_limit_is_not_used_but_named(tmp_path, tag, told, velocity, key, value, says):
     plugin = (
         "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
         f"<{tag}>{told}</{tag}></plugin></gazebo></robot>"
@@ -188,7 +178,7 @@ def test_a_speed_that_stands_for_no_limit_is_not_used_but_named(
     assert comments(found)[key].startswith(says)
 
 
-def test_wheels_of_different_radii_are_named_with_both(tmp_path: Path) -> None:
+def test_wheels_of_different_radii_are_named_with_both(tmp_path):
     """Wherever their axle is: at one height, or with both on the floor; and where the file names them itself."""
     text = (FIXTURES / "burger.urdf").read_text()
     plain, plugin = changed(tmp_path, "burger.urdf").read_text(), text[text.index("<gazebo>") :]
@@ -214,7 +204,7 @@ CONTROL = (
 )
 
 
-def test_ros2_control_names_the_driven_wheels_and_their_limit(tmp_path: Path) -> None:
+def test_ros2_control_names_the_driven_wheels_and_their_limit(tmp_path):
     """Of four wheels on two axles those that it drives by speed; the right one comes first in the file."""
     most = '<param name="min">-9</param><param name="max">5</param>'
     control = CONTROL.format("rear_right_wheel", most, "rear_left_wheel")
@@ -240,7 +230,7 @@ def test_ros2_control_names_the_driven_wheels_and_their_limit(tmp_path: Path) ->
             import_urdf(path)
 
 
-def test_a_wheel_that_is_a_little_askew_adds_no_corners(tmp_path: Path) -> None:
+def test_a_wheel_that_is_a_little_askew_adds_no_corners(tmp_path):
     """Quarter turns are often written 1.57, which tilts a wheel by 0.8 mrad."""
     straight, askew = (
         import_urdf(changed(tmp_path, "burger.urdf", ("-1.5707963", turn))) for turn in ("-1.5707963", "-1.57")
@@ -249,7 +239,7 @@ def test_a_wheel_that_is_a_little_askew_adds_no_corners(tmp_path: Path) -> None:
     assert askew.robot.footprint.bounds == pytest.approx(straight.robot.footprint.bounds, abs=1e-4)
 
 
-def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path: Path) -> None:
+def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path):
     with pytest.raises(
         InputError, match=r"max_speed: must be at least 0\.05, got 0\.0165 \(computed: the velocity limit"
     ):
@@ -264,9 +254,7 @@ def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path: Path) ->
         (3, 2, 2.0, "the effort limit of joint wheel_left_joint, 3 N m is more"),
     ],
 )
-def test_the_lowest_torque_that_can_be_used_is_and_the_other_is_named(
-    tmp_path: Path, effort: float, plugin: float, torque: float, beside: str
-) -> None:
+def test_the_lowest_torque_that_can_be_used_is_and_the_other_is_named(tmp_path, effort, plugin, torque, beside):
     plugged = (
         "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
         f"<max_wheel_torque>{plugin}</max_wheel_torque></plugin></gazebo></robot>"
@@ -279,14 +267,14 @@ def test_the_lowest_torque_that_can_be_used_is_and_the_other_is_named(
 
 
 @pytest.mark.parametrize("key", ["velocity", "effort"])
-def test_a_negative_limit_is_refused_with_joint_and_key(tmp_path: Path, key: str) -> None:
+def test_a_negative_limit_is_refused_with_joint_and_key(tmp_path, key):
     with pytest.raises(InputError, match=rf"joint wheel_\w+_joint: the limit's {key} must be at least 0, got -5$"):
         limited(tmp_path, f'{key}="-5"')
     none = limited(tmp_path, f'{key}="0"')
     assert none.robot == limited(tmp_path, "").robot  # 0 is how files say that there is none
 
 
-def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_path: Path) -> None:
+def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_path):
     plugin = (
         "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
         "<wheel_separation>0.2</wheel_separation><wheel_diameter>0.0661</wheel_diameter>"
@@ -303,12 +291,12 @@ def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_pat
     )
 
 
-def test_links_without_a_mass_are_named(tmp_path: Path) -> None:
+def test_links_without_a_mass_are_named(tmp_path):
     found = import_urdf(changed(tmp_path, "waffle.urdf", ('<mass value="0.03"/>', "")))
     assert comments(found)["mass"] == "computed: sum of the masses of base_link; left, right have none"
 
 
-def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle() -> None:
+def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle():
     with pytest.raises(
         InputError, match=r"2 pairs of wheels on axles \(front_left_wheel and front_right_wheel; rear_left"
     ):
@@ -322,33 +310,24 @@ JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="{}"/>
 
 
 #: Changes that make a file wrong, in one way each.
-WRONG: tuple[tuple[tuple[str, str], ...], ...] = (
-    (("<robot name", "<sdf name"), ("</robot>", "</sdf>")),
-    (('type="continuous"', 'type="fixed"'),),
-    (("0 -0.080 0.023", "0.05 -0.080 0.023"),),
-    (('child link="scan"', 'child link="scam"'),),
-    (('child link="scan"', 'child link="base_link"'),),
-    (('radius="0.035"', 'radius="wide"'),),
-    (('<box size="0.138 0.140 0.143"/>', '<mesh filename="package://a/b.stl"/>'),),
-    (("<box size", "<box dimensions"),),
-    (("<box size", "<cone size"),),
-    (('<link name="scan">', "<link>"),),
-    (('value="0.83"', 'value="nan"'),),
-    (("<robot name", "<!DOCTYPE robot><robot name"),),
-    (('value="0.83"', 'value="2e8"'),),
-    (('value="0.83"', 'value="-0.83"'),),
-    (('radius="0.033"', 'radius="-0.033"'),),
+WRONG = (
+    (("<robot name", "<sdf name"), ("</robot>", "</sdf>")), (('type="continuous"', 'type="fixed"'),),
+    (("0 -0.080 0.023", "0.05 -0.080 0.023"),), (('child link="scan"', 'child link="scam"'),),
+    (('child link="scan"', 'child link="base_link"'),), (('radius="0.035"', 'radius="wide"'),),
+    (('<box size="0.138 0.140 0.143"/>', '<mesh filename="package://a/b.stl"/>'),), (("<box size", "<box dimensions"),),
+    (("<box size", "<cone size"),), (('<link name="scan">', "<link>"),), (('value="0.83"', 'value="nan"'),),
+    (("<robot name", "<!DOCTYPE robot><robot name"),), (('value="0.83"', 'value="2e8"'),),
+    (('value="0.83"', 'value="-0.83"'),), (('radius="0.033"', 'radius="-0.033"'),),
     (('<origin xyz="-0.032 0 0.070"/>', '<origin xyz="-0.032 0 0.030"/>'),),
-    (('type="continuous"', 'type="revolute"'),),
-    (('value="0.83"', 'value="2e5"'),),
-)
+    (('type="continuous"', 'type="revolute"'),), (('value="0.83"', 'value="2e5"'),),
+)  # fmt: skip
 
 
-def test_the_middle_of_the_axle_need_not_be_the_roots(tmp_path: Path) -> None:
+def test_the_middle_of_the_axle_need_not_be_the_roots(tmp_path):
     import_urdf(changed(tmp_path, "burger.urdf", ("0 -0.080 0.023", "0 -0.120 0.023")))
 
 
-def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path: Path) -> None:
+def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path):
     steered = '<link name="knuckle"/>' + JOINT.format(
         "steer", "revolute", "knuckle", "0.2 0.1 0", '<limit lower="-1" upper="1"/>'
     )
@@ -372,7 +351,7 @@ def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path: Path) ->
         import_urdf(path)
 
 
-def test_a_plugin_for_a_vehicle_that_skids_chooses_no_axle(tmp_path: Path) -> None:
+def test_a_plugin_for_a_vehicle_that_skids_chooses_no_axle(tmp_path):
     plugin = "<gazebo><plugin>" + "".join(
         f"<{side}_joint>{end}_{side}_wheel</{side}_joint>" for side in ("left", "right") for end in ("front", "rear")
     ) + "</plugin></gazebo></robot>"  # fmt: skip
@@ -384,7 +363,7 @@ def test_a_plugin_for_a_vehicle_that_skids_chooses_no_axle(tmp_path: Path) -> No
     assert import_urdf(path).robot.footprint.bounds[2] == pytest.approx(0.751, abs=1e-3)
 
 
-def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path: Path) -> None:
+def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path):
     body = '<collision><origin xyz="-0.064 0 0.0815"/><geometry><box size="0.281 0.306 0.119"/></geometry></collision>'
     with pytest.raises(
         InputError, match="has no collision geometry beside its wheels, from which a footprint could follow"
@@ -396,7 +375,7 @@ def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("key", ["mass", "wheel_radius", "track"])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan])
-def test_given_values_that_no_robot_has_are_refused(key: str, value: float) -> None:
+def test_given_values_that_no_robot_has_are_refused(key, value):
     with pytest.raises(InputError, match=f"{key}: must be a number greater than 0"):
         imported("burger.urdf", given={key: value})
 
@@ -404,13 +383,13 @@ def test_given_values_that_no_robot_has_are_refused(key: str, value: float) -> N
 @pytest.mark.parametrize(
     ("key", "value"), [("max_lateral_acceleration", 0.785398), ("max_yaw_acceleration", 3.14159265)]
 )
-def test_long_numbers_stand_apart_from_their_comments(key: str, value: float) -> None:
+def test_long_numbers_stand_apart_from_their_comments(key, value):
     found = imported("burger.urdf", given={key: value})
     assert yaml.safe_load(found.text)[key] == pytest.approx(value)
     assert getattr(found.robot, key) == pytest.approx(value)
 
 
-def test_wheels_can_be_told_by_joint_or_link() -> None:
+def test_wheels_can_be_told_by_joint_or_link():
     there = imported("burger.urdf").robot
     assert imported("burger.urdf", left="wheel_left_link", right="wheel_right_joint").robot == there
     back = imported("burger.urdf", left="wheel_right_link", right="wheel_left_link").robot  # it drives backwards
@@ -425,7 +404,7 @@ def test_wheels_can_be_told_by_joint_or_link() -> None:
         imported("burger.urdf", left="wheel")
 
 
-def test_what_lies_higher_is_left_out_and_meshes_too_where_asked(tmp_path: Path) -> None:
+def test_what_lies_higher_is_left_out_and_meshes_too_where_asked(tmp_path):
     wide = changed(tmp_path, "turtlebot4.urdf", ('size="0.1 0.1 0.246"', 'size="0.9 0.1 0.246"'))
     assert import_urdf(wide).robot.radius > 0.45
     low = import_urdf(wide, below=0.1)
@@ -441,7 +420,7 @@ def test_what_lies_higher_is_left_out_and_meshes_too_where_asked(tmp_path: Path)
     assert found.text.endswith("# left out, because they were not found: mast: package://tb/mast.stl\n")
 
 
-def test_a_mesh_is_read_with_its_scale(tmp_path: Path) -> None:
+def test_a_mesh_is_read_with_its_scale(tmp_path):
     pytest.importorskip("trimesh")
     corners = [(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-1, 1)]
     (tmp_path / "meshes").mkdir()
@@ -456,7 +435,7 @@ def test_a_mesh_is_read_with_its_scale(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("unit", "scale"), [('<unit meter="0.001" name="millimetre"/>', 1.0), ("", 0.001)])
-def test_the_unit_of_a_collada_mesh_counts(tmp_path: Path, unit: str, scale: float) -> None:
+def test_the_unit_of_a_collada_mesh_counts(tmp_path, unit, scale):
     """A box of 400 x 300 x 100 units, as few tags as COLLADA allows."""
     pytest.importorskip("trimesh")
     pytest.importorskip("collada")
@@ -481,7 +460,7 @@ def test_the_unit_of_a_collada_mesh_counts(tmp_path: Path, unit: str, scale: flo
     assert import_urdf(path).robot.footprint.bounds == pytest.approx((-0.264, -0.1525, 0.136, 0.1525), abs=1e-3)
 
 
-def test_masses_and_torques_that_a_file_lacks_are_assumed(tmp_path: Path) -> None:
+def test_masses_and_torques_that_a_file_lacks_are_assumed(tmp_path):
     path = changed(tmp_path, "waffle.urdf", ('<mass value="1.74"/>', ""), ('<mass value="0.03"/>', ""))
     found = import_urdf(path)
     assert found.robot.mass == pytest.approx(150 * 0.281 * 0.306 * 0.141, rel=1e-3)
@@ -489,9 +468,7 @@ def test_masses_and_torques_that_a_file_lacks_are_assumed(tmp_path: Path) -> Non
 
 
 @given(st.floats(0.01, 0.5), st.floats(0.2, 2.0), st.floats(1.0, 100.0))
-def test_any_limits_of_the_joints_give_a_robot_that_reaches_what_it_promises(
-    radius: float, track: float, velocity: float
-) -> None:
+def test_any_limits_of_the_joints_give_a_robot_that_reaches_what_it_promises(radius, track, velocity):
     """Whatever the rounding does: a robot whose motors fall short by the last digit would be refused."""
     text = (FIXTURES / "waffle.urdf").read_text().partition("<gazebo>")[0] + "</robot>"
     body = f'<box size="{2.5 * max(radius, track)} {2 * track} 0.1"/>'
@@ -518,7 +495,7 @@ def test_any_limits_of_the_joints_give_a_robot_that_reaches_what_it_promises(
 points = st.tuples(st.floats(-1, 1), st.floats(-1, 1))
 
 
-def most_outside(footprint: dict[str, Any], some: list[tuple[float, float]]) -> float:
+def most_outside(footprint, some):
     """How far the outermost of some points lies outside a footprint as it stands in a robot's file [m]."""
     x, y = np.array(some).T
     if "radius" in footprint:
@@ -534,7 +511,7 @@ def most_outside(footprint: dict[str, Any], some: list[tuple[float, float]]) -> 
 
 
 @given(st.lists(points, min_size=3, max_size=60), st.sampled_from(["auto", "disc", "rectangle", "polygon"]))
-def test_a_footprint_holds_every_point_that_it_was_made_around(some: list[tuple[float, float]], kind: str) -> None:
+def test_a_footprint_holds_every_point_that_it_was_made_around(some, kind):
     ring = [(0.3 * math.cos(k), 0.2 * math.sin(k)) for k in range(7)]
     foot = footprint_around(some + ring, kind)
     assert most_outside(written(foot), some + ring) <= 1e-8
@@ -546,9 +523,7 @@ def test_a_footprint_holds_every_point_that_it_was_made_around(some: list[tuple[
     st.tuples(st.floats(0.05, 0.5), st.floats(0.05, 0.5)), st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(-3, 3),
     st.sampled_from(["auto", "disc", "rectangle", "polygon"]),
 )  # fmt: skip
-def test_no_corner_of_a_turned_box_is_outside_of_the_footprint(
-    size: tuple[float, float], x: float, y: float, yaw: float, kind: str
-) -> None:
+def test_no_corner_of_a_turned_box_is_outside_of_the_footprint(size, x, y, yaw, kind):
     """A few corners of any digits: a corner that is rounded to the nearest is too far inside for half of them."""
     box = [(x + a * math.cos(yaw) - b * math.sin(yaw), y + a * math.sin(yaw) + b * math.cos(yaw))
            for a in (-size[0], size[0]) for b in (-size[1], size[1])]  # fmt: skip
@@ -560,9 +535,7 @@ def test_no_corner_of_a_turned_box_is_outside_of_the_footprint(
 
 
 @given(st.lists(st.tuples(st.floats(-1, 1), st.floats(0, 1)), min_size=3, max_size=40), st.floats(0.2, 0.8))
-def test_a_robot_with_two_equal_sides_has_a_footprint_with_two_equal_sides(
-    some: list[tuple[float, float]], at: float
-) -> None:
+def test_a_robot_with_two_equal_sides_has_a_footprint_with_two_equal_sides(some, at):
     ring = [(at + 0.4 * math.cos(k / 30 * math.pi), 0.4 * math.sin(k / 30 * math.pi)) for k in range(31)]
     both = [(x, side * y) for x, y in some + ring for side in (-1, 1)]
     foot = footprint_around(both, "polygon")
@@ -572,7 +545,7 @@ def test_a_robot_with_two_equal_sides_has_a_footprint_with_two_equal_sides(
         assert min(math.dist((x, -y), corner) for corner in foot.corners) <= 1e-4
 
 
-def test_a_cylinder_is_as_long_and_as_wide_as_its_diameter(tmp_path: Path) -> None:
+def test_a_cylinder_is_as_long_and_as_wide_as_its_diameter(tmp_path):
     path = changed(
         tmp_path, "burger.urdf", ('<box size="0.138 0.140 0.143"/>', '<cylinder radius="0.2" length="0.143"/>')
     )
@@ -584,7 +557,7 @@ def test_a_cylinder_is_as_long_and_as_wide_as_its_diameter(tmp_path: Path) -> No
 
 
 @given(st.integers(13, 90), st.floats(0.3, 1.0))
-def test_fewer_corners_cost_little(count: int, squash: float) -> None:
+def test_fewer_corners_cost_little(count, squash):
     ellipse = [(math.cos(2 * math.pi * k / count), squash * math.sin(2 * math.pi * k / count)) for k in range(count)]
     fewer = fewer_corners(convex_hull(ellipse), 12)
     assert 4 <= len(fewer) <= 12
@@ -595,7 +568,7 @@ def test_fewer_corners_cost_little(count: int, squash: float) -> None:
     assert min(foot.depth(*point) for point in ellipse) > -1e-6
 
 
-def test_the_yaw_of_the_axle_is_the_robots(tmp_path: Path) -> None:
+def test_the_yaw_of_the_axle_is_the_robots(tmp_path):
     """A model whose ahead is the root's y axis: the same robot, turned."""
     text = (FIXTURES / "burger.urdf").read_text()
     for old, new in (
@@ -608,7 +581,7 @@ def test_the_yaw_of_the_axle_is_the_robots(tmp_path: Path) -> None:
         text = text.replace(old, new)
     path = tmp_path / "turned.urdf"
     path.write_text(text)
-    robot: RobotSpec = import_urdf(path).robot
+    robot = import_urdf(path).robot
     assert robot.footprint.bounds == pytest.approx((-0.101, -0.089, 0.037, 0.089), abs=1e-4)
 
 
@@ -621,7 +594,7 @@ def test_the_yaw_of_the_axle_is_the_robots(tmp_path: Path) -> None:
     ],
     ids=["expression", "package", "macro"],
 )
-def test_what_xacro_cannot_expand_is_refused_in_one_line(tmp_path: Path, inside: str, says: str) -> None:
+def test_what_xacro_cannot_expand_is_refused_in_one_line(tmp_path, inside, says):
     pytest.importorskip("xacrodoc")
     path = tmp_path / "robot.xacro"
     path.write_text(f'<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x">{inside}</robot>')
@@ -634,7 +607,7 @@ def test_what_xacro_cannot_expand_is_refused_in_one_line(tmp_path: Path, inside:
     assert "\\n" not in message
 
 
-def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path: Path) -> None:
+def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path):
     pytest.importorskip("xacrodoc")
     text = (FIXTURES / "burger.urdf").read_text()
     top = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="$(arg name)">'
@@ -658,7 +631,7 @@ def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path: Path
         imported("burger.urdf", arguments={"name": "two"})
 
 
-def test_meshes_of_a_package_are_found_where_it_is_said_to_be(tmp_path: Path) -> None:
+def test_meshes_of_a_package_are_found_where_it_is_said_to_be(tmp_path):
     pytest.importorskip("trimesh")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "body.obj").write_text(

@@ -1,7 +1,5 @@
 """A campaign of runs that take no time to speak of, in a process that tests kill: python -m tests.runs.campaigns.parent DIR."""
 
-from __future__ import annotations
-
 import signal
 import sys
 

@@ -1,15 +1,21 @@
-"""A campaign runs what its folder lacks, and its table says what came out."""
+"""A campaign runs what its folder lacks, and its table and its logs say what came out, whatever goes wrong in a run."""
 
-from __future__ import annotations
-
+import dataclasses
+import errno
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from antdrive import Scenario, run
+from antdrive import Rollout, Scenario, load_task, run
 from antdrive.base.errors import InputError
-from antdrive.runs.campaigns import canonical_bytes, expand, make_campaign, read_results, sweep
+from antdrive.planners import PlannerError
+from antdrive.robots import load_robot
+from antdrive.runs.campaigns import canonical_bytes, expand, job, make_campaign, read_results, running, sweep, sweeping
+from antdrive.runs.campaigns.running import Driving, log_path
+from antdrive.runs.campaigns.sweeping import calibrated
+from antdrive.runs.margins.choice import Calibration
 from antdrive.worlds import Disc, Task, World, save_task
 from tests.runs.campaigns.works import Deadly
 
@@ -27,7 +33,7 @@ def worlds(tmp_path, monkeypatch):
 
 
 def test_each_world_is_driven_with_each_planner_as_run_does_it(worlds):
-    results = sweep(TWO_BY_TWO, "out")
+    results = sweep(TWO_BY_TWO, "out", jobs=0)
     rows = results.table.to_pylist()
     assert [(row["world"], row["planner"]) for row in rows] == [
         ("small", "astar"), ("small", "aco-han ants=10"), ("other", "astar"), ("other", "aco-han ants=10")
@@ -41,9 +47,9 @@ def test_each_world_is_driven_with_each_planner_as_run_does_it(worlds):
 
 
 def test_what_is_there_is_not_run_again(worlds):
-    first = sweep(TWO_BY_TWO, "out")
+    first = sweep(TWO_BY_TWO, "out", jobs=0)
     before = canonical_bytes("out")
-    again = sweep(TWO_BY_TWO, "out")
+    again = sweep(TWO_BY_TWO, "out", jobs=0)
     assert (first.made, again.made, again.complete) == (4, 0, True)
     assert canonical_bytes("out") == before
 
@@ -120,3 +126,95 @@ def test_processes_and_order_do_not_show_in_the_table(worlds):
     back = {"worlds": TWO_BY_TWO["worlds"][::-1], "planners": TWO_BY_TWO["planners"][::-1]}
     sweep(back, "back", jobs=1)
     assert canonical_bytes("here") == canonical_bytes("back")
+
+
+BASE = {"worlds": ["empty", "no-path"], "planners": ["astar"]}
+
+
+@pytest.mark.parametrize(
+    ("raised", "outcome", "reason"),
+    [
+        (PlannerError("mine", "raised ValueError"), "planner_fault", str(PlannerError("mine", "raised ValueError"))),
+        (ZeroDivisionError("oh"), "crashed", "ZeroDivisionError: oh"),
+    ],
+)
+def test_what_a_run_raises_is_its_result(raised, outcome, reason, monkeypatch):
+    def fails(scenario):
+        raise raised
+
+    monkeypatch.setattr(running, "run", fails)
+    row = Driving()(expand(make_campaign(BASE)).jobs[0]).row
+    assert (row["outcome"], row["reason"], row["succeeded"], row["certified"]) == (outcome, reason, False, None)
+
+
+@pytest.mark.parametrize(("keep", "kept"), [("none", 0), ("failed", 0), ("all", 1)])
+def test_logs_are_kept_by_rule_and_hold_what_the_row_says(keep, kept, tmp_path):
+    rows = sweep({**BASE, "rollouts": keep}, tmp_path, jobs=0).table.to_pylist()
+    assert [row["outcome"] for row in rows] == ["succeeded", "no_path"]
+    assert [row["certified"] for row in rows] == [True, None]
+    assert [row["spl"] is None for row in rows] == [False, True]
+    logs = list(tmp_path.rglob("*.npz"))
+    assert len(logs) == kept
+    if kept:
+        assert rows[0]["rollout"] == log_path(rows[0]["key"])
+        assert Rollout.load(tmp_path / rows[0]["rollout"]).digest == rows[0]["digest"]
+
+
+@pytest.mark.parametrize("folder", ["", None])
+def test_a_log_that_cannot_be_written_is_no_crash_of_the_run(folder, tmp_path, monkeypatch):
+    def full(log, path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Rollout, "save", full)
+    driving = Driving("all", None if folder is None else str(tmp_path))
+    with pytest.raises(InputError, match=r"^rollouts/.*\.npz: cannot be written \(No space left on device\)$"):
+        driving(expand(make_campaign(BASE)).jobs[0])
+
+
+def test_a_planner_that_this_machine_lacks_ends_the_campaign(monkeypatch):
+    one = expand(make_campaign(BASE)).jobs[0]
+    case = dataclasses.replace(one.case, planner=dataclasses.replace(one.case.planner, source="elsewhere"))
+    with pytest.raises(InputError, match="no planner is called 'elsewhere'"):
+        Driving()(one._replace(case=case))
+
+
+def test_the_log_of_a_failed_drive_is_kept(tmp_path):
+    hit = {
+        **BASE,
+        "worlds": "empty",
+        "settings": {"unseen": [{"x": 3.0, "y": 3.0, "radius": 0.2}]},
+        "rollouts": "failed",
+    }
+    (row,) = sweep(hit, tmp_path, jobs=0).table.to_pylist()
+    assert row["outcome"] == "collided"
+    assert (tmp_path / row["rollout"]).exists()
+    assert "--unseen 3.0,3.0,0.2" in row["command"]
+
+
+def test_an_auto_margin_is_chosen_once_for_each_robot_and_its_settings(monkeypatch):
+    asked = []
+
+    def choose(conditions):
+        asked.append((conditions.robot.name, conditions.noise))
+        return Calibration(margin=0.07, loss=0.05, largest=0.04, reserve=0.01, probability=1e-3, drives=100, key="k")
+
+    monkeypatch.setattr(sweeping, "choose_margin", choose)
+    campaign = {**BASE, "robots": ["turtlebot", "jackal"], "noise": [0, 1], "margin": [0.03, "auto"], "seeds": 2}
+    jobs = calibrated(expand(make_campaign(campaign)).jobs)
+    assert sorted(asked) == [("jackal", 0.0), ("jackal", 1.0), ("turtlebot", 0.0), ("turtlebot", 1.0)]
+    assert len({one.key for one in jobs}) == len(jobs) == 2 * 2 * 2 * 2 * 2
+    auto = [one for one in jobs if one.case.settings.fields["margin"] == "auto"]
+    assert {one.case.scenario(one.seed).margin for one in auto} == {0.07}
+    assert all(one.case.scenario(one.seed).chosen is not None for one in auto)
+    assert {sweeping.grid_table([one])["margin"][0].as_py() for one in auto} == {0.07}
+
+
+def test_a_robot_of_ones_own_comes_along_with_the_folder(tmp_path):
+    source = tmp_path / "mine.yaml"
+    catalogue = Path(job.__file__).parents[2] / "robots" / "catalog" / "turtlebot.yaml"
+    source.write_text(catalogue.read_text().replace("mass: ", "mass: 1"))
+    save_task(load_task("empty"), tmp_path / "w.yaml")
+    campaign = make_campaign({"worlds": "w.yaml", "planners": "astar", "robots": "mine.yaml"}, tmp_path)
+    (row,) = sweep(campaign, tmp_path / "out", jobs=0).table.to_pylist()
+    word = row["command"].split("--robot ")[1].split()[0]
+    assert load_robot(tmp_path / "out" / word) == load_robot(source)

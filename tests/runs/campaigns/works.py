@@ -1,7 +1,5 @@
 """What workers do in tests instead of driving: nothing, or something terrible."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time
@@ -40,7 +38,7 @@ class Listing:
     def __call__(self, job):
         time.sleep(0.01)
         with Path(self.path).open("a") as stream:
-            stream.write(f"{os.getpid()} {job.case.world}\n")
+            stream.write(f"{os.getpid()} {job.case.place.world}\n")
         return Finished(fault_row(job.key, "succeeded", ""))
 
 

@@ -1,16 +1,21 @@
-"""What counts as a failure, and which failures are the same."""
+"""What counts as a failure, which failures are the same, and the scenario that is rebuilt from a log's record."""
 
 import dataclasses
 from dataclasses import replace
 
 import pytest
 
-from antdrive.base.errors import InputError
+from antdrive.base import InputError
+from antdrive.planners import PLANNERS, GridPlanner
+from antdrive.robots import Avoidance, PurePursuit
 from antdrive.runs.failures.failure import Failure, bound_broken_in, failure_of, parse_bound, without_numbers
+from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.runs.suites import Baseline, Demands, load_suite
 from antdrive.runs.suites.demands import Bound
-from antdrive.sim import METRICS, Certificate, Outcome, run
+from antdrive.sim import METRICS, Certificate, DriveRecord, Outcome, Perception, ReplanPolicy, Scenario, run
+from antdrive.sim.log.record import ComponentRecord, settings_of
 from antdrive.worlds import Cruising, Disc, Task, World
+from tests.records import made_up_record
 
 
 def test_a_certified_success_is_no_failure(small_run):
@@ -38,7 +43,6 @@ def test_no_path_is_a_failure(small_scenario):
     fence = tuple(Disc(2.0, 0.25 + 0.5 * k, 0.26) for k in range(6))
     task = Task(World("fence", (0.0, 0.0, 4.0, 3.0), fence), (0.5, 1.5, 0.0), (3.5, 1.5))
     found = failure_of(run(replace(small_scenario, task=task)))
-    assert found is not None
     assert (found.outcome, found.touched) == (Outcome.NO_PATH.key, "nothing")
 
 
@@ -91,12 +95,10 @@ def test_a_test_that_is_worse_than_its_baseline_fails_by_the_bound_that_this_set
     ):
         accepted(case, small_run, **{name: then})
         found = bound_broken_in(case, small_run)
-        assert found is not None
         assert (found.metric, found.sign) == (name, sign)
         allowed = METRICS[name].tolerance.allowed(then)
         assert found.value == pytest.approx(then + (allowed if sign == ">" else -allowed), abs=2e-6)
         failure = failure_of(small_run, found)
-        assert failure is not None
         assert failure.cause == str(found)
 
 
@@ -119,3 +121,82 @@ def test_what_no_other_world_repeats_is_said_in_one_line(case, small_run):
         InputError, match=r"a\.drive\.yaml::small\[0\]: end_m: .* 0\.2 m apart.*; no other world repeats that"
     ):
         bound_broken_in(case, small_run)
+
+
+def record_of(scenario):
+    rollout = run(scenario).rollout
+    return DriveRecord.from_json(replace(rollout.record, digest="0").to_json())
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_every_planner_is_rebuilt_with_its_options(name):
+    planner = replace(PLANNERS[name], **({"ants": 7} if hasattr(PLANNERS[name], "ants") else {}))
+    options = {key: getattr(planner, key) for key in vars(planner)}
+    record = made_up_record(planner=ComponentRecord(name=name, settings=settings_of(options)))
+    scenario = rebuilt(replace(record, controller=ComponentRecord(name="PurePursuit", settings=vars(PurePursuit()))))
+    assert scenario.planner == planner
+    assert scenario.planner_name == name
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"noise": 1.0, "seed": 4, "unseen": (Disc(2.0, 2.6, 0.1, 0.5),), "margin": 0.01},
+        {"smoothing": "none", "cell": 0.2, "controller": PurePursuit(lookahead_time=0.5), "physics_hz": 120},
+    ],
+    ids=["noise", "settings"],
+)
+def test_the_rebuilt_scenario_drives_the_same_bits(small_scenario, changes):
+    original = replace(small_scenario, **changes)
+    done, again = run(original).rollout, run(rebuilt(record_of(original))).rollout
+    assert again.digest == done.digest
+
+
+def test_what_the_robot_knows_of_movers_and_does_about_them_is_rebuilt():
+    original = Scenario.of(
+        "plaza-moving",
+        "astar",
+        time_limit=3.0,
+        perception=Perception(kind="positions", range=3.0),
+        avoidance=Avoidance(horizon=2.0),
+        replanning=ReplanPolicy(patience=5.0),
+    )
+    found = rebuilt(record_of(original))
+    keys = ("task", "perception", "avoidance", "replanning", "time_limit")
+    assert {key: getattr(found, key) for key in keys} == {key: getattr(original, key) for key in keys}
+    blind = replace(original, avoidance=None, replanning=None, perception=Perception())
+    assert (rebuilt(record_of(blind)).avoidance, rebuilt(record_of(blind)).perception) == (None, Perception())
+
+
+class Homemade(GridPlanner):
+    """A planner that is not registered."""
+
+    def _plan(self, query, rng):
+        return PLANNERS["astar"].plan(query, rng)
+
+
+def test_an_unregistered_planner_is_one_line_that_names_it():
+    record = made_up_record(planner=ComponentRecord(name="Homemade", settings={}))
+    with pytest.raises(InputError, match=r"record\.planner\.name: 'Homemade' is not registered.*entry point"):
+        rebuilt(record)
+    controller = ComponentRecord(name="PurePursuit", settings=vars(PurePursuit()))
+    assert rebuilt(replace(record, controller=controller), Homemade()).planner_name == "Homemade"
+
+
+def test_the_name_of_a_class_is_found_too():
+    controller = ComponentRecord(name="PurePursuit", settings=vars(PurePursuit()))
+    record = made_up_record(planner=ComponentRecord(name="AStar", settings={}), controller=controller)
+    assert rebuilt(record).planner_name == "astar"
+
+
+@pytest.mark.parametrize(
+    ("controller", "says"),
+    [
+        (ComponentRecord(name="Mine", settings={}), "record.controller.name: 'Mine' cannot be rebuilt"),
+        (ComponentRecord(name="PurePursuit", settings={"speed": 1.0}), "record.controller.settings.speed: unknown"),
+    ],
+    ids=lambda value: value.name if isinstance(value, ComponentRecord) else "",
+)
+def test_another_controller_is_refused(controller, says):
+    with pytest.raises(InputError, match=says):
+        rebuilt(made_up_record(controller=controller))

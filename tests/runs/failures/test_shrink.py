@@ -1,19 +1,61 @@
 """Shrinking keeps the failure, leaves nothing that can be left out, and goes on where it stopped."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from antdrive.base import InputError
 from antdrive.planners import PLANNERS, Planner
+from antdrive.planners.anyangle.passage import feasible
 from antdrive.runs.failures import passes
+from antdrive.runs.failures.ddmin import one_minimal
 from antdrive.runs.failures.failure import Failure, failure_of, parse_bound
 from antdrive.runs.failures.shrink import shrink
-from antdrive.runs.failures.space import feasible
 from antdrive.runs.failures.trials import Trials, changeable, identity_of, room_in
 from antdrive.sim import run
 from antdrive.worlds import Cruising, Disc, Task, World
+
+Property = Callable[[Sequence[int]], bool]
+
+
+def first_of(holds):
+    return lambda lists: next((some for some in lists if holds(some)), None)
+
+
+@given(st.integers(1, 40), st.sets(st.integers(0, 39), max_size=6))
+def test_the_needed_items_are_found_exactly(count, needed):
+    needed = {item for item in needed if item < count}
+    found = one_minimal(list(range(count)), first_of(lambda some: needed <= set(some)))
+    assert set(found) == needed
+
+
+@given(st.integers(1, 9), st.data())
+def test_the_result_is_one_minimal_whatever_the_property(count, data):
+    everything = tuple(range(count))
+    subsets = st.sets(st.integers(0, count - 1)).map(lambda some: tuple(sorted(some)))
+    failing = {everything, *data.draw(st.sets(subsets, max_size=40))}
+
+    def holds(some):
+        return tuple(sorted(some)) in failing
+
+    found = tuple(one_minimal(everything, first_of(holds)))
+    assert holds(found)
+    assert not any(holds(found[:i] + found[i + 1 :]) for i in range(len(found)))
+
+
+def test_nothing_is_asked_about_an_empty_list():
+    assert one_minimal([], first_of(lambda some: 1 / 0 > 0)) == []
+
+
+def test_a_result_that_stops_too_early_would_be_noticed():
+    """Pieces of a quarter are not enough: only single items come down to two that are far apart."""
+    found = one_minimal(list(range(40)), first_of(lambda some: {3, 36} <= set(some)))
+    assert list(found) == [3, 36]
+
 
 SIDE = 6.0
 COARSE = {"physics_hz": 80, "control_hz": 20}  # a third of the work of a drive; nothing here depends on the rates
@@ -125,7 +167,6 @@ def test_a_bound_on_a_metric_persists(small_scenario):
     tight = replace(tight, margin=0.0, smoothing="taut", **COARSE)
     shrunk = shrink(tight, bound=bound)
     rollout = run(shrunk.scenario).rollout
-    assert rollout is not None
     assert rollout.clearance.min() < 0.05
     assert len(shrunk.scenario.task.world.obstacles) <= 1
     with pytest.raises(InputError, match=r"does not fail.*the bound is min_clearance_m < 0.05"):
@@ -238,7 +279,6 @@ def test_a_world_that_has_a_path_keeps_one(struck, fenced):
     assert room == struck.inflate
     x, y, _ = struck.task.start
     near = passes.with_obstacles(struck, [Disc(x, y + 0.5 + struck.inflate - 0.01, 0.5)])
-    assert near is not None
     assert failure_of(run(near)) == failure
     assert not feasible(near.task, struck.inflate)
     assert Trials(failure).first([near]) is near

@@ -1,4 +1,4 @@
-"""The two tables: known differences are found, equal planners are not told apart, nothing unpaired is compared."""
+"""Comparisons: known differences are found, equal planners are not told apart, nothing unpaired is compared."""
 
 import dataclasses
 import itertools
@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from antdrive.base import FieldError
-from antdrive.runs.statistics.comparison import compare_metric, compare_success, pairs_of
+from antdrive.runs.statistics.comparison import _needed, compare_metric, compare_success, not_worse, pairs_of
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.runs.statistics.runs import SETTINGS, RunTable
+from antdrive.runs.statistics.price import prices
+from antdrive.runs.statistics.runs import PLACE, SETTINGS, RunTable, described, matching, merged
 from antdrive.runs.statistics.success import common_medians, success_table
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
 
@@ -283,3 +284,165 @@ def test_equal_planners_are_rarely_called_different():
         runs = made_up_runs({"a": Skill(0.6, 1.1), "b": Skill(0.6, 1.1)}, 15, 6, spread=0.4, rng_seed=k)
         called += bool(compare_success(PairedRuns.of(runs), [(0, 1)])[0].better)
     assert called <= 0.05 * 60 + 2 * (0.05 * 0.95 * 60) ** 0.5
+
+
+@pytest.fixture(scope="module")
+def three():
+    return PairedRuns.of(made_up_runs({"a": Skill(0.9, 1.0), "b": Skill(0.9, 1.0), "c": Skill(0.5, 1.3)}, 40, 4))
+
+
+def test_the_verdict_turns_at_the_end_of_the_interval(three):
+    for measure, better in (("success", "higher"), ("duration_s", "lower")):
+        rows = not_worse(three, "a", measure, 0.1, better)
+        assert [(row.planner, row.reference) for row in rows] == [("b", "a"), ("c", "a")]
+        end = -rows[0].interval.low
+        assert [not_worse(three, "a", measure, end * by, better)[0].not_worse for by in (0.999, 1.001)] == [False, True]
+        assert rows[1].advantage < 0, "c is worse, whatever direction is better"
+        assert not rows[1].not_worse
+
+
+def test_one_planner_alone_has_the_interval_of_the_comparison(three):
+    two = PairedRuns.of(three.table, ["b", "a"])
+    assert not_worse(two, "a", "success", 0.1, "higher")[0].interval == compare_success(two, [(0, 1)])[0].interval
+    plain = compare_metric(two, [(0, 1)], "duration_s", "lower")[0]
+    assert not_worse(two, "a", "duration_s", 1, "higher")[0].interval == plain.interval
+    three = not_worse(three, "a", "success", 0.1, "higher")[0].interval
+    assert three.low < plain.interval.low or three.low < compare_success(two, [(0, 1)])[0].interval.low, "two tests"
+
+
+def test_needed_worlds_are_those_of_statsmodels_and_of_wilson():
+    from statsmodels.stats.power import normal_sample_size_one_tail
+
+    means = np.random.default_rng(1).normal(0, 0.2, 50)
+    known = normal_sample_size_one_tail(0.05, 0.8, 0.025 / 3, std_null=float(np.std(means, ddof=1)))
+    assert _needed(means, 0.05, 0.05 / 3, success=False) == math.ceil(known)
+    n = _needed(np.zeros(9), 0.02, 0.05, success=True)
+    z2 = 1.959963984540054**2
+    assert z2 / (n + z2) <= 0.02 < z2 / (n - 1 + z2)
+
+
+VALUES = [0.0, 1.0, 2.5, None, True, "a,b", "forest", "10"]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "rows"),
+    [
+        ("0", [0]), ("1.0", [1]), ("0,1", [0, 1]), ("0.5..2.5", [1, 2]), ("1..", [1, 2]), ("..1", [0, 1]), ("..", []),
+        ("none", [3]), ("true", [4]), ("True", [4]), ("false", []), ("a,b", [5]), ("forest,a,b", [6]), ("10", [7]),
+        ("0..0,forest", [0, 6]), ("x..y", []),
+    ],
+)  # fmt: skip
+def test_values_lists_and_ranges_are_taken(wanted, rows):
+    assert matching(VALUES, wanted) == rows
+
+
+def test_values_are_described_shortly():
+    assert described([0.0, 1.5, None, True, "x"]) == "0, 1.5, none, true, x"
+    assert described([k / 3 for k in range(40)]) == "0 to 13"
+    assert described([f"w{k}" for k in range(23)]).endswith("w19 and 3 more")
+
+
+def test_a_table_takes_some_of_its_runs():
+    table = RunTable(made_up_columns({"a": Skill(), "b": Skill()}, worlds=3, seeds=4))
+    assert len(table.where("seed", "1,2").where("world", "world-001")) == 4
+    assert len(table.of_planners(["b"])) == 12
+
+
+def test_every_column_that_describes_a_run_is_paired_by():
+    from antdrive.runs.campaigns.rows import GRID
+
+    names = {"key", "planner", "planner_name", "planner_version", "options", "seed", "command", "area_m2"}
+    assert set(GRID) - names <= {*PLACE, *SETTINGS}
+
+
+def campaign(*planners, rng_seed=1, **words):
+    return made_up_columns(dict.fromkeys(planners, Skill(0.8)), worlds=6, seeds=3, rng_seed=rng_seed, **words)
+
+
+def test_planners_of_two_campaigns_are_paired():
+    both = merged({"may": RunTable(campaign("a")), "june": RunTable(campaign("b", rng_seed=2))})
+    paired = PairedRuns.of(both)
+    assert (paired.planners, both.texts("folder")) == (("a", "b"), ["may"] * 18 + ["june"] * 18)
+    assert compare_success(paired, pairs_of(paired))[0].pairs == 18
+
+
+def test_a_planner_of_two_campaigns_is_told_apart_by_them():
+    both = merged({"may": RunTable(campaign("a", "b")), "june": RunTable(campaign("a", rng_seed=2))})
+    paired = PairedRuns.of(both)
+    assert paired.planners == ("a @may", "b", "a @june")
+    assert set(both.texts("planner_name")) == {"a", "b"}
+    assert [row.pairs for row in compare_success(paired, pairs_of(paired))] == [18, 18, 18]
+
+
+def test_parts_of_one_grid_are_one_planner():
+    later = campaign("a", "b", rng_seed=2)
+    later["seed"] = [seed + 3 for seed in later["seed"]]
+    paired = PairedRuns.of(merged({"one": RunTable(campaign("a", "b")), "two": RunTable(later)}))
+    assert paired.planners == ("a", "b")
+    assert compare_success(paired, pairs_of(paired))[0].pairs == 36
+
+
+def test_one_table_is_left_as_it_is():
+    table = RunTable(campaign("a"))
+    assert merged({"may": table}) is table
+
+
+def table(worlds=12, seeds=4, *, lidars=False):
+    """Drives without the map take 1.5 times as long on 1.2 times the way, in the mean, more or less by world."""
+    rng = np.random.default_rng(3)
+    rows = []
+    for w in range(worlds):
+        hard = math.exp(0.1 * (w - (worlds - 1) / 2))
+        for s in range(seeds):
+            time = float(rng.uniform(5, 9))
+            drives = (("given", "a", time, 10.0), ("none", "b" if lidars else "a", 1.5 * hard * time, 12.0))
+            for kind, robot, arrival, length in drives:
+                rows.append(
+                    {
+                        "world": f"w{w}", "world_hash": f"h{w}", "task": "own", "planner": "astar", "robot": robot,
+                        "robot_hash": robot, "noise": 1.0, "map": kind, "seed": s, "outcome": "succeeded", "succeeded": True,
+                        "localisation": "matching" if kind == "none" else "fixes", "odometry": 1.0,
+                        "arrival_s": arrival, "driven_length_m": length,
+                    }
+                )  # fmt: skip
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def test_the_mean_ratio_is_geometric_and_its_interval_is_over_worlds():
+    (price,) = prices(RunTable(table()))
+    assert (price.planner, price.robot, price.localisation, price.odometry) == ("astar", "a", "matching", 1.0)
+    assert (price.pairs, price.worlds, price.lost, price.won, price.unpaired) == (48, 12, 0, 0, 0)
+    assert price.time.mean == pytest.approx(1.5)
+    assert price.time.most == pytest.approx(1.5 * math.exp(0.55))
+    assert price.time.low < 1.35 < 1.65 < price.time.high  # ratios differ between worlds by a factor of 3
+    assert price.length == pytest.approx([1.2] * 4)
+    assert "time x 1.500" in price.sentence
+    assert price.as_dict()["length"]["low"] == pytest.approx(1.2)
+
+
+def test_failures_and_lonely_drives_are_counted_and_left_out():
+    columns = table()
+    columns["succeeded"][1] = False  # without the map
+    columns["succeeded"][2] = False  # with it
+    columns["seed"][4] = 99  # its partner has another seed
+    (price,) = prices(RunTable(columns))
+    assert (price.pairs, price.lost, price.won, price.unpaired) == (45, 1, 1, 1)
+
+
+def test_another_lidar_is_another_robot_unless_it_may_be():
+    columns = table(lidars=True)
+    (price,) = prices(RunTable(columns))
+    assert (price.pairs, price.unpaired) == (0, 48)
+    assert price.as_dict()["time"] == dict.fromkeys(("mean", "low", "high", "most"))
+    assert "no pair" in price.sentence
+    (price,) = prices(RunTable(columns), any_robot=True)
+    assert price.pairs == 48
+
+
+def test_each_kind_of_drive_has_its_own_price():
+    columns = table()
+    none = [k for k, kind in enumerate(columns["map"]) if kind == "none"]
+    twice = {name: [*values, *(values[k] for k in none)] for name, values in columns.items()}
+    twice["odometry"][len(columns["map"]) :] = [5.0] * 48
+    assert [price.odometry for price in prices(RunTable(twice))] == [1.0, 5.0]
+    assert prices(RunTable({name: values for name, values in columns.items() if name != "map"})) == []

@@ -1,4 +1,4 @@
-"""Tests of paired differences, against exhaustive permutation and textbook values."""
+"""Tests, intervals, bootstraps and profiles, against exhaustive counts, published figures and other libraries."""
 
 import itertools
 import math
@@ -6,9 +6,11 @@ import math
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
+from hypothesis.extra.numpy import arrays
 
-from antdrive.runs.statistics import significance
+from antdrive.runs.statistics import intervals, significance
+from antdrive.runs.statistics.intervals import means_by_world, medians_by_world, paired_difference, resampled, wilson
 from antdrive.runs.statistics.significance import (
     differences,
     flips_by_world,
@@ -19,6 +21,7 @@ from antdrive.runs.statistics.significance import (
     sums_by_world,
     wilcoxon,
 )
+from antdrive.runs.statistics.success import distributions, performance_profiles
 
 
 def exhaustive(scores):
@@ -128,3 +131,179 @@ def test_holm_keeps_the_order_and_never_lowers(values):
     assert (adjusted >= given_p).all()
     assert (adjusted <= 1).all()
     assert (np.diff(adjusted[np.argsort(given_p, kind="stable")]) >= 0).all()
+
+
+def drawn(world, resamples=200):
+    return np.concatenate(list(resampled(world, resamples)))
+
+
+def test_worlds_are_drawn_and_then_runs_within():
+    world = np.array([0, 0, 0, 1, 1, 2])
+    weights = drawn(world, 2000)
+    by_world = np.stack([weights[:, world == w].sum(axis=1) for w in range(3)], axis=1)
+    times = by_world / [3, 2, 1]
+    assert (times == np.round(times)).all(), "a world is drawn whole: with as many runs as it has"
+    assert (times.sum(axis=1) == 3).all()
+    assert times.mean(axis=0) == pytest.approx([1, 1, 1], abs=0.06)
+    assert times.var(axis=0) == pytest.approx([2 / 3] * 3, abs=0.06), "binomial: 3 draws, chance 1/3"
+    assert (weights[:, 0] != weights[:, 1]).any(), "runs within a world are drawn, too"
+
+
+def test_blocks_do_not_change_what_one_block_would_be(monkeypatch):
+    world = np.array([0, 0, 1, 1, 1])
+    assert (drawn(world) == drawn(world)).all()
+    monkeypatch.setattr(intervals, "BLOCK", 50)
+    assert len(drawn(world)) == 200
+
+
+@settings(max_examples=30)
+@given(st.lists(st.one_of(st.none(), st.integers(-9, 9)), min_size=1, max_size=9), st.integers(1, 3))
+def test_medians_of_resamples_are_numpys(values, worlds):
+    column = np.array([np.nan if value is None else value for value in values])
+    world = np.arange(len(column)) % worlds
+    by_hand = []
+    for weights in drawn(world, 60):
+        sample = np.repeat(column, weights)
+        if (~np.isnan(sample)).any():
+            by_hand.append(np.nanmedian(sample))
+    found = medians_by_world(column[:, None], world, 60)[0]
+    if by_hand:
+        assert found == pytest.approx(np.quantile(by_hand, [0.025, 0.975]))
+    else:
+        assert np.isnan(found).all()
+
+
+def test_means_of_resamples_are_numpys():
+    column, world = np.array([1.0, 0.0, np.nan, 1.0, 0.5]), np.array([0, 0, 1, 1, 2])
+    by_hand = [np.nanmean(np.repeat(column, w)) for w in drawn(world, 60) if not np.isnan(np.repeat(column, w)).all()]
+    assert means_by_world(column[:, None], world, 60)[0] == pytest.approx(np.quantile(by_hand, [0.025, 0.975]))
+
+
+def simulated(by_world, trials=150):
+    """How often the interval holds the median 0 of a quantity whose worlds differ more than their runs."""
+    rng, held = np.random.default_rng(5), 0
+    world = np.repeat(np.arange(30), 8)
+    for _ in range(trials):
+        values = rng.normal(0, 1, 30)[world] + rng.normal(0, 0.3, len(world))
+        low, high = medians_by_world(values[:, None], world if by_world else np.arange(len(world)), 400)[0]
+        held += low <= 0 <= high
+    return held / trials
+
+
+@pytest.mark.slow
+def test_intervals_over_worlds_cover_the_truth_and_over_single_runs_do_not():
+    assert simulated(by_world=True) > 0.88
+    assert simulated(by_world=False) < 0.7
+
+
+Z = 1.959963984540054  # the normal distribution's 97.5 % quantile
+
+
+@pytest.mark.parametrize(
+    ("successes", "total", "low", "high"),
+    [(500, 500, 0.9924, 1.0), (10_000, 10_000, 0.9996, 1.0), (81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611)],
+)
+def test_wilson_gives_published_values(successes, total, low, high):
+    # 81 of 263 and 0 of 20: Newcombe 1998, table I, method 3.
+    assert wilson(successes, total) == pytest.approx((low, high), abs=5e-5)
+
+
+@given(st.integers(1, 2000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
+def test_wilsons_ends_solve_the_score_equation(trial):
+    successes, total = trial
+    share, interval = successes / total, wilson(successes, total)
+    assert 0 <= interval.low <= share <= interval.high <= 1
+    for end in interval:
+        assert abs(share - end) == pytest.approx(Z * np.sqrt(end * (1 - end) / total), abs=1e-8)
+
+
+@given(st.tuples(*[st.integers(0, 60)] * 4).filter(lambda cells: sum(cells) > 0))
+def test_the_paired_interval_holds_the_difference_and_is_mirrored(cells):
+    both, first, second, neither = cells
+    found = paired_difference(both, first, second, neither)
+    difference = (first - second) / sum(cells)
+    assert -1 - 1e-9 <= found.low <= difference + 1e-9
+    assert difference - 1e-9 <= found.high <= 1 + 1e-9
+    mirrored = paired_difference(both, second, first, neither)
+    assert mirrored == pytest.approx((-found.high, -found.low), abs=1e-9)
+
+
+@given(st.integers(0, 8), st.integers(0, 8), st.integers(0, 8), st.integers(0, 8))
+def test_without_correlation_the_paired_interval_is_that_of_independent_proportions(a, b, c, d):
+    from statsmodels.stats.proportion import confint_proportions_2indep
+
+    both, first, second, neither = a * c, a * d, b * c, b * d  # a product of margins: no correlation
+    n = both + first + second + neither
+    assume(n > 0)
+    independent = confint_proportions_2indep(both + first, n, both + second, n, method="newcomb", compare="diff")
+    assert paired_difference(both, first, second, neither) == pytest.approx(independent, abs=1e-9)
+
+
+def test_the_paired_interval_by_hand():
+    # 40 both, 10 and 4 alone, 46 neither: shares 0.50 and 0.44; Wilson 0.40383 to 0.59617 and 0.34670 to 0.53769;
+    # phi = (40 * 46 - 10 * 4 - 50) / sqrt(50 * 50 * 44 * 56) = 0.705104.
+    below = 0.09617**2 - 2 * 0.705104 * 0.09617 * 0.09769 + 0.09769**2
+    above = 0.09617**2 - 2 * 0.705104 * 0.09617 * 0.09330 + 0.09330**2
+    found = paired_difference(40, 10, 4, 46)
+    assert found == pytest.approx((0.06 - below**0.5, 0.06 + above**0.5), abs=2e-5)
+    # A negative correlation, 10 * 10 - 40 * 40, is not corrected for continuity and widens the interval.
+    wide = paired_difference(10, 40, 40, 10)
+    end = wilson(50, 100).high - 0.5
+    assert wide == pytest.approx((-end * 3.2**0.5, end * 3.2**0.5), abs=1e-9)
+
+
+def coverage(cells, n):
+    """The probability, summed over all tables of n pairs, that the interval holds the true difference."""
+    from scipy.stats import multinomial
+
+    total, truth = 0.0, cells[1] - cells[2]
+    for both, first, second in itertools.product(range(n + 1), repeat=3):
+        if both + first + second <= n:
+            counts = (both, first, second, n - both - first - second)
+            interval = paired_difference(*counts)
+            if interval.low <= truth <= interval.high:
+                total += multinomial.pmf(counts, n, cells)
+    return total
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cells", [(0.6, 0.2, 0.1, 0.1), (0.8, 0.1, 0.05, 0.05), (0.3, 0.3, 0.1, 0.3)])
+def test_the_paired_interval_covers_the_truth(cells):
+    assert 0.93 <= coverage(cells, 20) <= 0.995
+
+
+NAN = float("nan")
+COSTS = arrays(
+    float, st.tuples(st.integers(1, 8), st.integers(1, 4)), elements=st.sampled_from([NAN, 0.0, 1.0, 2.0, 3.5])
+)
+
+
+def test_a_profile_by_hand():
+    first, second = performance_profiles(np.array([[1.0, 2.0], [6.0, 2.0], [1.0, NAN], [NAN, NAN]]))
+    assert first.x.tolist() == [1, 3]
+    assert first.share.tolist() == [0.5, 0.75]
+    assert (second.x.tolist(), second.share.tolist()) == ([1, 2], [0.25, 0.5])
+    assert [first.at(x) for x in (0.9, 1, 2.9, 3, 99)] == [0, 0.5, 0.5, 0.75, 0.75]
+
+
+@given(COSTS, st.floats(1, 5))
+def test_a_profile_counts_instances(cost, x):
+    for k, curve in enumerate(performance_profiles(cost)):
+        fits = 0
+        for row in cost:
+            known = row[~np.isnan(row)]
+            fits += bool(len(known)) and not np.isnan(row[k]) and (row[k] == known.min() or row[k] <= x * known.min())
+        assert curve.at(x) == pytest.approx(fits / len(cost))
+
+
+@given(COSTS)
+def test_somebody_is_best_wherever_anybody_succeeds(cost):
+    solved = (~np.isnan(cost)).any(axis=1).mean()
+    assert sum(curve.at(1.0) for curve in performance_profiles(cost)) >= solved - 1e-12
+
+
+@given(COSTS)
+def test_distributions_rise_to_the_share_of_successes(values):
+    for column, curve in zip(values.T, distributions(values), strict=True):
+        assert curve.at(np.inf) == pytest.approx((~np.isnan(column)).mean())
+        assert (np.diff(curve.share) > 0).all()

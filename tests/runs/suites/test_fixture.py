@@ -1,7 +1,5 @@
 """The fixture `drive`, the assertions, and the strategies."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from dataclasses import replace

@@ -1,12 +1,9 @@
 """Baselines, and what is judged against them; each verdict by changing one thing in a baseline or a log."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math
 from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,7 +13,7 @@ from hypothesis import strategies as st
 from antdrive import METRICS, Outcome, run
 from antdrive.runs.suites import Baseline, Demands, judge, judging
 from antdrive.runs.suites.baseline import MAX_BYTES
-from antdrive.runs.suites.divergence import distances, divergence, explain, farthest
+from antdrive.runs.suites.judging import distances, divergence, explain, farthest
 from antdrive.runs.suites.nearest import nearest_of, touched_in
 from antdrive.sim.log.metrics import Tolerance
 from antdrive.views.artefacts import MOST_FILMS, Results, drive_of, file_name, remove_artefacts
@@ -60,7 +57,6 @@ def test_a_baseline_is_small_text_that_is_read_back_the_same(baseline, tmp_path)
 
 def test_the_line_is_that_of_the_log_ten_times_a_second(small_run, baseline):
     log = small_run.rollout
-    assert log is not None
     assert baseline.line_hz == 10
     assert np.allclose(np.diff(baseline.times)[:-1], 0.1)
     assert baseline.times[-1] == pytest.approx(log.t[-1])
@@ -72,7 +68,6 @@ def test_the_line_is_that_of_the_log_ten_times_a_second(small_run, baseline):
 
 def test_a_long_drive_has_a_coarser_line(small_run):
     log = small_run.rollout
-    assert log is not None
     rows = 240 * 300
     long = dataclasses.replace(
         log, t=np.arange(rows) / 240, pose=np.column_stack([np.linspace(0.123, 3, rows), np.ones(rows), np.ones(rows)]),
@@ -103,7 +98,6 @@ def test_a_drive_is_on_its_own_line_at_any_rate_of_physics(small_scenario, hz):
 @pytest.mark.parametrize("name", [name for name, metric in METRICS.items() if metric.tolerance is not None])
 def test_each_metric_fails_beyond_its_tolerance_in_its_worse_direction_only(small_run, baseline, name):
     metric, now = METRICS[name], METRICS[name](small_run.rollout)
-    assert metric.tolerance is not None
     step = metric.tolerance.allowed(now) / (1 - metric.tolerance.relative) + 1e-4
     better_before = now - step if metric.better == "lower" else now + step
     worse_before = now + step / (1 - metric.tolerance.relative) if metric.better == "lower" else now - step
@@ -160,7 +154,6 @@ def test_the_line_is_judged_where_it_is_asked_for_and_the_end_always(small_run, 
     (fault,) = judge(small_run, dataclasses.replace(PLAIN, trajectory=0.02), aside).faults
     assert fault.startswith("trajectory: up to 0.03")
     found = divergence(aside, small_run.rollout)
-    assert found is not None
     assert found.t == pytest.approx(aside.times[middle])
     assert math.dist(found.now, found.then) == pytest.approx(0.03, abs=1e-3)
     other = dataclasses.replace(baseline, drive_digest="0" * 64)
@@ -190,7 +183,6 @@ def test_what_was_touched_or_passed_is_named(small_run, collided_run):
     assert near.clearance == pytest.approx(small_run.rollout.clearance.min(), abs=1e-6)
     assert touched_in(small_run.rollout) is None
     touched = touched_in(collided_run.rollout)
-    assert touched is not None
     assert touched.thing.startswith("unseen[0] at (")
     assert touched.t == pytest.approx(collided_run.rollout.t[int(collided_run.rollout.contacts[0, 0])], abs=1e-3)
 
@@ -202,12 +194,10 @@ def test_what_was_touched_or_passed_is_named(small_run, collided_run):
 def test_each_wall_has_its_name(small_run, start, wall):
     """Logs count the walls left, right, lower, upper."""
     log = small_run.rollout
-    assert log is not None
     touching = dataclasses.replace(
         log, pose=np.tile(start, (len(log.t), 1)), contacts=np.array([[5.0, 1.0 + wall, 0.0, 1.0]])
     )
     touched = touched_in(touching)
-    assert touched is not None
     name = ("the left wall", "the right wall", "the lower wall", "the upper wall")[wall]
     assert (touched.thing, nearest_of(dataclasses.replace(touching, clearance=-log.t)).thing) == (name, name)
 
@@ -227,7 +217,7 @@ def test_a_way_after_the_baselines_end_is_looked_at_although_it_comes_back(basel
     end, last = baseline.times[-1], small_run.rollout.pose[-1:]
     t = np.append(small_run.rollout.t, end + np.array([1.0, 2.0]))
     longer = SimpleNamespace(t=t, pose=np.concatenate([small_run.rollout.pose, last + [0.3, 0.4, 0.0], last]))
-    assert farthest(baseline, cast(Any, longer)) == pytest.approx(0.5, abs=2e-3)
+    assert farthest(baseline, longer) == pytest.approx(0.5, abs=2e-3)
     assert farthest(baseline, small_run.rollout) < 2e-3
 
 

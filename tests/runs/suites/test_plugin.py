@@ -1,7 +1,5 @@
 """The pytest plugin, in runs of pytest of its own."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import re
@@ -24,6 +22,8 @@ numba.njit(lambda: 0.0)()
 pytest_plugins = ["pytester"]
 PLUGIN = ("-p", "antdrive.cli.testing.plugin", "-p", "no:cacheprovider")
 RUN_FIGURES, PLAN_FIGURES = (f"antdrive.views.figures.{name}_figures." for name in ("run", "plan"))
+for module in (RUN_FIGURES, PLAN_FIGURES, "antdrive.cli.testing.checking"):  # what is replaced here is not forgotten
+    importlib.import_module(module.removesuffix("."))
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
 scenarios:
@@ -306,7 +306,7 @@ def test_commands_work_where_pytest_was_started_and_in_its_rootdir(project):
 
 
 def test_kernels_are_compiled_before_the_first_drive_with_one_line(project, monkeypatch, capfd):
-    compiled: list[int] = []
+    compiled = []
     monkeypatch.setattr("antdrive.cli.warm.is_warm", lambda: bool(compiled))
     monkeypatch.setattr("antdrive.cli.warm.warm", lambda: compiled.append(1))
     monkeypatch.setattr("antdrive.base.kernel_cache.cache_folder", lambda: project.path)

@@ -1,39 +1,43 @@
-"""The parts of a control period, without physics."""
+"""The parts of a control period, without physics; and the ends of a drive."""
 
-import dataclasses
+from __future__ import annotations
+
 import itertools
 import math
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import FieldError
 from antdrive.planners import Query, load_planner, smooth
-from antdrive.robots import LIMITERS, AvoidanceState, PurePursuit, PursuitState, RobotSpec, Twist, load_robot
+from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
-from antdrive.sim.driving.blocking import blocked_cells, covered_discs
-from antdrive.sim.driving.driver import STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock, full_turn
-from antdrive.sim.driving.following import OnePath
-from antdrive.sim.driving.parts import Guide, Moment, Rule, Step
-from antdrive.sim.driving.perception import Told
-from antdrive.sim.driving.rules import OUT_OF_SIGHT, Avoid, Pursuit, StayInSight, braked
-from antdrive.sim.physics.engine import State
-from antdrive.worlds import Cruising, Disc, Grid, Keyframed, Task, Trajectories, World, rasterise
+from antdrive.sim.driving.blockage import blocked_cells, covered_discs
+from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, follow, full_turn
+from antdrive.sim.driving.localising import TruePose
+from antdrive.sim.driving.others import Told
+from antdrive.sim.driving.parts import Ending, Guide, Moment, Step
+from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.driving.rules import AVOIDING, OUT_OF_SIGHT, WAITING_SPEED, Avoid, Pursuit, braked, stopping_time
+from antdrive.sim.driving.stopping_constraint import StayInSight
+from antdrive.sim.physics.engine import Engine, State
+from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, rasterise
+from tests.records import changed
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0), (Disc(4.5, 4.5, 0.5),))
 CRUISING = Cruising(radius=0.3, position=(7.0, 1.0), velocity=(0.0, 0.1))
 TASK = Task(HALL, (1.0, 3.0, 0.0), (8.0, 3.0), cell=0.25)
 
 
-def hall_grid(world: World = HALL) -> Grid:
+def hall_grid(world=HALL):
     return rasterise(world, 0.25, 0.21)
 
 
-def driver(robot: RobotSpec, guide: Guide | None = None, *rules: Rule) -> Driver:
+def driver(robot, guide=None, *rules):
     grid = hall_grid()
     plan = load_planner("astar").plan(Query.between(grid, TASK), np.random.default_rng(0))
     controller = PurePursuit()
@@ -42,32 +46,26 @@ def driver(robot: RobotSpec, guide: Guide | None = None, *rules: Rule) -> Driver
     return Driver(guide or OnePath(), (pursuit, *rules), tracked, TASK, robot, 60)
 
 
-def at(driving: Driver, arc: float) -> Driver:
+def at(driving, arc):
     """The same, so far along its route [m]."""
     driving.step = Step(pursuit=PursuitState(arc=arc))
     return driving
 
 
-def test_progress_restarts_the_stuck_clock() -> None:
-    clock = StuckClock(farthest=1.0, driving=9, turning=4)
-    assert clock.after(PursuitState(arc=1.0 + 2 * STUCK_PROGRESS), waiting=False) == StuckClock(
-        1.0 + 2 * STUCK_PROGRESS
-    )
-    assert clock.after(PursuitState(arc=1.0 + STUCK_PROGRESS / 2), waiting=False).driving == 10
+@pytest.mark.parametrize(
+    ("state", "waiting", "after"),
+    [
+        ({"arc": 1.0 + 2 * STUCK_PROGRESS}, False, (1.0 + 2 * STUCK_PROGRESS, 0, 0, 0)), ({"arc": 3.0}, False, (3.0, 0, 0, 0)),
+        ({"arc": 1.0 + STUCK_PROGRESS / 2}, False, (1.0, 10, 4, 0)), ({"arc": 1.0, "turning": True}, False, (1.0, 9, 5, 0)),
+        ({"arc": 1.0}, True, (1.0, 9, 4, 0)), ({"arc": 1.0, "turning": True}, True, (1.0, 9, 4, 0)),
+    ],
+)  # fmt: skip
+def test_the_stuck_clock_counts_driving_and_turning_without_progress_and_no_waiting(state, waiting, after):
+    assert StuckClock() == (0.0, 0, 0, 0)
+    assert StuckClock(farthest=1.0, driving=9, turning=4).after(PursuitState(**state), waiting=waiting) == after
 
 
-def test_waiting_for_a_mover_does_not_count_as_being_stuck() -> None:
-    clock = StuckClock(farthest=1.0, driving=9, turning=4)
-    assert clock.after(PursuitState(arc=1.0), waiting=True) == clock
-    assert clock.after(PursuitState(arc=1.0, turning=True), waiting=True) == clock
-
-
-def test_turning_on_the_spot_has_a_count_of_its_own() -> None:
-    clock = StuckClock(farthest=1.0, driving=9, turning=4)
-    assert clock.after(PursuitState(arc=1.0, turning=True), waiting=False) == StuckClock(1.0, 9, 5)
-
-
-def test_that_sight_held_the_robot_is_said_where_it_did_so_for_most_of_the_time() -> None:
+def test_that_sight_held_the_robot_is_said_where_it_did_so_for_most_of_the_time():
     """Progress begins the count anew; a robot that waits counts as nothing."""
     held, free = PursuitState(limiter=OUT_OF_SIGHT), PursuitState()
     for states, said in (
@@ -84,7 +82,7 @@ def test_that_sight_held_the_robot_is_said_where_it_did_so_for_most_of_the_time(
         assert clock.after(held, waiting=True) == clock
 
 
-def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot: RobotSpec) -> None:
+def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot):
     still = driver(turtlebot)
     ticks = 0
     rest = State(*TASK.start, 0.0, 0.0)
@@ -94,10 +92,10 @@ def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot: Rob
     assert ticks == pytest.approx(STUCK_TIME * 60, abs=2)
 
 
-@pytest.mark.parametrize(("outside", "outcome"), [(-0.002, Outcome.SUCCEEDED), (0.002, Outcome.STUCK)])
-def test_a_robot_that_stops_just_outside_the_tolerance_has_not_arrived(
-    turtlebot: RobotSpec, outside: float, outcome: Outcome
-) -> None:
+@pytest.mark.parametrize(
+    ("outside", "outcome"), [(-0.002, Outcome.SUCCEEDED), (0.0, Outcome.SUCCEEDED), (0.002, Outcome.STUCK)]
+)
+def test_a_robot_that_stops_just_outside_the_tolerance_has_not_arrived(turtlebot, outside, outcome):
     x, y = TASK.goal
     away = TASK.goal_tolerance + outside
     at_end = driver(turtlebot)
@@ -106,7 +104,7 @@ def test_a_robot_that_stops_just_outside_the_tolerance_has_not_arrived(
     assert {ending.outcome for ending in endings if ending is not None} == {outcome}
 
 
-def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it() -> None:
+def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it():
     """The goal's cell and those around it stay free, wherever in its cell the goal is."""
     for x in (7.9, 8.0, 8.1):
         for y in (3.5, 3.6):
@@ -120,7 +118,7 @@ def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it() -> 
             assert not blocked_cells(grid, discs)[grid.cell_at(*goal)]
 
 
-def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(turtlebot: RobotSpec) -> None:
+def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(turtlebot):
     x, y = TASK.goal
     for distance, outcome in ((0.0, Outcome.SUCCEEDED), (0.3, Outcome.STUCK)):
         at_end = driver(turtlebot)
@@ -128,34 +126,30 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
         ending = None
         for tick in range(9):  # the command comes to rest first
             ending = ending or at_end.decide(tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
-        assert ending is not None
         assert ending.outcome is outcome
-        assert ending.reason == (
-            ""
-            if outcome is Outcome.SUCCEEDED
-            else "the robot believed that it was at the goal, 0.00 m from it, but was 0.300 m from it "
+        lost = (
+            "the robot believed that it was at the goal, 0.00 m from it, but was 0.300 m from it "
             "(the tolerance is 0.25 m): its estimate was wrong by 0.30 m"
         )
+        assert ending.reason == ("" if outcome is Outcome.SUCCEEDED else lost)
 
 
-def test_a_robot_that_knows_where_it_is_is_told_how_far_from_the_goal_its_route_ends(turtlebot: RobotSpec) -> None:
+def test_a_robot_that_knows_where_it_is_is_told_how_far_from_the_goal_its_route_ends(turtlebot):
     x, y = TASK.goal
     for off in (-0.3, 0.4):  # what it believes lies outside the tolerance, too
         ending = driver(turtlebot)._arrival((x, y + off, 0.0), State(x, y - 0.3, 0.0, 0.0, 0.0))
         assert ending.reason == "the route ends here, 0.300 m from the goal; the tolerance is 0.25 m"
 
 
-def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_holds_its_speed(
-    turtlebot: RobotSpec,
-) -> None:
+def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_holds_its_speed(turtlebot):
     """Local avoidance goes on for ever, and slowly, because the robot sees too little there."""
-    calm: Any = SimpleNamespace(
+    calm = SimpleNamespace(
         prediction_times=np.arange(3.0), step=1.0, avoid=lambda *_, **__: (Twist(0.5, 0.0), True, AvoidanceState())
     )
-    caution: Any = SimpleNamespace(limit=lambda *_: (Twist(0.005, 0.0), True))
     nobody = Told(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
-    sight: Any = SimpleNamespace(note_sight=lambda *_: None)
-    robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), StayInSight(caution, sight))
+    sight = StayInSight(None, turtlebot, 60, 0.1, lambda *_: None)
+    sight.limit = lambda *_: (Twist(0.005, 0.0), True)
+    robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), sight)
     at_goal = (*TASK.goal, 0.0)
     at(robot, robot.path.length - 0.5)
     endings = [robot.decide(tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
@@ -163,27 +157,19 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
 
 
-def test_a_robot_without_a_map_backs_off_slowly_where_its_lidar_does_not_look(
-    jackal: RobotSpec, turtlebot: RobotSpec, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_robot_without_a_map_backs_off_slowly_where_its_lidar_does_not_look(jackal, turtlebot, monkeypatch):
     """`jackal` sees 270 degrees, `turtlebot` all round. A robot that is told of movers knows what is behind it."""
     for robot, perception in itertools.product((jackal, turtlebot), (Perception(kind="lidar"), Perception())):
-        planner = load_planner("astar")
-        unknown = Scenario(
-            task=dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(CRUISING,))),
-            planner=planner,
-            robot=robot,
-            map="none",
-            perception=perception,
-            planner_name="astar",
+        unknown = Scenario.of(
+            changed(TASK, "world", movers=(CRUISING,)), "astar", robot, map="none", perception=perception
         )
-        asked: list[float] = []
+        asked = []
 
-        def avoid(*_: Any, backwards: float, asked: list[float] = asked, **__: Any) -> Any:
+        def avoid(*_, backwards, asked=asked, **__):
             asked.append(backwards)
             return Twist(0.0, 0.0), False, AvoidanceState()
 
-        noted: Any = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
+        noted = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
         monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
         rule = next(rule for rule in compose(unknown).rules if type(rule) is Avoid)
         still = State(*TASK.start, 0.0, 0.0)
@@ -195,14 +181,17 @@ def test_a_robot_without_a_map_backs_off_slowly_where_its_lidar_does_not_look(
 class OneReplan(Guide):
     """A guide that replans once, back along the path that it is given."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.log, self.path = [], None
 
-    def update(self, tick: int, *_: Any) -> Any:
-        return self.path if tick == 1 else None
+    def trigger(self, tick, *_):
+        return "now" if tick == 1 else ""
+
+    def replan(self, *_):
+        return self.path
 
 
-def test_a_replan_starts_its_route_from_the_beginning(turtlebot: RobotSpec) -> None:
+def test_a_replan_starts_its_route_from_the_beginning(turtlebot):
     monitor = OneReplan()
     robot = driver(turtlebot, monitor)
     monitor.path = driver(turtlebot).path
@@ -214,17 +203,15 @@ def test_a_replan_starts_its_route_from_the_beginning(turtlebot: RobotSpec) -> N
     assert robot.step.pursuit.arc == pytest.approx(0.0, abs=0.02)
 
 
-def test_the_first_command_accelerates_within_the_robots_limit(turtlebot: RobotSpec) -> None:
+def test_the_first_command_accelerates_within_the_robots_limit(turtlebot):
     first = driver(turtlebot)
     first.decide(0, TASK.start, State(*TASK.start, 0.0, 0.0))
     assert Twist(0.0, 0.0) != first.step.command
     assert 0 < first.step.command.speed <= turtlebot.max_acceleration / 60 + 1e-12
 
 
-@given(
-    st.lists(st.tuples(st.floats(0.5, 8.5), st.floats(0.5, 5.5), st.floats(0.05, 1.0)), max_size=5),
-)
-def test_discs_block_the_cells_that_the_same_obstacles_would(discs: list[tuple[float, float, float]]) -> None:
+@given(st.lists(st.tuples(st.floats(0.5, 8.5), st.floats(0.5, 5.5), st.floats(0.05, 1.0)), max_size=5))
+def test_discs_block_the_cells_that_the_same_obstacles_would(discs):
     """The oracle rasterises a world with the discs as obstacles; cells on a disc's very edge may differ."""
     found = [Disc(*disc) for disc in discs]
     grid = hall_grid()
@@ -235,7 +222,7 @@ def test_discs_block_the_cells_that_the_same_obstacles_would(discs: list[tuple[f
         assert min(abs(math.dist((x, y), (d.x, d.y)) - d.radius - grid.inflate) for d in found) < 1e-9
 
 
-def test_movers_close_neither_the_robots_position_nor_the_goal() -> None:
+def test_movers_close_neither_the_robots_position_nor_the_goal():
     over_goal = Keyframed(radius=0.6, keyframes=((0.0, 8.0, 3.2), (9.0, 8.0, 3.2001)))
     crossing = Cruising(radius=0.3, position=(4.0, 1.0), velocity=(0.0, 0.5))
     world = World("hall", HALL.bounds, HALL.obstacles, movers=(over_goal, crossing))
@@ -250,7 +237,7 @@ def test_movers_close_neither_the_robots_position_nor_the_goal() -> None:
 
 
 @given(speed=st.floats(-2.0, 2.0), yaw_rate=st.floats(-4.0, 4.0))
-def test_a_robot_that_brakes_for_the_goal_slows_its_turn_no_faster_than_it_can(speed: float, yaw_rate: float) -> None:
+def test_a_robot_that_brakes_for_the_goal_slows_its_turn_no_faster_than_it_can(speed, yaw_rate):
     jackal, last = load_robot("jackal"), Twist(speed, yaw_rate)
     slower = braked(last, jackal, 60)
     assert abs(last.speed - slower.speed) <= jackal.max_acceleration / 60 + 1e-12
@@ -259,3 +246,137 @@ def test_a_robot_that_brakes_for_the_goal_slows_its_turn_no_faster_than_it_can(s
     gentle = abs(yaw_rate) * jackal.max_acceleration <= abs(speed) * jackal.max_yaw_acceleration
     if gentle and speed:
         assert slower.yaw_rate * last.speed == pytest.approx(last.yaw_rate * slower.speed, abs=1e-9), "the same curve"
+
+
+def test_half_a_second_of_braking_is_logged_after_a_contact(collided_run):
+    log = collided_run.rollout
+    first = int(log.contacts[0, 0])
+    after = len(log.t) - 1 - first
+    assert 120 <= after < 120 + 240 // 60, "the control period is finished first"
+    assert not log.command[-120:].any()
+    assert log.command[-121].any()
+    assert abs(log.twist[-1, 0]) < abs(log.twist[first, 0])
+
+
+@pytest.mark.parametrize(
+    ("before", "speed", "stops"),
+    [
+        (0.237, 0.0, True), (0.238, 0.0, False), (-0.238, 0.0, False), (0.23, 0.6, True), (0.05, 0.7, True), (0.0, 0.7, False),
+        (0.3, 0.6, False), (-0.1, -0.5, True), (0.12, -0.5, False),
+    ],
+)  # fmt: skip
+def test_a_robot_that_brakes_stops_at_the_goal_if_both_ends_of_its_way_are_there(turtlebot, before, speed, stops):
+    """It counts as there within 95 % of 0.25 m, and goes on by 0.18 m at 0.6 m/s, 0.245 m at 0.7 m/s, 0.125 m at 0.5 m/s."""
+    x, y = TASK.goal
+    assert TASK.goal_tolerance == 0.25
+    for yaw, pose in ((0.0, (x - before, y, 0.0)), (np.pi / 2, (x, y - before, np.pi / 2))):
+        nobody = Told(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
+        rule = Avoid(Avoidance(), nobody, OnePath(), TASK, turtlebot, 60)
+        assert rule._stops_at_goal(pose, Twist(speed, 0.0)) is stops, yaw
+
+
+def test_braking_keeps_the_curve_as_far_as_the_turn_can_be_slowed(turtlebot):
+    assert braked(Twist(0.5, 1.0), turtlebot, 60) == pytest.approx((0.5 - 1 / 60, (0.5 - 1 / 60) / 0.5))
+    assert braked(Twist(-0.5, 1.0), turtlebot, 60) == pytest.approx((-0.5 + 1 / 60, (0.5 - 1 / 60) / 0.5))
+    slower = 1.0 - turtlebot.max_yaw_acceleration / 60  # the wheels cannot stop the turn at once
+    assert braked(Twist(0.01, 1.0), turtlebot, 60) == pytest.approx((0.0, slower))
+    assert braked(Twist(0.0, -1.0), turtlebot, 60) == pytest.approx((0.0, -slower))
+    assert braked(Twist(0.0, 0.01), turtlebot, 60) == (0.0, 0.0)
+
+
+def test_stopping_takes_as_long_as_the_slower_of_speed_and_turn(turtlebot):
+    assert stopping_time(Twist(-0.5, 1.0), turtlebot) == 0.5
+    assert stopping_time(Twist(0.1, -2.0), turtlebot) == 0.25
+
+
+def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
+    nobody = SimpleNamespace(predict=lambda *_: (np.empty((2, 0, 2)), np.empty(0)))
+    cautious = SimpleNamespace(
+        prediction_times=np.array([0.0, 0.1]),
+        step=0.1,
+        avoid=lambda *_, **__: (Twist(0.0, 0.0), True, AvoidanceState()),
+    )
+    waits = driver(turtlebot, None, Avoid(cautious, nobody, OnePath(), TASK, turtlebot, 60))
+    rest = State(*TASK.start, 0.0, 0.0)
+    for tick in range(round(STUCK_TIME * 60) + 20):
+        assert waits.decide(tick, TASK.start, rest) is None
+    assert waits.step.pursuit.limiter == AVOIDING
+    assert waits.gives_up(rest) is None
+
+
+class Watcher(Guide):
+    """A guide that notes whether the robot waits, and where it is asked for a way because the robot missed the goal."""
+
+    may_wait = True
+
+    def __init__(self):
+        self.log = []
+        self.waiting = []
+        self.misses = []
+
+    def trigger(self, tick, pose, waiting, *_):
+        self.waiting.append(waiting)
+        return ""
+
+    def missed(self, tick, pose):
+        self.misses.append(pose)
+
+
+@pytest.mark.parametrize(
+    ("avoids", "speed", "waits"),
+    [
+        (True, 0.0, True), (True, 0.9 * WAITING_SPEED, True), (True, -0.9 * WAITING_SPEED, True),
+        (True, WAITING_SPEED, False), (True, -1.1 * WAITING_SPEED, False), (False, 0.0, False),
+    ],
+)  # fmt: skip
+def test_a_robot_waits_if_it_stands_to_give_way(turtlebot, avoids, speed, waits):
+    monitor = Watcher()
+    robot = driver(turtlebot, monitor)
+    robot.step = Step(avoids=avoids)
+    robot.decide(0, TASK.start, State(*TASK.start, speed, 0.0))
+    assert monitor.waiting == [waits]
+
+
+@pytest.mark.parametrize(("true", "outcome"), [(0.4, Outcome.STUCK), (0.1, Outcome.SUCCEEDED)])
+@pytest.mark.parametrize(("off", "knows"), [(0.0, False), (0.25, False), (0.26, True), (0.4, True)])
+def test_a_robot_looks_for_a_new_route_to_a_goal_that_it_believes_it_missed(turtlebot, off, knows, true, outcome):
+    """It stands `true` from the goal, and estimates that it is `off` from it. What is true ends no drive for it."""
+    monitor, (x, y) = Watcher(), TASK.goal
+    robot = driver(turtlebot, monitor)
+    endings = []
+    for tick in range(9):  # the command comes to rest first
+        robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.path.length))
+        endings.append(robot.decide(tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
+    assert bool(monitor.misses) is knows
+    assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
+
+
+def test_progress_is_told_ten_times_a_second(turtlebot):
+    told = []
+    with Engine(TASK.world, turtlebot) as engine:
+        tracked = driver(turtlebot).path
+        log = follow(engine, PurePursuit(), tracked, TASK, limit=1.0, progress=told.append)
+    assert len(log.t) == 241
+    assert len(told) == 10
+    assert told == sorted(told)
+
+
+def test_the_first_row_is_at_rest_and_estimates_keep_their_error(turtlebot):
+    with Engine(TASK.world, turtlebot) as engine:
+        plant = Bullet(engine, TASK.start, 80)
+        x, y, yaw = plant.state.pose
+        localiser = TruePose(turtlebot.noise, turtlebot.track, 1 / 80, TASK.start, np.random.default_rng(0))
+        localiser.settle((x + 0.1, y - 0.2, yaw + 0.3 + 2 * np.pi))
+        plant.advance(Step(Twist(0.2, 0.1), PursuitState(limiter=2)), Twist(0.3, 0.4))
+        found = plant.finish(Ending(Outcome.TIMED_OUT))
+        logged = localiser.logged(found, plant.per_tick)
+    np.testing.assert_array_equal(found.command, [(0.0, 0.0), *[(0.2, 0.1)] * 3])
+    np.testing.assert_array_equal(logged["actuated"], [(0.0, 0.0), *[(0.3, 0.4)] * 3])
+    np.testing.assert_array_equal(found.limiter, [0, 2, 2, 2])
+    np.testing.assert_allclose(logged["estimate"] - found.pose, [(0.1, -0.2, 0.3)] * 4)
+
+
+@pytest.mark.parametrize("control_hz", [7, 50, 480])
+def test_control_periods_are_whole_numbers_of_steps(turtlebot, control_hz):
+    with Engine(TASK.world, turtlebot) as engine, pytest.raises(FieldError, match="must divide the physics rate 240"):
+        Bullet(engine, TASK.start, control_hz)

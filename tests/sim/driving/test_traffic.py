@@ -1,20 +1,32 @@
-"""Going round the ground that movers roam."""
+"""Routes round the ground that movers roam, told of them or seen by lidar."""
 
-import dataclasses
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.base import Floats
 from antdrive.planners import load_planner
-from antdrive.robots import RobotSpec
-from antdrive.sim import Outcome, Perception, ReplanPolicy, Run, Scenario, run
-from antdrive.sim.driving.perception import Told
-from antdrive.sim.driving.traffic import MIXING, Traffic, Zone
-from antdrive.worlds import Cruising, Disc, Keyframed, Mover, Task, Trajectories, World, import_dynabarn, rasterise
+from antdrive.sim import Outcome, Perception, ReplanPolicy, Scenario, run
+from antdrive.sim.compose import compose
+from antdrive.sim.driving.movers_ahead import (
+    FADING,
+    FAST,
+    MIXING,
+    SLACK,
+    MoversSeenAhead,
+    TrackedTraffic,
+    Traffic,
+    Zone,
+)
+from antdrive.sim.driving.others import Told, Tracked
+from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED
+from antdrive.sim.sensing import TrackedMovers
+from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, import_dynabarn, rasterise
+from tests.records import changed
 from tools.shared_data import DYNABARN
 
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))
@@ -23,33 +35,32 @@ GRID = rasterise(HALL, 0.25, 0.25)
 coordinate = st.floats(-1, 17)
 
 
-def shuttle(x: float, speed: float = 1.0, phase: float = 0.0) -> Keyframed:
+def shuttle(x, speed=1.0, phase=0.0):
     """A mover that goes to and fro across the middle of the hall."""
     frames = ((0.0, x, 2.5), (7.0 / speed, x, 9.5))
     return Keyframed(radius=0.4, keyframes=frames, loop="pingpong", phase=phase)
 
 
 SHUTTLES = tuple(shuttle(3.0 + 0.9 * k, 1.2, phase=4.7 * k) for k in range(11))
+SLOW = tuple(shuttle(3.0 + 0.9 * k, speed=0.2, phase=4.7 * k) for k in range(3))
 
 
-def traffic_of(*movers: Mover, kind: str = "velocities", reach: float = math.inf) -> Traffic:
-    motions = Trajectories.of(dataclasses.replace(HALL, movers=movers), (1.0, 6.0))
-    predictor = Told(motions, Perception(kind=kind, range=reach), 60)  # type: ignore[arg-type]
+def traffic_of(*movers, kind="velocities", reach=math.inf):
+    motions = Trajectories.of(replace(HALL, movers=movers), (1.0, 6.0))
+    predictor = Told(motions, Perception(kind=kind, range=reach), 60)
     return Traffic(predictor, 0.2, HALL.bounds, 60)
 
 
-def among(*movers: Mover, robot: RobotSpec, **settings: object) -> Run:
-    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
-    scenario = Scenario(
-        task=task, planner=load_planner("dstar-lite"), planner_name="dstar-lite", robot=robot, **settings
-    )  # type: ignore[arg-type]
+def among(*movers, robot, **settings):
+    task = changed(TASK, "world", movers=movers)
+    scenario = Scenario.of(task, "dstar-lite", robot, **settings)
     return run(scenario)
 
 
-def test_the_box_holds_every_place_that_was_seen_and_no_more() -> None:
+def test_the_box_holds_every_place_that_was_seen_and_no_more():
     traffic = traffic_of(*SHUTTLES, reach=5.0)
     seen = []
-    motions = Trajectories.of(dataclasses.replace(HALL, movers=SHUTTLES), (1.0, 6.0))
+    motions = Trajectories.of(replace(HALL, movers=SHUTTLES), (1.0, 6.0))
     for tick in range(0, 300, 7):
         robot = (1.0 + 0.02 * tick, 6.0)
         traffic.look(tick, robot)
@@ -59,7 +70,7 @@ def test_the_box_holds_every_place_that_was_seen_and_no_more() -> None:
     np.testing.assert_allclose(traffic.box, expected)
 
 
-def test_a_box_has_grown_only_when_a_mover_was_seen_farther_out() -> None:
+def test_a_box_has_grown_only_when_a_mover_was_seen_farther_out():
     traffic = traffic_of(shuttle(5.0), shuttle(8.0))
     assert not traffic.grown(0.1), "nothing was seen yet"
     traffic.look(0, (1.0, 6.0))
@@ -71,12 +82,12 @@ def test_a_box_has_grown_only_when_a_mover_was_seen_farther_out() -> None:
     assert not traffic.grown(0.6)
 
 
-def test_the_rate_is_that_of_movers_meeting_robots_put_down_at_random() -> None:
+def test_the_rate_is_that_of_movers_meeting_robots_put_down_at_random():
     """Brute force: on a fine lattice, how many standing robots each mover meets in a second."""
     movers = (shuttle(4.0, 1.3), Cruising(radius=0.25, position=(9.0, 5.0), velocity=(0.6, -0.7)))
     side = 0.02
     x, y = np.meshgrid(np.arange(0, 16, side), np.arange(0, 12, side))
-    motions = Trajectories.of(dataclasses.replace(HALL, movers=movers), (1.0, 6.0))
+    motions = Trajectories.of(replace(HALL, movers=movers), (1.0, 6.0))
     begin, end = motions.positions(1.0)[0], motions.positions(2.0)[0]
     met = 0
     for a, b, r in zip(begin, end, motions.radii, strict=True):
@@ -87,7 +98,7 @@ def test_the_rate_is_that_of_movers_meeting_robots_put_down_at_random() -> None:
     assert traffic_of(*movers, kind="positions").rate(60, (1.0, 6.0)) == 0.0
 
 
-def test_few_places_make_a_box_that_is_grown_and_many_one_as_seen() -> None:
+def test_few_places_make_a_box_that_is_grown_and_many_one_as_seen():
     """For n places drawn evenly from an interval, the highest lies 1 / (n + 1) of it below its end on average."""
     rng = np.random.default_rng(0)
     draws = rng.uniform(0.0, 1.0, (20_000, 11))
@@ -107,14 +118,12 @@ def test_few_places_make_a_box_that_is_grown_and_many_one_as_seen() -> None:
 
 
 @given(robot=st.tuples(coordinate, coordinate), goal=st.tuples(coordinate, coordinate), radius=st.floats(0.1, 0.6))
-def test_a_zone_blocks_what_lies_in_its_box_off_the_ways_of_the_ends(
-    robot: tuple[float, float], goal: tuple[float, float], radius: float
-) -> None:
+def test_a_zone_blocks_what_lies_in_its_box_off_the_ways_of_the_ends(robot, goal, radius):
     box, half = np.array([4.0, 3.0, 12.0, 9.0]), 2 * GRID.cell
     zone = Zone(box, radius, robot, goal, GRID)
     reach = radius + GRID.inflate
 
-    def inside(p: Floats) -> float:
+    def inside(p):
         return float(min(p[0] - box[0], box[2] - p[0], p[1] - box[1], box[3] - p[1])) + reach
 
     for cell in np.argwhere(GRID.free)[::17]:
@@ -140,57 +149,251 @@ def test_a_zone_blocks_what_lies_in_its_box_off_the_ways_of_the_ends(
         )
 
 
-def test_a_prediction_beyond_the_box_is_not_believed() -> None:
+def test_a_prediction_beyond_the_box_is_not_believed():
     zone = Zone(np.array([4.0, 3.0, 12.0, 9.0]), 0.4, (1.0, 6.0), (15.0, 6.0), GRID)
     assert zone.holds(Disc(11.9, 5.0, 0.4))
     assert not zone.holds(Disc(12.3, 5.0, 0.4))
 
 
-def test_the_robot_goes_round_busy_ground_and_through_quiet_ground(turtlebot: RobotSpec) -> None:
+@pytest.fixture(scope="module")
+def quiet(turtlebot):
+    """A drive among slow movers, of which few cross the hall."""
+    return among(*SLOW, robot=turtlebot)
+
+
+def test_the_robot_goes_round_busy_ground_and_through_quiet_ground(turtlebot, quiet):
     """The shuttles stay 2 m off the long walls."""
-    slow = tuple(shuttle(3.0 + 0.9 * k, speed=0.2, phase=4.7 * k) for k in range(3))
-    for movers, goes_round in ((SHUTTLES, True), (slow, False)):
-        done = among(*movers, robot=turtlebot)
+    for done, goes_round in ((among(*SHUTTLES, robot=turtlebot), True), (quiet, False)):
         assert done.succeeded, (done.outcome, done.reason)
-        assert done.rollout is not None
         middle = np.abs(done.rollout.pose[:, 0] - 8) < 2
-        off = np.abs(done.rollout.pose[middle, 1] - 6)
-        assert (off.min() > 3.5) == goes_round
-        triggers = {replan.trigger for replan in done.rollout.record.replans}
-        assert ("traffic" in triggers) == goes_round
+        assert (np.abs(done.rollout.pose[middle, 1] - 6).min() > 3.5) == goes_round
+        assert ("traffic" in {replan.trigger for replan in done.rollout.record.replans}) == goes_round
 
 
-def test_without_traffic_above_the_limit_nothing_changes(turtlebot: RobotSpec) -> None:
-    slow = tuple(shuttle(3.0 + 0.9 * k, speed=0.2, phase=4.7 * k) for k in range(3))
-    one, other = (
-        among(*slow, robot=turtlebot, replanning=ReplanPolicy(max_traffic=limit)).rollout for limit in (0.07, 1e9)
-    )
-    assert one is not None
-    assert other is not None
+def test_without_traffic_above_the_limit_nothing_changes(turtlebot, quiet):
+    one, other = quiet.rollout, among(*SLOW, robot=turtlebot, replanning=ReplanPolicy(max_traffic=1e9)).rollout
     assert (one.pose.tobytes(), one.command.tobytes()) == (other.pose.tobytes(), other.command.tobytes())
 
 
 @pytest.mark.parametrize(
     "settings", [{"perception": Perception(kind="motions")}, {"replanning": ReplanPolicy(max_detour=1.0)}]
 )
-def test_a_robot_that_knows_the_motions_or_may_not_go_far_round_goes_through(
-    turtlebot: RobotSpec, settings: dict[str, object]
-) -> None:
-    done = among(*SHUTTLES, robot=turtlebot, **settings)
-    assert done.rollout is not None
-    middle = np.abs(done.rollout.pose[:, 0] - 8) < 2
-    assert np.abs(done.rollout.pose[middle, 1] - 6).min(initial=0.0) < 3.5
+def test_a_robot_that_knows_the_motions_or_may_not_go_far_round_goes_through(turtlebot, settings):
+    done = among(*SHUTTLES, robot=turtlebot, time_limit=20.0, **settings)
+    assert np.abs(done.rollout.pose[:, 1] - 6).max() < 3.5
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not DYNABARN.exists(), reason="needs DynaBARN's worlds (docs/how-to/data.md)")
-def test_nearly_all_drives_in_the_hard_worlds_of_dynabarn_arrive(jackal: RobotSpec) -> None:
+def test_nearly_all_drives_in_the_hard_worlds_of_dynabarn_arrive(jackal):
     """Moments that benchmarks.dynamic does not use. A mover that jumps onto the robot ends one of the six drives."""
     hard = [task for task in import_dynabarn(DYNABARN) if int(task.world.name.split("-")[1]) >= 40]
-    moments = [dataclasses.replace(task, world=task.world.later(t)) for task in hard for t in (3.1, 7.4)]
+    moments = [replace(task, world=task.world.later(t)) for task in hard for t in (3.1, 7.4)]
     planner = load_planner("dstar-lite")
     done = [run(Scenario(task=task, planner=planner, planner_name="dstar-lite", robot=jackal)) for task in moments]
     outcomes = [each.outcome for each in done]
     assert len(done) == 6
     assert sum(each.succeeded for each in done) >= 5, outcomes
     assert Outcome.COLLIDED not in outcomes
+
+
+LIDAR = Perception(kind="lidar")
+ACROSS = Task(HALL, (1.0, 6.0, 0.0), (15.0, 6.0), goal_tolerance=0.5, cell=0.25)
+POSE = ACROSS.start
+anywhere = st.floats(-20, 20)
+
+
+class Seen:
+    """A watch that has seen what it is told."""
+
+    def __init__(self):
+        self.tick, self.sight, self.reach = 0, 50.0, 7.5
+        self.tracker = SimpleNamespace(movers=lambda: self.now, found=99)
+        self.see([])
+
+    def see(self, rows, hidden=0, tick=None):
+        """Movers at x, y with velocities vx, vy; the last `hidden` ones were not met by the scan."""
+        table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+        met = np.arange(len(table)) < len(table) - hidden
+        self.now = TrackedMovers(
+            table[:, :2], table[:, 2:], np.full(len(table), 0.4), np.arange(len(table), dtype=np.int64), met
+        )
+        self.tick = self.tick + 1 if tick is None else tick
+
+
+def traffic_seen(robot):
+    watch = Seen()
+    return TrackedTraffic(Tracked(watch, LIDAR, 60), robot, 60), watch
+
+
+def ahead(robot, hits=None, **policy):
+    watch = Seen()
+    found = np.empty((0, 3)) if hits is None else hits
+    survey = SimpleNamespace(map=SimpleNamespace(trust=7.5, discs=lambda: found))
+    predictor, settings = Tracked(watch, LIDAR, 60), ReplanPolicy(**policy)
+    return MoversSeenAhead(predictor, survey, settings, robot, ACROSS.goal, robot.radius + 0.03, 60), watch
+
+
+def busy(movers, watch, speed):
+    """Show it ten movers between the long walls, each on another place and going north."""
+    for tick in range(1, 61):
+        watch.see([(3.0 + k, 3.0 + 6.0 * ((k + 0.1 * tick) % 1.0), 0.0, speed) for k in range(10)], tick=tick)
+        movers.look(tick, POSE, False)
+
+
+def straight(robot, y=6.0):
+    """A path through the hall, as the parts that are tested here know it."""
+    xy = np.array([[1.0, y], [15.0, y]])
+    route = SimpleNamespace(xy=xy, arc=np.array([0.0, 14.0]))
+    return SimpleNamespace(route=route, length=14.0)
+
+
+def test_only_movers_that_the_last_scan_met_make_the_box(jackal):
+    traffic, watch = traffic_seen(jackal)
+    watch.see([(2.0, 3.0, 0.0, 1.0), (5.0, 4.0, 1.0, 0.0), (30.0, -9.0, 1.0, 0.0)], hidden=1)
+    traffic.look(watch.tick, POSE[:2])
+    assert traffic.box.tolist() == [2.0, 3.0, 5.0, 4.0]
+    assert traffic.samples == 2
+    watch.see([(7.0, 3.5, 1.0, 0.0)], tick=watch.tick)  # no new scan
+    traffic.look(watch.tick, POSE[:2])
+    assert traffic.box.tolist() == [2.0, 3.0, 5.0, 4.0]
+
+
+def test_the_rate_counts_fast_movers_in_reach_on_the_ground_in_sight(jackal):
+    """Two movers of 1.8 m/s: each would meet robots on 2 (0.4 + R) 1.8 square metres a second."""
+    traffic, watch = traffic_seen(jackal)
+    slow = FAST * jackal.max_speed - 0.01
+    rows = [(3.0, 5.0, 0.0, 1.8), (4.0, 7.0, -1.8, 0.0), (5.0, 5.0, slow, 0.0), (1.0 + 7.5 + 0.41, 6.0, 0.0, 1.9)]
+    expected = 2 * 2 * (0.4 + jackal.radius) * 1.8 / 50.0
+    for tick in range(1, 60 * 30):
+        watch.see(rows, tick=tick)
+        traffic.look(tick, POSE[:2])
+        if tick == 6:  # a velocity that is wrong for a moment is no traffic
+            assert 0 < traffic.rate(0, POSE[:2]) < 0.1 * expected
+    assert traffic.rate(0, POSE[:2]) == pytest.approx(expected)
+    for tick in range(watch.tick + 1, watch.tick + 1 + round(60 * FADING)):
+        watch.see([], tick=tick)
+        traffic.look(tick, POSE[:2])
+    assert traffic.rate(0, POSE[:2]) == pytest.approx(expected * math.exp(-1), rel=1e-3)
+
+
+@settings(max_examples=25)
+@given(hits=st.lists(st.tuples(anywhere, anywhere), max_size=9), x=anywhere, y=anywhere, yaw=st.floats(-3, 3))
+def test_without_tracks_nothing_changes(jackal, hits, x, y, yaw):
+    discs = np.array([(*hit, 0.03) for hit in hits]).reshape(-1, 3)
+    movers, watch = ahead(jackal, discs)
+    for tick in range(1, 200, 40):
+        watch.see([], tick=tick)
+        movers.look(tick, (x, y, yaw), False)
+        assert movers.trigger(tick, (x, y, yaw), straight(jackal), 0.0) == ""
+    assert not movers.heavy(200, (x, y, yaw))
+    assert movers.discs(200, (x, y, yaw)) == []
+    assert movers.without_trails(discs, (x, y, yaw)) is discs
+
+
+def test_a_mover_on_its_way_onto_the_route_makes_a_new_one_due(jackal):
+    movers, watch = ahead(jackal)
+    for start, trigger in (((3.0, 7.5), OBSTRUCTED), ((3.0, 9.0), ""), ((8.0, 7.5), "")):  # here, too late, too far
+        watch.see([(*start, 0.0, -1.0)])
+        assert movers.trigger(watch.tick, POSE, straight(jackal), 0.0) == trigger, start
+
+
+def test_a_robot_that_waits_for_long_looks_for_another_way(jackal):
+    movers, _ = ahead(jackal, max_wait=2.0)
+    due = []
+    for tick in range(200):
+        movers.look(tick, POSE, tick >= 10)
+        due.append(movers.trigger(tick, POSE, straight(jackal), 0.0))
+    assert due.index(WAITED) == pytest.approx(10 + 2 * 60, abs=1)
+    assert due.count(WAITED) == 1
+
+
+def test_a_route_through_busy_ground_is_due_for_a_new_one_and_one_along_the_wall_is_not(jackal):
+    for speed, y, trigger in ((1.8, 6.0, TRAFFIC), (1.8, 0.6, ""), (1.2, 6.0, "")):
+        movers, watch = ahead(jackal, max_traffic=0.07)
+        busy(movers, watch, speed)
+        watch.see([])  # where they are is no matter, but where they have been
+        assert movers.trigger(61, POSE, straight(jackal, y), 0.0) == trigger, (speed, y)
+
+
+def test_the_largest_zone_leaves_a_lane_along_the_walls(jackal):
+    corners = np.array([(0.0, 0.0, 0.02), (16.0, 0.0, 0.02), (0.0, 12.0, 0.02), (16.0, 12.0, 0.02)])
+    movers, watch = ahead(jackal, corners)
+    busy(movers, watch, 1.8)
+    assert movers.bounds((0.0, 0.0, 16.0, 12.0)) == (0.0, 0.0, 16.0, 12.0)
+    grid = rasterise(HALL, 0.05, jackal.radius + 0.03)
+    zones = movers.zones(60, POSE, grid)
+    assert len(zones) == 3
+    free = grid.free & ~zones[0].blocked
+    lane = free[grid.cell_at(8.0, 0.0)[0] :, grid.cell_at(8.0, 0.0)[1]]
+    below = int(np.argmin(lane[np.argmax(lane) :]))  # cells from the first free one on
+    assert below * 0.05 == pytest.approx(SLACK, abs=0.06)
+    assert zones[0].blocked.sum() > zones[1].blocked.sum() > zones[2].blocked.sum() > 0
+
+
+@given(st.lists(st.tuples(st.floats(0, 16), st.floats(0, 12)), min_size=1, max_size=30))
+def test_only_far_hits_where_movers_roam_are_left_out(jackal, hits):
+    movers, watch = ahead(jackal)
+    watch.see([(4.0, 3.0, 0.0, 1.0), (12.0, 9.0, 0.0, 1.0)])
+    movers.look(watch.tick, POSE, False)
+    discs = np.array([(*hit, 0.02) for hit in hits])
+    kept = [hit for hit in hits if not (4 < hit[0] < 12 and 3 < hit[1] < 9 and math.dist(hit, POSE[:2]) > 7.5)]
+    assert movers.without_trails(discs, POSE)[:, :2].tolist() == [list(hit) for hit in kept]
+
+
+def unknown(robot, planner="dstar-lite", **settings):
+    given = {"map": "none", "localisation": "matching", "perception": LIDAR, "noise": 1.0, **settings}
+    return Scenario.of(ACROSS, planner, robot, **given)
+
+
+@pytest.mark.parametrize("planner", ["dstar-lite", "astar", "tangent"])
+def test_plans_lead_round_busy_ground_and_off_movers(jackal, planner):
+    """The first scan sees the hall; tracks that are told it then stand for movers."""
+    exploration = compose(unknown(jackal, planner)).guide
+    movers = exploration._movers
+    watch = exploration.survey.watch = Seen()
+    movers._predictor.watch = watch
+    _, plan, avoided = exploration._plan_around(0, POSE)
+    assert (avoided, plan.cost) == ([], pytest.approx(14.0, abs=0.1))
+    watch.see([(3.0, 6.0, 0.0, 0.0)])
+    _, plan, avoided = exploration._plan_around(watch.tick, POSE)
+    assert len(avoided) > 0
+    assert 14.1 < plan.cost < 16.0
+    busy(movers, watch, 1.8)
+    _, plan, _ = exploration._plan_around(60, POSE)
+    assert plan.cost > 18.0
+    for pose in (POSE, (5.0, 9.0, 0.0)):  # beside it, and in it: straight out
+        grid, plan, avoided = exploration._plan_around(60, pose)
+        if planner != "tangent":  # which knows no cells, and what bounds the ground alone
+            assert any(not zone.blocked[tuple(plan.cells.T)].any() for zone in movers.zones(60, pose, grid))
+        route, _ = exploration._route(pose, grid, plan, avoided)
+        arcs = np.arange(0.0, route.length, 0.05)
+        points = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
+        gaps = [np.hypot(*(points - (disc.x, disc.y)).T).min() - disc.radius for disc in avoided]
+        assert min(gaps) > grid.inflate - 0.01
+
+
+def test_a_policy_may_leave_movers_to_local_avoidance(jackal):
+    for policy in (None, ReplanPolicy(around_movers=False)):
+        assert compose(unknown(jackal, replanning=policy)).guide._movers is None
+    assert compose(unknown(jackal, localisation="fixes", perception=Perception())).guide._movers is None
+
+
+@pytest.mark.slow
+def test_a_robot_without_a_map_drives_round_busy_ground(jackal):
+    """Ten shuttles, as fast as the robot nearly, which stay 3.5 m off the long walls; the robot sees them from 4 m off."""
+    shuttles = tuple(
+        Keyframed(
+            radius=0.4,
+            keyframes=((0.0, 5.0 + 0.9 * k, 5.5), (4.0, 5.0 + 0.9 * k, 12.5)),
+            loop="pingpong",
+            phase=2.3 * k,
+        )
+        for k in range(10)
+    )
+    hall = World("hall", (0.0, 0.0, 16.0, 18.0), movers=shuttles)
+    task = Task(hall, (1.0, 9.0, 0.0), (15.0, 9.0), goal_tolerance=0.5, cell=0.25)
+    done = run(replace(unknown(jackal), task=task))
+    assert done.succeeded, (done.outcome, done.reason)
+    middle = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 8.0) < 2.0]
+    assert np.abs(middle[:, 1] - 9.0).min() > 4.0

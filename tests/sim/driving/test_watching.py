@@ -1,27 +1,26 @@
 """Drives among movers that the robot finds with its lidar: told nothing of them, it avoids what no map explains."""
 
-import dataclasses
 import math
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from antdrive.base.errors import FieldError
-from antdrive.planners import load_planner
-from antdrive.robots import RobotSpec
 from antdrive.runs.failures.rebuild import rebuilt
-from antdrive.sim import Outcome, Perception, Rollout, Run, Scenario, run
+from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
+from antdrive.sim.compose import compose
+from antdrive.sim.driving.others import Tracked
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.driving.watching import Tracked, Watch
+from antdrive.sim.driving.survey import Watch
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord
-from antdrive.sim.log.scans import ranges_of
+from antdrive.sim.log.rollout import ranges_of
 from antdrive.sim.log.sights import passed
 from antdrive.sim.sensing import KnownGround, Scanner
 from antdrive.worlds import Disc, Keyframed, Task, World
-from tests.sim.driving.guides import exploration_of
+from tests.records import changed
 
 # A closet of touching posts in the lower right corner, into which no beam gets.
 CLOSET = tuple(Disc(5.0 + 0.14 * k, 1.2, 0.075) for k in range(22)) + tuple(
@@ -35,34 +34,32 @@ BOX = (Disc(2.3, 2.2, 0.15),)  # stands on the route, and is on no map
 LIDAR = Perception(kind="lidar")
 
 
-def scenario(robot: RobotSpec, task: Task = TASK, **settings: object) -> Scenario:
+def scenario(robot, task=TASK, **settings):
     given = {"perception": LIDAR, "unseen": BOX, **settings}
-    return Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, **given)  # type: ignore[arg-type]
+    return Scenario.of(task, "astar", robot, **given)
 
 
 @pytest.fixture(scope="module")
-def drive(jackal: RobotSpec) -> Run:
+def drive(jackal):
     return run(scenario(jackal))
 
 
 @pytest.fixture(scope="module")
-def log(drive: Run) -> Rollout:
-    assert drive.rollout is not None
+def log(drive):
     return drive.rollout
 
 
-def test_what_is_on_no_map_is_seen_and_avoided(drive: Run, log: Rollout, jackal: RobotSpec) -> None:
+def test_what_is_on_no_map_is_seen_and_avoided(drive, log, jackal):
     blind = run(scenario(jackal, avoidance=None, replanning=None))
     assert blind.outcome is Outcome.COLLIDED
     assert drive.succeeded, (drive.outcome, drive.reason, drive.certificate)
-    assert log.record.perception is not None
     assert (log.record.perception.kind, drive.scenario.as_dict()["settings"]["perception"]) == (
         "lidar",
         {"kind": "lidar"},
     )
 
 
-def test_the_log_tells_where_the_robot_believed_movers_to_be(log: Rollout, tmp_path: Path) -> None:
+def test_the_log_tells_where_the_robot_believed_movers_to_be(log, tmp_path):
     rows, x, y, vx, vy, radius = (log.tracks[:, k] for k in (0, 2, 3, 4, 5, 6))
     there = log.movers[rows.astype(int), 0]
     off = np.hypot(x - there[:, 0], y - there[:, 1])
@@ -77,33 +74,30 @@ def test_the_log_tells_where_the_robot_believed_movers_to_be(log: Rollout, tmp_p
     again = Rollout.load(log.save(tmp_path / "rollout.npz"))
     assert again.digest == log.digest
     assert np.array_equal(again.tracks, log.tracks)
-    broken = dataclasses.replace(log, tracks=log.tracks[::-1].copy())
+    broken = replace(log, tracks=log.tracks[::-1].copy())
     assert any("tracks" in problem for problem in broken.problems())
     assert certify(log).certified
-    told = dataclasses.replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
+    told = replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
     flat = log.tracks * np.array([1, 1, 1, 1, 1, 1, 0], dtype=np.float32)
-    for forged in (dataclasses.replace(log, record=told), dataclasses.replace(log, tracks=flat)):
+    for forged in (replace(log, record=told), replace(log, tracks=flat)):
         assert any("tracks" in problem for problem in certify(forged).problems)
 
 
-def test_a_mover_that_no_beam_meets_changes_nothing(jackal: RobotSpec, log: Rollout) -> None:
-    hidden = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(CROSSING, HIDDEN)))
+def test_a_mover_that_no_beam_meets_changes_nothing(jackal, log):
+    hidden = changed(TASK, "world", movers=(CROSSING, HIDDEN))
     other = run(scenario(jackal, hidden)).rollout
-    assert other is not None
     assert other.movers.shape[1] == 2
     for name in ("pose", "twist", "command", "limiter", "scans", "tracks"):
         assert np.array_equal(getattr(other, name), getattr(log, name)), name
-    seen = dataclasses.replace(HIDDEN, keyframes=tuple((t, x, y + 1.2) for t, x, y in HIDDEN.keyframes))
-    outside = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(CROSSING, seen)))
+    seen = replace(HIDDEN, keyframes=tuple((t, x, y + 1.2) for t, x, y in HIDDEN.keyframes))
+    outside = changed(TASK, "world", movers=(CROSSING, seen))
     differs = run(scenario(jackal, outside, time_limit=0.5)).rollout
-    assert differs is not None
     assert not np.array_equal(differs.tracks, log.tracks[log.tracks[:, 0] < len(differs.t)])
 
 
-def test_a_robot_without_a_map_follows_movers_too(jackal: RobotSpec) -> None:
-    short = dataclasses.replace(TASK, start=(2.6, 2.2, 0.0), goal=(5.6, 2.2))
+def test_a_robot_without_a_map_follows_movers_too(jackal):
+    short = replace(TASK, start=(2.6, 2.2, 0.0), goal=(5.6, 2.2))
     done = run(scenario(jackal, short, map="none", localisation="matching", noise=1.0, unseen=()))
-    assert done.rollout is not None
     assert done.succeeded, (done.outcome, done.reason, done.certificate)
     tracks = done.rollout.tracks
     there = done.rollout.movers[tracks[:, 0].astype(int), 0]
@@ -112,24 +106,22 @@ def test_a_robot_without_a_map_follows_movers_too(jackal: RobotSpec) -> None:
     assert rebuilt(done.rollout.record).perception == LIDAR
 
 
-def test_the_map_reaches_farther_among_movers(jackal: RobotSpec) -> None:
+def test_the_map_reaches_farther_among_movers(jackal):
     told = scenario(jackal, map="none", perception=Perception(), unseen=())
-    watching = dataclasses.replace(told, perception=LIDAR)
-    assert [exploration_of(s).survey.map.horizon for s in (told, watching)] == [10.0, 16.0]
+    watching = replace(told, perception=LIDAR)
+    assert [compose(s).guide.survey.map.horizon for s in (told, watching)] == [10.0, 16.0]
 
 
-def test_an_empty_world_is_watched_as_well(turtlebot: RobotSpec) -> None:
+def test_an_empty_world_is_watched_as_well(turtlebot):
     empty = Task(World("empty", (0.0, 0.0, 4.0, 3.0)), (0.8, 1.5, 0.0), (3.2, 1.5), cell=0.1)
     done = run(scenario(turtlebot, empty, unseen=()))
     assert done.succeeded
-    assert done.rollout is not None
     assert not len(done.rollout.tracks)
     assert done.rollout.record.perception is not None
     assert done.rollout.record.replans == ()
 
 
-def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal: RobotSpec) -> None:
-    assert jackal.lidar is not None
+def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal):
     watch, hall = Watch(jackal.lidar, 60), World("hall", (-5.0, -5.0, 5.0, 5.0))
     scanner = Scanner(jackal.lidar, np.empty((0, 3)), bounds=hall.bounds)
     ground = KnownGround(jackal.lidar, hall)
@@ -150,57 +142,45 @@ def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal: RobotSp
     assert math.hypot(2.0, 2.0) - 0.2 > 2.3
 
 
-def test_a_lidar_is_needed_and_a_pose_that_fits_the_map(jackal: RobotSpec) -> None:
-    with pytest.raises(FieldError, match="no lidar") as caught:
-        scenario(dataclasses.replace(jackal, lidar=None))
-    assert caught.value.key == "sees"
-    with pytest.raises(FieldError, match="localise by fixes or true"):
-        scenario(jackal, localisation="odometry")
-
-
-def test_a_robot_without_a_map_is_told_of_movers_only_by_name(jackal: RobotSpec) -> None:
-    nobody = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=()))
+def test_a_robot_without_a_map_is_told_of_movers_only_by_name(jackal):
+    nobody = changed(TASK, "world", movers=())
     given, alone, still = (
         scenario(jackal, task, map=map, perception=None, unseen=())
         for task, map in ((TASK, "given"), (TASK, "none"), (nobody, "none"))
     )
-    assert [s.effective_perception.kind for s in (given, alone, still)] == ["velocities", "lidar", "velocities"]
-    assert [s.watching for s in (given, alone, still)] == [False, True, False]
-    assert alone.as_dict() == dataclasses.replace(alone, perception=LIDAR).as_dict()
-    assert dataclasses.replace(alone, perception=Perception()).effective_perception == Perception()
+    assert [s.known_perception.kind for s in (given, alone, still)] == ["velocities", "lidar", "velocities"]
+    assert alone.as_dict() == replace(alone, perception=LIDAR).as_dict()
+    assert replace(alone, perception=Perception()).known_perception == Perception()
     for drifting in ("odometry", "matching"):
-        assert dataclasses.replace(alone, localisation=drifting).watching
+        assert replace(alone, localisation=drifting).known_perception.kind == "lidar"
         with pytest.raises(FieldError, match=f"velocities: the pose drifts with localisation {drifting}") as caught:
-            dataclasses.replace(alone, localisation=drifting, perception=Perception())
+            replace(alone, localisation=drifting, perception=Perception())
         assert caught.value.key == "sees"
-        assert not dataclasses.replace(still, localisation=drifting, perception=Perception()).watching
+        replace(still, localisation=drifting, perception=Perception())
 
 
-def test_without_a_map_a_mover_that_no_beam_meets_changes_nothing(jackal: RobotSpec) -> None:
+def test_without_a_map_a_mover_that_no_beam_meets_changes_nothing(jackal):
     """It is behind posts beside the robot, and comes towards it: a robot that is told of it evades."""
     closet = tuple(Disc(0.1 + 0.14 * k, 1.4, 0.075) for k in range(22)) + tuple(
         Disc(3.1, 1.4 - 0.14 * k, 0.075) for k in range(11)
     )
     mover = Keyframed(radius=0.2, keyframes=((0.0, 1.8, 0.25), (0.8, 1.8, 1.1)), loop="pingpong")
-    other = dataclasses.replace(mover, keyframes=((0.0, 2.6, 0.4), (1.0, 2.6, 0.5)))
+    other = replace(mover, keyframes=((0.0, 2.6, 0.4), (1.0, 2.6, 0.5)))
     logs = []
     for hidden in (mover, other):
-        task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, obstacles=closet, movers=(hidden,)))
+        task = changed(TASK, "world", obstacles=closet, movers=(hidden,))
         logs.append(run(scenario(jackal, task, map="none", perception=None, unseen=(), time_limit=1.0)).rollout)
     one, two = logs
-    assert one is not None
-    assert two is not None
     assert not np.array_equal(one.movers, two.movers)
     for name in ("pose", "twist", "command", "limiter", "scans", "tracks"):
         assert np.array_equal(getattr(one, name), getattr(two, name)), name
 
 
-def test_the_scans_of_a_robot_with_a_map_are_in_its_log(log: Rollout, jackal: RobotSpec) -> None:
-    assert jackal.lidar is not None
+def test_the_scans_of_a_robot_with_a_map_are_in_its_log(log, jackal):
     assert log.scans.shape[1] == jackal.lidar.beams
     assert (len(log.scans) - 1) / log.t[log.scan_rows[-1]] == pytest.approx(jackal.lidar.rate, rel=0.01)
     k, rows = 30, log.scan_rows
-    exact = dataclasses.replace(jackal.lidar, resolution=0.0)
+    exact = replace(jackal.lidar, resolution=0.0)
     radii = np.array([mover.radius for mover in log.record.world.movers])
     expected = Scanner.of(exact, log.record.world).scan(tuple(log.pose[rows[k]].tolist()), log.movers[rows[k]], radii)
     assert np.abs(ranges_of(log.scans[k]) - expected).max() < 0.0056  # half the resolution, and rounding
@@ -208,27 +188,26 @@ def test_the_scans_of_a_robot_with_a_map_are_in_its_log(log: Rollout, jackal: Ro
     assert {sight.obstacle for sight in passed(log) if sight.mover} == {0}
 
 
-def test_replays_take_the_scans_of_a_robot_with_a_map_again(log: Rollout) -> None:
+def test_replays_take_the_scans_of_a_robot_with_a_map_again(log):
     assert replay(log).problems == ()
     scans = log.scans.copy()
     scans[40, 300] += 10
-    (problem,) = replay(dataclasses.replace(log, scans=scans)).problems
+    (problem,) = replay(replace(log, scans=scans)).problems
     assert problem == (
         "replay: scans are not what the lidar measures from the logged poses, "
         f"from t = {log.t[log.scan_rows[40]]:.3f} s"
     )
-    fewer = dataclasses.replace(log, scans=np.delete(log.scans, 40, axis=0), scan_rows=np.delete(log.scan_rows, 40))
+    fewer = replace(log, scans=np.delete(log.scans, 40, axis=0), scan_rows=np.delete(log.scan_rows, 40))
     assert replay(fewer).problems == (problem,)
-    none = dataclasses.replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])  # as older logs are
+    none = replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])  # as older logs are
     assert replay(none).problems == ()
-    told = dataclasses.replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
-    forged = dataclasses.replace(log, record=told, tracks=log.tracks[:0])
+    told = replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
+    forged = replace(log, record=told, tracks=log.tracks[:0])
     assert "scans: must be empty, since the robot did not use its lidar" in certify(forged).problems
 
 
-def test_a_replay_draws_the_noise_of_scans_again(jackal: RobotSpec) -> None:
+def test_a_replay_draws_the_noise_of_scans_again(jackal):
     noisy = run(scenario(jackal, noise=1.0, time_limit=0.7)).rollout
-    assert noisy is not None
     assert len(noisy.scans) > 30
     assert replay(noisy).problems == ()
-    assert "scans" in replay(dataclasses.replace(noisy, scans=noisy.scans + np.uint16(2))).problems[0]
+    assert "scans" in replay(replace(noisy, scans=noisy.scans + np.uint16(2))).problems[0]

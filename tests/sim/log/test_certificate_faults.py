@@ -4,22 +4,22 @@ The logs are made up row by row; each claim looks for one check's sentence and l
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from antdrive.base import Floats
+from antdrive import Scenario, run
 from antdrive.robots import load_robot
 from antdrive.robots.spec import Footprint
 from antdrive.sim import Outcome, Rollout, certify
 from antdrive.sim.log.certificate import Certificate, closed_form_clearance
 from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, World
-from tests.records import made_up_record
+from tests.records import changed, made_up_log, made_up_record
 
 HZ, ROWS = 240, 1201
 ROBOT = load_robot("turtlebot")
@@ -27,30 +27,20 @@ DISC = Disc(3.0, 2.5, 0.3)
 
 
 @functools.cache
-def drive(speed: float = 0.0, *, hz: int = HZ, rows: int = ROWS, **record: Any) -> Rollout:
+def drive(speed=0.0, *, hz=HZ, rows=ROWS, **record):
     """A robot that drives along y = 1 from x = 1 at a constant speed, with nothing near; five seconds at 240 Hz."""
     t = np.arange(rows) / hz
     pose = np.stack([1.0 + speed * t, np.full(rows, 1.0), np.zeros(rows)], axis=1)
     world = World("made-up", (0.0, 0.0, 6.0, 4.0), (DISC,))
-    values = {
-        "task": Task(world, (1.0, 1.0, 0.0), (5.0, 1.0)),
-        "outcome": Outcome.TIMED_OUT,
-        "physics_hz": hz,
-        "time_limit": max(float(t[-1]), 1 / hz),
-        **record,
-    }
+    values = {"outcome": Outcome.TIMED_OUT, "time_limit": max(float(t[-1]), 1 / hz), **record}
+    record = made_up_record(task=Task(world, (1.0, 1.0, 0.0), (5.0, 1.0)), physics_hz=hz, **values)
     moving = np.tile([speed, 0.0], (rows, 1))
-    return with_clearance(
-        Rollout(
-            t=t, pose=pose, twist=moving, command=np.concatenate([np.zeros((1, 2)), moving[1:]]),
-            clearance=np.zeros(rows), limiter=np.zeros(rows, np.uint8), movers=np.empty((rows, 0, 2)),
-            contacts=np.empty((0, 4)), route=np.array([(1.0, 1.0), (5.0, 1.0)]),
-            cells=np.array([(4, c) for c in range(4, 21)], np.int32), record=made_up_record(**values),
-        )
-    )  # fmt: skip
+    arrays = {"twist": moving, "command": np.concatenate([np.zeros((1, 2)), moving[1:]])}
+    route, cells = np.array([(1.0, 1.0), (5.0, 1.0)]), np.array([(4, c) for c in range(4, 21)], np.int32)
+    return with_clearance(made_up_log(pose, hz, record, route=route, cells=cells, **arrays))
 
 
-def with_clearance(log: Rollout) -> Rollout:
+def with_clearance(log):
     """The log with the clearances of a disc among discs and walls."""
     x, y = log.pose[:, 0], log.pose[:, 1]
     xmin, ymin, xmax, ymax = log.record.world.bounds
@@ -59,41 +49,41 @@ def with_clearance(log: Rollout) -> Rollout:
     return replace(log, clearance=np.minimum.reduce(gaps) - log.record.robot.footprint.rounding)
 
 
-def edited(log: Rollout, name: str, change: Callable[[np.ndarray], None]) -> Rollout:
+def edited(log, name, change):
     array = getattr(log, name).copy()
     change(array)
     return with_clearance(replace(log, **{name: array}))
 
 
-def with_record(log: Rollout, **changes: Any) -> Rollout:
-    return replace(log, record=replace(log.record, **changes))
+def with_record(log, **changes):
+    return changed(log, "record", **changes)
 
 
-def with_task(log: Rollout, **changes: Any) -> Rollout:
+def with_task(log, **changes):
     return with_record(log, task=replace(log.record.task, **changes))
 
 
-def shifted(log: Rollout, by: float, column: int, rows: int = 1) -> Rollout:
+def shifted(log, by, column, rows=1):
     """Poses that creep aside by so much within some rows, and stay there."""
 
-    def shift(pose: np.ndarray) -> None:
+    def shift(pose):
         pose[:, column] += by * np.clip((np.arange(len(pose)) - 99) / rows, 0, 1)
 
     return edited(log, "pose", shift)
 
 
-def filled(log: Rollout, name: str, value: tuple[float, float], rows: slice = slice(None)) -> Rollout:
-    def fill(array: np.ndarray) -> None:
+def filled(log, name, value, rows=slice(None)):
+    def fill(array):
         array[rows] = value
 
     return edited(log, name, fill)
 
 
-def says(log: Rollout, text: str) -> bool:
+def says(log, text):
     return any(text in problem for problem in certify(log).problems)
 
 
-def only_beyond(limit: float, make: Callable[[float], Rollout], text: str, share: float = 0.01) -> None:
+def only_beyond(limit, make, text, share=0.01):
     """Nothing is said of a log just within a limit, and the text of one just beyond it."""
     assert not says(make(limit * (1 - share)), text), (
         f"{limit} - {share:.0%}: {certify(make(limit * (1 - share))).problems}"
@@ -101,7 +91,7 @@ def only_beyond(limit: float, make: Callable[[float], Rollout], text: str, share
     assert says(make(limit * (1 + share)), text), f"{limit} + {share:.0%}"
 
 
-def test_a_made_up_drive_is_certified() -> None:
+def test_a_made_up_drive_is_certified():
     certificate = certify(drive())
     assert certificate.certified, certificate.problems
     assert certificate.min_clearance == certificate.bound == pytest.approx(0.82)
@@ -144,21 +134,21 @@ POSES: dict[str, tuple[float, Callable[[float], Rollout], str]] = {
 }  # fmt: skip
 
 
-def slippery(log: Rollout, friction: float) -> Rollout:
+def slippery(log, friction):
     return with_record(log, robot=replace(log.record.robot, wheel_friction=friction))
 
 
-def arrived(**task: Any) -> Rollout:
+def arrived(**task):
     values = {"goal": (1.2, 1.0), "goal_tolerance": 0.25, **task}
     return with_task(drive(outcome=Outcome.SUCCEEDED), **values)
 
 
 @pytest.mark.parametrize("what", POSES)
-def test_poses_may_be_off_by_so_much(what: str) -> None:
+def test_poses_may_be_off_by_so_much(what):
     only_beyond(*POSES[what])
 
 
-def test_the_heading_is_an_angle() -> None:
+def test_the_heading_is_an_angle():
     for yaw in (math.pi, -math.pi):
         turned = edited(drive(), "pose", lambda pose: pose.__setitem__((slice(None), 2), yaw))  # noqa: B023
         assert not says(turned, "from -pi to pi")
@@ -166,13 +156,13 @@ def test_the_heading_is_an_angle() -> None:
         assert says(beyond, "from -pi to pi")
 
 
-def test_a_start_across_the_cut_of_the_angles_is_the_same_start() -> None:
+def test_a_start_across_the_cut_of_the_angles_is_the_same_start():
     log = edited(drive(), "pose", lambda pose: pose.__setitem__((slice(None), 2), math.pi))
     assert not says(with_task(log, start=(1.0, 1.0, -math.pi + 0.005)), "not the task's start")
 
 
 @pytest.mark.parametrize(("far", "verdict"), [(0.0009, "went nowhere"), (0.0011, "certified collision-free")])
-def test_a_robot_that_got_a_millimetre_away_went_somewhere(far: float, verdict: str) -> None:
+def test_a_robot_that_got_a_millimetre_away_went_somewhere(far, verdict):
     log = shifted(drive(), far, 1, 20)
     assert certify(log).certified, certify(log).problems
     assert certify(log).moved == pytest.approx(far)
@@ -180,18 +170,18 @@ def test_a_robot_that_got_a_millimetre_away_went_somewhere(far: float, verdict: 
     assert certify(with_record(log, margin=1.0)).verdict == "NOT certified collision-free"
 
 
-def test_a_millimetre_itself_is_nowhere() -> None:
+def test_a_millimetre_itself_is_nowhere():
     assert "went nowhere" in Certificate(True, 0, 1.0, 1.0, (), moved=0.001).verdict
 
 
-def touched(gap: float, row: int = 400, at: int = 400) -> Rollout:
+def touched(gap, row=400, at=400):
     """A contact in a row, where the closed form says a clearance of `gap` in row `at` alone and much elsewhere."""
     log = drive(outcome=Outcome.COLLIDED)
     log = edited(log, "pose", lambda pose: pose.__setitem__((at, 1), 4.0 - 0.18 - gap))
     return replace(log, contacts=np.array([[row, 0, -0.001, 5.0]]))
 
 
-def test_a_contact_is_felt_where_the_closed_form_is_within_12_mm() -> None:
+def test_a_contact_is_felt_where_the_closed_form_is_within_12_mm():
     only_beyond(0.012, touched, "readings disagree: physics reports a contact at row")
     assert says(touched(0.01), "physics reports 1 contact points, the first at t = 1.667 s")
     for at, near in ((398, False), (399, True), (401, True), (402, False)):
@@ -200,7 +190,7 @@ def test_a_contact_is_felt_where_the_closed_form_is_within_12_mm() -> None:
     assert certify(touched(0.01)).contacts == 1
 
 
-def test_an_overlap_without_a_contact_is_a_disagreement() -> None:
+def test_an_overlap_without_a_contact_is_a_disagreement():
     inside = edited(drive(), "pose", lambda pose: pose.__setitem__((400, 1), 3.9))
     assert says(inside, "closed form: the robot overlaps an obstacle by 0.0800 m at t = 1.667 s")
     assert says(inside, "finds an overlap, physics reports no contact")
@@ -212,17 +202,12 @@ def test_an_overlap_without_a_contact_is_a_disagreement() -> None:
 @pytest.mark.parametrize(
     ("twist", "step", "travel"),
     [
-        ((0.0, 0.0), (0.0, 0.01, 0.0), 0.01),
-        ((0.0, 0.0), (0.0, 0.0, 0.05), 0.05 * 0.18),
-        ((0.0, 0.0), (0.003, 0.004, -0.05), 0.005 + 0.05 * 0.18),
-        ((-2.4, 0.0), (0.0, 0.0, 0.0), 0.01),
-        ((0.0, -24.0), (0.0, 0.0, 0.0), 0.1 * 0.18),
-        ((2.4, 24.0), (0.001, 0.0, 0.01), 0.01 + 0.1 * 0.18),
+        ((0.0, 0.0), (0.0, 0.01, 0.0), 0.01), ((0.0, 0.0), (0.0, 0.0, 0.05), 0.05 * 0.18),
+        ((0.0, 0.0), (0.003, 0.004, -0.05), 0.005 + 0.05 * 0.18), ((-2.4, 0.0), (0.0, 0.0, 0.0), 0.01),
+        ((0.0, -24.0), (0.0, 0.0, 0.0), 0.1 * 0.18), ((2.4, 24.0), (0.001, 0.0, 0.01), 0.01 + 0.1 * 0.18),
     ],
-)
-def test_between_rows_no_point_gets_farther_than_the_travel(
-    twist: tuple[float, float], step: tuple[float, float, float], travel: float
-) -> None:
+)  # fmt: skip
+def test_between_rows_no_point_gets_farther_than_the_travel(twist, step, travel):
     """The larger of what the poses and what the speeds say, either row's speed."""
     for row in (600, 601):
         log = filled(drive(), "twist", twist, slice(row, row + 1))
@@ -233,13 +218,13 @@ def test_between_rows_no_point_gets_farther_than_the_travel(
     assert says(with_clearance(tight), "cannot be ruled out") is (step[1] == 0.0)
 
 
-def test_two_rows_have_one_way_between_them_and_one_row_has_none() -> None:
+def test_two_rows_have_one_way_between_them_and_one_row_has_none():
     for rows, travel in ((1, 0.0), (2, 2.4 / HZ), (3, 2.4 / HZ)):
         assert certify(drive(2.4, rows=rows)).bound == pytest.approx(0.82 - travel / 2)
 
 
 @functools.cache
-def among(*movers: Cruising | Keyframed) -> Rollout:
+def among(*movers):
     """A robot that stands among movers which are where they should be."""
     log = with_task(drive(), world=World("w", (0.0, 0.0, 6.0, 4.0), (DISC,), movers=movers))
     log = with_record(log, perception=PerceptionRecord(kind="velocities", range_m=None))
@@ -251,7 +236,7 @@ CRUISER = Cruising(radius=0.2, position=(1.6, 1.5), velocity=(0.0, -0.2))
 LEAPER = Keyframed(radius=0.2, keyframes=((0.0, 3.0, 0.7), (1.0, 2.0, 0.7)), loop="teleport")
 
 
-def test_a_mover_s_travel_lowers_the_bound() -> None:
+def test_a_mover_s_travel_lowers_the_bound():
     log = among(CRUISER)
     gap = np.hypot(*(log.movers[:, 0] - log.pose[:, :2]).T) - 0.38
     assert certify(log).min_clearance == pytest.approx(gap.min())
@@ -259,7 +244,7 @@ def test_a_mover_s_travel_lowers_the_bound() -> None:
     assert not says(log, "movers")
 
 
-def test_where_a_mover_teleports_only_the_nearer_end_counts() -> None:
+def test_where_a_mover_teleports_only_the_nearer_end_counts():
     log = among(LEAPER)
     gap = np.hypot(*(log.movers[:, 0] - log.pose[:, :2]).T) - 0.38
     row = int(np.abs(np.diff(gap)).argmax())
@@ -267,11 +252,11 @@ def test_where_a_mover_teleports_only_the_nearer_end_counts() -> None:
     assert certify(log).bound == pytest.approx(min(gap[row], gap[row + 1]) - log.trajectories().travel(log.t)[row, 0])
 
 
-def test_a_mover_is_where_the_task_puts_it() -> None:
+def test_a_mover_is_where_the_task_puts_it():
     for column in (0, 1):
         for sign in (1, -1):
 
-            def off(error: float, column: int = column, sign: int = sign) -> Rollout:
+            def off(error, column=column, sign=sign):
                 log = among(LEAPER, CRUISER)
                 movers = log.movers.copy()
                 movers[70, 1, column] += sign * error
@@ -280,7 +265,7 @@ def test_a_mover_is_where_the_task_puts_it() -> None:
             only_beyond(1e-9, off, "movers[1] is logged")
 
 
-def blocked(moved: float, *, since: int = 600, solved: tuple[bool, ...] = (True, False, False)) -> Rollout:
+def blocked(moved, *, since=600, solved=(True, False, False)):
     """Movers that are logged to go `moved` after a row, where searches are at rows 500, 600 and 700."""
     log = with_record(among(CRUISER, CRUISER), outcome=Outcome.BLOCKED)
     movers = np.full_like(log.movers, 2.0)
@@ -295,7 +280,7 @@ def blocked(moved: float, *, since: int = 600, solved: tuple[bool, ...] = (True,
     return with_record(replace(log, movers=movers), replans=replans)
 
 
-def test_a_blocked_drive_has_a_mover_that_stood_since_the_first_search_in_vain() -> None:
+def test_a_blocked_drive_has_a_mover_that_stood_since_the_first_search_in_vain():
     only_beyond(0.1, blocked, "no mover stood still from t = 2.500 s on")
     assert says(blocked(0.01, since=610), "no mover stood still")
     assert says(blocked(0.01, solved=(False, False, False)), "no mover stood still from t = 2.083 s on")
@@ -311,7 +296,7 @@ def test_a_blocked_drive_has_a_mover_that_stood_since_the_first_search_in_vain()
     "foot",
     [Footprint.disc(0.2), Footprint.rectangle(0.6, 0.3), Footprint(half_length=0.1, half_width=0.3, rounding=0.05)],
 )
-def test_the_closed_form_is_the_distance_of_a_dense_outline(foot: Footprint) -> None:
+def test_the_closed_form_is_the_distance_of_a_dense_outline(foot):
     rng = np.random.default_rng(5)
     rows = 120
     discs = tuple(Disc(*rng.uniform((0.5, 0.5, 0.05), (5.5, 3.5, 0.3))) for _ in range(3))
@@ -327,7 +312,7 @@ def test_the_closed_form_is_the_distance_of_a_dense_outline(foot: Footprint) -> 
     np.testing.assert_allclose(found[free], np.array([value for _, value in outlined])[free], atol=2e-3)
 
 
-def test_a_disc_within_a_rectangle_overlaps_it_by_its_way_out() -> None:
+def test_a_disc_within_a_rectangle_overlaps_it_by_its_way_out():
     foot = Footprint.rectangle(0.6, 0.3)
     log = with_record(drive(rows=2), robot=replace(ROBOT, footprint=foot))
     for yaw, ahead, aside, deep in ((0.0, 0.1, 0.02, 0.13), (0.5, 0.28, 0.0, 0.02), (-2.0, -0.1, -0.14, 0.01)):
@@ -337,9 +322,7 @@ def test_a_disc_within_a_rectangle_overlaps_it_by_its_way_out() -> None:
         np.testing.assert_allclose(closed_form_clearance(replace(log, pose=poses)), -deep - DISC.radius)
 
 
-def outline_clearance(
-    foot: Footprint, pose: Floats, discs: tuple[Disc, ...], movers: Floats, radii: tuple[float, ...]
-) -> tuple[bool, float]:
+def outline_clearance(foot, pose, discs, movers, radii):
     """Whether the footprint is free, and its clearance, from points along the edge of its rectangle."""
     s = np.linspace(-1, 1, 301)
     one = np.ones_like(s)
@@ -357,7 +340,7 @@ FORWARD, WHEEL = "forward speed of", "wheel speed of"
 SPEED_JUMPS, YAW_JUMPS, TOO_FAST = "the forward speed changes", "the yaw rate changes", "command: changes faster"
 
 
-def driving_limits(noise: float) -> tuple[float, float, float]:
+def driving_limits(noise):
     more = 8 * 0.02 * noise
     return 0.7 * (1.03 + more) + 0.02, (3.14 + more * 0.7 * 2 / 0.23) * (1.03 + more) + 0.02, 25 * (1.03 + more) + 0.02
 
@@ -385,59 +368,64 @@ CONSISTENCY: dict[str, tuple[float, Callable[[float], Rollout], str]] = {
     "a change of the turn": (1.5 * 8 / 60, lambda w: filled(drive(), "command", (0.0, w), slice(401, None)), TOO_FAST),
     "a change among movers": (1.5 / 60, lambda v: filled(among(CRUISER), "command", (v, 1.0), slice(401, None)), TOO_FAST),
     "the route's start": (0.375, lambda e: replace(drive(), route=np.array([(1.0, 1.0 + e), (5.0, 1.0)])), "route: begins"),
+    "a robot off its route": (0.18 + 0.5 * 0.7 + 0.375, lambda e: beside_route(e), "route: the robot is"),
     "the route's end": (0.375, lambda e: replace(drive(), route=np.array([(1.0, 1.0), (5.0, 1.0 - e)])), "route: ends"),
 }  # fmt: skip
 
 
-def rim(wheel_speed: float, share: float) -> tuple[float, float]:
+def beside_route(away):
+    return replace(drive(), route=np.array([(1.0, 1.0 + away), (5.0, 1.0 + away)]))
+
+
+def rim(wheel_speed, share):
     """A twist whose faster wheel turns so fast [rad/s], most of it from driving straight."""
     speed = wheel_speed * 0.036
     return speed * (1 - abs(share)), speed * share / (0.23 / 2)
 
 
-def starting(log: Rollout, speed: float) -> Rollout:
+def starting(log, speed):
     return filled(log, "twist", (speed, 0.0), slice(300, None))
 
 
-def swinging(log: Rollout, change: float) -> Rollout:
+def swinging(log, change):
     return filled(filled(log, "twist", (0.0, change / 2)), "twist", (0.0, -change / 2), slice(300, None))
 
 
 @pytest.mark.parametrize("what", CONSISTENCY)
-def test_rows_may_exceed_the_record_by_so_much(what: str) -> None:
+def test_rows_may_exceed_the_record_by_so_much(what):
     only_beyond(*CONSISTENCY[what])
 
 
 @pytest.mark.parametrize(
     ("hz", "control", "text"), [(60, 60, ""), (59, 59, "at least 60 Hz"), (240, 48, ""), (240, 50, "not divide")]
 )
-def test_the_rates_fit(hz: int, control: int, text: str) -> None:
+def test_the_rates_fit(hz, control, text):
     log = drive(hz=hz, control_hz=control)
     rates = [problem for problem in certify(log).problems if "physics_hz" in problem or "control_hz" in problem]
     assert len(rates) == bool(text)
     assert all(text in problem for problem in rates)
 
 
-def test_commands_keep_the_limits_exactly() -> None:
+def test_commands_keep_the_limits_exactly():
     for index, limit in enumerate((0.7, 3.14)):
         for sign in (1, -1):
             value = sign * limit * np.eye(2)[index]
             only_beyond(
                 1.0, lambda s, v=value: filled(drive(), "command", tuple(v * s)), "beyond the robot's limits", 1e-3
-            )  # type: ignore[misc]
+            )
             only_beyond(
                 1 + 1e-6, lambda s, v=value: filled(drive(), "command", tuple(v * s)), "beyond the robot's limits", 1e-7
-            )  # type: ignore[misc]
+            )
 
 
-def test_row_0_has_no_command_and_others_change_with_the_period() -> None:
+def test_row_0_has_no_command_and_others_change_with_the_period():
     assert says(filled(drive(), "command", (0.0, 1e-9), slice(0, 1)), "row 0 is before")
     assert not says(filled(drive(), "command", (0.0, 0.01), slice(401, 405)), "within a control period")
     for rows in (slice(402, 405), slice(401, 404), slice(404, 405), slice(403, 409)):
         assert says(filled(drive(), "command", (0.0, 0.01), rows), "command: changes within a control period")
 
 
-def test_the_first_command_that_changes_too_fast_is_named() -> None:
+def test_the_first_command_that_changes_too_fast_is_named():
     allowed = filled(drive(), "command", (1.5 / 60, 0.0), slice(101, None))
     assert not says(allowed, TOO_FAST)
     too_fast = filled(allowed, "command", (1.5 / 60 + 0.03, 0.0), slice(401, None))
@@ -445,7 +433,7 @@ def test_the_first_command_that_changes_too_fast_is_named() -> None:
 
 
 @functools.cache
-def noisy(speed: float = 0.0) -> Rollout:
+def noisy(speed=0.0):
     """A noisy robot with perfect senses whose motors do late what it commands: three periods of four rows."""
     log = drive(speed, noise=1.0)
     ramp = np.repeat(np.minimum(np.arange(1, 301) * 0.01, 0.5), 4)
@@ -455,7 +443,7 @@ def noisy(speed: float = 0.0) -> Rollout:
     return replace(log, command=command, estimate=log.pose.copy(), actuated=actuated)
 
 
-def test_motors_do_the_delayed_command_but_for_slip() -> None:
+def test_motors_do_the_delayed_command_but_for_slip():
     assert not says(noisy(), "actuated")
     for factor in (1 + 0.16 * 0.99, 1 - 0.16 * 0.99):
         assert not says(replace(noisy(), actuated=noisy().actuated * factor), "not the delayed command")
@@ -468,18 +456,18 @@ def test_motors_do_the_delayed_command_but_for_slip() -> None:
 
 
 @pytest.mark.parametrize("name", ["estimate", "actuated"])
-def test_only_noisy_logs_have_estimates_and_targets(name: str) -> None:
+def test_only_noisy_logs_have_estimates_and_targets(name):
     empty = {name: getattr(noisy(), name)[:0]}
     assert says(replace(noisy(), **empty), f"{name}: must have 1201 rows at a noise of 1")
     assert says(replace(drive(), **{name: getattr(noisy(), name)}), f"{name}: must have 0 rows at a noise of 0")
 
 
-def test_the_estimate_is_as_near_as_fixes_and_odometry_keep_it() -> None:
+def test_the_estimate_is_as_near_as_fixes_and_odometry_keep_it():
     odometry = 20 * 8 * 0.04 / 20 * 0.7
     far, turned = 8 * (0.01 + 0.7 * 0.01) + odometry + 0.02, 8 * 0.01 + 2 * odometry / 0.23 + 0.02
     for column, limit in ((0, far), (1, -far), (2, turned), (2, -turned)):
 
-        def off(error: float, column: int = column) -> Rollout:
+        def off(error, column=column):
             estimate = noisy().estimate.copy()
             estimate[77, column] += error
             return replace(noisy(), estimate=estimate)
@@ -490,7 +478,7 @@ def test_the_estimate_is_as_near_as_fixes_and_odometry_keep_it() -> None:
 
 
 @pytest.mark.parametrize("corner", [(-0.01, 1.0), (6.01, 1.0), (3.0, -0.01), (3.0, 4.01)])
-def test_routes_stay_in_the_world(corner: tuple[float, float]) -> None:
+def test_routes_stay_in_the_world(corner):
     inside = tuple(np.clip(corner, (0.0, 0.0), (6.0, 4.0)).tolist())
     for point, leaves in ((corner, True), (inside, False)):
         log = replace(drive(), route=np.array([(1.0, 1.0), point, (5.0, 1.0)]))
@@ -499,7 +487,7 @@ def test_routes_stay_in_the_world(corner: tuple[float, float]) -> None:
     assert says(replace(drive(), route=np.array([(1.0, 1.0)])), "two points or more, found 1")
 
 
-def test_a_route_of_decisions_need_not_reach_the_goal() -> None:
+def test_a_route_of_decisions_need_not_reach_the_goal():
     short = replace(drive(), route=np.array([(1.0, 1.0), (1.25, 1.0)]))
     step = ReplanRecord(t=1.0, trigger="cell", solved=True, cost_m=1.0, work=1, route=((1.0, 1.0), (5.0, 1.0)))
     assert says(short, "route: ends")
@@ -511,17 +499,17 @@ def test_a_route_of_decisions_need_not_reach_the_goal() -> None:
     ("cell", "fits"),
     [((0, 0), True), ((16, 24), True), ((-1, 0), False), ((0, -1), False), ((17, 0), False), ((0, 25), False)],
 )
-def test_cells_lie_on_the_grid(cell: tuple[int, int], fits: bool) -> None:
+def test_cells_lie_on_the_grid(cell, fits):
     assert says(replace(drive(), cells=np.array([cell], np.int32)), "cells: must lie on the grid") is not fits
 
 
-def test_cells_are_neighbours() -> None:
+def test_cells_are_neighbours():
     for step, fits in (((1, 1), True), ((-1, 0), True), ((2, 0), False), ((0, -2), False)):
         cells = np.array([(4, 4), (4 + step[0], 4 + step[1])], np.int32)
         assert says(replace(drive(), cells=cells), "must be neighbours") is not fits
 
 
-def test_a_drive_ends_when_its_outcome_says() -> None:
+def test_a_drive_ends_when_its_outcome_says():
     for outcome in (Outcome.NO_PATH, Outcome.STOPPED):
         assert says(with_record(drive(), outcome=outcome), "before the robot drives")
     assert not says(drive(), "before the robot drives")
@@ -535,7 +523,7 @@ def test_a_drive_ends_when_its_outcome_says() -> None:
     assert not says(replace(longer, contacts=np.array([[400, 0, -0.001, 5.0]])), "but the drive lasts")
 
 
-def test_rows_after_the_first_contact_are_not_held_against_the_drive() -> None:
+def test_rows_after_the_first_contact_are_not_held_against_the_drive():
     """A contact may throw the robot; the row of the contact itself is the first that it may have thrown."""
     contact = np.array([[400, 0, -0.001, 5.0], [420, 0, -0.001, 5.0]])
     for row, told in ((398, True), (399, True), (400, False), (410, False)):
@@ -545,8 +533,191 @@ def test_rows_after_the_first_contact_are_not_held_against_the_drive() -> None:
         assert says(log, FORWARD) is told
         aside = edited(
             replace(drive(), contacts=contact), "pose", lambda pose, r=row: pose.__setitem__((slice(r, None), 1), 1.1)
-        )  # type: ignore[misc]
+        )
         assert says(aside, SLIPS) is told
     first = replace(drive(), contacts=np.array([[0, 0, -0.001, 5.0]]))
     assert not says(filled(first, "twist", (5.0, 0.0), slice(1, None)), FORWARD)
     assert says(filled(first, "twist", (5.0, 0.0)), FORWARD)
+
+
+def test_the_problems_are_shown_and_numbered_from_one():
+    html = Certificate(False, 0, 1.0, 1.0, ("too near", "too fast"))._repr_html_()
+    assert html.index("problem 1") < html.index("too near") < html.index("problem 2") < html.index("too fast")
+
+
+def test_the_outcome_is_that_of_the_first_contact():
+    assert not says(touched(0.001), "the first contact was")
+    standing = with_record(touched(0.001), outcome=Outcome.HIT_WHILE_STANDING)
+    assert says(standing, "outcome: hit_while_standing, but the first contact was collided")
+
+
+def test_physics_reports_no_gap_without_a_force_and_no_pull():
+    for column, value, possible in ((2, 2e-4, True), (2, 2.1e-4, False), (3, 0.0, True), (3, -1e-6, False)):
+        contact = np.array([[400, 0, -0.001, 0.0], [401, 0, -0.001, 0.0]])
+        contact[1, column] = value
+        told = says(replace(touched(0.001), contacts=contact), "contacts: physics reports surfaces no farther")
+        assert told is not possible
+
+
+def test_a_contact_is_looked_for_one_row_before_and_after():
+    for at, near in ((398, False), (399, True), (400, True), (401, True), (402, False)):
+        log = touched(0.001, at=at)
+        log.contacts[:, 1] = 4  # of one disc and four walls the last, y = 4
+        assert says(log, "physics reports a contact with obstacle 4 at row 400") is not near
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.6, 1.9, math.pi - 0.3, -0.6, -2.5])
+def test_walls_are_as_far_as_the_nearest_corner(yaw):
+    """With nothing but walls the clearance is a corner's, less the rounding."""
+    foot = Footprint(half_length=0.4, half_width=0.15, rounding=0.05)
+    log = with_task(drive(rows=4), world=World("w", (0.0, 0.0, 6.0, 4.0)))
+    log = with_record(log, robot=replace(ROBOT, footprint=foot))
+    centres = np.array([(0.7, 2.0), (5.3, 2.0), (3.0, 0.7), (3.0, 3.3)])
+    found = closed_form_clearance(replace(log, pose=np.column_stack([centres, np.full(4, yaw)])))
+    corners = [a * 0.4 + b * 0.15j for a, b in itertools.product((-1, 1), repeat=2)]
+    for (x, y), clearance in zip(centres, found, strict=True):
+        points = [complex(x, y) + corner * complex(math.cos(yaw), math.sin(yaw)) for corner in corners]
+        walls = [min(p.real, 6.0 - p.real, p.imag, 4.0 - p.imag) for p in points]
+        assert clearance == pytest.approx(min(walls) - 0.05, abs=1e-12)
+
+
+@pytest.mark.parametrize("wall", [1, 2, 3, 4])
+@pytest.mark.parametrize("yaw", [0.0, 0.6, 1.9, math.pi - 0.3, -0.6, -2.5])
+def test_a_contact_with_a_wall_is_where_a_corner_is_near_it(wall, yaw):
+    foot = Footprint(half_length=0.4, half_width=0.15, rounding=0.05)
+    corners = [complex(a * 0.4, b * 0.15) * complex(math.cos(yaw), math.sin(yaw)) for a in (-1, 1) for b in (-1, 1)]
+    reach = max(abs(c.real if wall <= 2 else c.imag) for c in corners) + 0.05
+
+    def beside(gap):
+        away = reach + gap
+        x, y = {1: (away, 1.0), 2: (6.0 - away, 1.0), 3: (1.5, away), 4: (1.5, 4.0 - away)}[wall]
+        log = with_record(drive(outcome=Outcome.COLLIDED), robot=replace(ROBOT, footprint=foot))
+        pose = np.tile((3.0, 1.0, yaw), (ROWS, 1))
+        pose[400] = x, y, yaw
+        return replace(log, pose=pose, contacts=np.array([[400.0, wall, -0.001, 5.0]]))
+
+    only_beyond(0.012, beside, f"physics reports a contact with obstacle {wall} at row 400")
+
+
+def off_target(column, speed, seconds):
+    """A robot that is told to stand, drives for so long, and then back until the end."""
+    rows, twist = round(seconds * HZ), np.zeros((ROWS, 2))
+    twist[1:, column] = -speed
+    twist[1 : rows + 1, column] = speed
+    return replace(drive(), twist=twist)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("column", "least", "changes"), [(0, 0.01, (0.375, 1.4, 1.4)), (1, 0.05, (3.0, 6.28, 6.28))])
+def test_motors_may_be_late_by_two_periods(column, least, changes, sign):
+    """In each window: a least error, 2 % of the way, and what two periods of control and of physics change at most."""
+    text = f"the {('forward speed', 'yaw rate')[column]} does not follow the motors' targets"
+    late = 2 * (1 / 60 + 1 / 240)
+    for seconds, change in zip((0.25, 1.0, 4.0), changes, strict=True):
+        limit = sign * (least + late * change) / (1 - 0.02) / seconds
+        if seconds == 4.0:  # the shorter windows see less than their limits
+            only_beyond(limit, lambda v: off_target(column, v, 4.0), text)
+        elif seconds == 0.25:
+            only_beyond(limit, lambda v: filled(drive(), "twist", tuple(v * np.eye(2)[column]), slice(301, 361)), text)
+        else:
+            assert says(off_target(column, 1.01 * limit, seconds), text)
+
+
+def test_targets_that_are_kept_are_no_problem():
+    for speed in (0.5, -0.5):
+        assert not says(filled(drive(speed), "command", (speed, 0.0)), "does not follow")
+
+
+def test_a_robot_that_stands_off_the_goal_is_stuck_at_any_time():
+    text = "outcome: stuck, but the drive ends after"
+    for twist in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+        only_beyond(
+            0.02,
+            lambda v, t=twist: filled(drive(outcome=Outcome.STUCK), "twist", (v * t[0], v * t[1]), slice(-1, None)),
+            text,
+        )
+    at_goal = with_task(drive(outcome=Outcome.STUCK), goal=(1.2, 1.0), goal_tolerance=0.25)
+    assert says(at_goal, text)
+
+
+def test_a_robot_without_progress_for_eight_seconds_is_stuck():
+    """A quarter of what it could drive, 0.7 m/s x 8 s / 4."""
+    only_beyond(1.4, lambda way: drive(way / 8, rows=8 * HZ + 1, outcome=Outcome.STUCK), "farther in the last 8 s")
+    assert says(drive(0.1, rows=8 * HZ, outcome=Outcome.STUCK), "stuck, but the drive ends after 7.996 s")
+    assert not says(drive(0.1, rows=8 * HZ + 1, outcome=Outcome.STUCK), "outcome: stuck")
+    slow_at_first = drive(0.1, rows=10 * HZ + 1, outcome=Outcome.STUCK)
+    pose = slow_at_first.pose.copy()
+    pose[: 2 * HZ, 0] -= 5.0
+    assert not says(replace(slow_at_first, pose=pose), "outcome: stuck")
+
+
+def test_a_drive_ends_half_a_second_and_two_periods_after_its_first_contact():
+    text = "the first contact ends a drive, but the log goes on for"
+    for before, late in ((120, False), (127, False), (129, True), (400, True)):
+        assert says(touched(0.001, row=ROWS - 1 - before), text) is late
+
+
+def test_an_inflation_that_is_off_by_a_micrometre_fits():
+    assert not says(with_record(drive(), margin=1e-6, inflate=ROBOT.radius), "record.inflate")
+    assert says(with_record(drive(), margin=1.1e-6, inflate=ROBOT.radius), "record.inflate")
+
+
+def test_rates_that_contradict_each_other_are_a_problem_and_no_error():
+    assert says(drive(hz=240, control_hz=480), "control_hz")
+    assert says(with_record(noisy(), control_hz=480), "control_hz")
+
+
+@pytest.mark.parametrize("rows", [2, 5, 12, 13, 14])
+def test_logs_that_are_shorter_than_the_motors_delay_are_judged(rows):
+    names = ("t", "pose", "twist", "command", "clearance", "limiter", "movers", "estimate", "actuated")
+    short = replace(noisy(), **{name: getattr(noisy(), name)[:rows] for name in names})
+    assert not says(short, "actuated")
+
+
+def test_motors_are_not_expected_to_do_what_was_commanded_before_the_start():
+    first = filled(noisy(), "command", (0.1, 0.0), slice(0, 1))
+    assert says(first, "row 0 is before the first command")
+    assert not says(first, "not the delayed command")
+
+
+APART = "physics reports surfaces no farther apart"
+ROW = 400
+
+
+def touching(apart, force=5.0, *, speed=0.0):
+    return replace(drive(speed), contacts=np.array([[ROW, 0, apart, force]]))
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+def test_a_genuine_collision_is_refused_for_the_contact_alone(robot):
+    """Of the README: the first contact at speed has a force while the surfaces are 1 to 4 mm apart."""
+    result = run(Scenario.of("empty", "astar", robot, unseen=(Disc(3.0, 3.0, 0.2),)))
+    assert result.outcome is Outcome.COLLIDED
+    assert result.rollout.contacts[:, 2].max() > 1e-3
+    assert not says(result.rollout, "contacts: ")
+    forged = result.rollout.contacts.copy()
+    forged[:, 2] = 0.011  # nearer than the closed form's allowance, farther than a step
+    assert says(replace(result.rollout, contacts=forged), APART)
+
+
+def test_how_far_apart_surfaces_in_contact_may_be():
+    only_beyond(2e-4, lambda apart: touching(apart, 0.0, speed=0.5), APART)
+    only_beyond(2e-4, lambda apart: touching(apart), APART)
+    only_beyond(2e-4 + 0.5 / HZ, lambda apart: touching(apart, speed=0.5), APART)
+    assert says(touching(0.0, -1.0), APART)
+
+
+def test_a_robot_that_turns_or_slides_aside_or_a_mover_comes_nearer_too():
+    turning = touching(0.0)
+    twist = turning.twist.copy()
+    twist[ROW - 1, 1] = 2.0
+    radius = turning.record.robot.footprint.radius
+    only_beyond(2e-4 + 2.0 * radius / HZ, lambda a: replace(touching(a), twist=twist), APART)
+    pose = turning.pose.copy()
+    pose[ROW - 1 :, 1] += 0.002
+    only_beyond(2.2e-3, lambda a: replace(touching(a), pose=pose), APART)
+    mover = Keyframed(radius=0.2, keyframes=((0.0, 3.0, 3.0), (2.0, 5.0, 3.0)))
+    world = replace(turning.record.task.world, obstacles=(), movers=(mover,))
+    moving = with_task(turning, world=world)
+    places = moving.trajectories().positions(moving.t)
+    only_beyond(2e-4 + 1.0 / HZ, lambda a: replace(moving, movers=places, contacts=touching(a).contacts), APART)

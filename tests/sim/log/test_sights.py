@@ -1,28 +1,32 @@
-"""What scans say about ground and obstacles, against plain numpy and by hand."""
+"""What scans say about ground and obstacles, against plain numpy and by hand; and the frames and ranges of a log."""
 
-import dataclasses
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from antdrive.base.plane import frame_at, laid
 from antdrive.robots import load_robot
-from antdrive.robots.footprint import footprint_clearance
-from antdrive.sim import METRICS, Rollout
+from antdrive.robots.placing import footprint_clearance
+from antdrive.sim import METRICS
+from antdrive.sim.log.rollout import millimetres, ranges_of
 from antdrive.sim.log.sights import PASSED, first_meetings, movers_met, passed, seen_ground, sightings
 from antdrive.worlds import Disc, World
-from tests.views.scanned import scanned
+from tests.made_up_drive import scanned
+from tests.records import changed
 
 
 @pytest.fixture(scope="module")
-def log(made_up_drive) -> Rollout:
+def log(made_up_drive):
     return scanned(made_up_drive(size=(6.0, 4.0), obstacles=40))
 
 
-def visible(log: Rollout, k: int, points: np.ndarray, *others: np.ndarray) -> np.ndarray:
+def visible(log, k, points, *others):
     """Whether the lidar sees places from where scan k was taken: nothing stands on the line, and it is in the field of view."""
     lidar, discs = log.record.robot.lidar, (*log.record.world.discs, *others)
-    assert lidar is not None
     x, y, yaw = lidar.pose_on(tuple(log.pose[log.scan_rows[k]]))
     to = points - (x, y)
     away = np.hypot(*to.T)
@@ -35,7 +39,7 @@ def visible(log: Rollout, k: int, points: np.ndarray, *others: np.ndarray) -> np
     return seen
 
 
-def test_ground_is_seen_where_nothing_stands_between(log: Rollout) -> None:
+def test_ground_is_seen_where_nothing_stands_between(log):
     seen, cell = seen_ground(log)
     assert cell == 0.1
     assert seen.shape == (40, 60)
@@ -46,22 +50,19 @@ def test_ground_is_seen_where_nothing_stands_between(log: Rollout) -> None:
     assert METRICS["explored_m2"](log) == pytest.approx(seen.sum() * 0.01)
 
 
-def test_a_lidar_that_sees_less_far_explores_less(log: Rollout, made_up_drive) -> None:
+def test_a_lidar_that_sees_less_far_explores_less(log, made_up_drive):
     near = scanned(made_up_drive(size=(6.0, 4.0), obstacles=40), max_range=1.0)
     assert METRICS["explored_m2"](near) < 0.8 * METRICS["explored_m2"](log)
     assert math.isnan(METRICS["explored_m2"](made_up_drive()))
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-def test_approaches_are_as_near_as_clearances_say(log: Rollout, robot: str) -> None:
+def test_approaches_are_as_near_as_clearances_say(log, robot):
     """Against the clearance of each cylinder alone in a hall without end."""
     foot = load_robot(robot).footprint
-    record = dataclasses.replace(log.record, robot=dataclasses.replace(log.record.robot, footprint=foot))
+    record = changed(log.record, "robot", footprint=foot)
     poses = log.pose + (0.0, 0.0, 0.3)
-    found = {
-        sight.obstacle: sight
-        for sight in sightings(dataclasses.replace(log, pose=poses, record=record), first_meetings(log))
-    }
+    found = {sight.obstacle: sight for sight in sightings(replace(log, pose=poses, record=record), first_meetings(log))}
     for j, disc in enumerate(log.record.world.obstacles):
         apart = footprint_clearance(World("hall", (-99.0, -99.0, 99.0, 99.0), (disc,)), foot, poses)
         if apart.min() > 0:
@@ -71,23 +72,29 @@ def test_approaches_are_as_near_as_clearances_say(log: Rollout, robot: str) -> N
                 assert found[j].seen_from == pytest.approx(apart[np.searchsorted(log.t, found[j].seen_at)])
 
 
-def test_a_polygon_s_approach_is_to_its_edge(log: Rollout) -> None:
-    foot = dataclasses.replace(load_robot("turtlebot").footprint, half_length=0.0, half_width=0.0, rounding=0.0)
+def test_a_polygon_s_approach_is_to_its_edge(log):
+    foot = replace(load_robot("turtlebot").footprint, half_length=0.0, half_width=0.0, rounding=0.0)
     corners = ((0.4, -0.2), (0.4, 0.2), (-0.1, 0.2), (-0.1, -0.2))
-    polygon = dataclasses.replace(foot, corners=corners)
-    world = dataclasses.replace(log.record.world, obstacles=(Disc(3.0, 2.0, 0.2),))
-    record = dataclasses.replace(
+    polygon = replace(foot, corners=corners)
+    world = replace(log.record.world, obstacles=(Disc(3.0, 2.0, 0.2),))
+    record = replace(
         log.record,
-        task=dataclasses.replace(log.record.task, world=world),
-        robot=dataclasses.replace(log.record.robot, footprint=polygon),
+        task=replace(log.record.task, world=world),
+        robot=replace(log.record.robot, footprint=polygon),
     )
     ahead = np.column_stack([np.linspace(1.0, 2.0, len(log.t)), np.full(len(log.t), 2.0), np.zeros(len(log.t))])
-    (sight,) = sightings(dataclasses.replace(log, pose=ahead, record=record), np.array([0.0]))
+    straight = replace(log, pose=ahead, record=record)
+    (sight,) = sightings(straight, np.array([0.0]))
     assert sight.nearest == pytest.approx(3.0 - 2.0 - 0.4 - 0.2)
     assert sight.seen_from == pytest.approx(3.0 - 1.0 - 0.4 - 0.2)
+    assert (sight.touched, sight.nearest_at) == (False, log.t[-1])
+    hit = replace(straight, contacts=np.array([[len(log.t) - 1, 0, -0.001, 1.0]]))
+    (never,) = sightings(hit, np.array([math.inf]))
+    assert never.touched
+    assert math.isnan(never.seen_from)
 
 
-def test_passed_is_what_came_within_half_a_metre(log: Rollout, made_up_drive) -> None:
+def test_passed_is_what_came_within_half_a_metre(log, made_up_drive):
     everything = sightings(log, first_meetings(log))
     listed = passed(log)
     assert {sight.obstacle for sight in listed} == {sight.obstacle for sight in everything if sight.nearest <= PASSED}
@@ -102,12 +109,12 @@ def test_passed_is_what_came_within_half_a_metre(log: Rollout, made_up_drive) ->
     assert passed(made_up_drive()) == []
 
 
-def test_movers_are_first_seen_where_they_come_into_sight_and_passed_where_they_are_nearest(made_up_drive) -> None:
+def test_movers_are_first_seen_where_they_come_into_sight_and_passed_where_they_are_nearest(made_up_drive):
     drive = made_up_drive(size=(6.0, 4.0), obstacles=40, movers=2)
     to = drive.pose[:, :2] - (4.5, 2.0)
     nearer = drive.movers[:, 1] - to / 6 - (0.0, 0.3)
     turned = np.stack([drive.movers[:, 0], nearer], axis=1)
-    log = scanned(dataclasses.replace(drive, movers=turned))
+    log = scanned(replace(drive, movers=turned))
     rows, found = log.scan_rows, movers_met(log)
     assert min(sight.seen_at for sight in found) == 0 < max(sight.seen_at for sight in found)  # behind the other
     for j, sight in enumerate(found):
@@ -128,20 +135,50 @@ def test_movers_are_first_seen_where_they_come_into_sight_and_passed_where_they_
     assert [sight.followed_at for sight in found] == [math.inf, math.inf]
 
 
-def test_a_mover_is_followed_from_its_first_track_on(made_up_drive) -> None:
+def test_a_mover_is_followed_from_its_first_track_on(made_up_drive):
     """The estimate is 0.4 m and a quarter turn off, so that tracks lie elsewhere than movers."""
     log = scanned(made_up_drive(size=(6.0, 4.0), movers=2))
     x, y, yaw = log.pose.T
-    log = dataclasses.replace(log, estimate=np.column_stack([-y + 0.4, x, yaw + np.pi / 2]))
+    log = replace(log, estimate=np.column_stack([-y + 0.4, x, yaw + np.pi / 2]))
     at = log.scan_rows[[2, 3, 5]]
     (x, y), noise = log.movers[at, 1].T, (0.05, -0.05)
     tracks = np.zeros((3, 7), dtype=np.float32)
     tracks[:, 0], tracks[:, 1], tracks[:, 2], tracks[:, 3] = at, 4, -y + 0.4 + noise[0], x + noise[1]
     tracks[0, 2] += 0.2  # not yet the mover
-    first, second = movers_met(dataclasses.replace(log, tracks=tracks))
+    first, second = movers_met(replace(log, tracks=tracks))
     assert math.isinf(first.followed_at)
     assert second.followed_at == log.t[at[1]]
     plain = second.as_dict()
     assert (plain["mover"], plain["followed_s"], "obstacle" in plain) == (1, second.followed_at, False)
     touched = np.array([[200.0, len(log.record.world.obstacles) + 1, -0.001, 9.0]])
-    assert [sight.touched for sight in movers_met(dataclasses.replace(log, contacts=touched))] == [False, True]
+    assert [sight.touched for sight in movers_met(replace(log, contacts=touched))] == [False, True]
+
+
+RANDOM = np.random.default_rng(5)
+OWN, TRUE = RANDOM.uniform(-9, 9, (2, 40, 3))
+
+
+def flat(points):
+    return points[:, 0] + 1j * points[:, 1]
+
+
+def test_a_frame_lies_so_that_both_poses_are_one():
+    frames = frame_at(OWN, TRUE)
+    turn = np.exp(1j * frames[:, 2])
+    np.testing.assert_allclose(flat(frames) + turn * flat(OWN), flat(TRUE), atol=1e-12)
+    np.testing.assert_allclose(turn * np.exp(1j * OWN[:, 2]), np.exp(1j * TRUE[:, 2]), atol=1e-12)
+
+
+def test_what_the_robot_sees_lies_as_it_lies_from_the_robot():
+    seen = RANDOM.uniform(-9, 9, (40, 2))
+    ahead = (flat(seen) - flat(OWN)) * np.exp(-1j * OWN[:, 2])
+    there = flat(TRUE) + ahead * np.exp(1j * TRUE[:, 2])
+    np.testing.assert_allclose(flat(laid(seen, frame_at(OWN, TRUE))), there, atol=1e-12)
+
+
+@given(st.lists(st.floats(0.002, 65.0), max_size=20))
+def test_ranges_come_back_within_half_a_millimetre(ranges):
+    given_ranges = np.array([*ranges, np.inf, -np.inf])
+    back = ranges_of(millimetres(given_ranges))
+    assert np.array_equal(back[-2:], [np.inf, -np.inf])
+    assert np.abs(back[:-2] - given_ranges[:-2]).max(initial=0.0) <= 0.0005 + 1e-12

@@ -1,26 +1,26 @@
-"""Physics compared with closed forms."""
+"""Physics compared with closed forms, and Bullet's own output apart from ours."""
 
+import ctypes
 import math
+import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from antdrive.robots import RobotSpec, footprint_clearance
+from antdrive import load_robot
+from antdrive.robots import footprint_clearance
 from antdrive.sim import Engine
 from antdrive.sim.log.certificate import SKID, SPINNING
 from antdrive.sim.physics.bullet import bullet, client
 from antdrive.worlds import Disc, World
+from benchmarks.physics import Pass, drive_on, drive_past
 
 OPEN = World("open", (-10, -10, 10, 10))
 
 
-@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 @pytest.mark.parametrize(("share_v", "share_w"), [(1.0, 0.0), (0.5, 0.3), (0.3, -0.5), (0.0, 0.5)])
-def test_the_robot_moves_as_commanded(
-    robot: str, share_v: float, share_w: float, request: pytest.FixtureRequest
-) -> None:
-    spec: RobotSpec = request.getfixturevalue(robot)
+def test_the_robot_moves_as_commanded(spec, share_v, share_w):
     v, w = share_v * min(spec.max_speed, 1.0), share_w * spec.max_yaw_rate
     with Engine(OPEN, spec) as engine:
         engine.place((0, 0, 0.3))
@@ -40,14 +40,10 @@ def test_the_robot_moves_as_commanded(
     assert math.dist(before[:2], after[:2]) == pytest.approx(chord, abs=0.003)
 
 
-@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 @pytest.mark.parametrize("bearing", [0.0, 0.4, 0.7025, 1.2, math.pi / 2, 2.6])
 @pytest.mark.parametrize("gap", [-0.004, 0.002])
-def test_contacts_agree_with_the_closed_form(
-    robot: str, bearing: float, gap: float, request: pytest.FixtureRequest
-) -> None:
+def test_contacts_agree_with_the_closed_form(spec, bearing, gap):
     """A cylinder that overlaps the footprint by 4 mm is touched; one that is 2 mm away is not."""
-    spec: RobotSpec = request.getfixturevalue(robot)
     pose = (1.0, -2.0, 0.5)
     low, high = 0.0, 2.0
     for _ in range(60):  # the distance along the bearing at which the surfaces are `gap` apart
@@ -61,14 +57,14 @@ def test_contacts_agree_with_the_closed_form(
     assert {contact.obstacle for contact in touched} <= {1}
 
 
-def _gap(spec: RobotSpec, pose: tuple[float, float, float], bearing: float, distance: float) -> float:
+def _gap(spec, pose, bearing, distance):
     x, y, yaw = pose
     disc = Disc(x + distance * math.cos(yaw + bearing), y + distance * math.sin(yaw + bearing), 0.1)
     return float(footprint_clearance(World("w", OPEN.bounds, (disc,)), spec.footprint, [pose])[0])
 
 
 @pytest.mark.parametrize(("yaw", "wall"), [(0, 1), (math.pi, 0), (math.pi / 2, 3), (-math.pi / 2, 2)])
-def test_walls_are_solid(turtlebot: RobotSpec, yaw: float, wall: int) -> None:
+def test_walls_are_solid(turtlebot, yaw, wall):
     world = World("box", (-1, -1, 1, 1), (Disc(0.8, 0.8, 0.1),))
     with Engine(world, turtlebot) as engine:
         engine.place((0, 0, yaw))
@@ -82,16 +78,7 @@ def test_walls_are_solid(turtlebot: RobotSpec, yaw: float, wall: int) -> None:
     assert max(abs(state.x), abs(state.y)) == pytest.approx(1 - turtlebot.radius, abs=0.01)
 
 
-def test_a_low_obstacle_is_touched(turtlebot: RobotSpec) -> None:
-    with Engine(World("w", OPEN.bounds, (Disc(1, 0, 0.2, height=0.02),)), turtlebot) as engine:
-        engine.place((0, 0, 0))
-        engine.command(0.5, 0)
-        assert any(engine.step() for _ in range(480))
-
-
-def test_torque_limits_acceleration(turtlebot: RobotSpec) -> None:
-    from dataclasses import replace
-
+def test_torque_limits_acceleration(turtlebot):
     reached = []
     for torque in (1.5, 0.02):
         with Engine(OPEN, replace(turtlebot, wheel_torque=torque)) as engine:
@@ -104,25 +91,14 @@ def test_torque_limits_acceleration(turtlebot: RobotSpec) -> None:
     assert reached[1] < 0.3
 
 
-def test_clients_are_closed_even_after_an_error(turtlebot: RobotSpec) -> None:
-    engine = Engine(OPEN, turtlebot)
-    with pytest.raises(ZeroDivisionError), engine:
-        raise ZeroDivisionError
-    number = engine._client
-    assert bullet().getConnectionInfo(number)["isConnected"] == 0
-    with client() as fresh:
-        assert bullet().getNumBodies(fresh) == 0
-        assert bullet().getConnectionInfo(fresh)["isConnected"] == 1
-
-
-def test_the_pose_is_that_of_the_axle(jackal: RobotSpec) -> None:
+def test_the_pose_is_that_of_the_axle(jackal):
     """The centre of mass hangs below the axle: a tilt must not shift the pose."""
     with Engine(OPEN, jackal) as engine:
         engine.place((1.25, -2.5, 2.0))
         np.testing.assert_allclose(engine.state(), (1.25, -2.5, 2.0, 0, 0), atol=2e-4)
 
 
-def slide(spec: RobotSpec, acceleration: float, physics_hz: int, control_hz: int, degrees: float) -> float:
+def slide(spec, acceleration, physics_hz, control_hz, degrees):
     """How fast a robot slides aside that speeds up for half a second, on average [m/s]."""
     yaw, period = math.radians(degrees), physics_hz // control_hz
     with Engine(OPEN, spec, physics_hz=physics_hz) as engine:
@@ -137,11 +113,9 @@ def slide(spec: RobotSpec, acceleration: float, physics_hz: int, control_hz: int
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 @pytest.mark.parametrize(("acceleration", "physics_hz"), [(2.0, 60), (7.0, 60), (7.0, 240)])
-def test_a_robot_that_speeds_up_slides_by_a_third_of_what_it_gains_in_a_step(
-    robot: str, acceleration: float, physics_hz: int, request: pytest.FixtureRequest
-) -> None:
+def test_a_robot_that_speeds_up_slides_by_a_third_of_what_it_gains_in_a_step(robot, acceleration, physics_hz, request):
     """The certificate allows for it, see SKID."""
-    spec: RobotSpec = replace(request.getfixturevalue(robot), wheel_torque=1e3)
+    spec = replace(request.getfixturevalue(robot), wheel_torque=1e3)
     slides = [slide(spec, acceleration, physics_hz, physics_hz, degrees) for degrees in range(0, 180, 10)]
     share = max(slides) / (acceleration / physics_hz)
     assert 0.3 < share < 0.33
@@ -152,10 +126,108 @@ def test_a_robot_that_speeds_up_slides_by_a_third_of_what_it_gains_in_a_step(
 @pytest.mark.parametrize("friction", [0.9, 1.5])
 @pytest.mark.parametrize(("physics_hz", "control_hz"), [(60, 10), (60, 20), (240, 10)])
 def test_a_robot_whose_wheels_spin_slides_by_a_share_of_what_it_gains_in_a_period(
-    jackal: RobotSpec, friction: float, physics_hz: int, control_hz: int
-) -> None:
+    jackal, friction, physics_hz, control_hz
+):
     """The certificate allows for it, see SPINNING."""
     spec, acceleration = replace(jackal, wheel_friction=friction, wheel_torque=1e3), 7.0
     most = max(slide(spec, acceleration, physics_hz, control_hz, degrees) for degrees in range(0, 180, 10))
     spinning = min(1.0, acceleration / (friction * 9.81)) * acceleration / control_hz
     assert 0.5 * spinning * SPINNING < most < SKID * acceleration / physics_hz + SPINNING * spinning
+
+
+def written(capfd):
+    """What the process has written to file descriptor 1, with what C still had in its buffer."""
+    ctypes.CDLL(None).fflush(None)
+    return capfd.readouterr().out
+
+
+def test_bullet_prints_nothing_on_stdout(turtlebot, monkeypatch, capfd):
+    """A robot whose inertia is impossible makes Bullet print while it is loaded."""
+    import antdrive.sim.physics.engine as engine
+
+    text = engine.robot_urdf
+    monkeypatch.setattr(engine, "robot_urdf", lambda *args: text(*args).replace('ixx="', 'ixx="-'))
+    with Engine(OPEN, turtlebot) as made:
+        made.place((0, 0, 0))
+        os.write(1, b"ours")
+        made.step()
+    assert written(capfd) == "ours"
+
+
+def test_stdout_is_back_when_the_last_client_is_closed(capfd):
+    libc = ctypes.CDLL(None)
+    first, second = client(), client()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    libc.puts(b"within")
+    second.__exit__(None, None, None)
+    libc.puts(b"after")
+    assert written(capfd) == "after\n"
+
+
+def test_an_engine_takes_the_client_that_another_has_left(turtlebot):
+    p = bullet()
+    with Engine(OPEN, turtlebot) as first:
+        number = first._client
+        assert number > 0
+    assert p.isConnected(number)
+    assert p.getNumBodies(number) == 0
+    with Engine(OPEN, turtlebot) as second:
+        assert second._client == number
+
+
+def test_a_client_of_ones_own_is_never_the_one_that_is_kept(turtlebot):
+    """Calls of PyBullet without a client's number mean client 0."""
+    p = bullet()
+    with Engine(OPEN, turtlebot):
+        pass
+    mine = p.connect(p.DIRECT)
+    try:
+        assert mine == 0
+        box = p.createMultiBody(0, p.createCollisionShape(p.GEOM_BOX, halfExtents=[1, 1, 1]))
+        with Engine(OPEN, turtlebot) as engine:
+            engine.place((0, 0, 0))
+        assert p.getNumBodies() == 1
+        assert p.getBodyUniqueId(0) == box
+    finally:
+        p.disconnect(mine)
+
+
+def test_a_kept_client_that_was_closed_is_replaced(turtlebot):
+    p = bullet()
+    with Engine(OPEN, turtlebot) as first:
+        number = first._client
+    p.disconnect(number)
+    with Engine(OPEN, turtlebot) as second:
+        second.place((0, 0, 0))
+        assert second.step() == []
+
+
+def test_a_client_whose_world_failed_is_not_kept(turtlebot):
+    with Engine(OPEN, turtlebot) as first:
+        number = first._client
+    with pytest.raises(KeyError), client() as taken:
+        raise KeyError
+    assert taken == number
+    assert not bullet().isConnected(number)
+
+
+@pytest.mark.parametrize("clearance", [-0.005, 0.002, 0.02])
+def test_a_pass_is_judged_by_where_the_robot_drove(clearance):
+    """At 60 Hz the turtlebot leaves its line by 9 mm on the way to the cylinder, so that 2 mm of clearance are an overlap."""
+    robot = load_robot("turtlebot")
+    radius, speed = robot.footprint.bounds[3], robot.max_speed / 2
+    poses = drive_on(robot, 60, speed)
+    found = drive_past(robot, 60, speed, clearance, poses)
+    away = min(math.hypot(3.0 - x, radius + clearance + 0.3 - y) for x, y, _ in poses)
+    assert found.overlap == pytest.approx(1e3 * (radius + 0.3 - away), abs=1e-6)
+    assert found.overlap + 1e3 * clearance == pytest.approx(9.5, abs=1.0)
+    assert found.felt == (clearance < 0.009)
+    assert (found.missed, found.false) == (False, False)
+
+
+def test_physics_and_the_closed_form_may_disagree_in_two_ways():
+    judged = {(felt, overlap): Pass(felt, overlap) for felt in (False, True) for overlap in (-1.0, 1.0)}
+    assert [case for case, found in judged.items() if found.missed] == [(False, 1.0)]
+    assert [case for case, found in judged.items() if found.false] == [(True, -1.0)]

@@ -1,16 +1,14 @@
 """Scans are the exact distances to what collides: brute force and PyBullet's own rays are the oracles."""
 
-import dataclasses
 import math
+from dataclasses import replace
 
 import hypothesis
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import strategies as st
 
-from antdrive.base import Pose
-from antdrive.robots import Lidar, RobotSpec
+from antdrive.robots import Lidar
 from antdrive.sim import Engine
 from antdrive.sim.sensing import Scanner
 from antdrive.worlds import Cruising, Disc, Trajectories, World
@@ -18,7 +16,7 @@ from antdrive.worlds import Cruising, Disc, Trajectories, World
 EXACT = Lidar(beams=180, field_of_view=4.7, min_range=0.0, max_range=12.0, rate=20.0, x=0.05, y=-0.02, yaw=0.3)
 
 
-def brute_force(lidar: Lidar, discs: npt.NDArray[np.float64], pose: Pose) -> npt.NDArray[np.float64]:
+def brute_force(lidar, discs, pose):
     """The first intersection of every beam with every disc, from the quadratic equation."""
     x, y, yaw = pose
     eye = np.array(
@@ -40,8 +38,8 @@ discs = st.lists(st.tuples(numbers, numbers, st.floats(0.02, 1.5)), max_size=8)
 
 
 @hypothesis.given(discs, st.tuples(numbers, numbers, st.floats(-7, 7)), st.sampled_from([0.5, 3.0, 4.7, 2 * math.pi]))
-def test_ranges_are_the_first_intersections(found: list[tuple[float, ...]], pose: Pose, view: float) -> None:
-    lidar = dataclasses.replace(EXACT, field_of_view=view)
+def test_ranges_are_the_first_intersections(found, pose, view):
+    lidar = replace(EXACT, field_of_view=view)
     rows = np.array(found).reshape(-1, 3)
     scan, expected = Scanner(lidar, rows).scan(pose), brute_force(lidar, rows, pose)
     # A beam that grazes a disc may meet it or not, by rounding.
@@ -54,14 +52,14 @@ def test_ranges_are_the_first_intersections(found: list[tuple[float, ...]], pose
     assert np.all(clear | grazing)
 
 
-def test_pybullets_rays_meet_the_same_world(jackal: RobotSpec) -> None:
+def test_pybullets_rays_meet_the_same_world(jackal):
     rng = np.random.default_rng(4)
     posts = tuple(
         Disc(*rng.uniform((-4, -3), (4, 3)).tolist(), radius) for radius in rng.uniform(0.05, 0.6, 40).tolist()
     )
     movers = (Cruising(radius=0.3, position=(1.2, 0.4), velocity=(-0.5, 0.1)),)
     world = World("posts", (-5.0, -4.0, 5.0, 4.0), tuple(d for d in posts if math.hypot(d.x, d.y) > 1.6), movers=movers)
-    lidar = dataclasses.replace(EXACT, beams=720, field_of_view=6.0)
+    lidar = replace(EXACT, beams=720, field_of_view=6.0)
     trajectories = Trajectories.of(world, (0.0, 0.0))
     with Engine(world, jackal, trajectories=trajectories) as engine:
         engine.place((0.0, 0.0, 0.5))
@@ -89,16 +87,16 @@ def test_pybullets_rays_meet_the_same_world(jackal: RobotSpec) -> None:
     assert np.ptp(scan) > 3
 
 
-def test_cylinders_below_the_beams_are_not_seen() -> None:
-    lidar = dataclasses.replace(EXACT, height=0.5, x=0.0, y=0.0, yaw=0.0)
+def test_cylinders_below_the_beams_are_not_seen():
+    lidar = replace(EXACT, height=0.5, x=0.0, y=0.0, yaw=0.0)
     world = World("steps", (-5, -5, 5, 5), (Disc(2, 0, 0.3, 0.49), Disc(3, 0, 0.3, 0.5)))
     middle = Scanner.of(lidar, world).scan((0, 0, 0))[lidar.beams // 2 - 1 : lidar.beams // 2 + 1]
     assert middle == pytest.approx(2.7, abs=5e-3)
     assert Scanner(lidar, world.discs).scan((0, 0, 0)).min() == pytest.approx(1.7, abs=5e-3)
 
 
-def test_movers_are_seen_by_their_heights() -> None:
-    lidar = dataclasses.replace(EXACT, height=0.5, x=0.0, y=0.0, yaw=0.0)
+def test_movers_are_seen_by_their_heights():
+    lidar = replace(EXACT, height=0.5, x=0.0, y=0.0, yaw=0.0)
     places, radii = np.array([[2.0, 0.0], [0.0, 2.0]]), np.array([0.5, 0.5])
     none = np.empty((0, 3))
     seen = Scanner(lidar, none, mover_heights=np.array([0.4, 1.0])).scan((0, 0, 0), places, radii)
@@ -107,23 +105,23 @@ def test_movers_are_seen_by_their_heights() -> None:
     assert np.isfinite(Scanner(lidar, none).scan((0, 0, 0), places, radii)[lidar.beams // 2])
 
 
-def test_a_device_rounds_and_says_what_is_too_near_or_too_far() -> None:
+def test_a_device_rounds_and_says_what_is_too_near_or_too_far():
     lidar = Lidar(beams=4, field_of_view=2 * math.pi, min_range=0.5, max_range=4.0, rate=10.0, resolution=0.01)
     scan = Scanner(lidar, np.empty((0, 3)), bounds=(-0.4, -1.2345, 5.0, 2.0)).scan((0, 0, 0))
     # The first beam of a full circle points backwards, the second to the right.
     assert scan.tolist() == [-math.inf, pytest.approx(1.23), math.inf, pytest.approx(2.0)]
 
 
-def test_noise_has_the_lidars_sigma_and_repeats_with_the_seed() -> None:
-    lidar = dataclasses.replace(EXACT, sigma=0.02, beams=4000, max_range=30.0)
+def test_noise_has_the_lidars_sigma_and_repeats_with_the_seed():
+    lidar = replace(EXACT, sigma=0.02, beams=4000, max_range=30.0)
     scanner = Scanner(lidar, np.array([[0.0, 0.0, 1.0]]), bounds=(-9.0, -9.0, 9.0, 9.0))
     exact, noisy = scanner.scan((4, 0, 0)), scanner.scan((4, 0, 0), rng=np.random.default_rng(1))
     assert np.std(noisy - exact) == pytest.approx(0.02, rel=0.1)
     assert np.array_equal(noisy, scanner.scan((4, 0, 0), rng=np.random.default_rng(1)))
 
 
-def test_a_scan_draws_as_many_numbers_whatever_it_meets() -> None:
-    lidar = dataclasses.replace(EXACT, sigma=0.02)
+def test_a_scan_draws_as_many_numbers_whatever_it_meets():
+    lidar = replace(EXACT, sigma=0.02)
     after = []
     for world in (np.empty((0, 3)), np.array([[2.0, 0.0, 1.0]])):
         rng = np.random.default_rng(7)
@@ -132,7 +130,7 @@ def test_a_scan_draws_as_many_numbers_whatever_it_meets() -> None:
     assert after[0] == after[1]
 
 
-def test_a_lidar_inside_a_disc_or_a_wall_measures_nothing() -> None:
-    lidar = dataclasses.replace(EXACT, min_range=0.1)
+def test_a_lidar_inside_a_disc_or_a_wall_measures_nothing():
+    lidar = replace(EXACT, min_range=0.1)
     assert np.all(Scanner(lidar, np.array([[0.0, 0.0, 1.0]])).scan((0.2, 0, 0)) == -math.inf)
     assert np.all(Scanner(lidar, np.empty((0, 3)), bounds=(1, 1, 2, 2)).scan((0, 0, 0)) == -math.inf)

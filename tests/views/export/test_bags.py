@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,10 +14,9 @@ import pytest
 import yaml
 
 from antdrive.sim.log.record import ReplanRecord
-from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.sensing import Scanner
 from antdrive.views.export.exporting import export
-from antdrive.views.export.scans import LEFT_OUT, TAKEN_AGAIN
+from antdrive.views.export.samples import LEFT_OUT, TAKEN_AGAIN
 from antdrive.views.export.topics import message_types
 from antdrive.worlds.files.world_file import load_task
 from antdrive.worlds.grid import rasterise
@@ -41,22 +38,22 @@ class Said(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def log(made_up_drive: Callable[..., Rollout]) -> Rollout:
+def log(made_up_drive):
     """A drive of a second with movers, noise, a replan, an unseen cylinder and a contact, in a world turned in its map."""
     plain = made_up_drive(obstacles=6, collide=True, movers=2)
     hidden = Disc(3.5, 0.4, 0.1)
-    task = dataclasses.replace(plain.record.task, frame=FRAME)
+    task = replace(plain.record.task, frame=FRAME)
     replan = ReplanRecord(
         t=0.25, trigger="obstructed", solved=True, cost_m=1.0, work=3, route=((1.0, 1.5), (2.0, 1.5), (2.0, 2.0))
     )
-    record = dataclasses.replace(plain.record, task=task, unseen=(hidden,), replans=(replan,), reason="a cylinder")
+    record = replace(plain.record, task=task, unseen=(hidden,), replans=(replan,), reason="a cylinder")
     contacts = plain.contacts + [0, 0, 0, 0]
     noise = np.random.default_rng(1).normal(scale=0.01, size=plain.pose.shape)
-    return dataclasses.replace(plain, record=record, contacts=contacts, estimate=plain.pose + noise)
+    return replace(plain, record=record, contacts=contacts, estimate=plain.pose + noise)
 
 
 @pytest.fixture(scope="module")
-def folder(log: Rollout, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(log, tmp_path_factory):
     place = tmp_path_factory.mktemp("bags")
     log.save(place / "rollout.npz")
     export(place / "rollout.npz", "mcap", place / "drive.mcap")
@@ -64,13 +61,13 @@ def folder(log: Rollout, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def by_rosbags(path: Path) -> Iterator[Said]:
+def by_rosbags(path):
     with rosbag2.Reader(path) as reader:
         for connection, at, raw in reader.messages():
             yield Said(connection.topic, at, message_types().deserialize_cdr(raw, connection.msgtype))
 
 
-def by_mcap(path: Path) -> Iterator[Said]:
+def by_mcap(path):
     with path.open("rb") as file:
         reader = mcap_reader.make_reader(file, decoder_factories=[mcap_ros2.DecoderFactory()])
         for _, channel, raw, message in reader.iter_decoded_messages():
@@ -78,7 +75,7 @@ def by_mcap(path: Path) -> Iterator[Said]:
 
 
 @pytest.fixture(scope="module", params=["rosbags of the folder", "rosbags of the file", "mcap"])
-def said(request: pytest.FixtureRequest, folder: Path) -> list[Said]:
+def said(request, folder):
     readers = {
         "rosbags of the folder": lambda: by_rosbags(folder / "bag"),
         "rosbags of the file": lambda: by_rosbags(folder / "drive.mcap"),
@@ -87,26 +84,26 @@ def said(request: pytest.FixtureRequest, folder: Path) -> list[Said]:
     return list(readers[request.param]())
 
 
-def of(said: list[Said], topic: str) -> list[Said]:
+def of(said, topic):
     return [entry for entry in said if entry.topic == topic]
 
 
-def nanoseconds(stamp: Any) -> int:
+def nanoseconds(stamp):
     return int(stamp.sec * 10**9 + stamp.nanosec)
 
 
-def heading(q: Any) -> float:
+def heading(q):
     return math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
 
 
-def to_map(points: Any) -> np.ndarray:
+def to_map(points):
     """Points of the world in the map, by complex numbers."""
     z = np.asarray(points, dtype=np.float64)
     turned = (z[..., 0] + 1j * z[..., 1]) * np.exp(1j * FRAME[2]) + complex(FRAME[0], FRAME[1])
     return np.stack([turned.real, turned.imag], axis=-1)
 
 
-def test_every_row_is_there_with_its_pose(said: list[Said], log: Rollout) -> None:
+def test_every_row_is_there_with_its_pose(said, log):
     moving = of(said, "/tf")[1:]
     assert [entry.at for entry in moving] == [round(t * 1e9) for t in log.t.tolist()]
     for entry, pose, movers in zip(moving, log.pose.tolist(), log.movers.tolist(), strict=True):
@@ -119,7 +116,7 @@ def test_every_row_is_there_with_its_pose(said: list[Said], log: Rollout) -> Non
         assert np.abs(np.array(places) - movers).max() < 1e-6
 
 
-def test_odometry_commands_and_numbers_are_those_of_the_log(said: list[Said], log: Rollout) -> None:
+def test_odometry_commands_and_numbers_are_those_of_the_log(said, log):
     odometry = [entry.message for entry in of(said, "/odom")]
     assert [(m.header.frame_id, m.child_frame_id) for m in odometry] == [("odom", "base_link")] * len(log.t)
     poses = [(m.pose.pose.position.x, m.pose.pose.position.y, heading(m.pose.pose.orientation)) for m in odometry]
@@ -134,9 +131,9 @@ def test_odometry_commands_and_numbers_are_those_of_the_log(said: list[Said], lo
     assert np.array_equal(estimates, log.estimate[:, 0])
 
 
-def test_stamps_are_in_order_and_have_a_transform_at_or_before_them(said: list[Said], log: Rollout) -> None:
+def test_stamps_are_in_order_and_have_a_transform_at_or_before_them(said, log):
     assert [entry.at for entry in said] == sorted(entry.at for entry in said)
-    known: set[str] = set()
+    known = set()
     for entry in said:
         transforms = getattr(entry.message, "transforms", [])
         known |= {transform.child_frame_id for transform in transforms}
@@ -148,7 +145,7 @@ def test_stamps_are_in_order_and_have_a_transform_at_or_before_them(said: list[S
     assert known == {"odom", "base_link", "base_scan", "left_wheel", "right_wheel", "mover_0", "mover_1"}
 
 
-def test_fixed_transforms_are_sent_twice_and_the_world_lies_in_its_map(said: list[Said]) -> None:
+def test_fixed_transforms_are_sent_twice_and_the_world_lies_in_its_map(said):
     (static,), first = of(said, "/tf_static"), of(said, "/tf")[0]
     assert static.at == first.at == 0
     for entry in (static, first):
@@ -158,7 +155,7 @@ def test_fixed_transforms_are_sent_twice_and_the_world_lies_in_its_map(said: lis
         assert heading(lies.rotation) == pytest.approx(FRAME[2])
 
 
-def test_the_map_is_the_grid_that_was_planned_on(said: list[Said], log: Rollout) -> None:
+def test_the_map_is_the_grid_that_was_planned_on(said, log):
     (entry,) = of(said, "/map")
     info, record = entry.message.info, log.record
     grid = rasterise(record.task.world, record.cell, record.inflate)
@@ -168,7 +165,7 @@ def test_the_map_is_the_grid_that_was_planned_on(said: list[Said], log: Rollout)
     assert np.array_equal(np.array(entry.message.data).reshape(grid.shape) == 0, grid.free)
 
 
-def test_each_route_comes_when_it_is_followed(said: list[Said], log: Rollout) -> None:
+def test_each_route_comes_when_it_is_followed(said, log):
     first, second = of(said, "/plan")
     assert (first.at, second.at) == (0, 250_000_000)
     for entry, route in ((first, log.route), (second, log.record.replans[0].route)):
@@ -178,8 +175,8 @@ def test_each_route_comes_when_it_is_followed(said: list[Said], log: Rollout) ->
     assert headings == pytest.approx([0.0, math.pi / 2, math.pi / 2])
 
 
-def test_markers_show_cylinders_movers_and_contacts(said: list[Said], log: Rollout) -> None:
-    groups: dict[str, list[Any]] = {}
+def test_markers_show_cylinders_movers_and_contacts(said, log):
+    groups = {}
     for marker in of(said, "/obstacles")[0].message.markers:
         groups.setdefault(marker.ns, []).append(marker)
     standing = groups["cylinders"] + groups["unseen"]
@@ -201,7 +198,7 @@ def test_markers_show_cylinders_movers_and_contacts(said: list[Said], log: Rollo
     assert math.hypot(place.x - centre[0], place.y - centre[1]) == pytest.approx(disc.radius)
 
 
-def test_words_say_what_limits_the_speed_and_what_happened(said: list[Said], log: Rollout) -> None:
+def test_words_say_what_limits_the_speed_and_what_happened(said, log):
     names = {entry.at: entry.message.data for entry in of(said, "/limiter_name")}
     now = ""
     for t, limiter in zip(log.t.tolist(), log.limiter.tolist(), strict=True):
@@ -212,18 +209,16 @@ def test_words_say_what_limits_the_speed_and_what_happened(said: list[Said], log
     assert ended.message.data == "collided: touched an obstacle: a cylinder"
 
 
-def test_the_robot_is_described_with_its_footprint(said: list[Said], log: Rollout) -> None:
+def test_the_robot_is_described_with_its_footprint(said, log):
     robot = ElementTree.fromstring(of(said, "/robot_description")[0].message.data)
     body = robot.find("link[@name='base_link']/visual/geometry/cylinder")
-    assert body is not None
     assert float(body.get("radius", "")) == log.record.robot.footprint.rounding
-    children = {joint.find("child").get("link") for joint in robot.iter("joint")}  # type: ignore[union-attr]
+    children = {joint.find("child").get("link") for joint in robot.iter("joint")}
     assert children == {"left_wheel", "right_wheel"}
 
 
-def test_a_lidar_that_the_drive_did_not_use_measures_at_export(folder: Path, said: list[Said], log: Rollout) -> None:
+def test_a_lidar_that_the_drive_did_not_use_measures_at_export(folder, said, log):
     lidar, record = log.record.robot.lidar, log.record
-    assert lidar is not None
     scans, rows = of(said, "/scan"), range(0, len(log.t), round(record.physics_hz / lidar.rate))
     assert [entry.at for entry in scans] == [round(log.t[row] * 1e9) for row in rows]
     scanner, radii = Scanner.of(lidar, record.world), np.array([mover.radius for mover in record.world.movers])
@@ -237,14 +232,14 @@ def test_a_lidar_that_the_drive_did_not_use_measures_at_export(folder: Path, sai
     assert about["custom_data"] == {"antdrive_scans": TAKEN_AGAIN}
 
 
-def test_scans_are_taken_at_export_only_if_asked_for(folder: Path) -> None:
+def test_scans_are_taken_at_export_only_if_asked_for(folder):
     export(folder / "rollout.npz", "mcap", folder / "none.mcap", scans=False)
     assert "/scan" not in {entry.topic for entry in by_mcap(folder / "none.mcap")}
     with (folder / "none.mcap").open("rb") as file:
         assert [note.metadata for note in mcap_reader.make_reader(file).iter_metadata()] == [{"scans": LEFT_OUT}]
 
 
-def test_late_subscribers_get_what_is_sent_once(folder: Path) -> None:
+def test_late_subscribers_get_what_is_sent_once(folder):
     once = {"/tf_static", "/map", "/robot_description", "/obstacles", "/movers", "/plan"}
     for path in (folder / "bag", folder / "drive.mcap"):
         with rosbag2.Reader(path) as reader:
@@ -254,7 +249,7 @@ def test_late_subscribers_get_what_is_sent_once(folder: Path) -> None:
             assert reader.message_count == sum(c.msgcount for c in reader.connections)
 
 
-def test_the_log_and_all_that_it_proves_are_inside(folder: Path, log: Rollout, tmp_path: Path) -> None:
+def test_the_log_and_all_that_it_proves_are_inside(folder, log, tmp_path):
     with (folder / "drive.mcap").open("rb") as file:
         inside = {a.name: a.data for a in mcap_reader.make_reader(file).iter_attachments()}
     assert (
@@ -266,12 +261,12 @@ def test_the_log_and_all_that_it_proves_are_inside(folder: Path, log: Rollout, t
     assert load_task(tmp_path / "world.yaml") == log.record.task
 
 
-def test_the_layout_shows_topics_that_exist(folder: Path, said: list[Said]) -> None:
+def test_the_layout_shows_topics_that_exist(folder, said):
     layout = json.loads((folder / "drive.foxglove.json").read_text())
     assert layout == json.loads((folder / "bag" / "bag.foxglove.json").read_text())
     panels, topics = layout["configById"], {entry.topic for entry in said}
 
-    def named(node: Any) -> set[str]:
+    def named(node):
         return {node} if isinstance(node, str) else named(node["first"]) | named(node["second"])
 
     assert named(layout["layout"]) == set(panels)
@@ -299,7 +294,7 @@ KEYS = {
 }  # fmt: skip
 
 
-def test_the_layout_has_the_keys_that_the_panels_know(folder: Path) -> None:
+def test_the_layout_has_the_keys_that_the_panels_know(folder):
     layout = json.loads((folder / "drive.foxglove.json").read_text())
     assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
     for name, panel in layout["configById"].items():
@@ -309,15 +304,6 @@ def test_the_layout_has_the_keys_that_the_panels_know(folder: Path) -> None:
         if kind == "Plot":
             assert set(panel) == KEYS[kind], "none of them is optional"
     camera = {
-        "perspective",
-        "distance",
-        "phi",
-        "thetaOffset",
-        "targetOffset",
-        "target",
-        "targetOrientation",
-        "fovy",
-        "near",
-        "far",
-    }
+        "perspective", "distance", "phi", "thetaOffset", "targetOffset", "target", "targetOrientation", "fovy", "near", "far",
+    }  # fmt: skip
     assert set(layout["configById"]["3D!drive"]["cameraState"]) == camera

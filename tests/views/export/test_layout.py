@@ -5,14 +5,11 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-from collections.abc import Callable
-from typing import Any
 
 import pydantic
 import pytest
 
-from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.layout import foxglove_layout
+from antdrive.views.export.exporting import foxglove_layout
 
 layouts = pytest.importorskip("foxglove.layouts", reason="foxglove-sdk is not installed")
 
@@ -31,7 +28,7 @@ TOPICS = {
 
 
 @pytest.fixture(scope="module", autouse=True)
-def strict_types() -> None:
+def strict_types():
     """Types that refuse keys which they do not know."""
     for kind in vars(layouts).values():
         if inspect.isclass(kind) and dataclasses.is_dataclass(kind):
@@ -39,12 +36,11 @@ def strict_types() -> None:
 
 
 @pytest.fixture(scope="module")
-def panels(made_up_drive: Callable[..., Rollout]) -> dict[str, Any]:
-    content: dict[str, Any] = foxglove_layout(made_up_drive(movers=1))["configById"]
-    return content
+def panels(made_up_drive):
+    return foxglove_layout(made_up_drive(movers=1))["configById"]
 
 
-def snake(value: Any, named: bool = True) -> Any:
+def snake(value, named=True):
     """With the types' names of keys; the keys of `topics` and the like are people's own names."""
     if isinstance(value, list):
         return [snake(entry) for entry in value]
@@ -57,14 +53,14 @@ def snake(value: Any, named: bool = True) -> Any:
     }
 
 
-def test_panels_are_as_the_types_have_them(panels: dict[str, Any]) -> None:
+def test_panels_are_as_the_types_have_them(panels):
     for name, config in panels.items():
         kind = getattr(layouts, CONFIGS[name.split("!")[0]])
         given = {key: value for key, value in config.items() if key != "topics"}
         pydantic.TypeAdapter(kind).validate_python(snake(given))
 
 
-def test_topics_are_as_the_types_have_them(panels: dict[str, Any]) -> None:
+def test_topics_are_as_the_types_have_them(panels):
     topics = panels["3D!drive"]["topics"]
     assert set(topics) == set(TOPICS)
     for name, settings in topics.items():

@@ -1,35 +1,31 @@
 """Exported scans, read back and laid out through the exported transforms, end on what stands in the world."""
 
-import dataclasses
 import math
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.exporting import export
-from antdrive.views.export.scans import LOGGED, DriveScans
-from tests.views.scanned import scanned
+from antdrive.views.export.samples import LOGGED, DriveScans
+from tests.made_up_drive import scanned
 
 mcap_reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
 mcap_ros2 = pytest.importorskip("mcap_ros2.decoder", reason="mcap-ros2-support is not installed")
 
 
 @pytest.fixture(scope="module")
-def log(made_up_drive: Callable[..., Rollout]) -> Rollout:
+def log(made_up_drive):
     """A drive with a lidar that sits off the middle and looks aside."""
     return scanned(made_up_drive(size=(6.0, 4.0), obstacles=30), x=0.06, y=-0.03, yaw=0.4, max_range=2.5)
 
 
 @pytest.fixture(scope="module")
-def said(log: Rollout, tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, int, Any]]:
+def said(log, tmp_path_factory):
     return read(log, tmp_path_factory.mktemp("scans"))
 
 
-def read(log: Rollout, place: Path) -> list[tuple[str, int, Any]]:
+def read(log, place):
     log.save(place / "rollout.npz")
     export(place / "rollout.npz", "mcap", place / "drive.mcap")
     with (place / "drive.mcap").open("rb") as file:
@@ -37,20 +33,20 @@ def read(log: Rollout, place: Path) -> list[tuple[str, int, Any]]:
         return [(channel.topic, raw.log_time, message) for _, channel, raw, message in reader.iter_decoded_messages()]
 
 
-def placed(transform: Any, points: Any) -> Any:
+def placed(transform, points):
     """Points of the child frame in its parent, as complex numbers."""
     q, at = transform.rotation, transform.translation
     return points * complex(q.w, q.z) ** 2 + complex(at.x, at.y)
 
 
-def test_scans_come_at_their_rate(log: Rollout, said: list[tuple[str, int, Any]]) -> None:
+def test_scans_come_at_their_rate(log, said):
     scans = [(at, message) for topic, at, message in said if topic == "/scan"]
     assert [at for at, _ in scans] == [round(float(t) * 1e9) for t in log.t[log.scan_rows]]
     assert {message.header.frame_id for _, message in scans} == {"base_scan"}
     assert {round(message.scan_time, 6) for _, message in scans} == {0.1}
 
 
-def off_surfaces(log: Rollout, points: Any) -> float:
+def off_surfaces(log, points):
     """How far the farthest of the points is from every cylinder and wall [m]."""
     discs, (x0, y0, x1, y1) = log.record.world.discs, log.record.world.bounds
     away = np.abs(np.abs(points[:, None] - (discs[:, 0] + 1j * discs[:, 1])) - discs[:, 2]).min(axis=1)
@@ -58,7 +54,7 @@ def off_surfaces(log: Rollout, points: Any) -> float:
     return float(np.minimum(away, walls).max())
 
 
-def test_scans_end_on_cylinders_and_walls(log: Rollout, said: list[tuple[str, int, Any]]) -> None:
+def test_scans_end_on_cylinders_and_walls(log, said):
     fixed = {t.child_frame_id: t for topic, _, m in said if topic == "/tf_static" for t in m.transforms}
     assert fixed["base_scan"].header.frame_id == "base_link"
     moving = {at: t for topic, at, m in said if topic == "/tf" for t in m.transforms if t.child_frame_id == "base_link"}
@@ -74,12 +70,10 @@ def test_scans_end_on_cylinders_and_walls(log: Rollout, said: list[tuple[str, in
         assert off_surfaces(log, placed(base, seen)) > 0.03  # without the lidar's own place on the robot
 
 
-def test_scans_taken_at_export_are_those_that_the_drive_would_have_taken(
-    log: Rollout, said: Any, tmp_path: Path
-) -> None:
-    mapped = dataclasses.replace(log.record, sensing=None)
-    assert DriveScans.of(dataclasses.replace(log, record=mapped)).source == LOGGED
-    bare = dataclasses.replace(log, record=mapped, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
+def test_scans_taken_at_export_are_those_that_the_drive_would_have_taken(log, said, tmp_path):
+    mapped = replace(log.record, sensing=None)
+    assert DriveScans.of(replace(log, record=mapped)).source == LOGGED
+    bare = replace(log, record=mapped, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
     taken, logged = ([(at, m.ranges) for name, at, m in s if name == "/scan"] for s in (read(bare, tmp_path), said))
     assert [at for at, _ in taken] == [at for at, _ in logged]
     again, before = (np.array([ranges for _, ranges in found]) for found in (taken, logged))
@@ -87,7 +81,7 @@ def test_scans_taken_at_export_are_those_that_the_drive_would_have_taken(
     assert np.nanmax(np.abs(np.subtract(again, before, where=np.isfinite(before), out=np.zeros_like(again)))) < 0.00051
 
 
-def middles(grid: Any, value: int) -> Any:
+def middles(grid, value):
     """The middles of a grid's cells that have a value, in the grid's frame, as complex numbers."""
     info = grid.info
     rows, cols = np.nonzero(np.array(grid.data).reshape(info.height, info.width) == value)
@@ -95,13 +89,13 @@ def middles(grid: Any, value: int) -> Any:
     return (cols + 0.5 + 1j * (rows + 0.5)) * info.resolution * complex(q.w, q.z) ** 2 + complex(at.x, at.y)
 
 
-def within_cylinders(log: Rollout, points: Any) -> float:
+def within_cylinders(log, points):
     """How deep the deepest of the points lies in a cylinder [m]."""
     discs = log.record.world.discs
     return float((discs[:, 2] - np.abs(points[:, None] - (discs[:, 0] + 1j * discs[:, 1]))).max())
 
 
-def test_the_map_of_a_robot_without_one_is_what_it_had_seen(log: Rollout, said: list[tuple[str, int, Any]]) -> None:
+def test_the_map_of_a_robot_without_one_is_what_it_had_seen(log, said):
     maps = [(at, message) for topic, at, message in said if topic == "/map"]
     assert [at for at, _ in maps] == [0, *(round(at * 1e9) for at in [*np.arange(1.0, log.t[-1]), log.t[-1]])]
     known = [int((np.array(grid.data) >= 0).sum()) for _, grid in maps]
@@ -119,10 +113,10 @@ def test_the_map_of_a_robot_without_one_is_what_it_had_seen(log: Rollout, said: 
     assert within_cylinders(log, middles(maps[-1][1], -1)) > 2 * diagonal, "a robot cannot see into cylinders"
 
 
-def test_the_map_lies_so_that_the_robot_is_where_it_believes_to_be(log: Rollout, tmp_path: Path) -> None:
+def test_the_map_lies_so_that_the_robot_is_where_it_believes_to_be(log, tmp_path):
     turned = np.exp(0.2j)
     away = (log.pose[:, 0] + 1j * log.pose[:, 1]) * turned + (0.5 - 0.3j)
-    drifted = dataclasses.replace(log, estimate=np.column_stack([away.real, away.imag, log.pose[:, 2] + 0.2]))
+    drifted = replace(log, estimate=np.column_stack([away.real, away.imag, log.pose[:, 2] + 0.2]))
     said = read(drifted, tmp_path)
     at, grid = next((at, m) for topic, at, m in said if topic == "/map" and at)
     lies = next(

@@ -3,15 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from antdrive.views.colours import MOVER
 from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film import compositor as composing
-from antdrive.views.film.camera import Camera, camera_for
+from antdrive.views.film.camera import camera_for
 from antdrive.views.film.compositor import Compositor, drawn_height, part_pose, still_solids
 from antdrive.views.film.ground import paint_ground
 from antdrive.views.film.meshes import cylinder, robot_parts
-from antdrive.views.film.triangles import Solid, draw_solids, placed
+from antdrive.views.film.solids import Solid, draw_solids, placed
 from antdrive.views.scene import Scene
-from antdrive.views.style import MOVER
 
 SIZE = (320, 240)
 
@@ -26,7 +26,7 @@ def scene(drive):
     return Scene.of(drive)
 
 
-def camera(scene, name="oblique", size=SIZE) -> Camera:
+def camera(scene, name="oblique", size=SIZE):
     return camera_for(name, scene.bounds[:2], scene.bounds[2:], drawn_height(scene), size)
 
 

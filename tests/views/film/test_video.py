@@ -1,3 +1,6 @@
+"""Films: their format, their words, and what is shown before, between and after."""
+
+import os
 import re
 import subprocess
 import tracemalloc
@@ -11,13 +14,19 @@ from PIL import Image
 from antdrive.base import InputError
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord
-from antdrive.views.film import encoder, overlay, video
+from antdrive.sim.pipeline import run
+from antdrive.sim.scenario import Scenario
+from antdrive.views.colours import VERDICTS
+from antdrive.views.film import options, overlay, prelude, replay, video
 from antdrive.views.film.overlay import Layout, _entry_width, banner, legend_entries, legend_rows
+from antdrive.views.film.prelude import field_levels, plan_again, planning_frames
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.text import text_width
-from antdrive.views.film.video import film, frame_times, still
+from antdrive.views.film.video import film, film_failures, frame_times, render_frames, still
 from antdrive.views.scene import Scene
-from antdrive.views.style import VERDICTS
+from antdrive.worlds import Disc, Task, World, rasterise
+from tests.made_up_drive import undriven
+from tests.records import changed
 
 SIZE = (320, 240)
 
@@ -35,7 +44,7 @@ def crash(made_up_drive):
 @pytest.fixture(scope="module")
 def filmed(drive, tmp_path_factory):
     path = tmp_path_factory.mktemp("films") / "drive.mp4"
-    seen: list[float] = []
+    seen = []
     info = film(drive, path, size=SIZE, fps=20, note="certified", progress=seen.append)
     return info, seen
 
@@ -93,17 +102,6 @@ def test_gif_and_webp_are_animated(drive, tmp_path, suffix):
     with Image.open(info.path) as picture:
         assert picture.size == (160, 160)
         assert 2 <= picture.n_frames <= info.frames  # equal frames at the end may be one
-
-
-def test_every_camera_shows_robot_and_goal(drive, tmp_path):
-    pictures = {}
-    for camera in video.CAMERAS:
-        path = still(drive, tmp_path / f"{camera}.png", 0.5, camera=camera, size=SIZE)
-        with Image.open(path) as picture:
-            pictures[camera] = np.asarray(picture).astype(int)
-        red, green, blue = np.moveaxis(pictures[camera], -1, 0)
-        assert ((red > 215) & (green > 80) & (green < 150) & (blue < 60)).sum() > 8, "the robot's orange shell"
-    assert np.abs(pictures["top"] - pictures["oblique"]).max() > 100
 
 
 @pytest.mark.parametrize("size", [(640, 480), (1280, 720), (320, 240), (480, 640)])
@@ -177,7 +175,7 @@ def test_a_legend_stays_within_its_rows(drive, size):
 
 @pytest.mark.parametrize("outcome", list(Outcome))
 def test_every_outcome_ends_with_words_in_its_colour(drive, outcome):
-    ended = replace(drive, record=replace(drive.record, outcome=outcome))
+    ended = changed(drive, "record", outcome=outcome)
     shot = Shot(ended, camera="top", size=SIZE)
     before, after = shot.frame(1.0), shot.last_frame()
     colour = np.array(VERDICTS[outcome][1])
@@ -204,20 +202,8 @@ def test_a_contact_flashes_and_stays_marked(crash):
     assert redness(final, mark) > 0.15
 
 
-def test_wheels_roll_as_far_as_the_robot_drives(drive):
-    shot = Shot(drive, camera="top", size=SIZE)
-    left, right = shot.replay.wheels(shot.replay.duration)
-    length = np.hypot(*np.diff(drive.pose[:, :2], axis=0).T).sum()
-    assert (left + right) / 2 * Scene.of(drive).robot.wheel_radius == pytest.approx(length, rel=0.01)
-
-
 def test_a_drive_without_rows_still_makes_a_picture(drive, tmp_path):
-    empty = replace(
-        drive, t=drive.t[:0], pose=drive.pose[:0], twist=drive.twist[:0], command=drive.command[:0],
-        clearance=drive.clearance[:0], limiter=drive.limiter[:0], movers=drive.movers[:0], route=np.empty((0, 2)),
-        record=replace(drive.record, outcome=Outcome.NO_PATH),
-    )  # fmt: skip
-    info = film(empty, tmp_path / "nothing.mp4", size=SIZE, fps=10)
+    info = film(undriven(drive), tmp_path / "nothing.mp4", size=SIZE, fps=10)
     assert info.frames == 11
 
 
@@ -239,7 +225,7 @@ def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):
 
 
 def test_an_encoder_that_dies_is_reported(drive, tmp_path, monkeypatch):
-    monkeypatch.setitem(encoder.ENCODERS, ".mp4", ("-c:v", "no-such-codec"))
+    monkeypatch.setitem(options.ENCODERS, ".mp4", ("-c:v", "no-such-codec"))
     with pytest.raises(OSError, match="no-such-codec"):
         film(drive, tmp_path / "drive.mp4", size=SIZE)
     assert not list(tmp_path.iterdir())
@@ -258,27 +244,7 @@ def test_memory_does_not_grow_with_the_film(made_up_drive, tmp_path):
     assert peaks[1] < peaks[0] + 3 * 320 * 240 * 3
 
 
-@pytest.mark.parametrize(
-    ("path", "options", "message"),
-    [
-        ("a.avi", {}, r"unknown suffix '.avi'; choose one of .mp4, .gif, .webp"),
-        ("a", {}, "unknown suffix ''"),
-        ("a.mp4", {"camera": "side"}, "unknown camera 'side'; choose one of oblique, top, follow"),
-        ("a.mp4", {"size": (321, 240)}, "size: .*even"),
-        ("a.mp4", {"size": (32, 24)}, "size: .*from 160"),
-        ("a.mp4", {"fps": 0}, "fps: must be greater than 0"),
-        ("a.mp4", {"speed": -1}, "speed: must be greater than 0"),
-    ],
-)
-def test_wrong_input_is_named(drive, tmp_path, path, options, message):
-    with pytest.raises(InputError, match=message):
-        film(drive, tmp_path / path, **options)
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_still_may_be_webp(drive, tmp_path):
-    with pytest.raises(InputError, match=r"choose .png"):
-        still(drive, tmp_path / "a.jpg")
     with Image.open(still(drive, tmp_path / "a.webp", 0.5, size=SIZE)) as picture:
         assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("WEBP", SIZE, 1)
 
@@ -299,7 +265,7 @@ def test_a_film_goes_into_slow_motion_around_a_contact(crash):
     word = [shot.frame(at)[-100:, -120:] for at in (first - 0.1, first + 0.1)]
     steps = np.diff(times)
     slowly = (times[:-1] >= first) & (times[1:] <= last)
-    assert steps[slowly] == pytest.approx(1 / 30 / video.SLOW_MOTION)
+    assert steps[slowly] == pytest.approx(1 / 30 / replay.SLOW_MOTION)
     assert steps[: slowly.argmax() - 1] == pytest.approx(1 / 30)
     assert times[0] == 0
     assert end - times[-1] < 1 / 30
@@ -308,13 +274,10 @@ def test_a_film_goes_into_slow_motion_around_a_contact(crash):
     assert red[1] > 100, "the band is labelled SLOW"
 
 
-@pytest.mark.parametrize("jobs", [2])
-def test_frames_rendered_in_several_processes_equal_those_of_one(drive, jobs):
-    from antdrive.views.film.parallel import render_frames
-
+def test_frames_rendered_in_several_processes_equal_those_of_one(drive):
     setting = {"camera": "follow", "size": SIZE, "note": None, "speed": 1.0}
-    times = frame_times(0.6, 60, 1.0)
-    shared = list(render_frames(drive, setting, times, jobs))
+    times = frame_times(0.6, 20, 1.0)
+    shared = list(render_frames(drive, setting, times, 2))
     shot = Shot(drive, **setting)
     alone = [shot.frame(at) for at in times]
     assert len(shared) == len(alone) == len(times)
@@ -337,7 +300,7 @@ def test_a_replan_shows_its_new_route_and_its_cause(drive):
     """The new route replaces the old one, a dot marks the place, and the cause is shown for a while."""
     new = ReplanRecord(t=0.3, trigger="obstructed", solved=True, cost_m=2.5, work=1, route=((1.0, 0.4), (3.5, 0.4)))
     unsolved = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
-    replanned = replace(drive, record=replace(drive.record, replans=(new, unsolved)))
+    replanned = changed(drive, "record", replans=(new, unsolved))
 
     def views(rollout, news, *times):
         shot = Shot(rollout, camera="top", size=SIZE, bare=True)
@@ -366,7 +329,110 @@ def test_a_replan_shows_its_new_route_and_its_cause(drive):
 
 def test_replans_at_every_cell_have_no_caption(drive):
     entry = ReplanRecord(t=0.0, trigger="decision", solved=True, cost_m=0.5, work=1, route=((1.0, 1.0), (1.5, 1.0)))
-    decided = replace(drive, record=replace(drive.record, replans=(entry,)))
+    decided = changed(drive, "record", replans=(entry,))
     shot = Shot(decided, camera="top", size=SIZE)
     assert [event.caption for event in shot.replay.replans] == [""]
     shot.frame(0.5)
+
+
+def row(key, rollout, *, succeeded=False):
+    return {
+        "key": key, "world": "world_6", "planner": "as ants=5", "robot": "jackal", "seed": 3, "rollout": rollout,
+        "succeeded": succeeded, "outcome": "collided", "reason": "movers[3] at 1 m/s",
+    }  # fmt: skip
+
+
+def test_each_failure_that_has_a_log_is_filmed_once(made_up_drive, tmp_path, monkeypatch):
+    log = made_up_drive(collide=True).save(tmp_path / "rollouts" / "a.npz")
+    rows = [row("aaaabbbbcc", "rollouts/a.npz"), row("b", None), row("c", "rollouts/a.npz", succeeded=True)]
+    done = []
+    monkeypatch.setattr(video, "LONGEST_FAILURE", 0.3)  # of 0.6 s
+    films = film_failures(rows, tmp_path, tmp_path / "films", size=(320, 180), progress=done.append)
+    assert films == {"aaaabbbbcc": tmp_path / "films" / "world_6-as_ants_5-jackal-3-aaaabbbb.mp4"}
+    assert done == [1.0]
+    (path,) = films.values()
+    frames, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    assert frames > 5
+    before = path.stat()
+    film_failures(rows, tmp_path, tmp_path / "films", size=(320, 180))
+    assert path.stat() == before
+    os.utime(log, (before.st_mtime + 9, before.st_mtime + 9))  # another drive with the same key
+    film_failures(rows, tmp_path, tmp_path / "films", size=(320, 180))
+    assert path.stat().st_ino != before.st_ino
+
+
+def test_the_line_below_the_picture_is_the_cause(made_up_drive, tmp_path, monkeypatch):
+    made_up_drive(collide=True).save(tmp_path / "a.npz")
+    notes = []
+
+    def note(log, path, **given):
+        notes.append((path.name, given["note"], given["speed"]))
+
+    monkeypatch.setattr(video, "film", note)
+    film_failures([row("x", "a.npz"), {**row("y", "a.npz"), "reason": None}], tmp_path, tmp_path)
+    monkeypatch.setattr(video, "LONGEST_FAILURE", 0.3)
+    film_failures([row("x", "a.npz")], tmp_path, tmp_path)
+    assert [text for _, text, _ in notes[:2]] == ["seed 3, collided: movers[3] at 1 m/s", "seed 3, collided"]
+    assert [speed for *_, speed in notes] == [1.0, 1.0, pytest.approx(2.0, rel=0.02)]
+
+
+def test_a_log_that_is_gone_leaves_the_film_that_was_made_of_it(made_up_drive, tmp_path):
+    log = made_up_drive(collide=True).save(tmp_path / "a.npz")
+    rows, done = [row("x", "a.npz"), row("y", "gone.npz")], list[float]()
+    films = film_failures(rows, tmp_path, tmp_path / "films", size=(320, 180), progress=done.append)
+    assert (list(films), done) == (["x"], [0.5, 1.0])
+    log.unlink()
+    assert film_failures(rows, tmp_path, tmp_path / "films", size=(320, 180)) == films
+
+
+SETTING = {"camera": "top", "size": (320, 240), "note": None, "speed": 1.0}
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory):
+    """A short run by ants."""
+    from antdrive.worlds import save_task
+
+    world = World("posts", (0.0, 0.0, 3.0, 2.4), (Disc(1.5, 1.2, 0.25),))
+    path = tmp_path_factory.mktemp("worlds") / "posts.yaml"
+    save_task(Task(world, (0.5, 0.5, 0.0), (2.5, 1.9), cell=0.15), path)
+    return run(Scenario.of(str(path), "as", options={"ants": 8, "iterations": 12}, seed=3)).rollout
+
+
+def test_planning_again_gives_the_logged_path(walked):
+    _, total, states = plan_again(walked)
+    assert total == 12
+    *_, last = states
+    assert np.array_equal(last.cells, walked.cells)
+
+
+def test_a_prelude_shows_the_field_and_goes_on_to_the_last_iteration(walked):
+    frames = list(planning_frames(walked, SETTING, 5))
+    assert len(frames) == 5
+    assert all(frame.shape == (240, 320, 3) for frame in frames)
+    blue = [(frame[..., 2].astype(int) - frame[..., 0] > 60).sum() for frame in frames]
+    assert min(blue) > 150, "the dark end of the field"
+    assert (frames[0] != frames[-1]).any()
+
+
+def test_a_film_is_longer_by_its_prelude(walked, tmp_path):
+    lengths = [film(walked, tmp_path / "a.mp4", size=(320, 240), fps=4, prelude=p).frames for p in (0.0, 2.0)]
+    assert lengths[1] == lengths[0] + 8
+
+
+def test_a_log_whose_path_planning_again_does_not_give_is_refused(walked):
+    other = replace(walked, cells=walked.cells[::-1])
+    with pytest.raises(InputError, match="another path"):
+        list(planning_frames(other, SETTING, 2))
+
+
+def test_field_levels_run_from_0_to_1_and_leave_blocked_cells_out():
+    grid = rasterise(World("one", (0, 0, 3, 3), (Disc(1.5, 1.5, 0.4),)), 0.3, 0.1)
+    field = np.arange(np.prod(grid.shape), dtype=float).reshape(grid.shape)
+    levels = field_levels(grid, field)
+    assert np.isnan(levels[~grid.free]).all()
+    free = levels[grid.free]
+    assert free.min() == 0
+    assert free.max() == 1
+    assert (np.diff(free) >= 0).all()
+    assert not np.nanmax(prelude.field_levels(grid, np.ones(grid.shape)))

@@ -5,8 +5,6 @@ import json
 import re
 import shutil
 import subprocess
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -16,16 +14,15 @@ BROWSER = next(
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
 
 
-def found_by(probe: str, page: Path, *words: str) -> dict[str, Any]:
+def found_by(probe, page, *words):
     """What a script finds that ends by writing JSON into an element `#found`."""
     probed = page.with_name("probed.html")
     probed.write_text(page.read_text().replace("<head>", "<head>" + probe, 1))
     return shown_in(probed, *words)
 
 
-def shown_in(page: Path, *words: str) -> dict[str, Any]:
+def shown_in(page, *words):
     """The JSON in the element `#found` of a page."""
-    assert BROWSER is not None
     common = ("--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", "--dump-dom")
     done = subprocess.run(
         [BROWSER, *common, "--window-size=1280,900", *words, page.as_uri()],
@@ -36,11 +33,10 @@ def shown_in(page: Path, *words: str) -> dict[str, Any]:
     )
     text = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
     assert text is not None, done.stdout[-500:]
-    found: dict[str, Any] = json.loads(html.unescape(text[1]))
-    return found
+    return json.loads(html.unescape(text[1]))
 
 
-def overflow_on_a_phone(probe: str, page: Path, *words: str, wait: int = 0) -> int:
+def overflow_on_a_phone(probe, page, *words, wait=0):
     """How much wider than a phone's screen a page is [px]."""
     found_by(probe, page, *words)
     copy = "document.body.append(f.contentDocument.querySelector('#found').cloneNode(true))"
@@ -49,5 +45,4 @@ def overflow_on_a_phone(probe: str, page: Path, *words: str, wait: int = 0) -> i
         f"<script>onload = () => setTimeout(() => {{ {copy} }}, {wait})</script>"
         "<iframe id=f width=390 height=800 src=probed.html></iframe>"
     )
-    overflow: int = shown_in(phone, *words)["overflow"]
-    return overflow
+    return shown_in(phone, *words)["overflow"]

@@ -2,18 +2,16 @@
 
 import json
 import re
-from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from antdrive.runs.statistics.runs import RunTable
+from antdrive.views.colours import _luminance, label_styles
 from antdrive.views.pages.campaign import campaign_data, write_campaign_report
 from antdrive.views.pages.charts import campaign_charts
-from antdrive.views.pages.colours import _luminance, label_styles
-from antdrive.views.pages.summary import CampaignSummary, summarise
+from antdrive.views.pages.summary import summarise
 from tests.runs.made_up_campaign import Skill, made_up_columns
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 
@@ -65,7 +63,7 @@ window.addEventListener("load", () => {
 
 
 @pytest.fixture(scope="module")
-def columns() -> dict[str, list[Any]]:
+def columns():
     found = made_up_columns(PLANNERS, worlds=10, seeds=6)
     found["world"] = [ODD if world == "world-003" else world for world in found["world"]]
     found["reason"] = [ODD if reason else None for reason in found["reason"]]
@@ -73,19 +71,24 @@ def columns() -> dict[str, list[Any]]:
 
 
 @pytest.fixture(scope="module")
-def summary(columns: dict[str, list[Any]]) -> CampaignSummary:
+def summary(columns):
     return summarise(RunTable(columns), title=ODD)
 
 
 @pytest.fixture(scope="module")
-def page(summary: CampaignSummary, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page(summary, tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
     return write_campaign_report(summary, folder / "a campaign", folder / "page.html")[0]
 
 
+@pytest.fixture(scope="module")
+def found(page):
+    """What the probe finds in the page."""
+    return found_by(PROBE, page)
+
+
 @needs_browser
-def test_in_a_browser_it_sorts_filters_and_opens(page: Path, columns: dict[str, list[Any]]) -> None:
-    found = found_by(PROBE, page)
+def test_in_a_browser_it_sorts_filters_and_opens(found, columns):
     assert found["faults"] == []
     count, duration = len(columns["seed"]), columns["duration_s"]
     assert (found["sorted"], found["lines"] < 60, found["deep"] < 60) == ("ascending", True, True)
@@ -106,8 +109,7 @@ def test_in_a_browser_it_sorts_filters_and_opens(page: Path, columns: dict[str, 
 
 
 @needs_browser
-def test_in_a_browser_cells_show_failures_and_pairs_are_chosen(page: Path, columns: dict[str, list[Any]]) -> None:
-    found = found_by(PROBE, page)
+def test_in_a_browser_cells_show_failures_and_pairs_are_chosen(found, columns):
     names = sorted(set(columns["world"]), key=lambda name: (name != ODD, name))
     for line, world in zip(found["matrix"], names, strict=True):
         for cell, planner in zip(line, PLANNERS, strict=True):
@@ -124,19 +126,19 @@ def test_in_a_browser_cells_show_failures_and_pairs_are_chosen(page: Path, colum
 
 
 @needs_browser
-def test_the_page_follows_dark_mode(page: Path) -> None:
-    light, dark = found_by(PROBE, page), found_by(PROBE, page, "--force-dark-mode")
+def test_the_page_follows_dark_mode(page, found):
+    light, dark = found, found_by(PROBE, page, "--force-dark-mode")
     assert light["paper"] == "rgb(255, 255, 255)"
     assert dark["paper"] == "rgb(20, 24, 31)"
     assert light["curve"] != dark["curve"], "curves are lighter on a dark page"
 
 
 @needs_browser
-def test_on_a_phone_the_page_is_as_wide_as_the_screen(page: Path) -> None:
+def test_on_a_phone_the_page_is_as_wide_as_the_screen(page):
     assert overflow_on_a_phone(PROBE, page) <= 0
 
 
-def test_nothing_in_the_page_is_fetched_and_no_text_becomes_markup(page: Path) -> None:
+def test_nothing_in_the_page_is_fetched_and_no_text_becomes_markup(page):
     text = page.read_text()
     assert "<b>&" not in text.replace("<b>&nbsp;", "")
     assert not re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', text)
@@ -144,7 +146,7 @@ def test_nothing_in_the_page_is_fetched_and_no_text_becomes_markup(page: Path) -
     assert "http" not in re.sub(r'xmlns(:\w+)?="[^"]*"|"https?://www\.w3\.org[^"]*"', "", text)
 
 
-def test_the_data_come_back_as_they_are(columns: dict[str, list[Any]]) -> None:
+def test_the_data_come_back_as_they_are(columns):
     text = campaign_data(RunTable(columns), list(PLANNERS), "x/")
     assert not set("<\u2028") & set(text)
     data = json.loads(text)
@@ -168,7 +170,7 @@ def test_the_data_come_back_as_they_are(columns: dict[str, list[Any]]) -> None:
     assert data["shown"][:3] == ["world", "planner", "option.ants"]
 
 
-def test_charts_are_svg_with_a_curve_for_each_planner(summary: CampaignSummary) -> None:
+def test_charts_are_svg_with_a_curve_for_each_planner(summary):
     styles = label_styles(summary.paired.planners, ["ants", "ants", "astar"])
     charts = campaign_charts(summary, styles)
     assert [chart.title for chart in charts] == [
@@ -187,7 +189,7 @@ def test_charts_are_svg_with_a_curve_for_each_planner(summary: CampaignSummary) 
     assert [chart.svg for chart in charts] == [chart.svg for chart in campaign_charts(summary, styles)]
 
 
-def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths() -> None:
+def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths():
     columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)}, worlds=6, seeds=2)
     columns["duration_s"] = columns["driven_length_m"] = columns["gap_to_grid_optimum"] = [None] * 24
     for areas, says in (([4.0, 9.0, 400.0], "area of the world"), ([4.0] * 3, "shortest path on the grid")):
@@ -199,14 +201,14 @@ def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths
         assert ("(4, 4, 4 from" in chart.note) == ("area" in says)
 
 
-def test_charts_do_without_what_is_not_there() -> None:
+def test_charts_do_without_what_is_not_there():
     columns = made_up_columns({"a": Skill(0.0), "b": Skill(0.0)}, worlds=2, seeds=2)
     assert campaign_charts(summarise(RunTable(columns), title="t"), label_styles("ab", "ab")) == []
     bare = {name: columns[name] for name in ("world", "planner", "seed", "outcome", "succeeded")}
     assert campaign_charts(summarise(RunTable(bare), title="t"), label_styles("ab", "ab")) == []
 
 
-def test_styles_of_labels_differ_and_are_readable_on_their_ground() -> None:
+def test_styles_of_labels_differ_and_are_readable_on_their_ground():
     names = ["ants"] * 6 + ["aco-han"] * 3 + ["astar", "mmas", "plugin"]
     styles = label_styles([f"{name} {k}" for k, name in enumerate(names)], names)
     assert len({style.light for style in styles}) == len(styles)
@@ -219,7 +221,7 @@ def test_styles_of_labels_differ_and_are_readable_on_their_ground() -> None:
 
 
 @pytest.mark.slow
-def test_8500_runs_make_a_page_below_10_megabytes(tmp_path: Path) -> None:
+def test_8500_runs_make_a_page_below_10_megabytes(tmp_path):
     planners = {f"planner-{k}": Skill(0.98 - 0.01 * k, 1.0 + 0.02 * k) for k in range(17)}
     summary = summarise(RunTable(made_up_columns(planners, worlds=50, seeds=10)), title="big")
     page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0]

@@ -10,10 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import antdrive
 from antdrive.base import InputError
+from antdrive.planners import load_planner
+from antdrive.sim import run
 from antdrive.views.figures.run_figures import overview
+from antdrive.views.film.video import film
+from antdrive.views.pages import report as reporting
 from antdrive.views.pages.report import EMBEDDED_BYTES, write_report
 from antdrive.views.pages.runs import MEASURED, ReportedRun
+from tests.records import changed
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 
 PROBE = """<script>
@@ -59,8 +65,6 @@ window.onload = async () => {
 @pytest.fixture(scope="module")
 def runs(made_up_drive, tmp_path_factory):
     """Three runs without logs, one with a film, one that collided."""
-    from antdrive.views.film.video import film
-
     folder = tmp_path_factory.mktemp("runs")
     for k, (planner, outcome) in enumerate((("mmas", "succeeded"), ("astar", "collided"), ("<b>odd</b>", "succeeded"))):
         drive = made_up_drive(collide=outcome == "collided", outcome=outcome)
@@ -118,8 +122,6 @@ def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
 
 
 def test_the_page_stays_small_by_linking_figures(runs, tmp_path, monkeypatch):
-    from antdrive.views.pages import report as reporting
-
     write_report(runs, tmp_path / "all.html")
     assert (tmp_path / "all.html").stat().st_size < 5_000_000
     assert EMBEDDED_BYTES < 5_000_000
@@ -140,22 +142,6 @@ def test_the_markdown_is_a_table_with_pictures_and_commands(runs, tmp_path):
     assert all(line.startswith("|") for line in table)
     assert len({line.count("|") for line in table}) == 1
     assert "![overview.png](run%200/overview.png)" in lines
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("result.json", "{", "result.json: cannot be read"),
-        ("result.json", "[]", "world: missing"),
-        ("other", "", "no runs"),
-    ],
-)
-def test_folders_without_runs_and_broken_files_are_refused_by_name(tmp_path, name, content, message):
-    (tmp_path / name).write_text(content)
-    with pytest.raises(InputError, match=message):
-        write_report(tmp_path, tmp_path / "report.html")
-    with pytest.raises(InputError, match=r"choose .html or .md"):
-        write_report(tmp_path, tmp_path / "report.pdf")
 
 
 def write_run(run, folder, **claims):
@@ -190,11 +176,8 @@ def test_a_genuine_run_is_shown_as_certified(small_run, tmp_path):
     assert "1 / 1" in text
     assert "Certified collision-free: at least" in text
     assert "result.json is about another log" not in text
-
-
-def test_a_result_of_another_run_is_told(small_run, tmp_path):
-    write_run(small_run, tmp_path / "runs" / "a", digest="0" * 64)
-    assert "result.json is about another log: its digest differs" in reported(tmp_path / "runs", tmp_path)
+    write_run(small_run, tmp_path / "others" / "a", digest="0" * 64)
+    assert "result.json is about another log: its digest differs" in reported(tmp_path / "others", tmp_path)
 
 
 def test_without_a_log_a_drive_is_a_claim(small_run, tmp_path):
@@ -230,8 +213,8 @@ ODD_NAME = "a|b|c `x` <script>alert(1)</script> ``` </details> [u](v) *s*"
 
 def test_markdown_shows_odd_names_as_they_are(small_run, tmp_path):
     task = small_run.scenario.task
-    record = replace(small_run.rollout.record, task=replace(task, world=replace(task.world, name=ODD_NAME)))
-    odd = replace(small_run, rollout=replace(small_run.rollout, record=record))
+    record = replace(small_run.rollout.record, task=changed(task, "world", name=ODD_NAME))
+    odd = changed(small_run, "rollout", record=record)
     write_run(odd, tmp_path / "runs" / "a", command="antdrive run ```x\n```\n<b>")
     text = reported(tmp_path / "runs", tmp_path, "md")
     assert "<script>" not in text
@@ -244,31 +227,18 @@ def test_markdown_shows_odd_names_as_they_are(small_run, tmp_path):
 
 
 ODD_VALUES = [
-    None,
-    True,
-    0,
-    -1.5,
-    10**400,
-    "",
-    "x" * 5000,
-    "a\nb\x00\ud800",
-    [],
-    [1, [2]],
-    {},
-    {"film": {}},
-    "/etc/hosts",
-]
+    None, True, 0, -1.5, 10**400, "", "x" * 5000, "a\nb\x00\ud800", [], [1, [2]], {}, {"film": {}}, "/etc/hosts",
+]  # fmt: skip
 
 
 def test_no_value_in_result_json_ends_in_a_traceback(small_run, tmp_path):
-    """Each key with five odd values, each beside a log and without one: ten runs on a page."""
+    """Each key with five odd values, two of them beside a log: seven runs on a page."""
     rng = np.random.default_rng(3)
     facts = json.loads((write_run(small_run, tmp_path / "runs" / "driven-0") / "result.json").read_text())
+    shutil.copytree(tmp_path / "runs" / "driven-0", tmp_path / "runs" / "driven-1")
     for k in range(5):
-        if k:
-            shutil.copytree(tmp_path / "runs" / "driven-0", tmp_path / "runs" / f"driven-{k}")
         (tmp_path / "runs" / f"claimed-{k}").mkdir()
-    for key in [*facts, "files", "metrics.spl", "metrics.driven_length_m", "certificate.bound_m"]:
+    for turn, key in enumerate([*facts, "files", "metrics.spl", "metrics.driven_length_m", "certificate.bound_m"]):
         value = ODD_VALUES[rng.integers(len(ODD_VALUES))]
         for k, odd in enumerate((value, None, [], 10**400, "a\ud800")):
             edited = json.loads(json.dumps(facts))
@@ -277,21 +247,13 @@ def test_no_value_in_result_json_ends_in_a_traceback(small_run, tmp_path):
                 edited[place][inner] = odd
             else:
                 edited[place] = odd
-            for kind in ("driven", "claimed"):
+            for kind in ("driven", "claimed")[k > 1 :]:
                 (tmp_path / "runs" / f"{kind}-{k}" / "result.json").write_text(json.dumps(edited))
-        for kind in ("html", "md"):
-            assert "5 / 10" in reported(tmp_path / "runs", tmp_path, kind), key
+        assert "2 / 7" in reported(tmp_path / "runs", tmp_path, ("html", "md")[turn % 2]), key
 
 
 def test_files_that_cannot_be_read_are_one_line(small_run, tmp_path):
     folder = write_run(small_run, tmp_path / "runs" / "a")
-    result = folder / "result.json"
-    good = result.read_text()
-    for content in ("[" * 100_000, good.replace('"seed": 0', f'"seed": {"9" * 5000}'), "{" + " " * 10_000_001):
-        result.write_text(content)
-        with pytest.raises(InputError, match=r"result\.json: cannot be read"):
-            write_report(tmp_path / "runs", tmp_path / "report.html")
-    result.write_text(good)
     (folder / "overview.png").write_bytes(b"no picture")
     with pytest.raises(InputError, match=r"overview\.png: not a picture"):
         write_report(tmp_path / "runs", tmp_path / "report.html")
@@ -310,9 +272,6 @@ def columns_of(page):
 
 
 def test_settings_that_differ_between_runs_get_columns(small_scenario, tmp_path):
-    from antdrive.planners import load_planner
-    from antdrive.sim import run
-
     write_run(run(small_scenario), tmp_path / "runs" / "a")
     same = reported(tmp_path / "runs", tmp_path)
     assert columns_of(same)[1] == ["world", "planner", "outcome", "robot", "seed", *MEASURED]
@@ -342,20 +301,13 @@ def test_a_setting_that_the_log_contradicts_is_told(small_run, tmp_path, key, va
 def fake_run(folder, *, outcome="succeeded", **more):
     """The result.json of a run that is claimed, with a film beside it."""
     folder.mkdir(parents=True)
-    facts = {
-        "world": "w",
-        "planner": "astar",
-        "robot": "turtlebot",
-        "seed": 0,
-        "outcome": outcome,
-        "command": "antdrive run w",
-    }
-    (folder / "result.json").write_text(json.dumps({**facts, **more}))
+    facts = {"world": "w", "planner": "astar", "robot": "turtlebot", "seed": 0, "command": "antdrive run w"}
+    (folder / "result.json").write_text(json.dumps({**facts, "outcome": outcome, **more}))
     (folder / "a film.mp4").write_bytes(b"film")
 
 
-def test_the_markdown_of_2000_runs_is_short_with_failures_first(tmp_path):
-    for k in range(2000):
+def test_the_markdown_of_1000_runs_is_short_with_failures_first(tmp_path):
+    for k in range(1000):
         long = {"reason": "*" * 190, "command": "`" * 3500} if k % 2 else {}
         fake_run(tmp_path / "runs" / f"{k:04}", outcome="no_path" if k % 50 == 7 else "timed_out", seed=k, **long)
     write_report(tmp_path / "runs", tmp_path / "report.md")
@@ -364,7 +316,7 @@ def test_the_markdown_of_2000_runs_is_short_with_failures_first(tmp_path):
     text = content.decode()
     rows = [line for line in text.splitlines() if line.startswith("| w |")]
     told = re.search(r"Not in the table: (.*)\.", text).group(1)
-    assert len(rows) + sum(int(n.replace(",", "")) for n in re.findall(r"(\d[\d,]*) \w", told)) == 2000
+    assert len(rows) + sum(int(n.replace(",", "")) for n in re.findall(r"(\d[\d,]*) \w", told)) == 1000
 
 
 def test_markdown_puts_failures_first_and_links_films(small_run, collided_run, tmp_path):
@@ -379,8 +331,6 @@ def test_markdown_puts_failures_first_and_links_films(small_run, collided_run, t
 
 
 def test_runs_made_in_python_become_a_report_together_with_folders(small_run, collided_run, tmp_path):
-    import antdrive
-
     write_run(small_run, tmp_path / "runs" / "a")
     page = tmp_path / "page.html"
     assert antdrive.write_report([small_run, collided_run, tmp_path / "runs"], str(page), title="mine") == 3
@@ -393,8 +343,6 @@ def test_runs_made_in_python_become_a_report_together_with_folders(small_run, co
     assert page.read_text().count("data:video/mp4") == 1
     assert antdrive.write_report(small_run, tmp_path / "page.md") == 1
     assert "1 / 1" in (tmp_path / "page.md").read_text()
-    with pytest.raises(InputError, match="no runs"):
-        antdrive.write_report([], page)
 
 
 def test_a_run_that_was_edited_is_certified_anew(small_run, tmp_path):
@@ -418,6 +366,6 @@ def test_a_run_that_a_test_drove_says_why_the_test_failed(small_run, tmp_path, k
     assert "longer <script>" not in text
 
 
-def test_the_heading_of_a_run_lists_settings_and_not_what_came_of_them() -> None:
+def test_the_heading_of_a_run_lists_settings_and_not_what_came_of_them():
     run = ReportedRun(None, {}, None, 0, differing={"map": "none", "explored_m2": "94.7", "options": ""})
     assert run.heading == {"map": "none"}

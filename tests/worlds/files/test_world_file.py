@@ -3,10 +3,8 @@
 import json
 import math
 import os
-import re
 import stat
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,13 +39,13 @@ TASK = Task(
 )
 
 
-def write(folder: Path, content: str | bytes, name: str = "bad.yaml") -> Path:
+def write(folder, content, name="bad.yaml"):
     path = folder / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path
 
 
-def refusal(call: Callable[[], object]) -> str | None:
+def refusal(call):
     """The message of the InputError, if there is one."""
     try:
         call()
@@ -70,12 +68,6 @@ def test_a_hostile_file_is_refused_quickly(case, tmp_path):
     with pytest.raises(InputError):
         load_task(path)
     assert time.process_time() - started < 30
-
-
-def test_a_file_too_large_is_not_parsed(tmp_path):
-    path = write(tmp_path, GOOD + "# " + "x" * 3_000_000)
-    with pytest.raises(InputError, match="too large"):
-        load_task(path)
 
 
 @given(st.text(max_size=200))
@@ -101,25 +93,8 @@ def test_any_value_for_any_key_is_a_task_or_an_input_error(value, key):
     assert message is None or (message.startswith(f"task: {key}") and message.isprintable())
 
 
-def test_a_missing_file_names_close_worlds_of_the_catalogue():
-    with pytest.raises(InputError, match=r"^gat: no such file, nor a world of the catalogue; did you mean gate\?$"):
-        load_task("gat")
-    with pytest.raises(InputError, match=r"did you mean gate\?"):
-        load_task("somewhere/gate.yaml")
-    with pytest.raises(InputError, match="choose from empty, forest, gate"):
-        load_task("zzzzzz")
-
-
-@pytest.mark.parametrize("name", ["", "\x00", "a\nb", "x" * 5000])
-def test_strange_names_get_a_message_of_one_line(name):
-    with pytest.raises(InputError) as caught:
-        load_task(name)
-    assert str(caught.value).isprintable()
-
-
-def test_a_folder_is_no_world(tmp_path):
-    with pytest.raises(InputError, match=r"is a directory; give a YAML file$"):
-        load_task(tmp_path)
+def test_a_name_that_no_file_can_have_gets_a_message_of_one_line():
+    assert refusal(lambda: load_task("x" * 5000)).isprintable()
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="needs a user who may not read everything")
@@ -134,11 +109,6 @@ def test_a_dangling_link_is_a_missing_file(tmp_path):
     (tmp_path / "link.yaml").symlink_to(tmp_path / "nowhere")
     with pytest.raises(InputError, match=r"no such file"):
         load_task(tmp_path / "link.yaml")
-
-
-def test_an_unknown_key_is_reported_before_a_missing_one():
-    with pytest.raises(InputError, match=r"^task: strat: unknown key; did you mean start\?$"):
-        task_from_dict({k if k != "start" else "strat": v for k, v in task_to_dict(TASK).items()})
 
 
 # Accepted files
@@ -188,7 +158,7 @@ names = st.text(min_size=1, max_size=30).filter(str.isprintable)
 
 
 @st.composite
-def tasks(draw: st.DrawFn) -> Task:
+def tasks(draw):
     start = (draw(numbers), draw(numbers), draw(numbers))
     goal = (draw(numbers), draw(numbers))
     discs = [
@@ -258,9 +228,7 @@ def test_a_task_that_no_file_can_hold_is_not_written(tmp_path):
         (41_000, 2.0, "values, and a world file has at most 2 MB and 200000 values; use fewer"),
     ],
 )
-def test_a_world_that_could_not_be_read_back_is_not_written(
-    tmp_path: Path, count: int, place: float, problem: str
-) -> None:
+def test_a_world_that_could_not_be_read_back_is_not_written(tmp_path, count, place, problem):
     discs = (Disc(5.0, 4.0 + place, 0.1),) * count
     with pytest.raises(InputError) as caught:
         save_task(
@@ -271,7 +239,7 @@ def test_a_world_that_could_not_be_read_back_is_not_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_largest_world_that_is_written_reads_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_largest_world_that_is_written_reads_back(tmp_path, monkeypatch):
     """Values are counted alike in writing and in reading."""
     from antdrive.base import document
     from antdrive.worlds.files import world_file
@@ -296,7 +264,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
     path = tmp_path / "w.yaml"
     path.write_text("the old one")
 
-    def fail(*_: object, **__: object) -> None:
+    def fail(*_, **__):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_text", fail)
@@ -364,50 +332,8 @@ def test_tasks_are_chosen_by_name(tmp_path):
     assert load_tasks("empty") == {}
 
 
-@pytest.mark.parametrize(
-    ("text", "error"),
-    [
-        (NAMED + "  - {name: dock, goal: [1, 5]}\n", "office.yaml:9: tasks[2].name: 'dock' is the name of two tasks"),
-        (NAMED + "  - {name: out, goal: [99, 5]}\n", "office.yaml:9: tasks[2].goal: (99, 5) is out of bounds"),
-        (NAMED + "  - {goal: [1, 5]}\n", "office.yaml:9: tasks[2].name: missing"),
-        (NAMED + "frame: [0, 0]\n", "office.yaml:9: frame: must have 3 entries"),
-    ],
-)
-def test_wrong_tasks_are_refused(tmp_path, text, error):
-    (tmp_path / "office.yaml").write_text(text)
-    with pytest.raises(InputError, match=re.escape(error)):
-        load_task(tmp_path / "office.yaml")
-
-
-def test_an_unknown_task_is_refused_with_those_that_there_are(tmp_path):
-    (tmp_path / "office.yaml").write_text(NAMED)
-    with pytest.raises(InputError, match=r"office.yaml: no task 'dok'; did you mean dock\?"):
-        load_task(tmp_path / "office.yaml", "dok")
-    with pytest.raises(InputError, match="empty: no task 'dock'; the world has no tasks beside its own start and goal"):
-        load_task("empty", "dock")
-
-
 def test_how_a_world_lies_in_its_map_is_kept(tmp_path):
     task = replace(TASK, frame=(1.5, -2.0, 0.25))
     save_task(task, tmp_path / "w.yaml")
     assert load_task(tmp_path / "w.yaml") == task
     assert "frame" not in task_to_dict(TASK)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "what"),
-    [
-        ("w.sdf", "<sdf/>", "is no world file; make one of it"),
-        ("w.world", "<sdf/>", "is no world file; make one of it"),
-        ("w.map", "type octile", "is no world file; make one of it"),
-        ("w.yaml", "image: w.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n", "is a map of map_server; make a world of it"),
-    ],
-)
-def test_a_world_of_another_program_is_named_with_what_imports_it(
-    tmp_path: Path, name: str, text: str, what: str
-) -> None:
-    path = tmp_path / name
-    path.write_text(text)
-    with pytest.raises(InputError) as caught:
-        load_task(path)
-    assert str(caught.value) == f"{path}: {what} with antdrive worlds import {path}"

@@ -2,7 +2,6 @@
 
 import math
 import tarfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from tools.shared_data import BARN
 
 
 @pytest.fixture(scope="module")
-def barn_worlds(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def barn_worlds(tmp_path_factory):
     if not BARN.exists():
         pytest.skip("needs BARN's worlds (docs/how-to/data.md)")
     folder = tmp_path_factory.mktemp("barn")
@@ -24,8 +23,8 @@ def barn_worlds(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return worlds
 
 
-def test_every_barn_world_lets_a_jackal_through(barn_worlds):
-    for path in barn_worlds:
+def test_a_barn_world_lets_a_jackal_through(barn_worlds):
+    for path in barn_worlds[::5]:
         task = import_barn(path)
         assert 181 <= len(task.world.obstacles) <= 365
         assert {(d.radius, d.height) for d in task.world.obstacles} == {(0.075, 0.5)}
@@ -41,7 +40,7 @@ def test_the_outer_cylinders_of_a_barn_world_touch_the_bounds(barn_worlds):
 
 
 def test_the_reference_path_of_a_barn_world_leads_between_its_cylinders(barn_worlds):
-    for path in barn_worlds[:10]:
+    for path in barn_worlds[1::10]:
         task = import_barn(path)
         cells = np.load(path.with_name(path.name.replace("world_", "path_")).with_suffix(".npy"))
         xy = np.column_stack([0.15 * cells[:, 0] - 4.425, 0.15 * cells[:, 1] + 5.175])

@@ -1,7 +1,5 @@
 """Maps of cells: the discs that cover a map, and the map of a world of discs."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from fractions import Fraction
@@ -11,8 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from antdrive.base import InputError
-from antdrive.worlds import CellMap, Disc, Task, World, cell_map, map_task, rasterise
+from antdrive.worlds import CellMap, Disc, World, cell_map, map_task, rasterise
 from antdrive.worlds.formats.cellmap import cover, watch_conversion
 from tests.worlds.oracles import worlds
 
@@ -21,7 +18,7 @@ RESOLUTIONS = st.sampled_from([0.05, 0.1, 0.25, 1.0, 0.3])
 
 
 @st.composite
-def maps(draw: st.DrawFn, most: int = 9) -> CellMap:
+def maps(draw, most=9):
     rows, cols = draw(st.integers(1, most)), draw(st.integers(1, most))
     share = draw(st.integers(1, 9))
     cells = draw(st.lists(st.integers(0, 9), min_size=rows * cols, max_size=rows * cols))
@@ -30,11 +27,11 @@ def maps(draw: st.DrawFn, most: int = 9) -> CellMap:
     return CellMap(free, draw(RESOLUTIONS), origin)
 
 
-def centre(cells: CellMap, row: int, col: int) -> tuple[float, float]:
+def centre(cells, row, col):
     return cells.origin[0] + (col + 0.5) * cells.resolution, cells.origin[1] + (row + 0.5) * cells.resolution
 
 
-def joined(free: np.ndarray, *starts: tuple[int, int]) -> np.ndarray:
+def joined(free, *starts):
     """The free cells that steps over shared sides lead to."""
     seen, todo = np.zeros_like(free), deque(starts)
     while todo:
@@ -45,13 +42,13 @@ def joined(free: np.ndarray, *starts: tuple[int, int]) -> np.ndarray:
     return seen
 
 
-def touched_by(free: np.ndarray) -> list[tuple[int, int]]:
+def touched_by(free):
     """The blocked cells that share a point with a free one."""
     spots = np.argwhere(free)
     return [(r, c) for r, c in np.argwhere(~free) if len(spots) and np.abs(spots - (r, c)).max(axis=1).min() == 1]
 
 
-def covered(cells: CellMap, row: int, col: int, discs: np.ndarray) -> bool:
+def covered(cells, row, col, discs):
     """Whether one of the discs holds the four corners of a cell, in exact arithmetic."""
     side, x0, y0 = Fraction(cells.resolution), Fraction(cells.origin[0]), Fraction(cells.origin[1])
     corners = [(x0 + side * (col + i), y0 + side * (row + j)) for i in (0, 1) for j in (0, 1)]
@@ -61,7 +58,7 @@ def covered(cells: CellMap, row: int, col: int, discs: np.ndarray) -> bool:
     )
 
 
-def beyond_blocked(cells: CellMap, points: np.ndarray) -> np.ndarray:
+def beyond_blocked(cells, points):
     """Distances from points to the nearest blocked cell, or to the map's edge."""
     xmin, ymin, xmax, ymax = cells.bounds
     x, y = points.T
@@ -74,9 +71,7 @@ def beyond_blocked(cells: CellMap, points: np.ndarray) -> np.ndarray:
 
 @given(maps(), st.sampled_from([None, 0.25, 0.6, 1.3]))
 @settings(max_examples=60)
-def test_cells_are_fully_covered_and_discs_reach_no_farther_than_the_overhang(
-    cells: CellMap, wanted: float | None
-) -> None:
+def test_cells_are_fully_covered_and_discs_reach_no_farther_than_the_overhang(cells, wanted):
     side = cells.resolution
     found = cover(cells, None if wanted is None else wanted * side)
     assert found.overhang <= (CORNER if wanted is None else wanted) * side + 1e-9
@@ -93,7 +88,7 @@ def test_cells_are_fully_covered_and_discs_reach_no_farther_than_the_overhang(
             assert (beyond_blocked(cells, inside) <= found.overhang + 2e-9).all()
 
 
-def test_the_check_of_covers_notices_a_disc_too_small_or_too_large() -> None:
+def test_the_check_of_covers_notices_a_disc_too_small_or_too_large():
     cells = CellMap(np.array([[True, True, True], [True, False, True], [True, True, True]]), 0.05, (-12.2, 3.7))
     (disc,) = cover(cells).discs
     assert covered(cells, 1, 1, np.array([disc]))
@@ -101,7 +96,7 @@ def test_the_check_of_covers_notices_a_disc_too_small_or_too_large() -> None:
     assert disc[2] - 0.025 == pytest.approx(0.05 * CORNER, abs=2e-9)
 
 
-def test_solid_ground_takes_fewer_discs_than_cells_and_a_larger_overhang_fewer_still() -> None:
+def test_solid_ground_takes_fewer_discs_than_cells_and_a_larger_overhang_fewer_still():
     free = np.ones((40, 40), dtype=bool)
     free[8:32, 8:32] = False
     counts = [len(cover(CellMap(free, 0.1), overhang).discs) for overhang in (None, 0.05, 0.1)]
@@ -110,7 +105,7 @@ def test_solid_ground_takes_fewer_discs_than_cells_and_a_larger_overhang_fewer_s
 
 @given(maps(), st.data())
 @settings(max_examples=60)
-def test_planners_see_the_very_cells_of_the_map(cells: CellMap, data: st.DataObject) -> None:
+def test_planners_see_the_very_cells_of_the_map(cells, data):
     """The robot fits through what the discs leave of a passage one cell wide."""
     spots = [tuple(spot) for spot in np.argwhere(cells.free).tolist()]
     assume(spots)
@@ -127,7 +122,7 @@ def test_planners_see_the_very_cells_of_the_map(cells: CellMap, data: st.DataObj
     )
 
 
-def test_unreachable_cells_need_no_discs_and_the_bounds_are_drawn_in() -> None:
+def test_unreachable_cells_need_no_discs_and_the_bounds_are_drawn_in():
     free = np.zeros((20, 30), dtype=bool)
     free[5:8, 10:14] = True
     alone = map_task(CellMap(free, 1.0, (100.0, 0.0)), (110.5, 5.5, 0.0), (113.5, 7.5), name="room")
@@ -143,41 +138,12 @@ def test_unreachable_cells_need_no_discs_and_the_bounds_are_drawn_in() -> None:
 MAP = CellMap(np.array([[True, True, True, False], [True, True, True, True]]), 0.5)
 
 
-@pytest.mark.parametrize(
-    ("start", "goal", "overhang", "says"),
-    [
-        (None, (1.2, 0.2), None, "start: maps have none; give it on free ground, within x 0 to 2 and y 0 to 1 m"),
-        ((0.2, 0.2, 0.0), None, None, "goal: maps have none"),
-        (None, None, None, "start and goal: maps have none"),
-        ((0.2, 1.2, 0.0), (1.2, 0.2), None, "start: (0.2, 1.2) is not on the map, which spans x 0 to 2 and y 0 to 1"),
-        ((0.2, 0.2, 0.0), (1.7, 0.2), None, "goal: (1.7, 0.2) is on a blocked cell, in row 0 from below and column 3"),
-        ((0.2, 0.2, 0.0), (1.48, 0.2), None, "is inside obstacles[0]"),
-        ((0.2, 0.2, 0.0), (1.48, 0.2), None, "; it is within 0.1036 m of a blocked cell"),
-        ((0.2, 0.2, 0.0), (0.2, 0.2), None, "goal: is where the robot starts"),
-        ((0.2, 0.2, 0.0), (1.2, 0.2), 0.1, "overhang: must be at least 0.103553 m"),
-        ((0.2, 0.2, 0.0), (1.2, 0.2), math.nan, "overhang: must be at least 0.103553 m"),
-    ],
-)
-def test_unusable_ends_and_overhangs_are_named(start, goal, overhang, says) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(InputError) as caught:
-        map_task(MAP, start, goal, name="m", overhang=overhang)
-    assert says in str(caught.value)
-    assert str(caught.value).isprintable()
-
-
-def test_a_map_of_too_many_discs_is_refused() -> None:
-    free = np.ones((600, 300), dtype=bool)
-    free[1:-1:2, 1:-1:2] = False
-    with pytest.raises(InputError, match=r"needs 44\d\d\d discs; the limit is 20000; a larger overhang than 0.207 m"):
-        map_task(CellMap(free, 1.0), (0.5, 0.5, 0.0), (0.5, 599.5), name="posts")
-
-
 # The map of a world
 
 
 @given(worlds(), st.sampled_from([0.25, 0.3, 0.7, 1.1, 30.0]))
 @settings(max_examples=40)
-def test_a_cell_is_free_when_no_disc_and_no_wall_reaches_into_it(world: World, resolution: float) -> None:
+def test_a_cell_is_free_when_no_disc_and_no_wall_reaches_into_it(world, resolution):
     cells = cell_map(world, resolution)
     xmin, ymin, xmax, ymax = world.bounds
     assert cells.origin == (xmin, ymin)
@@ -196,7 +162,7 @@ def test_a_cell_is_free_when_no_disc_and_no_wall_reaches_into_it(world: World, r
         assert free == (depth <= 1e-9)
 
 
-def test_a_disc_that_only_touches_a_cell_does_not_block_it() -> None:
+def test_a_disc_that_only_touches_a_cell_does_not_block_it():
     world = World("one", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.5),))
     assert cell_map(world, 1.0).free.sum() == 8
     assert cell_map(World("one", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.50001),)), 1.0).free.sum() == 4
@@ -204,12 +170,12 @@ def test_a_disc_that_only_touches_a_cell_does_not_block_it() -> None:
 
 @given(worlds())
 @settings(max_examples=40)
-def test_a_world_made_from_a_worlds_cells_blocks_all_that_the_world_does(world: World) -> None:
+def test_a_world_made_from_a_worlds_cells_blocks_all_that_the_world_does(world):
     cells = cell_map(world, 0.5)
     spots = np.argwhere(cells.free)
     assume(len(spots) > 1)
     start, goal = centre(cells, *spots[0]), centre(cells, *spots[-1])
-    task: Task = map_task(cells, (*start, 0.0), goal, name="m")
+    task = map_task(cells, (*start, 0.0), goal, name="m")
     again = cell_map(task.world, 0.5)
     reached = joined(cells.free, tuple(spots[0]), tuple(spots[-1]))
     # The discs reach into cells beside the blocked ones, but a blocked cell that a free one touches stays blocked.
@@ -218,16 +184,10 @@ def test_a_world_made_from_a_worlds_cells_blocks_all_that_the_world_does(world: 
         assert spot is None or not again.free[spot]
 
 
-@pytest.mark.parametrize("resolution", [0.0, -1.0, math.nan, math.inf, 1e-5])
-def test_unusable_resolutions_are_refused(resolution: float) -> None:
-    with pytest.raises(InputError, match="resolution: "):
-        cell_map(World("w", (0.0, 0.0, 10.0, 10.0)), resolution)
-
-
-def test_a_conversion_says_how_far_it_is() -> None:
+def test_a_conversion_says_how_far_it_is():
     free = np.ones((20, 20), dtype=np.bool_)
     free[8:12, 3:15] = False
-    shares: list[float] = []
+    shares = []
     with watch_conversion(shares.append):
         map_task(CellMap(free, 0.1), (0.3, 0.3, 0.0), (1.7, 1.7), name="made")
     map_task(CellMap(free, 0.1), (0.3, 0.3, 0.0), (1.7, 1.7), name="nobody watches")

@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ ONE = {"name": "one", "bounds": [-12, -12, 12, 12], "start": [11, 0, 3.14], "goa
        "movers": [MOVER]}  # fmt: skip
 
 
-def written(folder: Path, content) -> Path:
+def written(folder, content):
     path = folder / "set.json"
     path.write_text(content if isinstance(content, str) else json.dumps(content))
     return path

@@ -1,11 +1,10 @@
 """The one function that imports any file: it chooses the format and refuses options of other formats."""
 
 import json
-from pathlib import Path
 
 import pytest
 
-from antdrive.base import FieldError, InputError
+from antdrive.base import FieldError
 from antdrive.worlds import export_map_server, export_movingai_map, export_sdf, import_file, import_format, load_task
 from tests.worlds.formats.test_dynabarn import ONE
 
@@ -32,22 +31,6 @@ def test_the_suffix_says_which_format_a_file_has(name, about):
 
 def test_a_barn_world_is_an_sdf_world_with_ends_of_its_own():
     assert import_format("w.world", barn=True).name == "a BARN world"
-    with pytest.raises(FieldError, match=r"^barn: a MovingAI map takes start, goal, cell, overhang, "):
-        import_format("w.map", barn=True)
-
-
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("w.pgm", "w.pgm: is an image; give the map's .yaml file"),
-        ("w.txt", "w.txt: cannot be imported; files that can be end in .sdf, .world, .yaml"),
-        ("w", "w: cannot be imported"),
-    ],
-)
-def test_other_suffixes_are_refused(name, says):
-    with pytest.raises(InputError) as caught:
-        import_format(name)
-    assert str(caught.value).startswith(says)
 
 
 @pytest.mark.parametrize("name", ["w.sdf", "w.yaml", "w.map", "w.json"])
@@ -67,7 +50,7 @@ def test_none_counts_as_not_given(tmp_path):
     assert [task.world.name for task in tasks] == ["one", "two"]
 
 
-def test_every_format_gives_its_tasks(tmp_path: Path):
+def test_every_format_gives_its_tasks(tmp_path):
     task = load_task("slalom")
     export_sdf(task, tmp_path / "w.sdf")
     assert import_file(tmp_path / "w.sdf") == [task]
@@ -76,8 +59,3 @@ def test_every_format_gives_its_tasks(tmp_path: Path):
     (served,) = import_file(tmp_path / "w.yaml", unknown="free")
     (octile,) = import_file(tmp_path / "w.map", start=task.start, goal=task.goal, resolution=0.1)
     assert (served.start, served.goal) == (octile.start, octile.goal) == (task.start, task.goal)
-
-
-def test_unknown_cells_are_blocked_or_free(tmp_path):
-    with pytest.raises(FieldError, match=r"^unknown: must be blocked or free, got 'maybe'$"):
-        import_file(tmp_path / "w.yaml", unknown="maybe")

@@ -1,9 +1,5 @@
 """Maps of ROS's map_server: what a pixel means, the order of rows, and which files are refused."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -26,7 +22,7 @@ free_thresh: 0.196
 PGM = b"P5\n# by hand\n3 2\n255\n" + bytes([254, 205, 0, 254, 254, 254])
 
 
-def written(folder: Path, text: str = GOOD, image: bytes | None = PGM) -> Path:
+def written(folder, text=GOOD, image=PGM):
     if image is not None:
         (folder / "made.pgm").write_bytes(image)
     path = folder / "made.yaml"
@@ -34,12 +30,12 @@ def written(folder: Path, text: str = GOOD, image: bytes | None = PGM) -> Path:
     return path
 
 
-def rows_of(path: Path, **options: bool) -> list[list[int]]:
+def rows_of(path, **options):
     """1 where a cell is free, from the lowest row."""
     return read_map(path, **options).cells.free.astype(int).tolist()
 
 
-def test_the_images_last_row_is_the_lowest_and_unknown_cells_block(tmp_path: Path) -> None:
+def test_the_images_last_row_is_the_lowest_and_unknown_cells_block(tmp_path):
     served = read_map(written(tmp_path))
     assert served.cells.free.astype(int).tolist() == [[1, 1, 1], [1, 0, 0]]
     assert served.unknown == 1
@@ -53,9 +49,7 @@ def test_the_images_last_row_is_the_lowest_and_unknown_cells_block(tmp_path: Pat
 
 @given(st.integers(1, 6), st.integers(1, 6), st.data())
 @settings(max_examples=40)
-def test_cell_r_c_is_the_pixel_r_rows_from_below(
-    tmp_path_factory: pytest.TempPathFactory, rows: int, cols: int, data: st.DataObject
-) -> None:
+def test_cell_r_c_is_the_pixel_r_rows_from_below(tmp_path_factory, rows, cols, data):
     folder = tmp_path_factory.mktemp("flip")
     level = data.draw(
         st.lists(st.lists(st.integers(0, 255), min_size=cols, max_size=cols), min_size=rows, max_size=rows)
@@ -67,11 +61,11 @@ def test_cell_r_c_is_the_pixel_r_rows_from_below(
             assert free[r, c] == ((255 - level[rows - 1 - r][c]) / 255 < 0.196)
 
 
-def strip(*levels: int) -> bytes:
+def strip(*levels):
     return b"P5 %d 1 255\n" % len(levels) + bytes(levels)
 
 
-def test_thresholds_are_compared_strictly_as_map_server_does(tmp_path: Path) -> None:
+def test_thresholds_are_compared_strictly_as_map_server_does(tmp_path):
     # (255 - 204) / 255 is 0.2 to the last bit, (255 - 51) / 255 is 0.8.
     text = GOOD.replace("0.196", "0.2").replace("0.65", "0.8")
     path = written(tmp_path, text, strip(205, 204, 51, 50))
@@ -79,13 +73,13 @@ def test_thresholds_are_compared_strictly_as_map_server_does(tmp_path: Path) -> 
     assert rows_of(path, unknown_is_free=True) == [[1, 1, 1, 0]]
 
 
-def test_negate_turns_black_and_white_around(tmp_path: Path) -> None:
+def test_negate_turns_black_and_white_around(tmp_path):
     for word in ("1", "true"):
         path = written(tmp_path, GOOD.replace("negate: 0", f"negate: {word}"), strip(0, 49, 50, 255))
         assert rows_of(path) == [[1, 1, 0, 0]]
 
 
-def test_raw_shades_are_percent_and_never_negated(tmp_path: Path) -> None:
+def test_raw_shades_are_percent_and_never_negated(tmp_path):
     for negate in "01":
         text = GOOD.replace("negate: 0", f"negate: {negate}") + "mode: raw\n"
         path = written(tmp_path, text, strip(0, 19, 20, 65, 66, 100, 101, 255))
@@ -94,7 +88,7 @@ def test_raw_shades_are_percent_and_never_negated(tmp_path: Path) -> None:
         assert read_map(path).unknown == 4
 
 
-def test_what_is_not_opaque_is_unknown_in_scale_and_averaged_in_trinary(tmp_path: Path) -> None:
+def test_what_is_not_opaque_is_unknown_in_scale_and_averaged_in_trinary(tmp_path):
     pixels = np.array([[[255, 255], [255, 254], [0, 255], [0, 0]]], dtype=np.uint8)
     Image.fromarray(pixels).save(tmp_path / "made.png")
     text = GOOD.replace("made.pgm", "made.png")
@@ -105,7 +99,7 @@ def test_what_is_not_opaque_is_unknown_in_scale_and_averaged_in_trinary(tmp_path
     assert rows_of(written(tmp_path, text), unknown_is_free=True) == [[1, 1, 1, 0]]
 
 
-def test_colours_are_averaged_and_other_depths_understood(tmp_path: Path) -> None:
+def test_colours_are_averaged_and_other_depths_understood(tmp_path):
     path = written(tmp_path, image=b"P6 2 1 255\n" + bytes([255, 255, 255, 255, 255, 90]))
     assert rows_of(path) == [[1, 0]]
     assert rows_of(written(tmp_path, image=b"P2 3 1 65535\n65535 60000 0\n")) == [[1, 1, 0]]
@@ -117,11 +111,11 @@ def test_colours_are_averaged_and_other_depths_understood(tmp_path: Path) -> Non
     assert rows_of(written(tmp_path, GOOD.replace("made.pgm", "made.png"))) == [[1, 0]]
 
 
-def test_keys_of_other_tools_are_ignored(tmp_path: Path) -> None:
+def test_keys_of_other_tools_are_ignored(tmp_path):
     assert rows_of(written(tmp_path, GOOD + "name: office\n")) == [[1, 1, 1], [1, 0, 0]]
 
 
-def test_the_task_has_a_source_and_can_be_saved(tmp_path: Path) -> None:
+def test_the_task_has_a_source_and_can_be_saved(tmp_path):
     task = import_map_server(written(tmp_path), start=(-0.7, 2.2, 0.0), goal=(0.2, 2.2))
     assert task.world.name == "made"
     assert task.world.source == (
@@ -133,12 +127,26 @@ def test_the_task_has_a_source_and_can_be_saved(tmp_path: Path) -> None:
     assert load_task(tmp_path / "kept.yaml") == task
 
 
-def _without(key: str) -> str:
+def _without(key):
     return "".join(line for line in GOOD.splitlines(keepends=True) if not line.startswith(key))
 
 
-#: What is wrong: the YAML and the image.
-BAD: dict[str, tuple[str, bytes | None]] = {
+#: Changes of the YAML that make it wrong, and images that are none.
+CHANGES = {
+    "image is a number": ("made.pgm", "7"), "image is a folder": ("made.pgm", "."), "resolution 0": ("0.5", "0.0"),
+    "resolution text": ("0.5", "5e-2"), "resolution nan": ("0.5", ".nan"), "origin without yaw": (", 0.0]", "]"),
+    "negate 2": ("negate: 0", "negate: 2"), "threshold 65": ("0.65", "65"), "threshold below 0": ("0.196", "-0.1"),
+    "thresholds crossed": ("0.196", "0.7"), "mode": ("0.196", "0.196\nmode: binary"),
+    "bad ends": ("0.196", "0.196\nantdrive: {start: [0.0, 0.0]}"),
+}  # fmt: skip
+IMAGES = {
+    "no image": None, "no picture": b"hello", "wrong magic": PGM.replace(b"P5", b"P9"), "cut off": PGM[:-2],
+    "gif": b"GIF89a\x01\x00\x01\x00\x80\x00\x00", "cut off in plain": b"P2 3 2 255\n1 2 3",
+    "cut off in the header": b"P5\n3", "no pixels": b"P5\n0 2\n255\n", "word for a pixel": b"P2 3 1 255\n1 x 3",
+    "pixel too bright": b"P2 3 1 255\n1 600 3", "maxval": b"P5 3 1 0\n123", "huge": b"P5 9999 9999 255\n123",
+    "a bomb": b"P5 99999 99999 255\n123", "float pixels": b"Pf\n1 1\n-1.0\n\0\0\0\0", "nothing free": strip(0, 0),
+}  # fmt: skip
+BAD = {
     **{
         f"no {key}": (_without(key), PGM)
         for key in ("resolution", "origin", "negate", "occupied_thresh", "free_thresh")
@@ -146,37 +154,12 @@ BAD: dict[str, tuple[str, bytes | None]] = {
     "empty": ("", PGM),
     "a list": ("- 1\n", PGM),
     "a world": ("schema: 1\nbounds: [0, 0, 1, 1]\n", PGM),
-    "image is a number": (GOOD.replace("made.pgm", "7"), PGM),
-    "resolution 0": (GOOD.replace("0.5", "0.0"), PGM),
-    "resolution text": (GOOD.replace("0.5", "5e-2"), PGM),
-    "resolution nan": (GOOD.replace("0.5", ".nan"), PGM),
-    "origin without yaw": (GOOD.replace(", 0.0]", "]"), PGM),
-    "negate 2": (GOOD.replace("negate: 0", "negate: 2"), PGM),
-    "threshold 65": (GOOD.replace("0.65", "65"), PGM),
-    "threshold below 0": (GOOD.replace("0.196", "-0.1"), PGM),
-    "thresholds crossed": (GOOD.replace("0.196", "0.7"), PGM),
-    "mode": (GOOD + "mode: binary\n", PGM),
-    "bad ends": (GOOD + "antdrive: {start: [0.0, 0.0]}\n", PGM),
-    "no image": (GOOD, None),
-    "image is a folder": (GOOD.replace("made.pgm", "."), PGM),
-    "no picture": (GOOD, b"hello"),
-    "wrong magic": (GOOD, PGM.replace(b"P5", b"P9")),
-    "gif": (GOOD, b"GIF89a\x01\x00\x01\x00\x80\x00\x00"),
-    "cut off": (GOOD, PGM[:-2]),
-    "cut off in plain": (GOOD, b"P2 3 2 255\n1 2 3"),
-    "cut off in the header": (GOOD, b"P5\n3"),
-    "no pixels": (GOOD, b"P5\n0 2\n255\n"),
-    "word for a pixel": (GOOD, b"P2 3 1 255\n1 x 3"),
-    "pixel too bright": (GOOD, b"P2 3 1 255\n1 600 3"),
-    "maxval": (GOOD, b"P5 3 1 0\n123"),
-    "huge": (GOOD, b"P5 9999 9999 255\n123"),
-    "a bomb": (GOOD, b"P5 99999 99999 255\n123"),
-    "float pixels": (GOOD, b"Pf\n1 1\n-1.0\n\0\0\0\0"),
-    "nothing free": (GOOD, strip(0, 0)),
+    **{name: (GOOD.replace(*change), PGM) for name, change in CHANGES.items()},
+    **{name: (GOOD, image) for name, image in IMAGES.items()},
 }
 
 
-def test_a_turned_map_becomes_an_upright_world_that_knows_how_it_lies(tmp_path: Path) -> None:
+def test_a_turned_map_becomes_an_upright_world_that_knows_how_it_lies(tmp_path):
     """The same picture, upright and turned: same world, and the ends go the way that complex numbers turn."""
     turn, corner = 0.4, complex(2.0, -3.0)
     for name, origin in (("upright", "[0.0, 0.0, 0.0]"), ("turned", "[2.0, -3.0, 0.4]")):
@@ -205,7 +188,7 @@ def test_a_turned_map_becomes_an_upright_world_that_knows_how_it_lies(tmp_path: 
 
 
 @pytest.mark.parametrize("there", ["w.yaml", "w.pgm"])
-def test_an_export_replaces_no_file_unless_it_is_told_to(tmp_path: Path, there: str) -> None:
+def test_an_export_replaces_no_file_unless_it_is_told_to(tmp_path, there):
     (tmp_path / there).write_text("mine")
     with pytest.raises(InputError, match=rf"{there}: exists; name another file, or replace it with --force"):
         export_map_server(load_task("empty"), tmp_path / "w.yaml")

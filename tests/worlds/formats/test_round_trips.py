@@ -1,10 +1,7 @@
 """Worlds exported to other formats and imported again."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -38,7 +35,7 @@ SPOTS = st.floats(-40.0, 40.0)
 
 
 @st.composite
-def tasks(draw: st.DrawFn) -> Task:
+def tasks(draw):
     """Discs of any numbers beside a start and a goal that are free of them."""
     discs = draw(st.lists(st.builds(Disc, SPOTS, SPOTS, LENGTHS, LENGTHS), max_size=5))
     name = draw(st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=8))
@@ -50,7 +47,7 @@ def tasks(draw: st.DrawFn) -> Task:
 
 @given(tasks())
 @settings(max_examples=60)
-def test_sdf_out_and_in_is_the_same_task_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, task: Task) -> None:
+def test_sdf_out_and_in_is_the_same_task_to_the_last_bit(tmp_path_factory, task):
     path = tmp_path_factory.mktemp("sdf") / "w.sdf"
     export_sdf(task, path)
     again = import_sdf(path)
@@ -59,7 +56,7 @@ def test_sdf_out_and_in_is_the_same_task_to_the_last_bit(tmp_path_factory: pytes
 
 
 @pytest.mark.parametrize("name", list_worlds())
-def test_every_world_of_the_catalogue_comes_back_from_sdf(name: str, tmp_path: Path) -> None:
+def test_every_world_of_the_catalogue_comes_back_from_sdf(name, tmp_path):
     task = load_task(name)
     if task.world.movers:
         for export, file in ((export_sdf, "w.sdf"), (export_map_server, "w.yaml"), (export_movingai_map, "w.map")):
@@ -72,14 +69,14 @@ def test_every_world_of_the_catalogue_comes_back_from_sdf(name: str, tmp_path: P
     assert import_sdf(tmp_path / "w.world") == task
 
 
-def test_given_values_replace_those_that_an_exported_world_keeps(tmp_path: Path) -> None:
+def test_given_values_replace_those_that_an_exported_world_keeps(tmp_path):
     export_sdf(load_task("slalom"), tmp_path / "w.sdf")
     given = {"start": (1.0, 1.0, 0.5), "goal": (2.0, 1.0), "goal_tolerance": 0.125, "cell": 0.0625}
-    task = import_sdf(tmp_path / "w.sdf", **given)  # type: ignore[arg-type]
+    task = import_sdf(tmp_path / "w.sdf", **given)
     assert {key: getattr(task, key) for key in given} == given
 
 
-def test_an_exported_sdf_has_walls_a_floor_and_static_cylinders_on_it(tmp_path: Path) -> None:
+def test_an_exported_sdf_has_walls_a_floor_and_static_cylinders_on_it(tmp_path):
     world = World("w", (-1.0, -2.0, 3.0, 4.0), (Disc(0.5, 0.25, 0.3, 0.8),))
     export_sdf(Task(world, (-0.5, 0.0, 0.0), (2.0, 2.0)), tmp_path / "w.sdf")
     root = ET.parse(tmp_path / "w.sdf").getroot()
@@ -90,7 +87,6 @@ def test_an_exported_sdf_has_walls_a_floor_and_static_cylinders_on_it(tmp_path: 
     assert can.findtext("pose") == "0.5 0.25 0.4 0 0 0"
     for kind in ("collision", "visual"):
         shape = can.find(f"link/{kind}/geometry/cylinder")
-        assert shape is not None
         assert (shape.findtext("radius"), shape.findtext("length")) == ("0.3", "0.8")
     # The walls' inner faces are the bounds: each box ends there and reaches past the corners.
     faces = []
@@ -102,7 +98,7 @@ def test_an_exported_sdf_has_walls_a_floor_and_static_cylinders_on_it(tmp_path: 
     assert np.allclose(faces, [[-1.2, -1, -2, 4], [3, 3.2, -2, 4], [-1.2, 3.2, -2.2, -2], [-1.2, 3.2, 4, 4.2]])
 
 
-def test_without_its_own_element_an_exported_world_has_walls_that_cannot_be_imported(tmp_path: Path) -> None:
+def test_without_its_own_element_an_exported_world_has_walls_that_cannot_be_imported(tmp_path):
     path = tmp_path / "w.sdf"
     export_sdf(load_task("slalom"), path)
     lines = path.read_text().splitlines(keepends=True)
@@ -111,34 +107,9 @@ def test_without_its_own_element_an_exported_world_has_walls_that_cannot_be_impo
         import_sdf(path)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ('goal="10.0 10.0"', 'goal="10.0"', "antdrive:task: goal: must be 2 numbers, got '10.0'"),
-        ('goal="10.0 10.0"', 'goal="a b"', "antdrive:task: goal: must be 2 numbers, got 'a b'"),
-        ('goal="10.0 10.0"', 'goal="nan 1"', "goal: must be a finite number, got nan"),
-        ('goal="10.0 10.0"', 'goal="99 1"', "goal: (99, 1) is out of bounds"),
-        ('cell="0.5"', 'cell="-1"', "cell: must be greater than 0, got -1"),
-        ('cell="0.5"', 'cell="0.5', "not XML"),
-    ],
-)
-def test_a_damaged_task_element_gets_a_message_of_one_line(old: str, new: str, says: str, tmp_path: Path) -> None:
-    path = tmp_path / "w.sdf"
-    world = World("w", (0.0, 0.0, 11.0, 11.0), (Disc(5.0, 5.0, 0.5),))
-    export_sdf(Task(world, (1.0, 1.0, 0.0), (10.0, 10.0)), path)
-    assert path.read_text().count(old) == 1
-    path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(InputError) as caught:
-        import_sdf(path)
-    assert says in str(caught.value)
-    assert str(caught.value).isprintable()
-
-
 @given(worlds(), st.sampled_from([0.25, 0.3, 1.1]))
 @settings(max_examples=25)
-def test_map_server_out_and_in_is_the_same_cells(
-    tmp_path_factory: pytest.TempPathFactory, world: World, resolution: float
-) -> None:
+def test_map_server_out_and_in_is_the_same_cells(tmp_path_factory, world, resolution):
     path = tmp_path_factory.mktemp("map") / "it's a map.yaml"
     free = replace(world, obstacles=tuple(d for d in world.obstacles if math.hypot(d.x, d.y) > d.radius + 1))
     task = Task(free, (0.1, 0.1, 0.5), (0.3, 0.1), 0.125)
@@ -152,7 +123,7 @@ def test_map_server_out_and_in_is_the_same_cells(
         assert (again.start, again.goal, again.goal_tolerance) == (task.start, task.goal, task.goal_tolerance)
 
 
-def test_the_uppermost_row_of_the_image_is_the_worlds_uppermost(tmp_path: Path) -> None:
+def test_the_uppermost_row_of_the_image_is_the_worlds_uppermost(tmp_path):
     world = World("w", (0.0, 0.0, 3.0, 2.0), (Disc(0.5, 1.5, 0.2),))
     export_map_server(Task(world, (2.0, 0.5, 0.0), (1.0, 0.5)), tmp_path / "w.yaml", resolution=1.0)
     assert (tmp_path / "w.pgm").read_bytes() == b"P5\n3 2\n255\n" + bytes([0, 254, 254, 254, 254, 254])
@@ -162,9 +133,7 @@ def test_the_uppermost_row_of_the_image_is_the_worlds_uppermost(tmp_path: Path) 
 
 @given(worlds(), st.sampled_from([0.25, 0.3, 1.1]))
 @settings(max_examples=25)
-def test_movingai_out_and_in_is_the_same_cells(
-    tmp_path_factory: pytest.TempPathFactory, world: World, resolution: float
-) -> None:
+def test_movingai_out_and_in_is_the_same_cells(tmp_path_factory, world, resolution):
     path = tmp_path_factory.mktemp("map") / "w.map"
     free = replace(world, obstacles=tuple(d for d in world.obstacles if math.hypot(d.x, d.y) > d.radius + 1))
     cells = export_movingai_map(Task(free, (0.1, 0.1, 0.0), (0.3, 0.1)), path, resolution=resolution)
@@ -172,7 +141,7 @@ def test_movingai_out_and_in_is_the_same_cells(
     np.testing.assert_array_equal(import_movingai_map(path).free, cells.free)
 
 
-def test_problems_out_and_in_are_the_same(tmp_path: Path) -> None:
+def test_problems_out_and_in_are_the_same(tmp_path):
     problems = [
         MapProblem((2, 1), (0, 3), 3.5, "3.50000000", "w.map", 0),
         MapProblem((1, 1), (1, 2), 1.0, "1", "w.map", 0),
@@ -182,7 +151,7 @@ def test_problems_out_and_in_are_the_same(tmp_path: Path) -> None:
     assert import_movingai_problems(tmp_path / "w.scen") == problems
 
 
-def test_files_that_cannot_be_written_are_named(tmp_path: Path) -> None:
+def test_files_that_cannot_be_written_are_named(tmp_path):
     task = load_task("empty")
     (tmp_path / "file").write_text("")
     for export in (export_sdf, export_map_server, export_movingai_map):

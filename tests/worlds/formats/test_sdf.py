@@ -1,13 +1,11 @@
 """Gazebo worlds: which models become cylinders, and which files are refused."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from antdrive.base import InputError
-from antdrive.worlds import Disc, import_barn, import_sdf, load_task, point_clearance, save_task
+from antdrive.worlds import Disc, import_sdf, load_task, point_clearance, save_task
 
 GROUND = """
 <model name='ground_plane'><static>1</static><link name='link'><collision name='c'>
@@ -15,7 +13,7 @@ GROUND = """
 </collision></link></model>"""
 
 
-def cylinder(name="can", pose="0 0 0 0 0 0", link="", collision="", radius=0.5, length=1.0, static="true") -> str:
+def cylinder(name="can", pose="0 0 0 0 0 0", link="", collision="", radius=0.5, length=1.0, static="true"):
     return f"""
 <model name='{name}'><static>{static}</static><pose frame=''>{pose}</pose>
   <link name='link'>{f"<pose>{link}</pose>" if link else ""}
@@ -27,13 +25,13 @@ def cylinder(name="can", pose="0 0 0 0 0 0", link="", collision="", radius=0.5, 
 </model>"""
 
 
-def shape(tag: str, inside: str = "", name: str = "thing") -> str:
+def shape(tag, inside="", name="thing"):
     return f"""
 <model name='{name}'><static>1</static><link name='l'><collision name='c'>
   <geometry><{tag}>{inside}</{tag}></geometry></collision></link></model>"""
 
 
-def world(tmp_path: Path, *parts: str) -> Path:
+def world(tmp_path, *parts):
     path = tmp_path / "made.world"
     path.write_text(
         f"<?xml version='1.0'?><sdf version='1.6'><world name='default'>{GROUND}{''.join(parts)}</world></sdf>"
@@ -41,7 +39,7 @@ def world(tmp_path: Path, *parts: str) -> Path:
     return path
 
 
-def discs(path: Path, **options: object) -> tuple[Disc, ...]:
+def discs(path, **options):
     return import_sdf(path, bounds=(-50, -50, 50, 50), **options).world.obstacles
 
 
@@ -67,7 +65,7 @@ def test_two_tilts_that_cancel_leave_an_upright_cylinder(tmp_path):
 def test_composition_is_that_of_rotation_matrices(tmp_path):
     rng = np.random.default_rng(0)
 
-    def about(axis: int, angle: float) -> np.ndarray:
+    def about(axis, angle):
         c, s = math.cos(angle), math.sin(angle)
         i, j = [(1, 2), (2, 0), (0, 1)][axis]
         turn = np.eye(3)
@@ -80,11 +78,7 @@ def test_composition_is_that_of_rotation_matrices(tmp_path):
         turn = about(2, yaw) @ about(1, pitch) @ about(0, roll)
         # A link that turns back what its model turned, expressed as roll, pitch and yaw.
         back = turn.T
-        angles = (
-            math.atan2(back[2, 1], back[2, 2]),
-            -math.asin(back[2, 0]),
-            math.atan2(back[1, 0], back[0, 0]),
-        )
+        angles = (math.atan2(back[2, 1], back[2, 2]), -math.asin(back[2, 0]), math.atan2(back[1, 0], back[0, 0]))
         offset = rng.uniform(-2, 2, 3)
         pose = " ".join(map(str, [*place, roll, pitch, yaw]))
         link = " ".join(map(str, [*offset, *angles]))
@@ -94,11 +88,7 @@ def test_composition_is_that_of_rotation_matrices(tmp_path):
 
 
 def test_a_cylinder_is_as_high_as_its_top_above_the_floor(tmp_path):
-    parts = (
-        cylinder("a", "0 0 0 0 0 0"),
-        cylinder("b", "2 0 0 3.14159265 0 0"),
-        cylinder("c", "4 0 -0.5 0 0 0"),
-    )
+    parts = (cylinder("a", "0 0 0 0 0 0"), cylinder("b", "2 0 0 3.14159265 0 0"), cylinder("c", "4 0 -0.5 0 0 0"))
     assert [(d.x, d.height) for d in discs(world(tmp_path, *parts))] == [(0.0, 0.5), (2.0, 0.5)]
 
 
@@ -113,7 +103,7 @@ def test_several_links_collisions_and_nested_models_count(tmp_path):
     assert {(d.x, d.y) for d in discs(path)} == {(5.0, 1.0), (0.0, 0.0)}
 
 
-def state(body: str) -> str:
+def state(body):
     return f"<state world_name='default'>{body}</state>"
 
 
@@ -132,11 +122,9 @@ def test_poses_in_the_state_win(tmp_path):
 
 
 def test_the_scale_in_the_state_stretches(tmp_path):
-    scaled = "<model name='can'><pose>1 1 0 0 0 0</pose><scale>{}</scale></model>"
-    path = world(tmp_path, cylinder(), state(scaled.format("0.5 0.5 4")))
+    scaled = "<model name='can'><pose>1 1 0 0 0 0</pose><scale>0.5 0.5 4</scale></model>"
+    path = world(tmp_path, cylinder(), state(scaled))
     assert discs(path) == (Disc(1.0, 1.0, 0.25, 2.0),)
-    with pytest.raises(InputError, match=r"can \(scaled out of round\)"):
-        discs(world(tmp_path, cylinder(), state(scaled.format("0.5 0.6 1"))))
 
 
 def test_degrees_are_degrees(tmp_path):
@@ -146,21 +134,15 @@ def test_degrees_are_degrees(tmp_path):
 
 
 UNSUPPORTED = {
-    "box": shape("box", "<size>1 1 1</size>", "crate"),
-    "sphere": shape("sphere", "<radius>1</radius>", "ball"),
-    "mesh": shape("mesh", "<uri>model://x.dae</uri>", "statue"),
-    "tilted": cylinder("pisa", "0 0 0 0.1 0 0"),
+    "box": shape("box", "<size>1 1 1</size>", "crate"), "sphere": shape("sphere", "<radius>1</radius>", "ball"),
+    "mesh": shape("mesh", "<uri>model://x.dae</uri>", "statue"), "tilted": cylinder("pisa", "0 0 0 0.1 0 0"),
     "lying": cylinder("log", collision="0 0 0 0 1.5708 0"),
-    "standing plane": shape("plane", "<normal>1 0 0</normal>", "wall"),
-    "not static": cylinder("cart", static="0"),
+    "standing plane": shape("plane", "<normal>1 0 0</normal>", "wall"), "not static": cylinder("cart", static="0"),
     "other frame": cylinder("tied").replace("<pose frame=''>", "<pose relative_to='other'>"),
-    "short pose": cylinder("odd", "1 2 3"),
-    "pose of words": cylinder("odd", "a b c d e f"),
-    "infinite pose": cylinder("odd", "inf 0 0 0 0 0"),
-    "negative radius": cylinder("odd", radius=-1.0),
-    "included": "<include><uri>model://house</uri></include>",
-    "actor": "<actor name='walker'/>",
-}
+    "short pose": cylinder("odd", "1 2 3"), "pose of words": cylinder("odd", "a b c d e f"),
+    "infinite pose": cylinder("odd", "inf 0 0 0 0 0"), "negative radius": cylinder("odd", radius=-1.0),
+    "included": "<include><uri>model://house</uri></include>", "actor": "<actor name='walker'/>",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", UNSUPPORTED)
@@ -169,36 +151,18 @@ def test_models_that_are_not_upright_cylinders_can_be_skipped(case, tmp_path):
     assert discs(path, skip_unsupported=True) == (Disc(5.0, 5.0, 0.5),)
 
 
-def test_many_unsupported_models_are_counted(tmp_path):
-    parts = [shape("box", name=f"box{i}") for i in range(9)]
-    with pytest.raises(InputError, match=r"box0 \(box\), .*box4 \(box\) and 4 more$"):
-        discs(world(tmp_path, *parts))
-
-
 def test_the_usual_includes_are_ignored(tmp_path):
     includes = [f"<include><uri>model://{name}</uri></include>" for name in ("sun", "ground_plane")]
     assert len(discs(world(tmp_path, *includes, cylinder()))) == 1
 
 
 BAD_XML = {
-    "no xml": "hello",
-    "empty": "",
-    "cut off": "<sdf>\n<world>\n",
-    "no sdf": "<robot name='r'/>",
-    "no world": "<sdf version='1.6'><model name='m'/></sdf>",
-    "no cylinder": "<sdf><world name='w'/></sdf>",
+    "no xml": "hello", "empty": "", "cut off": "<sdf>\n<world>\n", "no sdf": "<robot name='r'/>",
+    "no world": "<sdf version='1.6'><model name='m'/></sdf>", "no cylinder": "<sdf><world name='w'/></sdf>",
     "entities": "<!DOCTYPE sdf [<!ENTITY a 'b'>]><sdf><world>&a;</world></sdf>",
-    "external entity": "<!DOCTYPE s SYSTEM 'file:///etc/passwd'><sdf/>",
-    "deep": "<a>" * 5000 + "</a>" * 5000,
+    "external entity": "<!DOCTYPE s SYSTEM 'file:///etc/passwd'><sdf/>", "deep": "<a>" * 5000 + "</a>" * 5000,
     "unknown encoding": "<?xml version='1.0' encoding='x-nothing'?><sdf/>",
-}
-
-
-def test_a_missing_file_and_a_folder_are_named(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere\.world: no such file"):
-        import_sdf(tmp_path / "nowhere.world")
-    with pytest.raises(InputError, match="is a directory; give an XML file"):
-        import_barn(tmp_path)
+}  # fmt: skip
 
 
 def test_without_bounds_the_robot_gets_room_around_the_cylinders(tmp_path):
@@ -213,14 +177,6 @@ def test_without_bounds_the_robot_gets_room_around_the_cylinders(tmp_path):
 def test_given_ends_are_inside_the_bounds(tmp_path):
     task = import_sdf(world(tmp_path, cylinder()), start=(9.0, 0.0, 0.0), goal=(0.0, -7.0))
     assert task.world.bounds == (-1.5, -8.0, 10.0, 1.5)
-
-
-def test_unusable_ends_are_named_with_the_file(tmp_path):
-    path = world(tmp_path, cylinder())
-    with pytest.raises(InputError, match=r"made\.world: start: \(0, 0\) is inside obstacles\[0\]"):
-        import_sdf(path, start=(0.0, 0.0, 0.0))
-    with pytest.raises(InputError, match=r"made\.world: bounds: must be"):
-        import_sdf(path, bounds=(1, 1, 0, 0))
 
 
 def test_an_imported_world_can_be_saved(tmp_path):

@@ -1,5 +1,6 @@
 """The table of commands. Each is a file, imported when the command is called; heavy modules are imported when it runs.
 
+A command returns its verdict, which is its exit code; nothing where it has none; or the code itself.
 The files do without `from __future__ import annotations`: typer needs the annotations' values.
 """
 
@@ -14,7 +15,7 @@ class Command(NamedTuple):
     """A command that is not imported yet."""
 
     module: str  # below `antdrive.cli.commands`
-    function: str  # in it; returns the exit code
+    function: str  # in it
     summary: str  # the first line of the function's docstring, for the list of commands
 
 
@@ -39,7 +40,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "export": Command("export", "export_drive", "Export a drive for Foxglove, RViz and spreadsheets."),
         "verify": Command("verify", "verify", "Certify drives again, from their logs alone."),
         "check": Command("check", "check", "Drive suites and compare with their baselines."),
-        "accept": Command("accept", "accept", "Drive suites and write their baselines."),
+        "accept": Command("check", "accept", "Drive suites and write their baselines."),
         "margin": Command("margin", "margin", "Break a drive's safety margin down by cause."),
         "find-margin": Command("find_margin", "find_margin", "Find the least margin with which all drives are safe."),
         "falsify": Command("falsify", "falsify", "Look for worlds where a set-up fails."),
@@ -52,26 +53,20 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
 )
 WORLDS: Mapping[str, Command] = MappingProxyType(
     {
-        "list": Command("worlds.list", "list_worlds", "List the worlds in the catalogue."),
-        "show": Command("worlds.show", "show_world", "Describe a world, and whether a robot can cross it."),
-        "generate": Command("worlds.generate", "generate_world", "Write a random world."),
-        "import": Command(
-            "worlds.import_", "import_world", "Turn a world or map of another program into a world file."
-        ),
-        "export": Command("worlds.export", "export_world", "Write a world for another program."),
+        "list": Command("worlds", "list_worlds", "List the worlds in the catalogue."),
+        "show": Command("worlds", "show_world", "Describe a world, and whether a robot can cross it."),
+        "generate": Command("worlds", "generate_world", "Write a random world."),
+        "import": Command("worlds", "import_world", "Turn a world or map of another program into a world file."),
+        "export": Command("worlds", "export_world", "Write a world for another program."),
     }
 )
 #: `antdrive robots` alone lists, and `antdrive robots NAME` prints.
 ROBOTS: Mapping[str, Command] = MappingProxyType(
     {
-        "list": Command("robots.list", "list_all", "List the robots in the catalogue."),
-        "print": Command(
-            "robots.print_", "print_robot", "Print the file of a robot in the catalogue, to start another from."
-        ),
-        "show": Command("robots.show", "show_robot", "Describe a robot, and draw it from above."),
-        "import": Command(
-            "robots.import_", "import_robot", "Write the robot file of a differential-drive robot in URDF."
-        ),
+        "list": Command("robots", "list_all", "List the robots in the catalogue."),
+        "print": Command("robots", "print_robot", "Print the file of a robot in the catalogue, to start another from."),
+        "show": Command("robots", "show_robot", "Describe a robot, and draw it from above."),
+        "import": Command("robots", "import_robot", "Write the robot file of a differential-drive robot in URDF."),
     }
 )
 #: Groups of commands with the line that lists them.

@@ -1,43 +1,22 @@
 """`antdrive barn`."""
 
-import math
-import sys
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.campaigns import OPTIONS
-from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, campaign_bar, print_error, print_json, print_line, print_table
-from antdrive.cli.exits import FAILED, SUCCEEDED
+from antdrive.cli.campaigns import OPTIONS, resumable
+from antdrive.cli.console import bar, campaign_bar, show, table
+from antdrive.cli.options import argument, flag, option
+from antdrive.cli.warm import compile_once
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
-    import pyarrow
-
     from antdrive.runs.barn import BarnLine
     from antdrive.runs.campaigns.results import SweepResults
     from antdrive.runs.statistics.price import Price
-
-Source = Annotated[
-    Path, typer.Argument(metavar="FOLDER", help="Folder with the challenge's world_N.world files, or their archive.")
-]
-WithMap = Annotated[
-    bool,
-    typer.Option("--with-map", help="Drive each run with the map, too, and print what not knowing it costs."),
-]
-Trials = Annotated[int, typer.Option(min=1, max=10_000, metavar="NUMBER", help="How often each world is driven.")]
-Films = Annotated[
-    bool,
-    typer.Option("--film", help="Film each run that did not arrive, into OUT/films; its cause is in the picture."),
-]
-Out = Annotated[
-    Path,
-    typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results; what is there is not driven again."),
-]
 
 
 @options.with_settings(
@@ -47,17 +26,23 @@ Out = Annotated[
     localisation="matching",
 )
 def barn(
-    source: Source,
-    with_map: WithMap = False,
+    source: Annotated[Path, argument("FOLDER", "Folder with the challenge's world_N.world files, or their archive.")],
+    with_map: Annotated[
+        bool, flag("Drive each run with the map, too, and print what not knowing it costs.", "--with-map")
+    ] = False,
     planner: options.Planner = "astar",
     robot: options.Robot = "jackal",
-    trials: Trials = 10,
+    trials: Annotated[int, option("NUMBER", "How often each world is driven.", min=1, max=10_000)] = 10,
     jobs: options.Jobs = None,
-    out: Out = Path("out/barn"),
-    films: Films = False,
+    out: Annotated[Path, option("FOLDER", "Folder for the results; what is there is not driven again.")] = Path(
+        "out/barn"
+    ),
+    films: Annotated[
+        bool, flag("Film each run that did not arrive, into OUT/films; its cause is in the picture.", "--film")
+    ] = False,
     json: options.Json = False,
     **given: Any,
-) -> int:
+) -> bool:
     """Drive the BARN challenge's worlds and print its table.
 
     Exit code 0: all runs are done, whatever came out of them. The same command goes on after an interruption.
@@ -79,89 +64,53 @@ def barn(
     data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
     compile_once()
-    try:
-        with campaign_bar("driving") as progress:
-            results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress)
-    except KeyboardInterrupt:
-        print_error(f"{out}: what is done is kept; go on with: antdrive {' '.join(sys.argv[1:])}")
-        raise
+    with resumable(out), campaign_bar("driving") as progress:
+        results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress)
     runs, fastest = challenge.by_map(results.table), challenge.reference_times(folder)
     found = list(challenge.lines(runs[map], fastest))
     known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
     (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)
     if not json:
-        _print(found, known, price)  # before the films, which take long and may fail
+        show(json, None, _lines(found, known, price))  # before the films, which take long and may fail
     filmed = _films(results, out / "films") if films else {}
-    if json:
-        print_json(_facts(results, found, known, price, filmed))
-    else:
-        _print_failures(runs[map], filmed)
-    return SUCCEEDED if results.complete else FAILED
+    facts = {
+        "folder": str(results.folder),
+        "note": challenge.OURS,
+        "worlds": [vars(line) for line in found[:-1]],
+        "all": vars(found[-1]),
+        "published": [vars(entry) for entry in challenge.PUBLISHED],
+        "films": [str(path) for path in filmed.values()],
+        **({"with_map": vars(known), "price_of_not_knowing": price.as_dict()} if known and price else {}),
+    }
+    failed = (row for row in runs[map].to_pylist() if not row["succeeded"])
+    show(json, facts, (_failure_line(row, filmed) for row in failed))
+    return results.complete
 
 
 def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
     """Film what did not arrive; the films by the keys of the runs."""
-    from antdrive.views.film.failures import film_failures
+    from antdrive.views.film.video import film_failures
 
     with bar("filming failures") as progress:
         return film_failures(results.table.to_pylist(), results.folder, folder, progress=progress)
 
 
-def _facts(
-    results: "SweepResults",
-    found: "list[BarnLine]",
-    known: "BarnLine | None",
-    price: "Price | None",
-    films: "dict[str, Path]",
-) -> dict[str, object]:
-    from antdrive.runs.barn import OURS, PUBLISHED
+def _lines(found: "Sequence[BarnLine]", known: "BarnLine | None", price: "Price | None") -> Iterator[str]:
+    from antdrive.runs.barn import HEADS, OURS, PUBLISHED, PUBLISHED_HEADS
 
-    return {
-        "folder": str(results.folder),
-        "note": OURS,
-        "worlds": [vars(line) for line in found[:-1]],
-        "all": vars(found[-1]),
-        "published": [vars(entry) for entry in PUBLISHED],
-        "films": [str(path) for path in films.values()],
-        **({"with_map": vars(known), "price_of_not_knowing": price.as_dict()} if known and price else {}),
-    }
-
-
-def _print(found: "list[BarnLine]", known: "BarnLine | None", price: "Price | None") -> None:
-    from antdrive.runs.barn import OURS, PUBLISHED
-
-    heads = ("world", "runs", "certified", "mean time [s]", "mean score")
-    listed = [*((line.world, line) for line in found), *([("all, with the map", known)] if known else [])]
-    print_table(
-        heads,
-        (
-            (name, str(line.runs), str(line.arrived), _number(line.seconds, 2), _number(line.score, 4))
-            for name, line in listed
-        ),
-    )
-    print_line("")
+    listed = [*found, *([dataclasses.replace(known, world="all, with the map")] if known else [])]
+    yield from table(HEADS, (line.cells for line in listed))
+    yield ""
     if price:
-        print_line(price.sentence)
-        print_line("")
-    rows = (
-        (entry.who, _number(100 * entry.success, 0), _number(entry.seconds, 2), _number(entry.score, 4), entry.where)
-        for entry in PUBLISHED
-    )
-    print_table(("published", "success [%]", "mean time [s]", "mean score", "where"), rows)
+        yield price.sentence
+        yield ""
+    yield from table(PUBLISHED_HEADS, (entry.cells for entry in PUBLISHED))
     for source in dict.fromkeys(entry.source for entry in PUBLISHED):
-        print_line(f"  {', '.join(entry.who for entry in PUBLISHED if entry.source == source)}: {source}")
-    print_line("")
-    print_line(OURS)
+        yield f"  {', '.join(entry.who for entry in PUBLISHED if entry.source == source)}: {source}"
+    yield ""
+    yield OURS
 
 
-def _print_failures(runs: "pyarrow.Table", films: "dict[str, Path]") -> None:
-    for row in runs.select(["key", "world", "seed", "succeeded", "outcome", "reason", "rollout"]).to_pylist():
-        if not row["succeeded"]:
-            print_line(
-                f"  {row['world']}, seed {row['seed']}: {row['outcome']}  {row['reason'] or ''}  "
-                f"{films.get(row['key'], row['rollout'] or '')}"
-            )
-
-
-def _number(value: float, digits: int) -> str:
-    return "–" if math.isnan(value) else f"{value:.{digits}f}"
+def _failure_line(row: Mapping[str, Any], films: Mapping[str, Path]) -> str:
+    where = f"  {row['world']}, seed {row['seed']}: {row['outcome']}  {row['reason'] or ''}"
+    return f"{where}  {films.get(row['key'], row['rollout'] or '')}"

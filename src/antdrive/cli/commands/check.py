@@ -1,29 +1,41 @@
-"""`antdrive check`."""
+"""`antdrive check` and `antdrive accept`."""
 
-import os
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast, get_args
 
-import typer
+from antdrive.base.errors import FieldError, InputError
+from antdrive.cli import options
+from antdrive.cli.console import bar, print_error, print_line, show
+from antdrive.cli.exits import FAILED, FAULT, SUCCEEDED, WRONG_INPUT
+from antdrive.cli.options import argument, flag, option
+from antdrive.cli.scenario import with_chosen_margin
+from antdrive.cli.warm import compile_once
 
-from antdrive.cli import options, suites
-from antdrive.cli.console import print_error
-from antdrive.cli.suites import drive_suites, print_result, print_summary, results_in, unused_baselines
+if TYPE_CHECKING:
+    from antdrive.cli.testing.checking import CheckResult, Update
+    from antdrive.views.artefacts import Films
 
-Junit = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Write the results as JUnit XML, which CI services read.")
+Suites = Annotated[
+    list[str],
+    argument("SUITE", "Suites (*.drive.yaml), folders with suites, SUITE::scenario or SUITE::scenario[seed]."),
 ]
-Strict = Annotated[bool, typer.Option("--strict", help="Fail if there are baselines that belong to no test.")]
+Only = Annotated[str | None, option("PATTERN", "Only scenarios whose name matches, such as 'aisle-*'.")]
+ResultsFolder = Annotated[
+    Path | None, option("FOLDER", "Folder for logs, pictures and films of tests.  [default: in the user's cache]")
+]
+Film = Annotated[str, option("WHEN", "Of which tests a film is made: never, failed or always.")]
 
 
 def check(
-    tests: suites.Suites,
-    only: suites.Only = None,
+    tests: Suites,
+    only: Only = None,
     jobs: options.Jobs = None,
-    results: suites.ResultsFolder = None,
-    film: suites.Film = "failed",
-    junit: Junit = None,
-    strict: Strict = False,
+    results: ResultsFolder = None,
+    film: Film = "failed",
+    junit: Annotated[Path | None, option("FILE", "Write the results as JUnit XML, which CI services read.")] = None,
+    strict: Annotated[bool, flag("Fail if there are baselines that belong to no test.", "--strict")] = False,
     json: options.Json = False,
 ) -> int:
     """Drive suites and compare with their baselines.
@@ -31,22 +43,98 @@ def check(
     Exit code 0: every drive is as its suite expects, and none is worse than its baseline.
     """
     from antdrive.cli.testing.summary import add_to_page, drives_in, properties, save_junit
+    from antdrive.cli.testing.unused import unused_beside
 
-    found = drive_suites(
-        tests,
-        only,
-        jobs,
-        update="",
-        results=results_in(results, film),
-        show=lambda result: None if json else print_result(result, "passed"),
-    )
-    unused = unused_baselines(tests)
+    found = drive_suites(tests, only, jobs, "", results, film, json=json)
+    unused = unused_beside(tests)
     if junit is not None:
         save_junit(found, junit)
-    page = os.environ.get("GITHUB_STEP_SUMMARY")
-    if page:
-        drives = [drive for result in found for drive in drives_in(properties(result))]
-        problem = add_to_page(page, drives, unused)
-        if problem:
-            print_error(problem)
-    return print_summary(found, json, unused, strict=strict)
+    add_to_page((drive for result in found for drive in drives_in(properties(result))), unused, print_error)
+    return _summarise(found, json, unused, strict=strict)
+
+
+def accept(
+    tests: Suites,
+    only: Only = None,
+    new: Annotated[bool, flag("Write missing baselines only.", "--new")] = False,
+    jobs: options.Jobs = None,
+    results: ResultsFolder = None,
+    film: Film = "failed",
+    json: options.Json = False,
+) -> int:
+    """Drive suites and write their baselines.
+
+    A drive that is not as its suite expects is not accepted; its log, pictures and film say why. Exit code 0: every drive was
+    accepted.
+    """
+    from antdrive.cli.testing.unused import unused_beside
+
+    found = drive_suites(tests, only, jobs, "new" if new else "all", results, film, json=json)
+    return _summarise(found, json, unused_beside(tests))
+
+
+def drive_suites(
+    suites: list[str],
+    only: str | None,
+    jobs: int | None,
+    update: "Update",
+    folder: Path | None,
+    film: str,
+    *,
+    json: bool,
+) -> "list[CheckResult]":
+    """Drive and judge all tests that the words name, with a progress bar, and print what comes out of each."""
+    from antdrive.cli.testing import check_cases
+    from antdrive.runs.pool import cores
+    from antdrive.runs.suites import scenario_of, select
+    from antdrive.views.artefacts import Films, Results, default_folder
+    from antdrive.views.folder import check_folder
+
+    if film not in get_args(Films):
+        raise InputError(f"--film {film}: unknown; choose from {', '.join(get_args(Films))}")
+    if folder is not None:
+        check_folder(folder)
+    results = Results(folder or default_folder(Path.cwd()), cast("Films", film))
+    cases = select(suites, only)
+    compile_once()
+    for case in cases:
+        if case.given.get("margin") == "auto":  # chosen once and with a bar, not by each process
+            with suppress(InputError, FieldError):  # is told as the fault of the test
+                scenario_of(case, with_chosen_margin)
+    processes = min(jobs or cores(), len(cases))
+    found = []
+    with bar("driving") as progress:
+        for result in check_cases(cases, jobs=processes, update=update, results=results):
+            found.append(result)
+            if not json:
+                _print(result)
+            progress(len(found) / len(cases))
+    return found
+
+
+def _print(result: "CheckResult") -> None:
+    """Print what came out of one test."""
+    print_line(f"{result.address}: {(result.accepted or 'passed') if result.passed else 'FAILED'}")
+    for line in result.gains if result.passed else result.message.splitlines():
+        print_line(f"  {line}")
+
+
+def _summarise(results: "list[CheckResult]", json: bool, unused: Sequence[str], *, strict: bool = False) -> int:
+    """Print how many tests passed, and unused baselines; the exit code, which is that of the worst test."""
+    from antdrive.cli.testing.checking import FAULT as INTERNAL
+    from antdrive.cli.testing.checking import WRONG_INPUT as WRONG
+    from antdrive.cli.testing.summary import films_left_out, unused_lines
+
+    failed = [result for result in results if not result.passed]
+    worst = {WRONG: WRONG_INPUT, INTERNAL: FAULT}
+    code = max((worst.get(result.outcome, FAILED) for result in failed), default=SUCCEEDED)
+    if strict and unused:
+        code = max(code, FAILED)
+    better = sum(bool(result.gains) and result.passed for result in results)
+    gained = f"; {better} better than the baseline; antdrive accept renews it" if better else ""
+    unfilmed = sum(result.unfilmed for result in results)
+    lines = [*unused_lines(unused, strict), f"{len(results) - len(failed)} of {len(results)} passed{gained}"]
+    lines += [films_left_out(unfilmed, "--film always")] if unfilmed else []
+    tests = [result.as_dict() for result in results]
+    show(json, {"passed": code == SUCCEEDED, "tests": tests, "unused": list(unused)}, lines)
+    return code

@@ -1,6 +1,7 @@
 """`antdrive compare`."""
 
-from collections.abc import Mapping, Sequence
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,192 +10,122 @@ import typer
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
 from antdrive.cli import options
-from antdrive.cli.campaign_tables import Against, Allow, Metrics, Where, campaigns_of_words, compare_campaigns
-from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import planning, print_error, print_files, print_json, print_line, print_table, this_command
+from antdrive.cli.campaign_tables import Questions, campaigns_of_words, compare_campaigns
+from antdrive.cli.console import file_lines, planning, print_error, show, table
 from antdrive.cli.entrants import Entrant, check_worlds, entrants_of, repeating
-from antdrive.cli.exits import FAILED, SUCCEEDED
-from antdrive.cli.output import film_drives
-from antdrive.cli.scenario import chosen_task, ends_words, make_scenario
+from antdrive.cli.options import argument, option
+from antdrive.cli.output import film_drives, results_folder
+from antdrive.cli.scenario import Ends, Setup
 from antdrive.runs.comparing import COMPARED, Compared, difference_cells, differences, mark_of, same_drives
-from antdrive.runs.folder import free_folder, opened
-from antdrive.views.folder import (
-    check_film,
-    check_folder,
-    write_result,
-    write_run,
-)
+from antdrive.views.folder import check_film, check_folder, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
+    from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
-    from antdrive.worlds import Task
 
 MARKER = "comparison.json"
-Worlds = Annotated[
-    list[str],
-    typer.Argument(metavar="WORLD...", help="Names of worlds in the catalogue, or world files; or campaigns' folders."),
-]
-Planners = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--planner",
-        "-p",
-        metavar="NAME",
-        help="Planner; repeat it for two to six of them. LABEL=NAME gives it a label, so that one planner can be "
-        "compared with other options of its own.",
-    ),
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        "-s",
-        metavar="GROUP.KEY=VALUE",
-        help="Set an option: of one planner by its name or label, such as aco-han.ants=50; of all with planner.ants=50; "
-        "or of the controller, such as controller.lookahead_time=0.5. May be repeated.",
-    ),
-]
-Seeds = Annotated[
-    int, typer.Option(min=1, max=10_000, metavar="NUMBER", help="Number of seeds for each world, from --seed on.")
-]
 
 
 @options.with_settings(("smoothing", "noise", "margin", "cell", "seed"))
 def compare(
+    *,
     context: typer.Context,
-    worlds: Worlds,
-    planner: Planners = None,
-    settings: Settings = None,
+    worlds: Annotated[
+        list[str], argument("WORLD...", "Names of worlds in the catalogue, or world files; or campaigns' folders.")
+    ],
+    planner: Annotated[
+        list[str] | None,
+        option(
+            "NAME",
+            "Planner; repeat it for two to six of them. LABEL=NAME gives it a label, so that one planner can be "
+            "compared with other options of its own.",
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        option(
+            "GROUP.KEY=VALUE",
+            "Set an option: of one planner by its name or label, such as aco-han.ants=50; of all with planner.ants=50; "
+            "or of the controller, such as controller.lookahead_time=0.5. May be repeated.",
+            "--set",
+            "-s",
+        ),
+    ] = None,
     robot: options.Robot = "turtlebot",
-    seeds: Seeds = 1,
-    task: options.TaskName = None,
-    start: options.Start = None,
-    goal: options.Goal = None,
-    frame: options.Frame = "world",
+    seeds: Annotated[int, option("NUMBER", "Number of seeds for each world, from --seed on.", min=1, max=10_000)] = 1,
+    ends: Ends,
     out: options.Out = None,
     figures: options.Figures = True,
     film: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Film the first world's drives side by side: .mp4, .gif or .webp."),
+        Path | None, option("FILE", "Film the first world's drives side by side: .mp4, .gif or .webp.")
     ] = None,
     speed: options.Speed = 1.0,
-    metric: Metrics = None,
-    against: Against = None,
-    allow: Allow = None,
-    where: Where = None,
+    asked: Questions,
     json: options.Json = False,
     **given: Any,
-) -> int:
+) -> bool:
     """Compare planners: drive worlds with each, or read a campaign.
 
     The planners are paired by world and seed. Figures and film show the first of them. Exit code 0: every run succeeded.
     Folders of campaigns, made by `antdrive sweep`: success with intervals, outcomes, and tests of every pair.
     """
-    if campaigns := campaigns_of_words(worlds, context):
-        return compare_campaigns(campaigns, planner or (), metric, against, allow, where, json)
+    if campaigns := campaigns_of_words(worlds, context, asked):
+        compare_campaigns(campaigns, planner or (), asked, json)
+        return True
     check_worlds(worlds)
     entrants = entrants_of(planner, settings)
-    tasks = {world: chosen_task(world, task, start, goal, frame) for world in worlds}
-    scenarios = _scenarios(worlds, tasks, entrants, robot, given)
+    tasks = {world: ends.of(world) for world in worlds}
+    scenarios = {
+        (world, entrant): Setup(entrant.name, list(entrant.settings), robot).scenario(tasks[world], given)
+        for world in worlds
+        for entrant in entrants
+    }
+    names = {world: scenario.task.world.name for (world, _), scenario in scenarios.items()}
+    if len(set(names.values())) < len(worlds):
+        raise InputError(f"{' '.join(worlds)}: name worlds with different names, each once")
     cases = [(world, number) for world in worlds for number in range(given["seed"], given["seed"] + seeds)]
-    default, mark = _default_folder(scenarios, cases)
-    folder = out or default
-    _make_ready(folder, film)
-    with opened(folder, MARKER):
-        facts = {"fingerprint": mark, "command": this_command()}
-        runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal, frame))
+    if film is not None:
+        check_film(film)
+    marks = {f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}
+    mark = mark_of(marks, [(names[world], number) for world, number in cases])
+    usual = Path("out") / file_name(f"compare-{'-'.join(names.values())}"[:100])
+    with results_folder(out, usual, MARKER, mark, told=False) as (folder, facts):
+        runs: list[Compared] = []
+        logs: dict[str, Rollout] = {}
+        for world, seed in cases:
+            part = folder if len(cases) == 1 else folder / file_name(f"{names[world]}-{seed}")
+            is_first = (world, seed) == cases[0]
+            for entrant in entrants:
+                scenario = dataclasses.replace(scenarios[world, entrant], seed=seed)
+                result = _drive(scenario, entrant, part / entrant.label)
+                if not runs:  # an interrupted comparison leaves the results that it has, marked as its own
+                    write_json(folder / MARKER, facts)
+                written = write_run(result, part / entrant.label, figures=figures and is_first)
+                write_result(result, written, repeating(scenario, entrant, world, robot, ends.words))
+                runs.append(Compared.of(entrant.label, result, folder=str(part / entrant.label)))
+                if is_first and result.rollout is not None:
+                    logs[entrant.label] = result.rollout
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, film, speed, figures)
         told = {"differences": differences(runs), "same": same_drives(runs, given["smoothing"])}
         told["drives"] = [{"label": run.label, **run.facts} for run in runs]
         write_json(folder / MARKER, {**facts, **told})
-    if json:
-        print_json({"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **told, "files": files})
-    else:
-        _print(runs, len(cases), told, files)
-    _warn_of_few(len(logs))
-    return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
-
-
-def _make_ready(folder: Path, film: Path | None) -> None:
-    """Refuse places where nothing can be written, before anything is driven, and compile the kernels."""
-    if film is not None:
-        check_film(film)
-    check_folder(folder)
-    compile_once()
-
-
-def _warn_of_few(drives: int) -> None:
-    """Say why there is no figure and no film, if fewer than two planners drove."""
-    if drives < 2:
-        found = "only one planner" if drives else "no planner"
+    results = {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **told, "files": files}
+    show(json, results, _lines(runs, len(cases) > 1, told, files))
+    if len(logs) < 2:
+        found = "only one planner" if logs else "no planner"
         print_error(f"{found} found a path: there is nothing to compare in a figure or film")
+    return all(run.facts["succeeded"] for run in runs)
 
 
-def _scenarios(
-    worlds: Sequence[str],
-    tasks: "Mapping[str, str | Task]",
-    entrants: Sequence[Entrant],
-    robot: str,
-    given: Mapping[str, Any],
-) -> "dict[tuple[str, Entrant], Scenario]":
-    """The scenario of every world, as given, and planner, with the first seed."""
-    scenarios = {
-        (world, entrant): make_scenario(tasks[world], entrant.name, list(entrant.settings), robot, given)
-        for world in worlds
-        for entrant in entrants
-    }
-    if len({scenario.task.world.name for scenario in scenarios.values()}) < len(worlds):
-        raise InputError(f"{' '.join(worlds)}: name worlds with different names, each once")
-    return scenarios
+def _drive(scenario: "Scenario", entrant: Entrant, folder: Path) -> "Run":
+    """Drive with a progress bar, if the results can be written."""
+    from antdrive.sim.pipeline import run
 
-
-def _default_folder(
-    scenarios: "dict[tuple[str, Entrant], Scenario]", cases: Sequence[tuple[str, int]]
-) -> tuple[Path, str]:
-    """The folder of a comparison for which none is given, and the fingerprint of the comparison."""
-    names = {world: scenario.task.world.name for (world, _), scenario in scenarios.items()}
-    marks = {f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}
-    mark = mark_of(marks, [(names[world], number) for world, number in cases])
-    name = file_name(f"compare-{'-'.join(names.values())}"[:100])
-    return free_folder(Path("out") / name, MARKER, mark), mark
-
-
-def _drive(
-    scenarios: "dict[tuple[str, Entrant], Scenario]",
-    cases: Sequence[tuple[str, int]],
-    folder: Path,
-    robot: str,
-    figures: bool,
-    facts: dict[str, str],
-    ends: Sequence[str],
-) -> "tuple[list[Compared], dict[str, Rollout]]":
-    """Drive every case with every planner, each into its folder; the runs, and the logs of the first case by label."""
-    import dataclasses
-
-    from antdrive.sim.pipeline import run as drive
-
-    runs: list[Compared] = []
-    logs: dict[str, Rollout] = {}
-    for place, (world, seed) in enumerate(cases):
-        for (of, entrant), base in scenarios.items():
-            if of != world:
-                continue
-            scenario = dataclasses.replace(base, seed=seed)
-            part = folder if len(cases) == 1 else folder / file_name(f"{base.task.world.name}-{seed}")
-            check_folder(part / entrant.label)
-            with planning(f"{base.task.world.name}, seed {seed}: {entrant.label}"):
-                result = drive(scenario)
-            if not runs:  # an interrupted comparison leaves the results that it has, marked as its own
-                write_json(folder / MARKER, facts)
-            written = write_run(result, part / entrant.label, figures=figures and place == 0)
-            write_result(result, written, repeating(scenario, entrant, world, robot, ends))
-            kept = Compared.of(entrant.label, result)
-            runs.append(dataclasses.replace(kept, facts={**kept.facts, "folder": str(part / entrant.label)}))
-            if place == 0 and result.rollout is not None:
-                logs[entrant.label] = result.rollout
-    return runs, logs
+    check_folder(folder)
+    with planning(f"{scenario.task.world.name}, seed {scenario.seed}: {entrant.label}"):
+        return run(scenario)
 
 
 def _views(logs: "dict[str, Rollout]", folder: Path, film: Path | None, speed: float, figures: bool) -> dict[str, str]:
@@ -210,9 +141,8 @@ def _views(logs: "dict[str, Rollout]", folder: Path, film: Path | None, speed: f
     return files
 
 
-def _print(runs: list[Compared], cases: int, told: dict[str, Any], files: dict[str, str]) -> None:
-    many = cases > 1
-    print_table(
+def _lines(runs: Sequence[Compared], many: bool, told: Mapping[str, Any], files: Mapping[str, str]) -> Iterator[str]:
+    yield from table(
         (*(("world", "seed") if many else ()), "planner", *COMPARED.values(), "outcome"),
         (
             (*((run.world, str(run.seed)) if many else ()), run.label, *run.cells, str(run.facts["sentence"]))
@@ -220,8 +150,8 @@ def _print(runs: list[Compared], cases: int, told: dict[str, Any], files: dict[s
         ),
     )
     if many:
-        print_line(f"differences from {runs[0].label}, of the pairs in which both succeeded: median (least to most)")
-        print_table(("planner", "succeeded", "pairs", *COMPARED.values()), map(difference_cells, told["differences"]))
-    for sentence in told["same"]:
-        print_line(sentence)
-    print_files(files)
+        yield f"differences from {runs[0].label}, of the pairs in which both succeeded: median (least to most)"
+        heads = ("planner", "succeeded", "pairs", *COMPARED.values())
+        yield from table(heads, map(difference_cells, told["differences"]))
+    yield from told["same"]
+    yield from file_lines(files)

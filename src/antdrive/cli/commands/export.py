@@ -3,32 +3,27 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli import options
-from antdrive.cli.console import print_files, print_json
-from antdrive.cli.exits import SUCCEEDED
+from antdrive.cli.console import file_lines, show
+from antdrive.cli.options import flag, option
 from antdrive.cli.parse import log_at
 
 
 def export_drive(
-    rollout: Annotated[Path, typer.Argument(metavar="ROLLOUT", help="Log of a drive, or the folder of a run.")],
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="PATH", help="The .mcap file, or a new folder for rosbag2 and csv."),
-    ],
-    to: Annotated[str, typer.Option("--to", metavar="KIND", help="mcap, rosbag2 or csv.")] = "mcap",
-    force: Annotated[bool, typer.Option("--force", help="Replace an .mcap file and a layout that exist.")] = False,
+    rollout: options.Log,
+    out: Annotated[Path, option("PATH", "The .mcap file, or a new folder for rosbag2 and csv.")],
+    to: Annotated[str, option("KIND", "mcap, rosbag2 or csv.", "--to")] = "mcap",
+    force: Annotated[bool, flag("Replace an .mcap file and a layout that exist.", "--force")] = False,
     scans: Annotated[
         bool,
-        typer.Option(
+        flag(
+            "Whether a bag has what the robot's lidar would have measured, where the log holds no scans.",
             "--scans/--no-scans",
-            help="Whether a bag has what the robot's lidar would have measured, where the log holds no scans.",
         ),
     ] = True,
     json: options.Json = False,
-) -> int:
+) -> None:
     """Export a drive for Foxglove, RViz and spreadsheets.
 
     mcap and rosbag2 hold ROS 2 messages, without ROS; they need antdrive[ros].
@@ -42,8 +37,4 @@ def export_drive(
     except FieldError as error:
         raise InputError(f"--{error.key}: {error.problem}") from None
     written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}
-    if json:
-        print_json({"files": written})
-    else:
-        print_files(written)
-    return SUCCEEDED
+    show(json, {"files": written}, file_lines(written))

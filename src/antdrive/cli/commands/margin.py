@@ -1,24 +1,17 @@
 """`antdrive margin`."""
 
 import dataclasses
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from antdrive.cli import options
-from antdrive.cli.console import print_json, print_line, print_table
-from antdrive.cli.exits import SUCCEEDED
+from antdrive.cli.console import show, table
 from antdrive.cli.parse import log_at
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
 
 
-def margin(
-    rollout: Annotated[Path, typer.Argument(metavar="ROLLOUT", help="Log of a drive, or the folder of a run.")],
-    json: options.Json = False,
-) -> int:
+def margin(rollout: options.Log, json: options.Json = False) -> None:
     """Break a drive's safety margin down by cause.
 
     Planning keeps the margin free around the robot. Reports how much of it the drive used up, where, and why:
@@ -34,32 +27,28 @@ def margin(
 
     log = Rollout.load(log_at(rollout))
     spent, prediction = budget(log), _prediction(log)
-    if json:
-        print_json({**spent.as_dict(), "prediction": prediction})
-        return SUCCEEDED
     place = f"({spent.x:.2f}, {spent.y:.2f}), t = {spent.t:.2f} s"
-    print_line(f"{rollout}: margin {spent.margin:.3f} m, least room left around the disc {spent.left:.4f} m at {place}")
-    print_table(
-        ("cause", "used at most m", "at", "at the tightest place m"),
+    rows = (
         (
-            (
-                share.cause,
-                f"{share.metres:.4f}",
-                f"({share.x:.2f}, {share.y:.2f}), {share.t:.2f} s" if share.metres else "-",
-                f"{share.at_tightest:+.4f}",
-            )
-            for share in spent.contributions
-        ),
+            share.cause,
+            f"{share.metres:.4f}",
+            f"({share.x:.2f}, {share.y:.2f}), {share.t:.2f} s" if share.metres else "-",
+            f"{share.at_tightest:+.4f}",
+        )
+        for share in spent.contributions
     )
-    if spent.largest.metres:
-        print_line(f"the largest loss is due to {spent.largest.cause}")
-    else:
-        print_line("nothing was used: the robot never came closer to an obstacle than the margin")
+    lines = [
+        f"{rollout}: margin {spent.margin:.3f} m, least room left around the disc {spent.left:.4f} m at {place}",
+        *table(("cause", "used at most m", "at", "at the tightest place m"), rows),
+        f"the largest loss is due to {spent.largest.cause}"
+        if spent.largest.metres
+        else "nothing was used: the robot never came closer to an obstacle than the margin",
+    ]
     if prediction is not None:
         loss = prediction["footprint_loss_m"]
         drive = "this drive had movers or unseen obstacles" if loss is None else f"the footprint lost {loss:.4f} m"
-        print_line(f"chosen by --margin auto for a predicted loss of {prediction['loss_m']:.4f} m; {drive}")
-    return SUCCEEDED
+        lines.append(f"chosen by --margin auto for a predicted loss of {prediction['loss_m']:.4f} m; {drive}")
+    show(json, {**spent.as_dict(), "prediction": prediction}, lines)
 
 
 def _prediction(log: "Rollout") -> dict[str, float | None] | None:

@@ -1,17 +1,16 @@
 """`antdrive plan`."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from antdrive.base.atomic import claimed
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import planning, print_files, print_json, print_line
-from antdrive.cli.exits import FAILED, SUCCEEDED
+from antdrive.cli.console import file_lines, planning, show
+from antdrive.cli.options import option
 from antdrive.cli.output import chosen_margin, in_brackets, plain
-from antdrive.cli.scenario import chosen_task, make_scenario
+from antdrive.cli.scenario import Ends, Setup
+from antdrive.cli.warm import compile_once
 from antdrive.views.folder import suffixes
 
 if TYPE_CHECKING:
@@ -22,21 +21,15 @@ if TYPE_CHECKING:
 
 @options.with_settings(("margin", "cell", "seed"))
 def plan(
+    *,
     world: options.World,
-    planner: options.Planner = "ants",
-    settings: options.Settings = None,
-    robot: options.Robot = "turtlebot",
-    task: options.TaskName = None,
-    start: options.Start = None,
-    goal: options.Goal = None,
-    frame: options.Frame = "world",
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Draw the plan's figures into this folder.")
-    ] = None,
+    setup: Setup,
+    ends: Ends,
+    out: Annotated[Path | None, option("FOLDER", "Draw the plan's figures into this folder.")] = None,
     vector: options.Vector = False,
     json: options.Json = False,
     **given: Any,
-) -> int:
+) -> bool:
     """Plan a path without driving it.
 
     Exit code 0: there is a path.
@@ -44,36 +37,19 @@ def plan(
     from antdrive.planners import keep_best
     from antdrive.sim.pipeline import plan as make_plan
 
-    scenario = make_scenario(chosen_task(world, task, start, goal, frame), planner, settings, robot, given)
+    scenario = setup.scenario(ends.of(world), given)
     compile_once()
-    with planning(f"planning with {planner}"), keep_best():
+    with planning(f"planning with {setup.planner}"), keep_best():
         grid, answer = make_plan(scenario)
-    files = {}
+    files: dict[str, str] = {}
     if out is not None:
         from antdrive.views.figures.plan_figures import plan_figures
 
+        named: dict[str, Any] = {"name": setup.planner, "suffixes": suffixes(vector)}
         with claimed(out):
-            made = plan_figures(
-                scenario.task, grid, answer, scenario.robot, out, name=planner, suffixes=suffixes(vector)
-            )
+            made = plan_figures(scenario.task, grid, answer, scenario.robot, out, **named)
         files = {name: str(path) for name, path in made.items()}
-    if json:
-        print_json({**_facts(scenario, grid, answer), "files": files})
-    else:
-        print_line(f"{scenario.task.world.name}: {planner} {answer.status.value}" + in_brackets(answer.reason))
-        if len(answer.cells):
-            length, count = answer.line_length, len(answer.cells)
-            print_line(f"  length {length:.3f} m over {count} cells, {answer.work} {answer.work_unit}")
-        if scenario.chosen is not None:
-            print_line(f"  {chosen_margin(scenario.chosen)}")
-        rows, columns = grid.shape
-        print_line(f"  planned in {answer.wall_s * 1000:.1f} ms on {rows} x {columns} cells of {grid.cell:g} m")
-        print_files(files)
-    return SUCCEEDED if answer.solved else FAILED
-
-
-def _facts(scenario: "Scenario", grid: "Grid", answer: "PlanResult") -> dict[str, Any]:
-    return {
+    facts = {
         "world": scenario.task.world.name,
         "planner": scenario.planner_name,
         "robot": scenario.robot.name,
@@ -90,4 +66,21 @@ def _facts(scenario: "Scenario", grid: "Grid", answer: "PlanResult") -> dict[str
         "grid": {"rows": grid.shape[0], "cols": grid.shape[1], "cell": grid.cell, "inflate": grid.inflate},
         "options": {key: plain(value) for key, value in answer.options.items()},
         "cells": answer.cells.tolist(),
+        "files": files,
     }
+    show(json, facts, _lines(setup.planner, scenario, grid, answer, files))
+    return answer.solved
+
+
+def _lines(
+    planner: str, scenario: "Scenario", grid: "Grid", answer: "PlanResult", files: Mapping[str, str]
+) -> Iterator[str]:
+    yield f"{scenario.task.world.name}: {planner} {answer.status.value}" + in_brackets(answer.reason)
+    if len(answer.cells):
+        length, count = answer.line_length, len(answer.cells)
+        yield f"  length {length:.3f} m over {count} cells, {answer.work} {answer.work_unit}"
+    if scenario.chosen is not None:
+        yield f"  {chosen_margin(scenario.chosen)}"
+    rows, columns = grid.shape
+    yield f"  planned in {answer.wall_s * 1000:.1f} ms on {rows} x {columns} cells of {grid.cell:g} m"
+    yield from file_lines(files)

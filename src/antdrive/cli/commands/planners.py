@@ -4,33 +4,25 @@ import dataclasses
 from typing import Any
 
 from antdrive.cli import options
-from antdrive.cli.console import print_json, print_line
-from antdrive.cli.exits import SUCCEEDED
+from antdrive.cli.console import show
 from antdrive.cli.output import plain
 
 
-def planners(json: options.Json = False) -> int:
+def planners(json: options.Json = False) -> None:
     """List the planners with their options."""
     from antdrive.planners import describe, list_planners
 
-    known = list_planners()
-    if json:
-        print_json(
-            {
-                name: {
-                    "about": describe(planner),
-                    "options": {key: plain(value) for key, value in _options(planner).items()},
-                }
-                for name, planner in known.items()
-            }
-        )
-        return SUCCEEDED
-    for name, planner in known.items():
-        print_line(f"{name:14} {describe(planner)}")
-        values = [f"{key}={value}" for key, value in _options(planner).items()]
+    known = {name: (describe(planner), _options(planner)) for name, planner in list_planners().items()}
+    facts = {
+        name: {"about": about, "options": {key: plain(value) for key, value in values.items()}}
+        for name, (about, values) in known.items()
+    }
+    lines = []
+    for name, (about, values) in known.items():
+        lines.append(f"{name:14} {about}")
         if values:
-            print_line(f"{'':14}   {', '.join(values)}")
-    return SUCCEEDED
+            lines.append(f"{'':14}   {', '.join(f'{key}={value}' for key, value in values.items())}")
+    show(json, facts, lines)
 
 
 def _options(planner: Any) -> dict[str, Any]:

@@ -3,46 +3,39 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import print_files, print_json
-from antdrive.cli.exits import SUCCEEDED
+from antdrive.cli.console import file_lines, show
+from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives
 from antdrive.cli.parse import log_at
 from antdrive.cli.parse import size as parse_size
+from antdrive.cli.warm import compile_once
 from antdrive.views.folder import caption
 
 
 def render(
     rollouts: Annotated[
-        list[Path],
-        typer.Argument(metavar="ROLLOUT", help="Logs of drives or folders of runs; two to six are shown side by side."),
+        list[Path], argument("ROLLOUT", "Logs of drives or folders of runs; two to six are shown side by side.")
     ],
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="FILE", help="The film: .mp4, .gif or .webp; .png writes one frame."),
-    ],
-    camera: Annotated[str, typer.Option(metavar="NAME", help="Camera: oblique, top or follow.")] = "oblique",
+    out: Annotated[Path, option("FILE", "The film: .mp4, .gif or .webp; .png writes one frame.")],
+    camera: Annotated[str, option("NAME", "Camera: oblique, top or follow.")] = "oblique",
     size: Annotated[
         str | None,
-        typer.Option(
-            metavar="WIDTHxHEIGHT",
-            help="Size of the picture [px]. Of several drives from above as much of the default as their worlds fill.",
+        option(
+            "WIDTHxHEIGHT",
+            "Size of the picture [px]. Of several drives from above as much of the default as their worlds fill.",
             show_default="1280x720",
         ),
     ] = None,
-    fps: Annotated[int, typer.Option(min=1, max=240, metavar="NUMBER", help="Frames per second.")] = 30,
+    fps: Annotated[int, option("NUMBER", "Frames per second.", min=1, max=240)] = 30,
     speed: options.Speed = 1.0,
     at: Annotated[
-        float | None,
-        typer.Option(min=0.0, metavar="SECONDS", help="Write the one frame of this moment [s]: .png or .webp."),
+        float | None, option("SECONDS", "Write the one frame of this moment [s]: .png or .webp.", min=0.0)
     ] = None,
     prelude: options.Prelude = 0.0,
     json: options.Json = False,
-) -> int:
+) -> None:
     """Film drives from their logs, from any camera.
 
     Nothing is simulated again.
@@ -63,8 +56,4 @@ def render(
     else:
         begins = {} if len(logs) > 1 else {"prelude": prelude}
         facts = film_drives(logs, out, camera=camera, **shape, fps=fps, speed=speed, **begins)
-    if json:
-        print_json(facts)
-    else:
-        print_files({"film": facts["file"]})
-    return SUCCEEDED
+    show(json, facts, file_lines({"film": facts["file"]}))

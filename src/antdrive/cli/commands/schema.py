@@ -2,18 +2,12 @@
 
 from typing import Annotated
 
-import typer
-
 from antdrive.base.errors import InputError
 from antdrive.cli.console import print_json
-from antdrive.cli.exits import SUCCEEDED
+from antdrive.cli.options import argument
 
 
-def schema(
-    kind: Annotated[
-        str, typer.Argument(metavar="KIND", help="Kind of file: world, robot, suite or campaign.")
-    ] = "world",
-) -> int:
+def schema(kind: Annotated[str, argument("KIND", "Kind of file: world, robot, suite or campaign.")] = "world") -> None:
     """Print the JSON Schema of a kind of file.
 
     An editor that knows it completes keys and marks mistakes.
@@ -27,4 +21,3 @@ def schema(
     if kind not in schemas:
         raise InputError(f"schema: unknown kind {kind!r}; choose from {', '.join(schemas)}")
     print_json(schemas[kind]())
-    return SUCCEEDED

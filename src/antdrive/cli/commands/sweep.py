@@ -1,130 +1,93 @@
 """`antdrive sweep`."""
 
 import shlex
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
-import typer
-
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import campaign_bar, print_error, print_json, print_line
-from antdrive.cli.exits import SUCCEEDED
+from antdrive.cli.campaigns import campaign_from, resumable
+from antdrive.cli.console import campaign_bar, print_error, show, table
+from antdrive.cli.options import argument, flag, option
+from antdrive.cli.warm import compile_once
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
-    from antdrive.runs.campaigns.campaign import Campaign
     from antdrive.runs.campaigns.expanding import Expansion
     from antdrive.runs.campaigns.results import SweepResults
     from antdrive.runs.campaigns.running import Keep
 
-File = Annotated[
-    Path | None, typer.Argument(metavar="CAMPAIGN", help="Campaign file; may be left out where the options name all.")
-]
-Folder = Annotated[
-    Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results; a campaign there goes on.")
-]
-Worlds = Annotated[
-    list[str] | None,
-    typer.Option("--world", "-w", metavar="NAME", help="World of the catalogue, file, or pattern. May be repeated."),
-]
-Generate = Annotated[
-    list[str] | None,
-    typer.Option(metavar="KIND:SEEDS", help="Random worlds, such as forest:20 or barn:0-9. May be repeated."),
-]
-Planners = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--planner",
-        "-p",
-        metavar="NAME",
-        help="Planner, or FILE.py:CLASS, with options such as aco-han:ants=10,50 or aco-han:ants=10..50..20. May be repeated.",
-    ),
-]
-Robots = Annotated[
-    list[str] | None,
-    typer.Option("--robot", "-r", metavar="NAME", help="Robot of the catalogue, or file. May be repeated."),
-]
-Seeds = Annotated[
-    str | None, typer.Option(metavar="SEEDS", help="How many seeds, such as 10, or which, such as 0-9 or 3,7.")
-]
-Tasks = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NUMBER[:METRES]|named",
-        help="Random starts and goals in each world, at least so many metres apart; or named: those that its file lists.  "
-        "[default: its own]",
-    ),
-]
-Dask = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Make the runs on a cluster: tcp://HOST:PORT of a dask scheduler, or local:N. Whoever reaches a scheduler can "
-        "run code on its machines: use it in trusted networks only.",
-    ),
-]
-Rollouts = Annotated[
-    str | None,
-    typer.Option("--keep", metavar="WHICH", help="Logs to keep: none, failed or all.  [default: as the campaign says]"),
-]
-Limit = Annotated[
-    float | None,
-    typer.Option(
-        "--run-limit", metavar="SECONDS", help="Wall-clock time of a run, after which its process is ended [s]."
-    ),
-]
-Retry = Annotated[bool, typer.Option("--retry-crashed", help="Make runs again that crashed.")]
-Again = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="NAME", help="Make runs again of a planner, or with an outcome: planner_fault. May be repeated."
-    ),
-]
-DryRun = Annotated[
-    bool, typer.Option("--dry-run", help="Say how many runs there are and how many are missing; run nothing.")
-]
-Report = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE", help="Write the campaign's statistics too, as `antdrive report` does: .html, .md, .tex or .csv."
-    ),
-]
-
 
 @options.with_settings((name for name, one in SETTINGS.items() if one.flag and one.is_word), many=True)
 def sweep(
-    campaign: File = None,
-    out: Folder = None,
-    world: Worlds = None,
-    generate: Generate = None,
-    planner: Planners = None,
-    robot: Robots = None,
-    seeds: Seeds = None,
-    tasks: Tasks = None,
+    campaign: Annotated[
+        Path | None, argument("CAMPAIGN", "Campaign file; may be left out where the options name all.")
+    ] = None,
+    out: Annotated[Path | None, option("FOLDER", "Folder for the results; a campaign there goes on.")] = None,
+    world: Annotated[
+        list[str] | None, option("NAME", "World of the catalogue, file, or pattern. May be repeated.")
+    ] = None,
+    generate: Annotated[
+        list[str] | None, option("KIND:SEEDS", "Random worlds, such as forest:20 or barn:0-9. May be repeated.")
+    ] = None,
+    planner: Annotated[
+        list[str] | None,
+        option(
+            "NAME",
+            "Planner, or FILE.py:CLASS, with options such as aco-han:ants=10,50 or aco-han:ants=10..50..20. May be repeated.",
+        ),
+    ] = None,
+    robot: Annotated[list[str] | None, option("NAME", "Robot of the catalogue, or file. May be repeated.")] = None,
+    seeds: Annotated[str | None, option("SEEDS", "How many seeds, such as 10, or which, such as 0-9 or 3,7.")] = None,
+    tasks: Annotated[
+        str | None,
+        option(
+            "NUMBER[:METRES]|named",
+            "Random starts and goals in each world, at least so many metres apart; or named: those that its file lists.  "
+            "[default: its own]",
+        ),
+    ] = None,
     jobs: options.Jobs = None,
-    dask: Dask = None,
-    keep: Rollouts = None,
-    run_limit: Limit = None,
-    retry_crashed: Retry = False,
-    again: Again = None,
-    dry_run: DryRun = False,
-    report: Report = None,
+    dask: Annotated[
+        str | None,
+        option(
+            "ADDRESS",
+            "Make the runs on a cluster: tcp://HOST:PORT of a dask scheduler, or local:N. Whoever reaches a scheduler can "
+            "run code on its machines: use it in trusted networks only.",
+        ),
+    ] = None,
+    keep: Annotated[
+        str | None, option("WHICH", "Logs to keep: none, failed or all.  [default: as the campaign says]", "--keep")
+    ] = None,
+    run_limit: Annotated[
+        float | None,
+        option("SECONDS", "Wall-clock time of a run, after which its process is ended [s].", "--run-limit"),
+    ] = None,
+    retry_crashed: Annotated[bool, flag("Make runs again that crashed.", "--retry-crashed")] = False,
+    again: Annotated[
+        list[str] | None,
+        option("NAME", "Make runs again of a planner, or with an outcome: planner_fault. May be repeated."),
+    ] = None,
+    dry_run: Annotated[
+        bool, flag("Say how many runs there are and how many are missing; run nothing.", "--dry-run")
+    ] = False,
+    report: Annotated[
+        Path | None,
+        option("FILE", "Write the campaign's statistics too, as `antdrive report` does: .html, .md, .tex or .csv."),
+    ] = None,
     json: options.Json = False,
     **given: Any,
-) -> int:
+) -> None:
     """Drive every combination of a campaign.
 
     The folder holds a row for each run as Parquet. The same command goes on after an interruption, and runs what is new after
     a change. Options that name worlds, planners and so on take the place of what the file says. Exit code 0: all runs are
     done, whatever came out of them.
     """
-    from antdrive.cli.campaigns import campaign_from, print_sweep
     from antdrive.runs.campaigns.expanding import expand
+    from antdrive.runs.campaigns.sweeping import missing_runs
+    from antdrive.runs.campaigns.sweeping import sweep as make_runs
 
     if out is None and not dry_run:
         raise InputError("--out: missing; name the folder for the results")
@@ -134,28 +97,34 @@ def sweep(
         run_limit=run_limit,
     )  # fmt: skip
     expansion = expand(asked)
-    if dry_run:
-        return _say_size(expansion, out, json, retry_crashed=retry_crashed, again=again or ())
-    assert out is not None
     rest: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
-    results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=cast("Keep | None", keep), **rest)
+    if dry_run or out is None:
+        size = len(expansion.jobs)
+        missing = size if out is None else len(missing_runs(expansion.jobs, out, **rest).jobs)
+        counts = {"duplicates": expansion.duplicates, "counts": expansion.counts}
+        show(json, {"runs": size, "missing": missing, **counts}, _size_lines(expansion, missing))
+        return
+    compile_once()
+    with resumable(out), campaign_bar("driving") as progress:
+        rest |= {"jobs": jobs, "dask": dask, "keep": cast("Keep | None", keep)}
+        results = make_runs(asked, out, expansion=expansion, progress=progress, **rest)
     for note in results.notes:
         print_error(note)
-    files = _reported(out, report)
-    if json:
-        print_json({**_facts(results), **({"report": files[0]} if files else {})})
-    else:
-        print_sweep(results, files)
-    return SUCCEEDED
+    files: list[str] = []
+    if report is not None:
+        from antdrive.views.pages.campaign import report_campaign
 
-
-def _reported(folder: Path, report: Path | None) -> list[str]:
-    """Write the campaign's report, if one is wanted; the files."""
-    if report is None:
-        return []
-    from antdrive.views.pages.campaign import report_campaign
-
-    return [str(path) for path in report_campaign(folder, report)]
+        files = [str(path) for path in report_campaign(out, report)]
+    facts = {
+        "folder": str(results.folder),
+        "table": str(results.path),
+        "runs": results.size,
+        "made": results.made,
+        "succeeded": results.succeeded,
+        "outcomes": results.outcomes,
+        **({"report": files[0]} if files else {}),
+    }
+    show(json, facts, _lines(results, files))
 
 
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
@@ -174,58 +143,29 @@ def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | 
         raise InputError("--jobs: has no effect with --dask; write --dask local:N for N processes, or leave it out")
 
 
-def _run(asked: "Campaign", expansion: "Expansion", out: Path, **options: Any) -> "SweepResults":
-    """Make the runs, with a progress bar."""
-    from antdrive.runs.campaigns.sweeping import sweep as make_runs
+def _size_lines(expansion: "Expansion", missing: int) -> Iterator[str]:
+    """How large a campaign is, in words."""
 
-    compile_once()
-    with _resumable(out), campaign_bar("driving") as progress:
-        return make_runs(asked, out, expansion=expansion, progress=progress, **options)
+    def counted(name: str, count: int) -> str:
+        plural = count != 1 or " " in name or name == "settings"
+        return f"{count} {name if plural else name.removesuffix('s')}"
 
-
-@contextmanager
-def _resumable(folder: Path) -> Iterator[None]:
-    """A context that says, when it is interrupted, how the campaign goes on."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        command = shlex.join(["antdrive", *_without_again(sys.argv[1:])])
-        print_error(f"{folder}: what is done is kept; go on with: {command}")
-        raise
+    yield " x ".join(counted(name, count) for name, count in expansion.counts.items())
+    left_out = f"; {expansion.duplicates} combinations that mean the same as others are left out"
+    yield f"{len(expansion.jobs)} runs, {missing} of them missing{left_out if expansion.duplicates else ''}"
 
 
-def _without_again(words: list[str]) -> Iterator[str]:
-    """The words of a command without --again: what it made again is not to be made a third time."""
-    rest = iter(words)
-    for word in rest:
-        if word == "--again":
-            next(rest, None)
-        elif not word.startswith("--again="):
-            yield word
+def _lines(results: "SweepResults", reports: Sequence[str]) -> Iterator[str]:
+    """How the runs of a campaign ended, what was measured in those that succeeded, and where more is said."""
+    from antdrive.runs.campaigns.results import MEDIANS
 
-
-def _say_size(expansion: "Expansion", out: Path | None, json: bool, **asked: Any) -> int:
-    from antdrive.cli.campaigns import size_lines
-    from antdrive.runs.campaigns.missing import missing_runs
-
-    missing = len(expansion.jobs) if out is None else len(missing_runs(expansion.jobs, out, **asked).jobs)
-    facts: dict[str, Any] = {
-        "runs": len(expansion.jobs), "missing": missing, "duplicates": expansion.duplicates, "counts": expansion.counts
-    }  # fmt: skip
-    if json:
-        print_json(facts)
-        return SUCCEEDED
-    for line in size_lines(expansion, missing):
-        print_line(line)
-    return SUCCEEDED
-
-
-def _facts(results: "SweepResults") -> dict[str, Any]:
-    return {
-        "folder": str(results.folder),
-        "table": str(results.path),
-        "runs": results.size,
-        "made": results.made,
-        "succeeded": results.succeeded,
-        "outcomes": results.outcomes,
-    }
+    yield f"{results.size} runs, {results.made} of them made now; {results.succeeded} succeeded, certified"
+    yield from table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
+    yield ""
+    yield "medians of the runs that succeeded (least to most)"
+    yield from table(("planner", "runs", *MEDIANS.values()), results.medians())
+    yield f"  table    {results.path}"
+    yield from (f"  report   {file}" for file in reports)
+    if not reports:
+        report = shlex.join(["antdrive", "report", str(results.folder), "-o", str(results.folder / "report.html")])
+        yield f"  charts, intervals and all runs: {report}"

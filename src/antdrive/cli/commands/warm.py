@@ -3,12 +3,9 @@
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import bar, print_line
-from antdrive.cli.exits import SUCCEEDED
 
 
-def warm(
-    jobs: options.Jobs = None,
-) -> int:
+def warm(jobs: options.Jobs = None) -> None:
     """Compile every planner into the cache.
 
     Needed once for an installation; otherwise the first command that plans or drives does it.
@@ -19,10 +16,8 @@ def warm(
 
     if cache_folder() is None:
         raise InputError("warm: no folder for compiled code can be written; name one in NUMBA_CACHE_DIR")
-    if is_warm():
-        print_line("every planner is compiled already")
-        return SUCCEEDED
-    with bar("compiling the planners") as progress:
-        compile_all(jobs, progress=progress)
-    print_line("every planner is compiled")
-    return SUCCEEDED
+    done = is_warm()
+    if not done:
+        with bar("compiling the planners") as progress:
+            compile_all(jobs, progress=progress)
+    print_line(f"every planner is compiled{' already' if done else ''}")

@@ -19,19 +19,12 @@ from antdrive.planners import PlannerError
 from antdrive.runs.pool import Pool, WorkerDied
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import Demands
-from antdrive.runs.suites.divergence import explain
-from antdrive.runs.suites.judging import RAISED, Judgement, judge, unfulfilled
+from antdrive.runs.suites.judging import RAISED, Judgement, explain, judge, unfulfilled
 from antdrive.runs.suites.scenarios import run_command, scenario_of
 from antdrive.runs.suites.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
-from antdrive.views.artefacts import (
-    MOST_FILMS,
-    Results,
-    remove_artefacts,
-    write_artefacts,
-    write_traceback,
-)
+from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, write_artefacts, write_traceback
 
 #: Which baselines are written: none, only those that are missing, or all.
 Update: TypeAlias = Literal["", "new", "all"]
@@ -107,11 +100,7 @@ class Check:
     results: Results | None = None  # which of them are written; None: none
 
     def judge(self, run: Run) -> CheckResult:
-        """Judge a run.
-
-        Raises:
-            InputError: the baseline is wrong, or it or the folder cannot be written.
-        """
+        """Judge a run."""
         started, path, accepted = time.perf_counter(), self.baseline, ""
         baseline = None if path is None or self.update == "all" else Baseline.own(path, self.name)
         if path is not None and baseline is None:

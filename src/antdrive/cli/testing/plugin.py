@@ -6,7 +6,6 @@ Importing it must cost nothing: a run of pytest that collects no suite and uses 
 from __future__ import annotations
 
 import contextlib
-import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -147,7 +146,7 @@ def compile_first(config: pytest.Config) -> None:
     if _COMPILED in config.stash:
         return
     config.stash[_COMPILED] = True
-    from antdrive.cli.compiling import compile_once
+    from antdrive.cli.warm import compile_once
 
     def say(text: str) -> None:
         capture = config.pluginmanager.getplugin("capturemanager")
@@ -314,11 +313,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     terminalreporter.section("drives")
     for line in lines(drives, unused, config.getoption("drive_strict")):
         terminalreporter.write_line(line)
-    page = os.environ.get("GITHUB_STEP_SUMMARY")
-    if page:
-        problem = add_to_page(page, drives, unused)
-        if problem:
-            terminalreporter.write_line(problem)
+    add_to_page(drives, unused, terminalreporter.write_line)
 
 
 def _name_in_file(item: pytest.Item) -> str:

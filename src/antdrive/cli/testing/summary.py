@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +64,12 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
     unfilmed = sum(drive.get("film") == "none" for drive in drives)
     if unfilmed:
         yield films_left_out(unfilmed, "--drive-film always")
-    for path in unused:
-        yield f"{'FAILED: ' if strict else ''}unused baseline: {path}; remove it"
+    yield from unused_lines(unused, strict)
+
+
+def unused_lines(unused: Sequence[str], strict: bool) -> Iterator[str]:
+    """A line for each baseline that belongs to no test."""
+    return (f"{'FAILED: ' if strict else ''}unused baseline: {path}; remove it" for path in unused)
 
 
 def films_left_out(count: int, option: str) -> str:
@@ -99,11 +104,7 @@ def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
 
 
 def save_junit(results: Sequence[CheckResult], path: Path) -> None:
-    """Write the results of suites as JUnit XML, with the same properties as pytest's.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write the results of suites as JUnit XML, with the same properties as pytest's."""
     import xml.etree.ElementTree as ET
 
     failed = sum(not result.passed for result in results)
@@ -125,14 +126,14 @@ def save_junit(results: Sequence[CheckResult], path: Path) -> None:
         ET.ElementTree(tree).write(part, encoding="utf-8", xml_declaration=True)
 
 
-def add_to_page(page: str, drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
-    """Add a summary to the page of a CI run, the file that GITHUB_STEP_SUMMARY names; what is wrong with the file, if it is."""
-    try:
-        with open(page, "a", encoding="utf-8") as file:
-            file.write(markdown(drives, unused))
-    except (OSError, ValueError) as error:
-        return f"GITHUB_STEP_SUMMARY: {page}: cannot be written ({getattr(error, 'strerror', None) or error})"
-    return ""
+def add_to_page(drives: Iterable[Mapping[str, str]], unused: Sequence[str], say: Callable[[str], None]) -> None:
+    """Add a summary to the page of a CI run, the file that GITHUB_STEP_SUMMARY names, if any; say what is wrong with it."""
+    if page := os.environ.get("GITHUB_STEP_SUMMARY"):
+        try:
+            with open(page, "a", encoding="utf-8") as file:
+                file.write(markdown(list(drives), unused))
+        except (OSError, ValueError) as error:
+            say(f"GITHUB_STEP_SUMMARY: {page}: cannot be written ({getattr(error, 'strerror', None) or error})")
 
 
 def _plain(text: str) -> str:

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from antdrive.base.errors import InputError
-from antdrive.runs.suites.suite import BASELINES, SUFFIX, SuiteCase, baseline_folder, load_suite
+from antdrive.runs.suites.names import select
+from antdrive.runs.suites.suite import BASELINES, SUFFIX, SuiteCase, baseline_folder, load_suite, shown_path
+
+
+def unused_beside(words: Sequence[str]) -> list[str]:
+    """The baselines beside the suites that words name which belong to no test, as people name them."""
+    suites = dict.fromkeys(case.suite for case in select(words))
+    return sorted({shown_path(path) for suite in suites for path in unused_of_suite(suite, load_suite(suite))})
 
 
 def unused_of_suite(suite: Path, cases: Iterable[SuiteCase]) -> Iterator[Path]:

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from antdrive.base import Floats
+from antdrive.base.errors import require
 from antdrive.base.plane import polyline_length
 from antdrive.planners.anyangle.lines import RouteEnds, cells_along, route_ends, terrain
-from antdrive.planners.iterative import Iteration, IterativePlanner, require
+from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
 
 

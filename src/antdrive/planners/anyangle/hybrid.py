@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import polyline_length
 from antdrive.planners.anyangle.ga_han import Incumbent, ViaPointPlanner, seeded
 from antdrive.planners.anyangle.lines import RouteEnds, route_ends, terrain
 from antdrive.planners.colonies.catalog import colonies
 from antdrive.planners.colonies.colony import Colony
-from antdrive.planners.iterative import REHEARSED, Iteration, require
+from antdrive.planners.iterative import REHEARSED, Iteration
 from antdrive.planners.plan import Cells, Query
 
 ROUNDS = 20  # how often each via point of a new path is tightened

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from antdrive.base import Floats, Point
 from antdrive.base.plane import polyline_length
 from antdrive.planners.plan import Cells, Query
-from antdrive.worlds.ends import longest_line
+from antdrive.worlds.route import longest_line
 
 if TYPE_CHECKING:  # importing kernels loads the compiler
     from antdrive.planners.anyangle._kernels_lines import Terrain

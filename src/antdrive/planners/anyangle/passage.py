@@ -30,6 +30,12 @@ class Passage:
     between: tuple[int, ...] = ()
 
 
+def feasible(task: Task, clearance: float) -> bool:
+    """Whether a path exists from start to goal that keeps a clearance [m], by the exact shortest path."""
+    world = task.world
+    return shortest(world.discs, world.bounds, clearance, task.start[:2], task.goal) is not None
+
+
 def widest_passage(task: Task, most: float) -> Passage | None:
     """The narrowest place on the way of the widest disc from the task's start to its goal.
 
@@ -42,8 +48,7 @@ def widest_passage(task: Task, most: float) -> Passage | None:
     low, high = 0, len(radii)  # the sizes before `low` pass, those from `high` on do not
     while low < high:
         middle = (low + high) // 2
-        way = shortest(world.discs, world.bounds, max(radii[middle] - CLOSER, 0.0), task.start[:2], task.goal)
-        low, high = (low, middle) if way is None else (middle + 1, high)
+        low, high = (middle + 1, high) if feasible(task, max(radii[middle] - CLOSER, 0.0)) else (low, middle)
     if low == 0:
         return None
     x, y = places[low - 1].tolist()

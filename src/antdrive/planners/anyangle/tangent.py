@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats, InputError, Point
+from antdrive.base.errors import require
 from antdrive.planners.anyangle.lines import RouteEnds, cells_along, cells_under, route_ends
 from antdrive.planners.graph.search import AStar
-from antdrive.planners.iterative import require
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Task
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, require
 from antdrive.planners.colonies.colony import (
     FIRST_KIND,
     ChoiceContext,
@@ -19,7 +19,6 @@ from antdrive.planners.colonies.colony import (
     IterationState,
     Weights,
 )
-from antdrive.planners.iterative import require
 
 
 @dataclass(frozen=True, kw_only=True)

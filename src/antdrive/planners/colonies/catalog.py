@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from antdrive.planners.colonies.aco_han import AcoHan
-from antdrive.planners.colonies.ant_system import AgeingAnts, AntSystem, ExploringAnts
+from antdrive.planners.colonies.ant_system import AgeingAnts, AntSystem, ExploringAnts, MaxMinAnts
 from antdrive.planners.colonies.colony import Colony
 from antdrive.planners.colonies.merging_ants import MergingAnts
-from antdrive.planners.colonies.mmas import MaxMinAnts
 from antdrive.planners.colonies.mmas_dstar import MaxMinDStar
 from antdrive.planners.colonies.pfaco import PotentialFieldAnts
 from antdrive.planners.plan import Planner

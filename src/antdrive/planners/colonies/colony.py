@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
-from antdrive.planners.iterative import Iteration, IterativePlanner, require
+from antdrive.base.errors import require
+from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Query
 
 Flat = npt.NDArray[np.int32]  # flat cell indices

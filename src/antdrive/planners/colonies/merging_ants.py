@@ -1,27 +1,32 @@
-"""The strongest colony here: MAX-MIN ants and scouts, whose tours of an iteration are merged into one."""
+"""The strongest colony here: MAX-MIN ants and scouts, whose tours of an iteration are merged into one.
+
+It replans from the trails that it already has.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, require
+from antdrive.planners.colonies.ant_system import MaxMinAnts
 from antdrive.planners.colonies.colony import (
     FIRST_KIND,
     ChoiceContext,
     ColonyGraph,
     Heuristic,
     IterationState,
+    Memory,
     Walks,
     Weights,
 )
-from antdrive.planners.colonies.mmas import MaxMinAnts
-from antdrive.planners.colonies.warm_start import WarmStartedColony
-from antdrive.planners.iterative import require
-from antdrive.planners.plan import Capabilities, Query
+from antdrive.planners.graph.incremental import CachedReplanner
+from antdrive.planners.plan import Capabilities, PlanResult, Query
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,3 +180,59 @@ class MergingAnts(MaxMinAnts):
         over_open_ground = high - low + math.sqrt(2.0) * low
         enough = min(self.settled, max(20, round(0.6 * float(state.best.lengths[0]))))
         return state.since >= enough or bool(state.best.lengths[0] <= over_open_ground + 1e-9)
+
+
+class WarmStartedColony(CachedReplanner):
+    """Ants that continue on their old trails, which are evened out near the cells that changed.
+
+    After a change, the trails of arcs within `reach` cells of it move towards the strongest trail, more so
+    the nearer they are (M. Guntsch and M. Middendorf, *Pheromone modification strategies for ant algorithms
+    applied to dynamic TSP*, 2001: the strategy by distance). The part of the best tour that can still be
+    walked joins the tours of the first iteration. The colony stops after `settled` iterations without
+    improvement.
+
+    Args:
+        planner: the colony
+        query: the query to begin with
+        rng: the source of randomness of all answers
+        settled: iterations without improvement after which a warm-started colony stops
+        reach: how far from a changed cell trails are evened out [cells]
+
+    Raises:
+        ValueError: `settled` or `reach` is below 1.
+    """
+
+    def __init__(
+        self, planner: MergingAnts, query: Query, rng: np.random.Generator, *, settled: int = 4, reach: int = 10
+    ) -> None:
+        super().__init__(query)
+        require("settled", settled, at_least=1)
+        require("reach", reach, at_least=1)
+        self._planner, self._rng, self._reach = planner, rng, reach
+        self._brief = dataclasses.replace(planner, settled=min(settled, planner.settled))
+        self._memory = Memory()
+
+    def _plan_anew(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
+        warm = self._memory.tour is not None
+        planner = self._brief if warm else self._planner
+        if warm and self._memory.trail is not None and len(changed):
+            even_out(self._memory.trail, query.grid.shape, changed, self._reach)
+        answer = planner.answer(query, planner.resume(query, self._rng, self._memory))
+        return dataclasses.replace(answer, options=dataclasses.asdict(planner))
+
+
+def even_out(trail: Floats, shape: tuple[int, int], changed: npt.NDArray[np.int64], reach: int) -> None:
+    """Move trails near changed cells towards the strongest trail, by a share of 1 - d / (reach + 1)."""
+    near = np.zeros(shape, dtype=np.bool_)
+    near.ravel()[changed] = True
+    share = near / (reach + 1.0)
+    for _ in range(reach):  # the neighbourhood grows by one cell per pass, so nearer cells are counted more often
+        near[1:] |= near[:-1].copy()
+        near[:-1] |= near[1:].copy()
+        near[:, 1:] |= near[:, :-1].copy()
+        near[:, :-1] |= near[:, 1:].copy()
+        share += near / (reach + 1.0)
+    here = np.flatnonzero(share)
+    strongest = float(trail.max())
+    if math.isfinite(strongest):
+        trail[here] += share.ravel()[here, np.newaxis] * (strongest - trail[here])

@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
+from antdrive.base.errors import require
 from antdrive.planners.colonies.colony import ColonyGraph, Flat
 from antdrive.planners.graph.search import NO_WAY, reachable
-from antdrive.planners.iterative import require
 from antdrive.planners.plan import Capabilities, Cell, GridPlanner, PlanResult, PlanStatus, Query, path_cost
-from antdrive.planners.replanning.agents import SteppingAgent
+from antdrive.planners.replanners import SteppingAgent
 
 SPREAD_ANEW = "spread pheromone anew around what was in the way"
 PATIENCE = 4  # waits in a row, or visits of one cell, after which an agent spreads pheromone anew

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, require
 from antdrive.planners.colonies.colony import ColonyGraph
-from antdrive.planners.iterative import Iteration, IterativePlanner, require
+from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Query
 
 if TYPE_CHECKING:  # importing kernels loads the compiler

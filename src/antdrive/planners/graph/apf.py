@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.base import Floats
+from antdrive.base.errors import require
 from antdrive.planners.graph.search import NO_WAY, reachable
-from antdrive.planners.iterative import require
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 
 

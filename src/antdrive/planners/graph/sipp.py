@@ -8,17 +8,16 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import segment_lengths
 from antdrive.planners.graph.search import NO_WAY, reachable
-from antdrive.planners.iterative import require
-from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, TimedPlan, path_cost
 from antdrive.worlds import MoverMotion
 
 STEP = 0.05  # time between the first samples of a motion; more are added where it turns in between [s]
@@ -27,57 +26,6 @@ INSTANT = 1e-6  # a motion that is not straight over so short a time is a jump [
 # is added to the distance that the robot keeps.
 TOLERANCE = 1e-3
 UNIT = "safe intervals expanded"
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TimedPlan(PlanResult):
-    """A plan with times: each cell is reached at `arrive` and left at `leave`; the robot waits in between.
-
-    From one cell to the next it drives straight at the plan's speed.
-
-    Attributes:
-        arrive: when each cell is reached (N,) [s]
-        leave: when each cell is left (N,) [s]
-        xy: centres of the cells (N, 2) [m]
-    """
-
-    arrive: Floats = field(default_factory=lambda: np.empty(0))
-    leave: Floats = field(default_factory=lambda: np.empty(0))
-    xy: Floats = field(default_factory=lambda: np.empty((0, 2)))
-
-    @property
-    def duration(self) -> float:
-        """Time from the departure to the arrival [s]; infinite without a path."""
-        return float(self.arrive[-1] - self.arrive[0]) if len(self.arrive) else math.inf
-
-    @property
-    def waited(self) -> float:
-        """The total time that the robot waits on its way [s]."""
-        return float((self.leave - self.arrive).sum())
-
-    def at(self, t: npt.ArrayLike) -> Floats:
-        """Where the robot is (T, 2) [m] at times `t` (T,) [s]; before the plan begins and after it ends, at its ends.
-
-        Raises:
-            ValueError: the plan has no path.
-        """
-        if not self.solved:
-            raise FieldError("plan", "has no path to follow")
-        knots = np.stack([self.arrive, self.leave], axis=1).ravel()
-        when = np.asarray(t, dtype=np.float64)
-        return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
-
-    def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
-        """The least distance between the robot's centre and a mover's surface [m], sampled every `step` seconds.
-
-        Args:
-            movers: the motions of the movers
-            step: time between two samples [s]
-        """
-        ticks = max(1, math.ceil(self.duration / step))
-        t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
-        robot = self.at(t)
-        return min((float(np.hypot(*(robot - m.at(t)).T).min()) - m.radius for m in movers), default=math.inf)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,12 +59,7 @@ class SafeIntervals(GridPlanner):
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return plan_in_time(
-            query,
-            query.motions,
-            speed=self.speed,
-            start_time=query.start_time,
-            horizon=self.horizon,
-            stay=self.stay,
+            query, query.motions, speed=self.speed, start_time=query.start_time, horizon=self.horizon, stay=self.stay
         )
 
 

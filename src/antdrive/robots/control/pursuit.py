@@ -23,7 +23,7 @@ from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
-from antdrive.robots.control.speed_limits import speed_profile, speeds_along
+from antdrive.robots.control.speed_limits import limits_along, speed_profile
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
@@ -230,7 +230,7 @@ class PurePursuit:
             curvature[:] = np.nan
         near_obstacles = self.min_speed_near_obstacles, self.clearance_time
         braking = self.braking * robot.max_acceleration
-        speed = speeds_along(route, world, robot.radius, profile, lookahead, tuning, near_obstacles, braking)
+        speed = limits_along(route, world, robot.radius, profile, lookahead, tuning, near_obstacles, braking)
         limits = MotionLimits(
             speed=robot.max_speed,
             yaw_rate=robot.max_yaw_rate,

@@ -1,11 +1,11 @@
-"""How fast a robot may drive along a route: a forward and a backward pass under the robot's limits.
+"""Speed limits along a route, before it is driven: by the robot's limits, in gaps, and where the lookahead is short.
 
 On a fixed path, the fastest speeds follow from a limit at each place: a forward pass lowers them to what
 accelerating can reach, and a backward pass to what braking can still obey (Bobrow, Dubowsky & Gibson,
 *Time-optimal control of robotic manipulators along specified paths*, IJRR 4, 1985; in this form Lipp & Boyd,
 *Minimum-time speed optimisation over a fixed path*, Int. J. Control 87, 2014). Here the yaw acceleration is
 checked with the speed at the slower end of each step, so the result is the fastest up to the length of a
-step.
+step. `limits_along` adds the limits beside obstacles; `_kernels_pursuit.speed_limit` applies those of the place at run time.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple
     return heading, curvature, change
 
 
-def speeds_along(
+def limits_along(
     route: Route,
     world: World,
     radius: float,

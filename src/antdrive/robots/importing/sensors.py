@@ -8,13 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Floats
-from antdrive.robots.feasible import require_on_robot
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
+from antdrive.robots.spec import require_on_robot
+from antdrive.worlds.formats.xml import turned
 
 KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")  # of Gazebo's sensors that are lidars
 LEVEL = 0.99  # the least vertical part of a planar lidar's axis
@@ -60,11 +59,7 @@ def found_lidar(
 
 
 def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list[str]]:
-    """The lidar, and what is assumed of it.
-
-    Raises:
-        FieldError: it is no planar lidar, or has a value that none may have.
-    """
+    """The lidar, and what is assumed of it."""
     scan = sensor.element.find("ray")
     scan = sensor.element.find("lidar") if scan is None else scan
     if scan is None or scan.find("scan/horizontal/samples") is None:
@@ -72,7 +67,7 @@ def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list
     if _number(scan, "scan/vertical/samples", 1.0) > 1:
         raise FieldError("scan", "has several layers")
     x, y, z, *angles = _pose(sensor.element)
-    turn = sensor.place[:3, :3] @ _turned(*angles)
+    turn = sensor.place[:3, :3] @ turned(*angles)
     if abs(turn[2, 2]) < LEVEL:
         raise FieldError("pose", "its beams are not level")
     spot = sensor.place @ (x, y, z, 1.0)
@@ -133,15 +128,3 @@ def _number(element: ET.Element, path: str, default: float) -> float:
     if not abs(value) <= 1e6:
         raise FieldError(path.rpartition("/")[2], f"must be a number, got {text.strip()[:40]!r}")
     return value
-
-
-def _turned(roll: float, pitch: float, yaw: float) -> Floats:
-    """The turn (3, 3) about the fixed axes x, y and z [rad]."""
-    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in (roll, pitch, yaw))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )

@@ -33,11 +33,7 @@ class DrivenWheel:
 def driven_wheels(
     model: UrdfModel, left: str | None = None, right: str | None = None, radius: float | None = None
 ) -> tuple[DrivenWheel, DrivenWheel]:
-    """The left and the right driven wheel.
-
-    Raises:
-        InputError: the robot is no differential drive, or it is not clear which wheels drive it.
-    """
+    """The left and the right driven wheel."""
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
     if left is not None and right is not None:

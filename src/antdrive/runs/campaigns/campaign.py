@@ -16,15 +16,7 @@ from antdrive.base.checks import SchemaVersion, check, schema_of, show
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import InputError
 from antdrive.base.records import STRICT
-from antdrive.sim.forms import (
-    SEEDS_SCHEMA,
-    TextOrMapping,
-    file_fields,
-    said,
-    seed_list,
-    written_default,
-    written_kind,
-)
+from antdrive.sim.forms import SEEDS_SCHEMA, TextOrMapping, file_fields, said, seed_list, written_default, written_kind
 from antdrive.sim.settings import SETTINGS
 
 MOST_SEEDS = 1_000_000  # given as a number
@@ -36,11 +28,7 @@ def _listed(value: Any) -> Any:
 
 
 def seeds_of(value: Any) -> list[int]:
-    """The seeds that people write as a number of them, as [3, 7] or as 0-9.
-
-    Raises:
-        ValueError: it is none of these; the text says what would be right.
-    """
+    """The seeds that people write as a number of them, as [3, 7] or as 0-9."""
     if type(value) is int:
         if not 1 <= value <= MOST_SEEDS:
             raise ValueError(f"must be from 1 to {MOST_SEEDS} seeds, or a list such as [{value}], got {value}")
@@ -79,7 +67,7 @@ def _axes() -> dict[str, Any]:
         kind, usual = written_kind(one), written_default(one)
         listed = Annotated[list[kind], Field(min_length=1), BeforeValidator(_listed)]  # type: ignore[valid-type]
         schema = WithJsonSchema(_of(TypeAdapter(kind).json_schema()))
-        fields[one.setting.axis] = (Annotated[listed, schema], Field([usual.default], description=usual.description))
+        fields[one.key] = (Annotated[listed, schema], Field([usual.default], description=usual.description))
     return fields
 
 
@@ -209,7 +197,7 @@ class Campaign:
 
     def values(self, name: str) -> list[Any]:
         """The values of a setting that the campaign lists under a key of its own."""
-        return list(getattr(self.entry, AXES[name].setting.axis))
+        return list(getattr(self.entry, AXES[name].key))
 
     def error(self, location: Location, problem: str) -> InputError:
         """The error for a value: file, line, key and problem.

@@ -6,64 +6,29 @@ import dataclasses
 import itertools
 import shlex
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from antdrive.base.checks import resolve, suggest
-from antdrive.base.document import Location
 from antdrive.base.errors import FieldError
 from antdrive.base.files import file_name
-from antdrive.robots import RobotSpec, list_robots, load_robot
+from antdrive.robots import list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
-from antdrive.runs.campaigns.grid_planners import PlannerVariant, planner_variants
-from antdrive.runs.campaigns.grid_tasks import campaign_tasks
-from antdrive.runs.campaigns.grid_worlds import NamedTask, campaign_worlds
-from antdrive.runs.campaigns.job import Job, SweepCase, key_of
+from antdrive.runs.campaigns.grid import campaign_tasks, campaign_worlds, planner_variants
+from antdrive.runs.campaigns.job import Job, NamedRobot, NamedSettings, NamedTask, PlannerVariant, SweepCase, key_of
 from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting_words
-from antdrive.sim.log.binding import canonical_hash
-from antdrive.sim.policy import usual_perception
-from antdrive.sim.settings import SETTINGS
+from antdrive.sim.log.record import canonical_hash
 from antdrive.worlds import Task
 
 WORLDS, ROBOTS = "worlds", "robots"  # folders in a campaign's folder with what its commands name
 
 
 @dataclass(frozen=True, eq=False)
-class NamedRobot:
-    """A robot as a campaign and its commands call it."""
-
-    robot: RobotSpec  # the robot
-    name: str  # what tables call it: its own name, or its file where another robot of the campaign has that name, too
-    content: str  # its canonical hash
-    word: str  # what commands call it
-    file: Path | None  # its file; None: it is of the catalogue
-
-
-@dataclass(frozen=True, eq=False)
-class NamedSettings:
-    """One combination of route, noise, margin and settings."""
-
-    # fields of `Scenario` by name; the margin may be "auto", and perception None until the world is known
-    fields: Mapping[str, Any]
-    columns: Mapping[str, Any]  # what tables say of them, by column
-    words: tuple[str, ...] | None  # the words of `antdrive run` for them; None where it has no flags for all
-    place: Location  # where in the campaign the settings are written
-
-    def among(self, movers: bool) -> NamedSettings:
-        """The settings with what robots perceive in a world with movers, or without; so keys name what is driven."""
-        if self.fields["perception"] is not None:
-            return self
-        fields = {**self.fields, "perception": usual_perception(self.fields["map"], movers)}
-        return dataclasses.replace(self, fields=fields, columns=columns_of(fields))
-
-
-@dataclass(frozen=True, eq=False)
 class Expansion:
     """The runs of a campaign."""
 
-    # the runs in the campaign's order: by world, task, robot, route, noise, margin, planner and seed
+    # the runs in the campaign's order: by world, task, robot, smoothing, noise, margin, planner and seed
     jobs: tuple[Job, ...]
     duplicates: int  # how many combinations were left out because they mean the same as an earlier one
     counts: dict[str, int]  # how many there are of worlds, tasks in each, robots, and so on, by name
@@ -93,7 +58,7 @@ def expand(campaign: Campaign) -> Expansion:
     counts = {
         **_count_tasks(tasks),
         "robots": len(robots),
-        **{one.setting.axis: len(campaign.values(name)) for name, one in AXES.items()},
+        **{one.key: len(campaign.values(name)) for name, one in AXES.items()},
         "settings": len(campaign.settings),
         "planners": len(planners),
         "seeds": len(campaign.entry.seeds),
@@ -135,7 +100,7 @@ def _settings(campaign: Campaign) -> list[NamedSettings]:
     for name, one in AXES.items():
         for i, value in enumerate(campaign.values(name)):
             if one.setting.choices and value not in one.setting.choices:
-                raise campaign.error((one.setting.axis, i), f"unknown {value!r}; {suggest(value, one.setting.choices)}")
+                raise campaign.error((one.key, i), f"unknown {value!r}; {suggest(value, one.setting.choices)}")
     listed = list(zip(campaign.settings, campaign.places, strict=True))
     found = []
     for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
@@ -151,7 +116,7 @@ def _settings(campaign: Campaign) -> list[NamedSettings]:
 
 
 #: Where a campaign writes what a scenario calls by another name.
-_PLACES = {"start": ("tasks",)} | {one.key: (one.setting.axis,) for one in SETTINGS.values() if one.setting.axis}
+_PLACES = {"start": ("tasks",), "seed": ("seeds",)} | {one.key: (one.key,) for one in AXES.values()}
 
 
 def _check(
@@ -170,7 +135,14 @@ def _check(
             for one in settings if n in whole else obstructed:
                 margin = 0.0 if one.fields["margin"] == "auto" else None
                 try:
-                    _case(task, robot, one.among(n in moving), planner).scenario(0, margin)
+                    SweepCase(
+                        place=task,
+                        world_hash="",
+                        planner=planner,
+                        robot=robot,
+                        settings=one.among(n in moving),
+                        words=None,
+                    ).scenario(0, margin)
                 except FieldError as error:
                     place = _PLACES.get(error.key, (*one.place, error.key))
                     where = task.place if error.key == "start" and not campaign.tasks else place
@@ -190,38 +162,11 @@ def _cases(
         word = task.catalogue or f"{WORLDS}/{_file_name(task)}-{content[:8]}.yaml"
         if task.catalogue is None:
             files[word] = task.task
+        place = dataclasses.replace(task, others={})
         known = [one.among(bool(task.task.world.movers)) for one in settings]
         for robot, one, planner in itertools.product(robots, known, planners):
-            yield _case(task, robot, one, planner, word, content)
-
-
-def _case(
-    task: NamedTask,
-    robot: NamedRobot,
-    settings: NamedSettings,
-    planner: PlannerVariant,
-    word: str = "",
-    content: str = "",
-) -> SweepCase:
-    """A run but for its seed; its command calls the world by `word`."""
-    return SweepCase(
-        task=task.task,
-        world=task.world,
-        world_hash=content,
-        task_name=task.name,
-        planner=planner.label,
-        planner_name=planner.name,
-        planner_source=planner.source,
-        planner_version=planner.version,
-        given=planner.given,
-        options=planner.options,
-        robot=robot.robot,
-        robot_name=robot.name,
-        robot_hash=robot.content,
-        fields=settings.fields,
-        columns=settings.columns,
-        words=None if settings.words is None else _words(word, robot.word, settings.words, planner),
-    )
+            words = None if one.words is None else _words(word, robot.word, one.words, planner)
+            yield SweepCase(place=place, world_hash=content, planner=planner, robot=robot, settings=one, words=words)
 
 
 def _words(world: str, robot: str, settings: Sequence[str], planner: PlannerVariant) -> str:

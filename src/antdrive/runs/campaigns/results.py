@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.rows import NOT_CANONICAL
 from antdrive.runs.campaigns.store import GRID_FILE, TABLE, joined, read_manifest
-from antdrive.runs.statistics.merging import FOLDER, merged
-from antdrive.runs.statistics.runs import RunTable
-from antdrive.runs.statistics.selecting import column_named, matching, places_of
+from antdrive.runs.statistics.runs import FOLDER, RunTable, column_named, matching, merged
 
 if TYPE_CHECKING:
     import pyarrow
+
+MEDIANS = {
+    "driven_length_m": "length m",
+    "duration_s": "duration s",
+    "min_clearance_m": "least clearance m",
+    "plan_s": "planning ms",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +65,17 @@ class SweepResults:
     def outcomes(self) -> dict[str, int]:
         """How many runs ended in which way, the most frequent first."""
         return dict(Counter(self.table["outcome"].to_pylist()).most_common())
+
+    def medians(self) -> Iterator[tuple[str, ...]]:
+        """Rows of a table: for each planner how many runs succeeded, and median and extremes of `MEDIANS` in them."""
+        rows = [row for row in self.table.select(["planner", "succeeded", *MEDIANS]).to_pylist() if row["succeeded"]]
+        for planner in dict.fromkeys(row["planner"] for row in rows):
+            own = [row for row in rows if row["planner"] == planner]
+            cells = []
+            for name, unit in MEDIANS.items():
+                found = np.array([row[name] for row in own], dtype=float) * (1000.0 if unit.endswith(" ms") else 1.0)
+                cells.append(f"{np.median(found):.3g} ({found.min():.3g} to {found.max():.3g})")
+            yield planner, str(len(own)), *cells
 
     def pandas(self) -> Any:
         """The table as a pandas DataFrame; needs pandas."""
@@ -107,12 +125,7 @@ Columns = Mapping[str, Sequence[Any]]
 
 
 def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Sequence[str]) -> tuple[RunTable, int]:
-    """The runs that are done so far, and how many of the chosen ones the campaigns have.
-
-    Raises:
-        InputError: a folder holds no campaign, or one is named twice.
-        FieldError: no finished run, no such planner, or no run with these values.
-    """
+    """The runs that are done so far, and how many of the chosen ones the campaigns have."""
     base, names = common_folder(folders), _names(folders)
     tables: dict[str, RunTable] = {}
     missing: dict[str, Columns] = {}
@@ -165,7 +178,7 @@ def _chosen(
     }
     for column, value in where.items():
         name = column_named(table.columns, column)
-        table = table.take(places_of(column, table.columns[name], value))
+        table = table.where(column, value)
         for folder, columns in left.items():
             if name in columns:
                 rows = matching(columns[name], value)

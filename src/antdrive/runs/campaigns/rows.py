@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.job import Job
-from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.pipeline import Run, versions
 from antdrive.sim.settings import SETTING_COLUMNS
 
@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 CRASHED = "crashed"  # the outcome of a run whose process died, or in which antdrive itself failed
 PLANNER_FAULT = "planner_fault"  # the outcome of a run whose planner raised something
 TOO_SLOW = "too_slow"  # the outcome of a run that was ended because it took longer than the campaign's limit
-WALL_TIMES = ("plan_s", "drive_wall_s")  # metrics that differ between repetitions
 #: The columns that differ between repetitions of the same run; the canonical table is without them.
-NOT_CANONICAL = (*WALL_TIMES, "attempts")
+NOT_CANONICAL = (*WALL_CLOCK, "attempts")
 VERSIONS = ("antdrive", "numpy", "pybullet", "numba")
 BATCH = 50_000  # rows that are plain Python at a time
 OPTION = "option."  # what the names of columns with a planner's option begin with
@@ -55,7 +54,7 @@ RESULT: Mapping[str, str] = {
     "reason": "string",
     "digest": "string",
     "drive_digest": "string",
-    **{name: "double" for name in METRICS if name not in WALL_TIMES},
+    **{name: "double" for name in METRICS if name not in WALL_CLOCK},
     "plan_length_m": "double",
     "grid_optimum_m": "double",
     "rollout": "string",
@@ -68,24 +67,24 @@ RESULT: Mapping[str, str] = {
 
 def grid_row(job: Job) -> dict[str, Any]:
     """What a run is, by column."""
-    case, fields = job.case, job.case.fields
-    x0, y0, x1, y1 = case.task.world.bounds
+    case, planner, robot, fields = job.case, job.case.planner, job.case.robot, job.case.settings.fields
+    x0, y0, x1, y1 = case.place.task.world.bounds
     margin = case.calibration.margin if case.calibration else fields["margin"]
     return {
         "key": job.key,
-        "world": case.world,
+        "world": case.place.world,
         "world_hash": case.world_hash,
         "area_m2": (x1 - x0) * (y1 - y0),
-        "task": case.task_name,
-        "planner": case.planner,
-        "planner_name": case.planner_name,
-        "planner_version": case.planner_version,
-        "options": json.dumps(case.options, sort_keys=True),
-        "robot": case.robot_name,
-        "robot_hash": case.robot_hash,
-        **case.columns,
+        "task": case.place.name,
+        "planner": planner.label,
+        "planner_name": planner.name,
+        "planner_version": planner.version,
+        "options": json.dumps(planner.options, sort_keys=True),
+        "robot": robot.name,
+        "robot_hash": robot.content,
+        **case.settings.columns,
         "margin": None if margin == "auto" else float(margin),
-        "cell": float(fields["cell"] or case.task.cell),
+        "cell": float(fields["cell"] or case.place.task.cell),
         "seed": job.seed,
         "command": None if case.words is None else f"{case.words} --seed {job.seed}",
     }
@@ -146,8 +145,8 @@ def grid_table(jobs: Sequence[Job]) -> pyarrow.Table:
     tables = [arrow.Table.from_pylist([grid_row(job) for job in batch], schema=schema) for batch in batches]
     table = arrow.concat_tables([schema.empty_table(), *tables]).combine_chunks()
     place = table.schema.get_field_index("options") + 1
-    for name in sorted({option for job in jobs for option in job.case.given}):
-        values = [job.case.options.get(name) for job in jobs]
+    for name in sorted({option for job in jobs for option in job.case.planner.given}):
+        values = [job.case.planner.options.get(name) for job in jobs]
         table = table.add_column(place, OPTION + name, arrow.array(_alike(values)))
         place += 1
     return table

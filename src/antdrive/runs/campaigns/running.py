@@ -42,11 +42,7 @@ class Driving:
     folder: str | None = None  # the campaign's folder, where logs are written; None: they are handed back
 
     def __call__(self, job: Job) -> Finished:
-        """Make the run. What its planner raises, and what antdrive itself raises, is the run's result, not the campaign's end.
-
-        Raises:
-            InputError: the planner does not exist on this machine, or the log cannot be written.
-        """
+        """Make the run. What its planner raises, and what antdrive itself raises, is the run's result, not the campaign's end."""
         try:
             done = run(prepare(job))
         except InputError:
@@ -72,12 +68,7 @@ class Driving:
 
 
 def prepare(job: Job) -> Scenario:
-    """The scenario of a run. What runs in the same world can share within a process belongs here.
-
-    Raises:
-        InputError: a planner or option does not exist here.
-        FieldError: a setting is out of range.
-    """
+    """The scenario of a run. What runs in the same world can share within a process belongs here."""
     return job.case.scenario(job.seed)
 
 

@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text, written_whole
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.optional import parquet_library
 from antdrive.runs import folder as folders
@@ -55,8 +55,7 @@ class Store:
         """Write what is to be run."""
         write_table(grid, self.folder / GRID_FILE)
         text = json.dumps(manifest, indent=1, ensure_ascii=False)
-        with written_whole(self.folder / MANIFEST) as part:
-            part.write_text(text + "\n", encoding="utf-8")
+        write_text(self.folder / MANIFEST, text + "\n")
         write_table(joined(self.folder), self.folder / TABLE)  # until there is another one at the end
 
     def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
@@ -119,11 +118,7 @@ class Store:
 
 @contextmanager
 def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
-    """A context with a campaign's folder for this process alone.
-
-    Raises:
-        InputError: another process writes into it, it cannot be written to, or it holds something else.
-    """
+    """A context with a campaign's folder for this process alone."""
     with folders.opened(Path(folder), MANIFEST, kind="a campaign") as path:
         (path / PARTS).mkdir(exist_ok=True)
         for left in (*path.glob(f"{UNFINISHED}*"), *(path / PARTS).glob(f"{UNFINISHED}*")):
@@ -143,11 +138,7 @@ def former_grid(folder: Path) -> pyarrow.Table | None:
 
 
 def read_manifest(folder: str | Path) -> dict[str, Any]:
-    """The manifest of a campaign's folder.
-
-    Raises:
-        InputError: there is none.
-    """
+    """The manifest of a campaign's folder."""
     path = Path(folder) / MANIFEST
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
@@ -187,11 +178,7 @@ def _after(names: Sequence[str], name: str) -> int:
 
 
 def write_table(table: pyarrow.Table, path: Path) -> None:
-    """Write an Arrow table as Parquet, whole or not at all, and onto the disk.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write an Arrow table as Parquet, whole or not at all, and onto the disk."""
     parquet_library()
     import pyarrow.parquet
 

@@ -7,27 +7,76 @@ import dataclasses
 import hashlib
 import os
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
 from antdrive.base.atomic import written_whole
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, InputError
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.runs.campaigns.expanding import Expansion, expand
 from antdrive.runs.campaigns.job import Job, SweepCase
-from antdrive.runs.campaigns.missing import changed_planners, missing_runs
 from antdrive.runs.campaigns.results import SweepResults
-from antdrive.runs.campaigns.rows import grid_table
+from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, TOO_SLOW, grid_table
 from antdrive.runs.campaigns.running import Driving, Finished, Keep, Work, finished_of
-from antdrive.runs.campaigns.store import Store, opened
-from antdrive.runs.margins.choice import choose_margin
-from antdrive.runs.margins.prediction import Calibration
-from antdrive.runs.margins.trial import Conditions
+from antdrive.runs.campaigns.store import Store, former_grid, opened, outcomes_in
+from antdrive.runs.margins.choice import Calibration, choose_margin
+from antdrive.runs.margins.trial import key_of
 from antdrive.runs.pool import Done, Pool, cores
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import versions
 from antdrive.worlds import save_task
+
+OUTCOMES = (*(one.key for one in Outcome), PLANNER_FAULT, CRASHED, TOO_SLOW)
+
+
+@dataclass(frozen=True, eq=False)
+class MissingRuns:
+    """What is to be done."""
+
+    jobs: tuple[Job, ...]  # the runs to make, in the campaign's order
+    forgotten: frozenset[str]  # the keys of those among them whose present results are to be forgotten
+
+
+def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, again: Sequence[str]) -> MissingRuns:
+    """The runs that a folder lacks, and those that are asked for again."""
+    planners = dict.fromkeys(name for job in jobs for name in (job.case.planner.label, job.case.planner.name))
+    for word in again:
+        if word not in planners and word not in OUTCOMES:
+            raise InputError(
+                f"--again {word}: no such planner or outcome; choose from {', '.join((*planners, *OUTCOMES))}"
+            )
+    outcomes, asked = outcomes_in(folder), set(again)
+    wanted, forgotten = [], set()
+    for job in jobs:
+        outcome = outcomes.get(job.key)
+        if outcome is not None and asked & {outcome, job.case.planner.label, job.case.planner.name}:
+            forgotten.add(job.key)
+        elif outcome is not None and not (retry_crashed and outcome == CRASHED):
+            continue
+        wanted.append(job)
+    return MissingRuns(tuple(wanted), frozenset(forgotten))
+
+
+def changed_planners(jobs: Sequence[Job], folder: Path) -> Iterator[str]:
+    """A sentence for each planner whose earlier runs were made with another version of it, and do not count any more."""
+    former = former_grid(folder)
+    if former is None or "planner_version" not in former.column_names:
+        return
+    now = {job.case.planner.label: job.case.planner.version for job in jobs}
+    keys, made = {job.key for job in jobs}, outcomes_in(folder)
+    columns = (former[name].to_pylist() for name in ("key", "planner", "planner_version"))
+    old = Counter(
+        (planner, version)
+        for key, planner, version in zip(*columns, strict=True)
+        if key in made and key not in keys and now.get(planner, version) != version
+    )
+    for (planner, version), count in old.items():
+        runs = "1 run" if count == 1 else f"{count} runs"
+        yield f"{runs} of {planner} came from {version}; {now[planner]} is here now, and makes them anew"
 
 
 def sweep(
@@ -112,23 +161,20 @@ def _runs(
             yield runs
     else:
         with Pool(cores() if jobs is None else jobs, **watched) as pool:
-            yield pool.each(work, todo, group=lambda job: job.case.world)
+            yield pool.each(work, todo, group=lambda job: job.case.place.world)
 
 
 def calibrated(jobs: Iterable[Job]) -> list[Job]:
-    """The runs, with a margin for those that leave it to be chosen; each robot and its settings are calibrated once.
-
-    Raises:
-        FieldError: no margin leaves the reserve.
-    """
+    """The runs, with a margin for those that leave it to be chosen; each robot and its settings are calibrated once."""
     chosen: dict[str, Calibration] = {}
     cases: dict[int, SweepCase] = {}
     for job in jobs:
-        if job.case.fields["margin"] == "auto" and id(job.case) not in cases:
-            conditions = Conditions.of(job.case.scenario(job.seed, margin=0.0))
-            if conditions.key not in chosen:
-                chosen[conditions.key] = choose_margin(conditions)
-            cases[id(job.case)] = dataclasses.replace(job.case, calibration=chosen[conditions.key])
+        if job.case.settings.fields["margin"] == "auto" and id(job.case) not in cases:
+            conditions = job.case.scenario(job.seed, margin=0.0).loss_conditions
+            key = key_of(conditions)
+            if key not in chosen:
+                chosen[key] = choose_margin(conditions)
+            cases[id(job.case)] = dataclasses.replace(job.case, calibration=chosen[key])
     return [job._replace(case=cases[id(job.case)]) if id(job.case) in cases else job for job in jobs]
 
 

@@ -11,14 +11,15 @@ from antdrive.base.checks import suggest
 from antdrive.base.errors import FieldError, input_error
 from antdrive.planners import PlannerError
 from antdrive.runs.suites.baseline import Baseline
-from antdrive.runs.suites.demands import CYLINDER, UNSEEN, WALL, WALL_CLOCK, Bound
+from antdrive.runs.suites.demands import CYLINDER, UNSEEN, WALL, Bound
 from antdrive.runs.suites.judging import RAISED, judge, limits, unfulfilled
 from antdrive.runs.suites.nearest import NOTHING, cause_of_contact, touched_first
 from antdrive.runs.suites.suite import SuiteCase
-from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.pipeline import Run
+from antdrive.sim.pipeline import Run, run
+from antdrive.sim.scenario import Scenario
 
 _BOUND = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|==)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
@@ -68,36 +69,33 @@ class Failure:
         return " ".join(parts) + (f" ({self.cause})" if self.cause else "")
 
 
-def failure_of(run: Run, bound: Bound | None = None) -> Failure | None:
+def failure_of(done: Run, bound: Bound | None = None) -> Failure | None:
     """How a run failed; None if it did not.
 
     Args:
-        run: the run
+        done: the run
         bound: what counts as failure; None: everything but a certified success
     """
-    rollout = run.rollout
+    rollout = done.rollout
     touched = NOTHING if rollout is None else touched_first(rollout)
     if bound is not None:
         if rollout is None or not bound.holds(METRICS[bound.metric](rollout)):
             return None
-        return Failure(run.outcome.key, touched, str(bound))
-    if run.succeeded:
+        return Failure(done.outcome.key, touched, str(bound))
+    if done.succeeded:
         return None
-    if run.outcome is Outcome.SUCCEEDED:
-        assert run.certificate is not None
-        return Failure(run.outcome.key, touched, "certificate: " + without_numbers(run.certificate.problems[0]))
+    if done.outcome is Outcome.SUCCEEDED:
+        assert done.certificate is not None
+        return Failure(done.outcome.key, touched, "certificate: " + without_numbers(done.certificate.problems[0]))
     if rollout is not None and touched in (CYLINDER, WALL):
-        return Failure(run.outcome.key, touched, cause_of_contact(rollout))
-    return Failure(run.outcome.key, touched, "" if touched != NOTHING else without_numbers(run.reason))
+        return Failure(done.outcome.key, touched, cause_of_contact(rollout))
+    return Failure(done.outcome.key, touched, "" if touched != NOTHING else without_numbers(done.reason))
 
 
 def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
     """What counts as failing where a test's drive ends as expected but breaks a bound of the test or of its baseline.
 
     None where it breaks none: then the run itself is the failure, or there is none.
-
-    Raises:
-        InputError: the run differs from its baseline in what no other world can repeat; or the baseline is damaged.
     """
     rollout, demands = done.rollout, case.demands
     if rollout is None or done.outcome is not demands.outcome:
@@ -122,7 +120,46 @@ def _first_broken(bounds: Iterable[Bound], rollout: Rollout) -> Bound | None:
     return next((bound for bound in broken if bound is not None), None)
 
 
-def failure_of_planner(error: PlannerError) -> Failure:
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """What came of an attempt to run a scenario.
+
+    Attributes:
+        scenario: the scenario
+        run: its run; None where the planner raised something
+        error: what it raised; None where it did not
+    """
+
+    scenario: Scenario
+    run: Run | None
+    error: PlannerError | None = None
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Attempt:
+        """Run a scenario."""
+        try:
+            return cls(scenario, run(scenario))
+        except PlannerError as error:
+            return cls(scenario, None, error)
+
+    @property
+    def rollout(self) -> Rollout | None:
+        """The log of the drive; None if the robot did not drive."""
+        return None if self.run is None else self.run.rollout
+
+    @property
+    def fingerprint(self) -> str:
+        """The attempt in one text: the same wherever the run is the same bit for bit, or the planner raises the same."""
+        if self.run is None:
+            return without_numbers(str(self.error))
+        return f"{self.run.outcome.key}: {self.run.reason}" if self.run.rollout is None else self.run.rollout.digest
+
+    def failure(self, bound: Bound | None = None) -> Failure | None:
+        """How it failed, as `failure_of` says; what a planner raises is a failure, whatever the bound."""
+        return failure_of_planner(self.error) if self.run is None else failure_of(self.run, bound)
+
+
+def failure_of_planner(error: PlannerError | None) -> Failure:
     """The failure of a run that ended because the planner raised something."""
     return Failure(RAISED, NOTHING, without_numbers(str(error)))
 

@@ -13,22 +13,23 @@ from typing import Any
 
 import yaml
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name
-from antdrive.planners import PlannerError, list_planners, load_planner
+from antdrive.planners import list_planners, load_planner
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.robots.files import footprint_to_dict
+from antdrive.runs.failures.failure import Attempt
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.runs.suites.names import is_own_entry
 from antdrive.runs.suites.nearest import cause_of_contact, touched_first
 from antdrive.runs.suites.scenarios import scenario_of
-from antdrive.runs.suites.suite import load_suite
+from antdrive.runs.suites.suite import SuiteCase, load_suite
 from antdrive.sim.forms import written
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import changes
-from antdrive.sim.pipeline import Run, run
+from antdrive.sim.pipeline import Run
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import save_task
 
@@ -42,14 +43,14 @@ class Handover:
 
     Attributes:
         name: the scenario's name in the suite, and that of its world file
-        run: the run that failed; the scenario alone where the planner raised something
+        failed: the attempt that failed
         bound: the metric's bound that it crosses, if that is its failure
         note: what people should know about it; may be empty
         planner: the planner in the words of the suite, such as {file: ../mine.py, name: Mine}; None: by its name
     """
 
     name: str
-    run: Run | Scenario
+    failed: Attempt
     bound: Bound | None = None
     note: str = ""
     planner: str | Mapping[str, Any] | None = None
@@ -74,8 +75,8 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
     entries: dict[str, Any] = {}
     robots: dict[str, RobotSpec] = {}
     for handover in handovers:
-        failed = handover.run
-        scenario = failed.scenario if isinstance(failed, Run) else failed
+        failed = handover.failed
+        scenario = failed.scenario
         world = Path("worlds") / f"{handover.name}.yaml"
         save_task(scenario.task, path.parent / world)
         entries[handover.name] = {
@@ -83,12 +84,11 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
             "world": str(world),
             **suite_entry(scenario, _robot(scenario.robot, path.parent, robots)),
             **({"planner": handover.planner} if handover.planner else {}),
-            **({"expect": expectation(failed, handover.bound)} if isinstance(failed, Run) else {}),
+            **({"expect": expectation(failed.run, handover.bound)} if failed.run is not None else {}),
             "baseline": False,
         }
-    with written_whole(path) as part:
-        text = yaml.safe_dump({"schema": 1, "scenarios": entries}, sort_keys=False, allow_unicode=True, width=110)
-        part.write_text(text, encoding="utf-8")
+    text = yaml.safe_dump({"schema": 1, "scenarios": entries}, sort_keys=False, allow_unicode=True, width=110)
+    write_text(path, text)
     return path
 
 
@@ -103,7 +103,16 @@ def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
     }
 
 
-def planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> str | dict[str, Any] | None:
+def planner_beside(
+    case: SuiteCase | None, own: str | None, scenario: Scenario, folder: Path
+) -> str | dict[str, Any] | None:
+    """The planner of a test, or of a log whose own class is named, in the words of a suite in a folder; None if registered."""
+    if case is not None:
+        return _planner_moved(case.entry.planner, case.suite.parent, folder)
+    return None if own is None else _planner_moved(planner_words(scenario, own), Path.cwd(), folder.absolute())
+
+
+def _planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> str | dict[str, Any] | None:
     """The words of a suite for a planner in a file or module of people's own, as a suite in another folder writes them.
 
     None for a registered planner.
@@ -133,11 +142,6 @@ def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
     return expected
 
 
-def fingerprint_of(done: Run) -> str:
-    """A run in one text, which is the same wherever the run is the same bit for bit."""
-    return done.rollout.digest if done.rollout is not None else f"{done.outcome.key}: {done.reason}"
-
-
 def suite_elsewhere(suite: Path) -> list[str]:
     """The fingerprints of a suite's scenarios, run in other processes; a fault of a file stands for one."""
     with Pool(2) as pool:
@@ -149,6 +153,14 @@ def _fingerprint_from(suite: Path, index: int) -> str:
         return _fingerprint(scenario_of(load_suite(suite)[index]))
     except InputError as error:
         return str(error)
+
+
+def renamed(scenario: Scenario, name: str, note: str = "") -> Scenario:
+    """The scenario with another name of its world, and a note where the world comes from."""
+    task = scenario.task
+    source = "; ".join(part for part in (task.world.source, note) if part) if note else task.world.source
+    world = dataclasses.replace(task.world, name=name, source=source)
+    return dataclasses.replace(scenario, task=dataclasses.replace(task, world=world))
 
 
 def scenario_name(text: str) -> str:
@@ -163,16 +175,7 @@ def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
 
 
 def _fingerprint(scenario: Scenario) -> str:
-    done = run_if_planned(scenario)
-    return done if isinstance(done, str) else fingerprint_of(done)
-
-
-def run_if_planned(scenario: Scenario) -> Run | str:
-    """A scenario's run; where the planner raises something, what it raises."""
-    try:
-        return run(scenario)
-    except PlannerError as error:
-        return str(error)
+    return Attempt.of(scenario).fingerprint
 
 
 def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str, Any]:
@@ -200,6 +203,5 @@ def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:
 def _write_robot(robot: RobotSpec, target: Path) -> None:
     data = {"schema": 1, **dataclasses.asdict(robot)}
     data["footprint"] = footprint_to_dict(robot.footprint)
-    with written_whole(target) as part:
-        text = yaml.safe_dump({key: value for key, value in data.items() if value is not None}, sort_keys=False)
-        part.write_text(text, encoding="utf-8")
+    text = yaml.safe_dump({key: value for key, value in data.items() if value is not None}, sort_keys=False)
+    write_text(target, text)

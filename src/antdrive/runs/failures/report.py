@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from antdrive.runs.failures.failure import failure_of, without_numbers
-from antdrive.runs.failures.handover import (
-    Handover,
-    fingerprint_of,
-    run_elsewhere,
-    run_if_planned,
-    suite_elsewhere,
-    write_suite,
-)
+from antdrive.runs.failures.failure import Attempt
+from antdrive.runs.failures.handover import Handover, renamed, run_elsewhere, suite_elsewhere, write_suite
 from antdrive.runs.failures.hunt import Finding, Hunt
-from antdrive.runs.failures.shrink import shrink
-from antdrive.sim.pipeline import Run
-from antdrive.sim.scenario import Scenario
+from antdrive.runs.failures.shrink import Shrunk, shrink
+from antdrive.runs.suites.demands import Bound
 
 SUITE = "failures.drive.yaml"
 
@@ -31,15 +23,10 @@ class Reported:
 
     name: str  # its name in the suite, and of its world
     finding: Finding  # the failure as it was found
-    run: Run | Scenario  # the run of the small scenario; that scenario alone where the planner raised something
+    small: Attempt  # what came of the small scenario
     # whether the found scenario, and the small one as it is read from its files, gave the same bits in another
     # process
     repeats: bool
-
-    @property
-    def scenario(self) -> Scenario:
-        """The small scenario."""
-        return self.run.scenario if isinstance(self.run, Run) else self.run
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
@@ -49,7 +36,7 @@ class Reported:
             **dataclasses.asdict(self.finding.failure),
             "repeats": self.repeats,
             "obstacles_found": len(self.finding.scenario.task.world.obstacles),
-            "obstacles": len(self.scenario.task.world.obstacles),
+            "obstacles": len(self.small.scenario.task.world.obstacles),
         }
 
 
@@ -59,11 +46,8 @@ def report(
     """Shrink the different failures of a search, write them, and run what was written again in another process.
 
     A suite and the worlds are written. Ctrl-C ends the shrinking; what is not shrunk by then is handed over as it was found.
-
-    Raises:
-        InputError: a file cannot be written.
     """
-    small: list[Run | Scenario] = []
+    small: list[Attempt] = []
     for k, finding in enumerate(hunt.distinct):
         name, scenario = _name(k), finding.scenario
         if seconds > 0:
@@ -71,9 +55,7 @@ def report(
                 scenario = shrink(scenario, seconds=seconds, journal=folder / "journals" / f"{name}.json").scenario
             except KeyboardInterrupt:
                 seconds = 0.0
-        named = _named(scenario, name)
-        done = run_if_planned(named)
-        small.append(named if isinstance(done, str) else done)
+        small.append(Attempt.of(renamed(scenario, name)))
         if progress is not None:
             progress((k + 1) / (len(hunt.distinct) + 1))
     suite = _write(small, hunt.distinct, folder)
@@ -88,22 +70,26 @@ def _name(index: int) -> str:
     return f"failure-{index + 1}"
 
 
-def _repeats(finding: Finding, small: Run | Scenario, found_elsewhere: str, small_elsewhere: str) -> bool:
+def _repeats(finding: Finding, small: Attempt, found_elsewhere: str, small_elsewhere: str) -> bool:
     """Whether a failure and its small scenario gave the same bits in another process, and fail in the same way."""
-    if isinstance(small, Scenario):  # the planner raised something
-        masked = {without_numbers(text) for text in (finding.fingerprint, found_elsewhere, small_elsewhere)}
-        return masked == {finding.failure.cause}
-    same = (found_elsewhere, small_elsewhere) == (finding.fingerprint, fingerprint_of(small))
-    return same and failure_of(small) == finding.failure
+    same = (found_elsewhere, small_elsewhere) == (finding.fingerprint, small.fingerprint)
+    return same and small.failure() == finding.failure
 
 
-def _write(small: Sequence[Run | Scenario], findings: Sequence[Finding], folder: Path) -> Path:
+def hand_over(
+    shrunk: Shrunk, name: str, folder: Path, *, bound: Bound | None, planner: str | Mapping[str, Any] | None
+) -> tuple[Attempt, Path, bool]:
+    """Write the suite of one small failure; the failure, the suite, and whether that gives the same in another process."""
+    note = f"shrunk from {shrunk.original.task.world.name}: {shrunk.summary}"
+    small = Attempt.of(renamed(shrunk.scenario, name, note))
+    handover = Handover(name, small, bound, shrunk.failure.sentence, planner)
+    suite = write_suite(folder / f"{name}.drive.yaml", [handover])
+    repeats = suite_elsewhere(suite) == [small.fingerprint] and small.failure(bound) == shrunk.failure
+    return small, suite, repeats
+
+
+def _write(small: Sequence[Attempt], findings: Sequence[Finding], folder: Path) -> Path:
     """Write the suite and the worlds of failures; the suite's path."""
     pairs = enumerate(zip(small, findings, strict=True))
     handovers = [Handover(_name(k), done, note=finding.failure.sentence) for k, (done, finding) in pairs]
     return write_suite(folder / SUITE, handovers)
-
-
-def _named(scenario: Scenario, name: str) -> Scenario:
-    world = dataclasses.replace(scenario.task.world, name=name)
-    return dataclasses.replace(scenario, task=dataclasses.replace(scenario.task, world=world))

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from antdrive.base.errors import InputError
-from antdrive.planners import PlannerError
-from antdrive.runs.failures.failure import Failure, failure_of, failure_of_planner
+from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.runs.failures.passes import PASSES
 from antdrive.runs.failures.trials import OutOfTimeError, Trials, changeable, failure_in, identity_of, room_in
 from antdrive.runs.suites.demands import Bound
-from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 
 ROUNDS = 20  # far more than were ever needed; a pass can undo nothing, so rounds end by themselves
@@ -88,12 +86,10 @@ def shrink(
         InputError: the scenario does not fail.
         PlannerError: the planner raised something, and a bound is what counts.
     """
-    try:
-        failure = failure_of(run(scenario), bound)
-    except PlannerError as error:
-        if bound is not None:
-            raise
-        failure = failure_of_planner(error)
+    first = Attempt.of(scenario)
+    if first.error is not None and bound is not None:
+        raise first.error
+    failure = first.failure(bound)
     if failure is None:
         counts = "a failure is anything but a certified success" if bound is None else f"the bound is {bound}"
         raise InputError(f"{scenario.task.world.name}: this run does not fail, so there is nothing to shrink; {counts}")

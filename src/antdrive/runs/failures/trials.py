@@ -12,13 +12,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import Planner, PlannerError
-from antdrive.planners.anyangle.passage import MOST_OBSTACLES
+from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible
 from antdrive.planners.own_code import is_importable_elsewhere
-from antdrive.runs.failures.failure import Failure, failure_of, failure_of_planner
-from antdrive.runs.failures.space import feasible
+from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_planner
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim.log.outcome import Outcome
@@ -102,11 +101,7 @@ class Trials:
         self._latest: tuple[str, Rollout | None] | None = None
 
     def first(self, candidates: Iterable[Scenario | None]) -> Scenario | None:
-        """The first candidate that fails in the wanted way; None if there is none. Candidates that are None are left out.
-
-        Raises:
-            OutOfTimeError: the time is over.
-        """
+        """The first candidate that fails in the wanted way; None if there is none. Candidates that are None are left out."""
         waiting = (candidate for candidate in candidates if candidate is not None)
         while batch := list(itertools.islice(waiting, self._jobs)):
             keys = [_digest(changeable(candidate)) for candidate in batch]
@@ -120,10 +115,7 @@ class Trials:
         """The drive of a scenario that is known to fail; None if it fails before it drives."""
         key = _digest(changeable(scenario))
         if self._latest is None or self._latest[0] != key:
-            try:
-                self._latest = key, run(scenario).rollout
-            except PlannerError:  # the failure itself
-                self._latest = key, None
+            self._latest = key, Attempt.of(scenario).rollout
         return self._latest[1]
 
     def forget(self) -> None:
@@ -142,8 +134,7 @@ class Trials:
         self._written = time.monotonic()
         if self._journal is not None:
             text = json.dumps({"header": self._header, "answers": self._answers}, indent=0, sort_keys=True)
-            with written_whole(self._journal) as part:
-                part.write_text(text + "\n", encoding="utf-8")
+            write_text(self._journal, text + "\n")
 
     def _try(self, batch: list[tuple[str, Scenario]]) -> None:
         self.recalled |= {key for key, _ in batch} & self._known

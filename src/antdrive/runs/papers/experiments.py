@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 
 from antdrive.planners import Planner, Query
 from antdrive.runs.papers import maps
-from antdrive.runs.papers.baselines import FirstTouchDStar
-from antdrive.runs.papers.candidates import MoveCount, candidate, winding_candidate
+from antdrive.runs.papers.maps import MoveCount, candidate, winding_candidate
+from antdrive.runs.papers.trials import FirstTouchDStar
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,10 +104,7 @@ def han2007() -> list[Experiment]:
         *_han_experiments("one obstacle of radius 1", maps.han_ants((10.0, 10.0, 1.0)), "aco-han", [*plain, elite]),
         *_han_experiments("no obstacle", maps.han_ants(None), "aco-han", [plain[-1], elite]),
         *_han_experiments(
-            "14 obstacles",
-            listed,
-            "ga-han",
-            [("4 via points", None, {"via_points": 4, "mutation": 0.4}), single],
+            "14 obstacles", listed, "ga-han", [("4 via points", None, {"via_points": 4, "mutation": 0.4}), single]
         ),
         *_han_experiments("two walls of obstacles", maps.han_genes(*maps.TWO_WALLS), "ga-han", [single]),
         *_han_experiments(
@@ -151,14 +148,7 @@ def suganthi2019() -> list[Experiment]:
     It does not say what an ant in a dead end does, whether loops are cut, or whether the elite's factor in eq. 7 is
     the alpha of eq. 5. The constants of `pfaco` are those of Table 1, whose first value the text does not show.
     """
-    common = {
-        "alpha": 1.0,
-        "beta": 1.0,
-        "evaporation": 0.3,
-        "deposit": 1.0,
-        "heuristic": "step",
-        "iterations": 100,
-    }
+    common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
     freed, letter = {"backtrack": True, "shortcut": True}, {"backtrack": False, "shortcut": False}
     many: dict[str, Any] = {"ants": 25, "explorers": 75, **common}
     wild = ("as, ants die", "iaco, ants die")  # two of their runs differ by a quarter of the length

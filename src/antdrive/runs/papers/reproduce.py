@@ -1,9 +1,15 @@
-"""Repeat the papers' experiments: printed and measured values, and the claims with their verdicts."""
+"""The papers' experiments repeated: printed and measured values, and the claims with their verdicts.
+
+Trials are kept in files, so that an interrupted reproduction goes on where it stopped.
+"""
 
 from __future__ import annotations
 
 import csv
 import dataclasses
+import functools
+import hashlib
+import json
 import math
 import operator
 import re
@@ -13,18 +19,22 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
+from zipfile import BadZipFile
 
 import numpy as np
+import numpy.typing as npt
 
-from antdrive.base.atomic import written_whole
+import antdrive.planners
+import antdrive.runs.papers
+import antdrive.worlds
+from antdrive.base.atomic import write_text, written_whole
 from antdrive.base.errors import InputError
-from antdrive.runs.papers.claims import CLAIMS, Arm, Claim
-from antdrive.runs.papers.experiments import PAPERS, Experiment
-from antdrive.runs.papers.keeping import keep_trials, kept_trials, trials_key
-from antdrive.runs.papers.movers import drive_among
-from antdrive.runs.papers.trials import Trial, solve
-from antdrive.runs.papers.verdicts import (
+from antdrive.planners import History, PlanResult, PlanStatus
+from antdrive.runs.papers.claims import (
+    CLAIMS,
     VERDICT_HEADS,
+    Arm,
+    Claim,
     Verdict,
     judge,
     trials_at_hand,
@@ -32,8 +42,104 @@ from antdrive.runs.papers.verdicts import (
     verdict_cells,
     verdict_facts,
 )
+from antdrive.runs.papers.experiments import PAPERS, Experiment
+from antdrive.runs.papers.trials import Trial, drive_among, solve
 from antdrive.runs.pool import Pool, processes_for
-from antdrive.runs.statistics.bootstrap import medians_by_world
+from antdrive.runs.statistics.intervals import medians_by_world
+
+HISTORY = ("best", "iteration_best", "iteration_mean", "arrived")
+NUMBERS = ("optimum", "cpu_s", "total", "concentration")  # in the order of `Trial`
+NONE = -1  # the size of waypoints that a plan does not have
+
+
+def trials_key(experiment: Experiment, seeds: int) -> str:
+    """What the trials of an experiment depend on, the source code included: a file with another key is not used."""
+    facts = {
+        "map": experiment.map,
+        "name": experiment.name,
+        "planner": experiment.planner if experiment.made is None else repr(experiment.made),
+        "options": dict(experiment.options),
+        "worlds": experiment.worlds,
+        "work": experiment.work,
+        "movers": experiment.movers,
+        "seeds": seeds,
+        "code": code_hash(),
+    }
+    return json.dumps(facts, sort_keys=True)
+
+
+@functools.cache
+def code_hash() -> str:
+    """The hash of the source files of worlds, planners and papers' experiments, but for those that only judge and draw."""
+    found = hashlib.sha256()
+    for package in (antdrive.worlds, antdrive.planners, antdrive.runs.papers):
+        for folder in package.__path__:
+            for path in sorted(Path(folder).rglob("*.py")):
+                if package is antdrive.runs.papers and path.stem == "claims":  # no trial depends on it
+                    continue
+                found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def keep_trials(trials: Sequence[Trial], path: Path, key: str) -> None:
+    """Write trials to a file; plans lose their fields, options and planning times."""
+    plans = [trial.result for trial in trials]
+    lines = [plan.waypoints for plan in plans]
+    arrays: dict[str, Any] = {
+        "key": np.array(key),
+        "seed": np.array([trial.seed for trial in trials]),
+        "world": np.array([trial.world for trial in trials]),
+        "numbers": np.array([[getattr(trial, name) for name in NUMBERS] for trial in trials]).reshape(-1, len(NUMBERS)),
+        "status": np.array([plan.status.name for plan in plans], dtype=np.str_),
+        "work": np.array([plan.work for plan in plans]),
+        "lengths": np.array([[plan.cost, _or_nan(plan.length)] for plan in plans]).reshape(-1, 2),
+        "cells": np.concatenate([np.empty((0, 2), dtype=np.int32), *(plan.cells for plan in plans)]),
+        "sizes": np.array([len(plan.cells) for plan in plans]),
+        "waypoints": np.concatenate([np.empty((0, 2)), *(line for line in lines if line is not None)]),
+        "waypoint_sizes": np.array([NONE if line is None else len(line) for line in lines]),
+        "history_sizes": np.array([len(plan.history) for plan in plans]),
+    }
+    for name in HISTORY:
+        arrays[name] = np.concatenate([getattr(History(), name), *(getattr(plan.history, name) for plan in plans)])
+    with written_whole(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def kept_trials(path: Path, key: str) -> list[Trial] | None:
+    """The trials of a file; None if there is no such file, or it has another key or cannot be read."""
+    try:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
+            if str(file["key"]) != key:
+                return None
+            arrays = {name: file[name] for name in file.files}
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        return None
+    cells = _parts(arrays["cells"], arrays["sizes"])
+    waypoints = _parts(arrays["waypoints"], np.maximum(arrays["waypoint_sizes"], 0))
+    histories = [_parts(arrays[name], arrays["history_sizes"]) for name in HISTORY]
+    trials = []
+    for k, (seed, world) in enumerate(zip(arrays["seed"], arrays["world"], strict=True)):
+        cost, length = (float(value) for value in arrays["lengths"][k])
+        plan = PlanResult(
+            status=PlanStatus[str(arrays["status"][k])],
+            cells=cells[k],
+            cost=cost,
+            length=None if math.isnan(length) else length,
+            waypoints=None if arrays["waypoint_sizes"][k] == NONE else waypoints[k],
+            work=int(arrays["work"][k]),
+            history=History(*(parts[k] for parts in histories)),
+        )
+        trials.append(Trial(int(seed), int(world), plan, *map(float, arrays["numbers"][k])))
+    return trials
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _parts(joined: npt.NDArray[Any], sizes: npt.NDArray[np.int64]) -> list[npt.NDArray[Any]]:
+    return np.split(joined, np.cumsum(sizes)[:-1]) if len(sizes) else []
+
 
 T = TypeVar("T")
 MOST_SEEDS = 1000  # every claim can be decided with fewer
@@ -93,9 +199,6 @@ def reproduce(
 
     The trials of an experiment are written as soon as it is done. A second call with the same folder and seeds takes them
     from there, unless the source code has changed in between.
-
-    Raises:
-        InputError: an unknown paper.
     """
     experiments = _experiments(papers, quick)
     measured, kept = _all_trials(experiments, folder / TRIALS, seeds, jobs, progress)
@@ -175,11 +278,7 @@ def _judgeable(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[Claim,
 
 
 def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> str:
-    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all.
-
-    Raises:
-        InputError: an unknown paper.
-    """
+    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all."""
     experiments = _experiments(papers, quick)
 
     def undecided(count: int) -> tuple[int, int]:
@@ -258,8 +357,7 @@ NOTE = (
 
 def _write_table(heads: Sequence[str], rows: Iterable[Sequence[str]], path: Path, note: str = "") -> str:
     lines = [heads, ["---"] * len(heads), *rows]
-    with written_whole(path) as temporary:
-        temporary.write_text(note + "".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8")
+    write_text(path, note + "".join(f"| {' | '.join(line)} |\n" for line in lines))
     return str(path)
 
 

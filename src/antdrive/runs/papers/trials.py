@@ -1,21 +1,89 @@
-"""Single plans of the papers' experiments: one planner, one map, one seed, as many ant steps as wanted."""
+"""Trials of the papers' experiments: a planner's path on one map with one seed, planned at once or decided cell by cell.
+
+As in hasan, obstacles of one cell may move to a random free neighbouring cell at every decision. His baseline must have been
+a D* that is not optimal: its printed costs are far above those of shortest paths.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import heapq
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
-from antdrive.planners import Planner, PlanResult, Query, load_planner
+from antdrive.planners import (
+    Cell,
+    OnlineAgent,
+    Planner,
+    PlannerError,
+    PlanResult,
+    PlanStatus,
+    Query,
+    agent_for,
+    load_planner,
+)
 from antdrive.planners.iterative import Iteration, as_iterative
+from antdrive.planners.plan import Capabilities, GridPlanner, path_cost
 from antdrive.runs.papers import maps
-from antdrive.runs.papers.baselines import total_cost
+from antdrive.worlds import DIRECTIONS, Grid
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstTouchDStar(GridPlanner):
+    """Spreads costs from the goal, nearest to the start first, and never lowers a cost once it is given.
+
+    Both liberties are those of hasan's own listing: a cell gets its cost when it is new, and no order of the
+    open list is stated. Paths around concave obstacles are longer than the shortest.
+    """
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs."""
+        return Capabilities()
+
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        onward: dict[Cell, Cell] = {query.goal: query.goal}
+        queue = [(0.0, query.goal)]
+        while queue and query.start not in onward:
+            _, cell = heapq.heappop(queue)
+            for near in neighbours(query, cell):
+                if near not in onward:
+                    onward[near] = cell
+                    heapq.heappush(queue, (math.dist(near, query.start), near))
+        if query.start not in onward:
+            return PlanResult(status=PlanStatus.NO_PATH, reason="no path", work=len(onward), work_unit="cells")
+        cells = [query.start]
+        while cells[-1] != query.goal:
+            cells.append(onward[cells[-1]])
+        path = np.array(cells, dtype=np.int32)
+        cost = path_cost(path, query.grid.cell)
+        return PlanResult(status=PlanStatus.SOLVED, cells=path, cost=cost, work=len(onward), work_unit="cells")
+
+
+def neighbours(query: Query, cell: Cell) -> list[Cell]:
+    """The cells to which a move is allowed; all moves of a grid are allowed both ways."""
+    moves = int(query.grid.moves[cell])
+    return [(cell[0] + dr, cell[1] + dc) for k, (dr, dc) in enumerate(DIRECTIONS) if moves >> k & 1]
+
+
+def total_cost(query: Query, result: PlanResult) -> float:
+    """hasan's total path cost: over all cells that are entered, the sum of what is left to the goal; inf without a path.
+
+    A straight move costs 1 and a diagonal one 1.4, as in the paper; what is left is counted along the path.
+    """
+    if not result.solved:
+        return math.inf
+    diagonal = np.abs(np.diff(result.cells, axis=0)).sum(axis=1) == 2
+    steps = np.where(diagonal, 1.4, 1.0)
+    return float(np.cumsum(steps[::-1]).sum())
+
 
 ENDLESS = 1_000_000  # iterations; the ant steps end such a plan much earlier
 CLOSE = 0.25  # a path is close to the shortest when it is at most this share longer
@@ -104,11 +172,7 @@ class Trial:
 
 
 def solve(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, work: float = math.inf) -> Trial:
-    """Plan once.
-
-    Raises:
-        FieldError: `work` is finite and the planner has no iterations.
-    """
+    """Plan once."""
     chosen = load_planner(planner, **options) if isinstance(planner, str) else planner
     rng = np.random.default_rng(seed)
     started = time.process_time()
@@ -141,3 +205,85 @@ def _until(states: Iterator[Iteration], work: float) -> Iterator[Iteration]:
         done += state.work
         if done >= work:
             return
+
+
+DECISIONS = 5000  # after so many a drive has failed
+
+
+class Strollers:
+    """Movers of one cell each that go to a random free neighbouring cell in every step."""
+
+    def __init__(self, grid: Grid, count: int, rng: np.random.Generator, away: tuple[Cell, ...]) -> None:
+        """Put movers on random free cells."""
+        self._grid, self._rng = grid, rng
+        free = [tuple(map(int, cell)) for cell in np.argwhere(grid.free)]
+        chosen = rng.permutation(len(free))
+        self._cells = [free[i] for i in chosen if free[i] not in away][:count]
+
+    @property
+    def cells(self) -> npt.NDArray[np.int64]:
+        """The cells that movers are in (N, 2)."""
+        return np.array(self._cells, dtype=np.int64).reshape(-1, 2)
+
+    def step(self, robot: Cell) -> None:
+        """Move each to a free neighbouring cell other than the robot's, if there is one."""
+        for n, (r, c) in enumerate(self._cells):
+            moves = int(self._grid.moves[r, c])
+            near = [(r + dr, c + dc) for k, (dr, dc) in enumerate(DIRECTIONS) if moves >> k & 1]
+            draw = self._rng.random()  # one number per step, whatever the robot does
+            near = [cell for cell in near if cell != robot and cell not in self._cells]
+            if near:
+                self._cells[n] = near[int(draw * len(near))]
+
+
+def drive(
+    robot: OnlineAgent,
+    query: Query,
+    movers: Strollers,
+    name: str = "",
+    limit: int = DECISIONS,
+    spent: Callable[[float], None] = lambda seconds: None,
+) -> list[Cell]:
+    """The cells that a robot goes through, start included; the last is the goal if it arrives within the decisions.
+
+    `spent` is told the processor time of each decision, the movers' steps left out [s].
+    """
+    cells, name = [robot.cell], name or type(robot).__name__
+    for _ in range(limit):
+        if robot.arrived:
+            break
+        movers.step(robot.cell)
+        before, blocked, started = robot.cell, movers.cells, time.process_time()
+        to = robot.step(blocked)
+        spent(time.process_time() - started)
+        if to is None:
+            continue
+        step = DIRECTIONS.index((to[0] - before[0], to[1] - before[1]))
+        if not int(query.grid.moves[before]) >> step & 1:
+            raise PlannerError(name, f"went from {before} to {to}, a move that is not allowed")
+        if list(to) in movers.cells.tolist():
+            raise PlannerError(name, f"went from {before} to {to}, into a mover")
+        cells.append(to)
+    return cells
+
+
+def drive_among(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, count: int) -> Trial:
+    """Drive once, cell by cell, among movers; the trial's path is the one that was driven."""
+    chosen = load_planner(planner, **options) if isinstance(planner, str) else planner
+    movers = Strollers(query.grid, count, np.random.default_rng([seed, count]), (query.start, query.goal))
+    started = time.process_time()
+    robot = agent_for(chosen, query, np.random.default_rng(seed))
+    times = [time.process_time() - started]
+    name = planner if isinstance(planner, str) else type(planner).__name__
+    path = np.array(drive(robot, query, movers, name, spent=times.append), dtype=np.int32)
+    result = PlanResult(
+        status=PlanStatus.SOLVED if robot.arrived else PlanStatus.STOPPED,
+        cells=path,
+        cost=path_cost(path, query.grid.cell),
+        reason=robot.note if robot.arrived else f"not at the goal after {DECISIONS} decisions",
+        work=robot.stats.propagated,
+        work_unit="cells",
+    )
+    if not result.solved:
+        result = dataclasses.replace(result, cells=path[:0], cost=float("inf"))
+    return Trial(seed, seed, result, maps.optimum(query), sum(times), total_cost(query, result))

@@ -9,7 +9,8 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Flags, Floats, Ints
-from antdrive.runs.statistics.runs import OF_WORLDS, PLACE, WALL_TIMES, RunTable
+from antdrive.runs.statistics.runs import OF_WORLDS, PLACE, RunTable
+from antdrive.sim.log.metrics import WALL_CLOCK
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +39,7 @@ class PairedRuns:
 
     @classmethod
     def of(cls, table: RunTable, planners: Sequence[str] = ()) -> PairedRuns:
-        """Arrange the runs of a table, or of some planners in this order.
-
-        Raises:
-            FieldError: the table is empty, no such planner is in it, or a planner has two runs of one instance.
-        """
+        """Arrange the runs of a table, or of some planners in this order."""
         table = table.of_planners(planners) if planners else table
         if not len(table):
             raise FieldError("runs", "none; the campaign has no finished run")
@@ -79,7 +76,7 @@ class PairedRuns:
         Wall-clock times of a drive that repeats with every seed are the median over its repetitions.
         """
         values = np.where(self.success, self.table.numbers(name)[self.row], np.nan)
-        return self._over_repetitions(values) if name in WALL_TIMES else values
+        return self._over_repetitions(values) if name in WALL_CLOCK else values
 
     def _over_repetitions(self, values: Floats) -> Floats:
         """Values (N, P) in which those of repeated drives are replaced by their median."""

@@ -1,8 +1,10 @@
-"""The table of a campaign's runs as columns, however it was stored."""
+"""The runs of campaigns as columns, however they were stored: chosen as `--where COLUMN=VALUE` says it, or merged."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +13,75 @@ import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Flags, Floats
-from antdrive.runs.statistics.selecting import column_named, places_of
 from antdrive.sim.settings import SETTING_COLUMNS
 from antdrive.sim.settings import SETTINGS as DECLARED
+
+LISTED = 20  # values that an error names
+NONE = "none"  # stands for a run without a value
+
+
+def column_named(names: Iterable[str], column: str) -> str:
+    """The full name of a column."""
+    known = list(names)
+    for name in (column, f"option.{column}"):
+        if name in known:
+            return name
+    raise FieldError(column, f"no such column; choose from {', '.join(known)}")
+
+
+def places_of(column: str, values: Sequence[Any], wanted: str) -> list[int]:
+    """The rows whose value is wanted, at least one."""
+    found = matching(values, wanted)
+    if not found:
+        raise FieldError(column, f"no run with {wanted!r}; the campaign has {described(values)}")
+    return found
+
+
+def matching(values: Sequence[Any], wanted: str) -> list[int]:
+    """The rows whose value is wanted."""
+    whole = [k for k, value in enumerate(values) if _text(value) == wanted]
+    if whole:  # a name may hold a comma
+        return whole
+    tests = [_range(part) or part for part in wanted.split(",")]
+    return [k for k, value in enumerate(values) if any(_fits(value, test) for test in tests)]
+
+
+def described(values: Sequence[Any]) -> str:
+    """The values of a column in a few words."""
+    different = list(dict.fromkeys(values))
+    numbers = [value for value in different if isinstance(value, int | float) and not isinstance(value, bool)]
+    if len(numbers) > LISTED:
+        return f"{min(numbers):g} to {max(numbers):g}"
+    texts = [f"{value:g}" if isinstance(value, float) else _text(value) or NONE for value in different]
+    return ", ".join(texts[:LISTED]) + (f" and {len(texts) - LISTED} more" if len(texts) > LISTED else "")
+
+
+def _text(value: Any) -> str:
+    return "" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _range(text: str) -> tuple[float, float] | None:
+    """The ends of a range such as "10..20"."""
+    found = re.fullmatch(r"(.*?)\.\.(.*)", text)
+    if found is None or not (found[1] or found[2]):
+        return None
+    try:
+        return float(found[1] or -math.inf), float(found[2] or math.inf)
+    except ValueError:
+        return None
+
+
+def _fits(value: Any, test: str | tuple[float, float]) -> bool:
+    if isinstance(test, tuple):
+        return isinstance(value, int | float) and not isinstance(value, bool) and test[0] <= value <= test[1]
+    text = _text(value)
+    if text == test or (isinstance(value, bool) and text == test.lower()) or (test == NONE and not text):
+        return True
+    try:
+        return not isinstance(value, bool) and float(text) == float(test)
+    except ValueError:
+        return False
+
 
 #: Where a run took place.
 PLACE = ("world", "world_hash", "task")
@@ -27,8 +95,6 @@ ASKED, DRIVEN = "margin_asked", "margin"
 OF_WORLDS = ("cell",)
 #: Hashes tell what equal names hide; pages show the names.
 HASHES = ("world_hash", "robot_hash")
-#: Columns that differ between repetitions of one drive: their median over repetitions is taken.
-WALL_TIMES = ("plan_s", "drive_wall_s")
 
 
 REQUIRED = ("world", "planner", "seed", "outcome", "succeeded")
@@ -79,19 +145,11 @@ class RunTable:
         return done
 
     def where(self, column: str, value: str) -> RunTable:
-        """The runs with some values in a column.
-
-        Raises:
-            FieldError: no such column, or no run with this value.
-        """
+        """The runs with some values in a column."""
         return self.take(places_of(column, self.columns[column_named(self.columns, column)], value))
 
     def of_planners(self, labels: Sequence[str]) -> RunTable:
-        """The runs of some planners.
-
-        Raises:
-            FieldError: no such planner among the runs.
-        """
+        """The runs of some planners."""
         mine = self.texts("planner")
         for label in labels:
             if label not in mine:
@@ -105,3 +163,54 @@ class RunTable:
     def codes(self, name: str) -> npt.NDArray[np.int64]:
         """Equal numbers for runs with equal texts in a column, (N,)."""
         return np.unique(np.array(self.texts(name), dtype=object), return_inverse=True)[1].astype(np.int64)
+
+
+FOLDER = "folder"  # the column that names the campaign
+
+
+def merged(tables: Mapping[str, RunTable]) -> RunTable:
+    """The runs of several campaigns in one table, with the column `folder`.
+
+    A planner of which two campaigns have a run of the same instance is a planner of its own in each: "astar @today".
+    """
+    if len(tables) == 1:
+        return next(iter(tables.values()))
+    _check(tables)
+    names = list(dict.fromkeys(name for table in tables.values() for name in table.columns))
+    columns = {
+        name: [value for table in tables.values() for value in table.columns.get(name, [None] * len(table))]
+        for name in names
+    }
+    folders = [name for name, table in tables.items() for _ in range(len(table))]
+    several = _in_several(RunTable(columns), folders)
+    columns["planner"] = [
+        f"{label} @{folder}" if label in several else label
+        for label, folder in zip(columns["planner"], folders, strict=True)
+    ]
+    return RunTable({**columns, FOLDER: folders})
+
+
+def _check(tables: Mapping[str, RunTable]) -> None:
+    described = (*PLACE, *SETTINGS)
+    every = [name for name in described if any(name in table for table in tables.values())]
+    for folder, table in tables.items():
+        lacks = [name for name in every if name not in table]
+        if lacks:
+            raise FieldError(
+                folder,
+                f"its table lacks {', '.join(lacks)}, which the others have; antdrive sweep of its campaign adds them",
+            )
+
+
+def _in_several(table: RunTable, folders: list[str]) -> set[str]:
+    """Labels of planners of which two folders have a run of one instance."""
+    described = [name for name in (*PLACE, *SETTINGS, "seed", "planner") if name in table]
+    if ASKED in described:
+        described.remove(DRIVEN)
+    first: dict[tuple[str, ...], str] = {}
+    labels = table.texts("planner")
+    return {
+        label
+        for label, folder, *instance in zip(labels, folders, *map(table.texts, described), strict=True)
+        if first.setdefault(tuple(instance), folder) != folder
+    }

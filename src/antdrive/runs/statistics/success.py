@@ -1,4 +1,7 @@
-"""How often each planner succeeds, and its medians: both on instances that all of the planners share."""
+"""How often each planner succeeds, and its medians: both on instances that all of the planners share.
+
+Performance profiles and empirical distributions are over all instances; failures count in the denominator.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,14 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from antdrive.base.types import Flags
-from antdrive.runs.statistics.bootstrap import means_by_world, medians_by_world
+from antdrive.base.errors import FieldError
+from antdrive.base.types import Flags, Floats
+from antdrive.runs.statistics.intervals import NOWHERE, Interval, means_by_world, medians_by_world, wilson
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.runs.statistics.proportions import Interval, wilson
-
-NOWHERE = Interval(math.nan, math.nan)
 
 
 @dataclass(frozen=True)
@@ -103,3 +104,45 @@ def common_medians(paired: PairedRuns, metrics: Sequence[str]) -> tuple[int, dic
             intervals = medians_by_world(values, paired.world[common])
             found[metric] = list(zip(np.median(values, axis=0).tolist(), intervals, strict=True))
     return int(common.sum()), found
+
+
+class StepCurve(NamedTuple):
+    """A curve that rises in steps."""
+
+    x: Floats  # where it rises, ascending, (M,)
+    share: Floats  # its value from there on, 0 to 1, (M,)
+
+    def at(self, x: float) -> float:
+        """The curve's value."""
+        place = int(np.searchsorted(self.x, x, side="right"))
+        return float(self.share[place - 1]) if place else 0.0
+
+
+def performance_profiles(cost: Floats) -> list[StepCurve]:
+    """For each planner the share of instances that it solves at no more than x times the best cost.
+
+    Performance profiles after Dolan and Moré (2002). An instance that nobody solves counts as unsolved by all.
+    """
+    _check(cost)
+    if np.nanmin(cost, initial=0.0) < 0:
+        raise FieldError("cost", "must not be negative; a ratio to the best is not defined")
+    best = np.where(np.isnan(cost), np.inf, cost).min(axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(cost == best, 1.0, cost / best)
+    ratio[np.isnan(cost)] = np.nan
+    return distributions(ratio)
+
+
+def distributions(values: Floats) -> list[StepCurve]:
+    """For each planner the share of instances that it solves with a value of at most x."""
+    _check(values)
+    curves = []
+    for column in values.T:
+        x, counts = np.unique(column[np.isfinite(column)], return_counts=True)
+        curves.append(StepCurve(x, np.cumsum(counts) / len(column)))
+    return curves
+
+
+def _check(values: Floats) -> None:
+    if values.ndim != 2 or not values.size:
+        raise FieldError("values", f"must be instances by planners, at least one of each; got shape {values.shape}")

@@ -14,18 +14,17 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text
 from antdrive.base.errors import input_error
+from antdrive.base.files import read_bytes
 from antdrive.base.plane import wrap_angle
-from antdrive.base.reading import read_bytes
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
-from antdrive.runs.suites.demands import WALL_CLOCK
 from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
 from antdrive.runs.suites.suite import shown_path
-from antdrive.sim.log.binding import hashes_of
-from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import hashes_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import ENDED_BY, Run, versions
 
@@ -150,8 +149,7 @@ class Baseline:
         Raises:
             InputError: the file cannot be written.
         """
-        with written_whole(path) as temporary:
-            temporary.write_text(self.to_text(), encoding="utf-8")
+        write_text(path, self.to_text())
 
     def renew(self, path: Path) -> str:
         """Write the baseline unless the file holds the same drive already; what was done.

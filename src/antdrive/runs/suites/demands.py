@@ -13,16 +13,13 @@ from typing import Any, Literal
 
 from antdrive.base.checks import show, suggest
 from antdrive.base.errors import FieldError
-from antdrive.sim.log.metrics import METRICS, Tolerance
+from antdrive.sim.log.metrics import METRICS, WALL_CLOCK, Tolerance
 from antdrive.sim.log.outcome import Outcome
 
 #: The distance between the places where two drives end, which is judged like a metric [m].
 END = "end_m"
 END_TOLERANCE = Tolerance(0.05)
 LEAST_TRAJECTORY = 0.002  # baselines hold positions in whole millimetres [m]
-
-#: Metrics that no repetition reproduces.
-WALL_CLOCK = ("plan_s", "drive_wall_s")
 
 #: The kinds of things that a robot can touch.
 CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"

@@ -21,11 +21,7 @@ SOURCES = frozenset({"module", "file"})
 
 
 def check_names(case: SuiteCase) -> None:
-    """Check what can be checked of a test without reading worlds and robots: that all it names exists.
-
-    Raises:
-        InputError: something is missing; the message has the suite's file, line and key.
-    """
+    """Check what can be checked of a test without reading worlds and robots: that all it names exists."""
     entry = case.entry
     if isinstance(entry.world, str):
         world_path(case, entry.world)
@@ -35,29 +31,17 @@ def check_names(case: SuiteCase) -> None:
 
 
 def world_path(case: SuiteCase, name: str) -> Path:
-    """The file of a world that a test names.
-
-    Raises:
-        InputError: there is no such world.
-    """
+    """The file of a world that a test names."""
     return _path(case, "world", name, list_worlds())
 
 
 def robot_path(case: SuiteCase) -> Path:
-    """The file of a test's robot.
-
-    Raises:
-        InputError: there is no such robot.
-    """
+    """The file of a test's robot."""
     return _path(case, "robot", case.entry.robot, list_robots())
 
 
 def planner_of(case: SuiteCase) -> tuple[Planner, str]:
-    """The planner of a test, and its name in records.
-
-    Raises:
-        InputError: there is no such planner, module, file or option, or an option does not take the value.
-    """
+    """The planner of a test, and its name in records."""
     given = case.entry.planner
     options = {"name": given} if isinstance(given, str) else dict(given)
     name, sources = options.pop("name", None), {key: options.pop(key) for key in SOURCES if key in options}
@@ -75,7 +59,9 @@ def planner_of(case: SuiteCase) -> tuple[Planner, str]:
         if text.startswith("planner.") and ": " in text:  # an option
             option, _, problem = text.partition(": ")
             raise case.error(option, problem) from None
-        raise (error if text.startswith(case.document.source) else _at_planner(case, text)) from None
+        raise (
+            error if text.startswith(case.document.source) else case.error("planner", text.removeprefix("planner: "))
+        ) from None
 
 
 def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
@@ -91,10 +77,6 @@ def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Pa
         return resolve(key, name, known, case.suite.parent)
     except FieldError as error:
         raise case.error(key, error.problem) from None
-
-
-def _at_planner(case: SuiteCase, text: str) -> InputError:
-    return case.error("planner", text.removeprefix("planner: "))
 
 
 def _own(case: SuiteCase, name: str, sources: Mapping[str, Any]) -> Any:

@@ -10,14 +10,14 @@ from typing import Any
 
 from antdrive.base.checks import show
 from antdrive.base.errors import FieldError, InputError
-from antdrive.robots import RobotSpec, list_robots, load_robot
+from antdrive.robots import list_robots, load_robot
 from antdrive.runs.margins.choice import with_chosen_margin
 from antdrive.runs.suites.names import SOURCES, is_own_entry, planner_of, robot_path, world_path
 from antdrive.runs.suites.suite import SuiteCase, shown_path
 from antdrive.sim.forms import option_text, scenario_fields, setting_words
-from antdrive.sim.resolving import generated
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Task, list_worlds, load_task
+from antdrive.worlds.generators.generate import generated
 
 
 def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = with_chosen_margin) -> Scenario:
@@ -38,22 +38,17 @@ def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = with_c
     task = _with_ends(case, task_of(case))
     try:
         fields = {**scenario_fields(given), "seed": case.seed, **({"margin": 0.0} if auto else {})}
-        scenario = Scenario(task=task, planner=planner, planner_name=name, robot=robot_of(case), **fields)
+        scenario = Scenario(task=task, planner=planner, planner_name=name, robot=load_robot(robot_path(case)), **fields)
         return choose(scenario) if auto else scenario
     except FieldError as error:
         raise case.error(error.key, error.problem) from None
 
 
 def task_of(case: SuiteCase) -> Task:
-    """The world of a test, with the world's own start and goal.
-
-    Raises:
-        InputError: there is no such world, or something in its file is wrong.
-    """
+    """The world of a test, with the world's own start and goal."""
     world = case.entry.world
     if isinstance(world, str):
-        path = world_path(case, world)
-        return load_task(path)
+        return load_task(world_path(case, world))
     options = dict(world)
     kind, seed = options.pop("generate", None), options.pop("seed", 0)
     if not isinstance(kind, str):
@@ -64,16 +59,6 @@ def task_of(case: SuiteCase) -> Task:
         return generated(kind, seed, tuple((key, option_text(value)) for key, value in options.items()))
     except InputError as error:
         raise case.error("world", str(error)) from None
-
-
-def robot_of(case: SuiteCase) -> RobotSpec:
-    """The robot of a test.
-
-    Raises:
-        InputError: there is no such robot, or something in its file is wrong.
-    """
-    path = robot_path(case)
-    return load_robot(path)
 
 
 def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:

@@ -1,9 +1,17 @@
-"""When waiting cannot help: movers that stand still close every way to the goal."""
+"""What movers block: the ground that they will cover soon, narrow gaps beside those that stand still, and every way.
+
+Planning keeps the safety margin from movers, local avoidance more. A robot that waits before a narrow gap would be sent
+into it again by every replan, so the guide notes the mover and plans with what avoidance keeps. If there is no other
+way, and all movers have stood still since, the robot passes at the safety margin, as it passes a cylinder; a robot that
+has to wait nevertheless does not try again.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +20,100 @@ from antdrive.base import Floats, Pose
 from antdrive.base.plane import place_name
 from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
-from antdrive.sim.driving.blocking import covered_discs, with_obstacles
-from antdrive.sim.driving.mover_gaps import STILL, NarrowGaps
-from antdrive.sim.driving.parts import Others
-from antdrive.worlds import Grid, Task, rasterise
+from antdrive.robots import TrackedPath
+from antdrive.sim.driving.others import Others
+from antdrive.sim.policy import ReplanPolicy
+from antdrive.worlds import Disc, Grid, Task, rasterise
+from antdrive.worlds.world import PointWorld
 
+if TYPE_CHECKING:
+    from antdrive.planners import Query
+    from antdrive.sim.driving.movers_ahead import Zone
+
+STEP = 0.25  # movers are predicted at least this often [s]
+MIN_RADIUS = 0.01  # smaller discs are left out [m]
+STILL = 0.05  # a mover that stays this close to where it was stands still [m]
+LOOK_AHEAD = 3.0  # the route is looked at for this far [m]
+GAP_STEP = 0.05  # between two points of it [m]
+GAP_SLACK = 0.05  # avoidance may still refuse a route that passes a mover with this much more than it keeps [m]
 LOOK = 1.0  # predictions are checked this often for a mover that sets out again [s]
+
+
+def covered_discs(
+    predictor: Others,
+    tick: int,
+    ends: Floats,
+    duration: float,
+    grid: Grid,
+    only: npt.NDArray[np.int64] | None = None,
+    wider: float = 0.0,
+) -> list[Disc]:
+    """The discs that movers cover within `duration` [s] of a tick; with `only`, those of these movers, `wider` [m].
+
+    Discs are made smaller where an end (N, 2) [m] would lie within the inflation around them: movers close
+    neither end. The first of the ends is the robot's position.
+    """
+    x, y = ends[0].tolist()
+    times = np.linspace(0.0, duration, 1 + math.ceil(duration / STEP))
+    positions, radii = predictor.predict(tick, (x, y), times)
+    if only is not None:
+        wanted = np.isin(predictor.within_range(tick, (x, y)), only)
+        positions, radii = positions[:, wanted], radii[wanted]
+    room = np.hypot(*np.moveaxis(positions[:, :, None] - ends, -1, 0)).min(axis=-1) - grid.inflate - grid.cell
+    radius = np.minimum(radii + wider, room)
+    return [
+        Disc(float(positions[k, m, 0]), float(positions[k, m, 1]), float(radius[k, m]))
+        for k, m in np.argwhere(radius > MIN_RADIUS).tolist()
+    ]
+
+
+def blocked_cells(grid: Grid, discs: Sequence[Disc]) -> npt.NDArray[np.bool_]:
+    """Which free cells (R, C) have their centre within a disc grown by the grid's inflation."""
+    rows, cols = grid.shape
+    x = grid.origin[0] + grid.cell * np.arange(cols)
+    y = grid.origin[1] + grid.cell * np.arange(rows)
+    blocked = np.zeros(grid.shape, dtype=np.bool_)
+    for disc in discs:
+        reach = disc.radius + grid.inflate
+        c0, c1 = np.searchsorted(x, (disc.x - reach, disc.x + reach))
+        r0, r1 = np.searchsorted(y, (disc.y - reach, disc.y + reach))
+        near = np.hypot(x[None, c0:c1] - disc.x, y[r0:r1, None] - disc.y) <= reach
+        blocked[r0:r1, c0:c1] |= near
+    return blocked & grid.free
+
+
+def closed_cells(query: Query, discs: Sequence[Disc], zone: Zone | None = None) -> npt.NDArray[np.bool_]:
+    """Which cells (R, C) discs and a zone close; neither the start nor the goal is."""
+    closed = blocked_cells(query.grid, discs)
+    if zone is not None:
+        closed |= zone.blocked
+    closed[query.start] = closed[query.goal] = False
+    return closed
+
+
+def close_route(discs: list[Disc], tracked: TrackedPath, arc: float, reach: float, inflate: float) -> bool:
+    """Whether a disc comes closer than `inflate` [m] to the route within `reach` [m] beyond an arc length on it [m]."""
+    ahead = np.arange(arc, min(arc + reach, tracked.length), 0.1)
+    if not discs or not len(ahead):
+        return False
+    movers = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
+    gaps = np.hypot(*np.moveaxis(points_at(tracked, ahead)[:, None] - movers[None, :, :2], -1, 0)) - movers[:, 2]
+    return bool((gaps < inflate).any())
+
+
+def points_at(tracked: TrackedPath, arcs: Floats) -> Floats:
+    """The points (N, 2) of a route at arc lengths (N,) [m]."""
+    route = tracked.route
+    return np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
+
+
+def with_obstacles(task: Task, discs: Sequence[Disc]) -> Task:
+    """A task with more obstacles in its world, in plan view."""
+    if not discs:
+        return task
+    more = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
+    world = PointWorld.of(task.world.name, task.world.bounds, np.concatenate((task.world.discs, more)))
+    return dataclasses.replace(task, world=world)
 
 
 class Blockage:
@@ -26,27 +122,24 @@ class Blockage:
     A mover that moves may open a way, so it never counts. While the same movers stand where they stood at the first
     such failure, each further search waits twice as long as the one before.
 
+    It also notes the movers beside which the robot has waited for a gap that local avoidance does not enter: that keeps a
+    distance between the robot's centre and a mover's surface.
+
     Attributes:
         failures: failed searches in a row
         reason: which mover stands where, once the robot has no patience left; empty before
-        gaps: the movers beside which there is too little room for local avoidance
     """
 
-    def __init__(
-        self,
-        task: Task,
-        grid: Grid,
-        predictor: Others,
-        hz: int,
-        *,
-        interval: float,
-        patience: float,
-        keeps: float = 0.0,
-    ) -> None:
+    def __init__(self, task: Task, grid: Grid, predictor: Others, hz: int, policy: ReplanPolicy, keeps: float) -> None:
         self.failures, self.reason = 0, ""
-        self.gaps = NarrowGaps(grid, predictor, keeps)
+        self._keeps = keeps
+        self._gaps: dict[int, tuple[float, float]] = {}  # where the noted movers stand
+        self._widths: dict[int, float] = {}  # what plans keep from their surfaces [m]
+        self._passed: set[int] = set()  # those of them that the robot passes at the safety margin
+        self._refused: set[int] = set()  # those of them where it had to wait nevertheless
+        self._all = np.empty((0, 2))  # where all movers were when the last one was noted
         self._task, self._grid, self._predictor, self._hz = task, grid, predictor, hz
-        self._interval, self._patience = interval, patience
+        self._interval, self._patience = policy.min_interval, policy.patience
         self._since = self._due = -math.inf
         self._standing: npt.NDArray[np.int64] = np.empty(0, dtype=np.int64)
         self._places = np.empty((0, 2))
@@ -82,8 +175,64 @@ class Blockage:
         self._due = min(now + wait, max(self._since + self._patience, now + self._interval))
 
     def may_pass(self, tick: int, robot: tuple[float, float]) -> bool:
-        """Whether the robot now passes through a gap at the safety margin that it waited before; not at the first failure."""
-        return self.failures > 0 and self.gaps.may_pass(tick, robot, self.standing(tick, robot))
+        """Allow the robot to pass noted movers at the safety margin, after a failure, if all movers have stood still since."""
+        if not self.failures:
+            return False
+        noted = np.setdiff1d(self._noted(tick, robot), [*self._passed, *self._refused])
+        perceived, positions = self._predictor.perceived(tick, robot)
+        if not len(noted) or not np.isin(perceived, self.standing(tick, robot)).all():
+            return False
+        if len(positions) != len(self._all):  # a mover has come into sight
+            return False
+        if not (np.hypot(*(positions - self._all)[perceived].T) <= STILL).all():
+            return False
+        self._passed |= set(noted.tolist())
+        return True
+
+    def note_gaps(self, tick: int, robot: tuple[float, float], tracked: TrackedPath, arc: float) -> None:
+        """Note the movers that the route ahead passes hardly farther away than avoidance keeps, or than was noted before."""
+        standing = self.standing(tick, robot)
+        if self._keeps <= self._grid.inflate or not len(standing):
+            return
+        ahead = np.arange(arc, min(arc + LOOK_AHEAD, tracked.length), GAP_STEP)
+        points, positions = points_at(tracked, ahead), self._predictor.perceived(tick, robot)[1]
+        noted = self._noted(tick, robot)
+        for m in standing.tolist():
+            gap = np.hypot(*(points - positions[m]).T).min(initial=np.inf) - self._predictor.radius_of(m)
+            width = self._widths[m] if m in noted else self._keeps
+            if gap < width + GAP_SLACK:
+                self._widths[m] = max(width, gap + GAP_SLACK)
+                self._gaps[m] = (float(positions[m, 0]), float(positions[m, 1]))
+                self._all = positions
+                if m in self._passed:
+                    self._passed.remove(m)
+                    self._refused.add(m)
+
+    def _noted(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
+        """The movers (N,) that the robot noted and that stand where they stood."""
+        positions = self._predictor.perceived(tick, robot)[1]
+        self._gaps = {m: at for m, at in self._gaps.items() if np.hypot(*(positions[m] - at)) <= STILL}
+        self._passed &= self._gaps.keys()
+        self._refused &= self._gaps.keys()
+        return np.array(sorted(self._gaps), dtype=np.int64)
+
+    def discs(self, tick: int, ends: Floats, only: npt.NDArray[np.int64] | None = None) -> list[Disc]:
+        """The noted movers as discs, so much larger that a plan keeps from them what avoidance keeps."""
+        noted = self._noted(tick, (float(ends[0, 0]), float(ends[0, 1])))
+        wanted = np.setdiff1d(noted if only is None else np.intersect1d(noted, only), list(self._passed))
+        found: list[Disc] = []
+        for m in wanted:
+            wider = self._widths[int(m)] - self._grid.inflate
+            found += covered_discs(self._predictor, tick, ends, 0.0, self._grid, np.array([m]), wider)
+        return found
+
+    def closer(self, tick: int, robot: tuple[float, float]) -> Floats:
+        """How much closer than usual the robot may come to each mover that it perceives (P,) [m]."""
+        perceived = self._predictor.within_range(tick, robot)
+        if not self._passed:
+            return np.zeros(len(perceived))
+        passed = np.isin(perceived, self._noted(tick, robot)) & np.isin(perceived, list(self._passed))
+        return np.where(passed, self._keeps - self._grid.inflate, 0.0)
 
     def standing(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
         """The movers (S,) that the robot perceives and predicts to stand still for as long as its patience lasts."""
@@ -107,7 +256,7 @@ class Blockage:
         task = dataclasses.replace(self._task, start=pose)
         ends: Floats = np.array([pose[:2], task.goal])
         discs = covered_discs(self._predictor, tick, ends, 0.0, self._grid, only=movers)
-        discs += [] if narrow else self.gaps.discs(tick, ends, only=movers)
+        discs += [] if narrow else self.discs(tick, ends, only=movers)
         world = with_obstacles(task, discs).world
         return reachable(Query.between(rasterise(world, self._grid.cell, self._grid.inflate), task))
 
@@ -118,9 +267,9 @@ class Blockage:
         alone = (m for m in order.tolist() if self._way(tick, pose, order[order != m]))
         mover = next(alone, int(order[0]))
         at = place_name(self._task.frame, *positions[mover].tolist())
-        narrow = mover in self.gaps.noted(tick, pose[:2]) and self._way(tick, pose, order, narrow=True)
+        narrow = mover in self._noted(tick, pose[:2]) and self._way(tick, pose, order, narrow=True)
         closes = (
-            f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self.gaps.keeps:.3g} m from it"
+            f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self._keeps:.3g} m from it"
             if narrow
             else "closes the way"
         )

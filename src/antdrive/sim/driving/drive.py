@@ -1,11 +1,20 @@
-"""The drive loop: control periods until the drive ends."""
+"""The drive loop, and what the robot does in one control period: follow the guide, apply the rules, arrive."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
-from antdrive.sim.driving.parts import Decider, Ending, Localiser, Map, Plant
+from antdrive.base import Pose
+from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath
+from antdrive.sim.driving.localising import Exact
+from antdrive.sim.driving.parts import Decider, Ending, Guide, Localiser, Moment, Plant, Rule, Scanning, Step
+from antdrive.sim.driving.plants import Bullet, Drive
+from antdrive.sim.driving.rules import OUT_OF_SIGHT, WAITING_SPEED, Pursuit, standing
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.physics.engine import Engine, State
+from antdrive.worlds import Task
 
 PROGRESS_HZ = 10  # calls of `progress` per simulated second
 #: Called with the fraction of the route that is done.
@@ -16,40 +25,202 @@ def unheard(fraction: float) -> None:
     """Ignore the progress of a drive."""
 
 
+def unscanned(tick: int, pose: Pose, estimate: Pose) -> Pose:
+    """The estimate of a robot that does not scan."""
+    return estimate
+
+
 def drive(
     plant: Plant,
     decider: Decider,
     localiser: Localiser,
-    map: Map,
+    scan: Scanning = unscanned,
     *,
-    hz: int,
-    limit: float,
+    hz: int,  # control periods per second
+    limit: float,  # the longest time [s]
     progress: Progress = unheard,
 ) -> Ending:
-    """Drive until the decider ends it, the robot touches something, or the time is over.
-
-    Args:
-        hz: control periods per second
-        limit: the longest time [s]
-    """
+    """Drive until the decider ends it, the robot touches something, or the time is over."""
     ending = Ending(Outcome.COLLIDED) if plant.touched else None
     tick = 0
     for tick in range(round(limit * hz)):
         if ending:
             break
-        ending = _control_period(tick, plant, decider, localiser, map)
+        ending = _control_period(tick, plant, decider, localiser, scan)
         if tick % (hz // PROGRESS_HZ or 1) == 0:
             progress(decider.fraction)
     return decider.explained(ending or Ending(Outcome.TIMED_OUT), tick)
 
 
-def _control_period(tick: int, plant: Plant, decider: Decider, localiser: Localiser, map: Map) -> Ending | None:
+def _control_period(tick: int, plant: Plant, decider: Decider, localiser: Localiser, scan: Scanning) -> Ending | None:
     """Sense, decide and act for one control period; how the drive ends in it, if it does."""
     state = plant.state
-    estimate = map.scan(tick, state.pose, localiser.sense(state))
+    estimate = scan(tick, state.pose, localiser.sense(state))
     ending = decider.decide(tick, localiser.settle(estimate), state)
     if ending:
         return ending
     step = decider.step
     plant.advance(step, localiser.actuate(step.command))
     return Ending(Outcome.COLLIDED) if plant.touched else decider.gives_up(plant.state)
+
+
+STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
+STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
+
+
+class StuckClock(NamedTuple):
+    """How long the robot has made no progress along its route. Waiting for a mover does not count."""
+
+    farthest: float = 0.0  # the farthest that the robot has got along the route [m]
+    driving: int = 0  # control periods since then in which the robot was to drive, not rotate
+    turning: int = 0  # control periods since then in which the robot rotated in place
+    held: int = 0  # how many of all these its sight limited the robot's speed
+
+    def after(self, pursuit: PursuitState, waiting: bool) -> StuckClock:
+        """The clock after one more control period."""
+        if pursuit.arc > self.farthest + STUCK_PROGRESS:
+            return StuckClock(pursuit.arc)
+        if waiting:
+            return self
+        held = self.held + (pursuit.limiter == OUT_OF_SIGHT)
+        if pursuit.turning:
+            return StuckClock(self.farthest, self.driving, self.turning + 1, held)
+        return StuckClock(self.farthest, self.driving + 1, self.turning, held)
+
+    @property
+    def reason(self) -> str:
+        """What is said of a robot that has made no progress for too long."""
+        why = f"no progress along the route for {STUCK_TIME:g} s"
+        if 2 * self.held > self.driving + self.turning:
+            return f"{why}; its sight held it: it had seen no free ground where it was to go"
+        return why
+
+
+class Driver(Decider):
+    """Drives a robot along a path, period by period. `decide` makes each step.
+
+    Attributes:
+        path: the path that the robot follows now
+        step: what the robot does now
+    """
+
+    def __init__(
+        self, guide: Guide, rules: Sequence[Rule], path: TrackedPath, task: Task, robot: RobotSpec, hz: int
+    ) -> None:
+        self.path, self.step = path, Step()
+        self._guide, self._rules, self._task, self._hz = guide, tuple(rules), task, hz
+        self._clock = StuckClock()
+        self._patience = round(STUCK_TIME * hz)
+        self._full_turn = full_turn(robot, hz)
+
+    @property
+    def fraction(self) -> float:
+        """The fraction of the route that is done."""
+        return self.step.pursuit.arc / self.path.length
+
+    def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
+        """Make the step of one control period, or end the drive."""
+        guide, before = self._guide, self.step
+        waiting = before.avoids and abs(state.speed) < WAITING_SPEED
+        trigger = guide.trigger(tick, pose, waiting, self.path, before.pursuit.arc)
+        if trigger:
+            self._follow(guide.replan(tick, pose, trigger))
+        if guide.wrong:
+            return self._wrong_plan(tick)
+        if guide.blocked:
+            return Ending(Outcome.BLOCKED, guide.blocked)
+        self.path = guide.refreshed(self.path, pose)
+        now, step = Moment(tick, pose, state, self.path, self.step, self._clock), self.step
+        for rule in self._rules:
+            step = rule.apply(now, step)
+        self.step = step
+        if step.arrived:
+            return self._arrival(pose, state)
+        ending = self._end_of_route(tick, pose, state)
+        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scans)
+        return ending
+
+    def gives_up(self, state: State) -> Ending | None:
+        """End the drive of a robot without progress for too long; rotating in place may take a full turn's time longer."""
+        clock = self._clock
+        if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
+            return None
+        return Ending(Outcome.STUCK, clock.reason)
+
+    def explained(self, ending: Ending, tick: int) -> Ending:
+        """How the drive ends; of a robot that did not get on, whether it had found no way."""
+        if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
+            return ending
+        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.no_way(tick)))))
+
+    def _follow(self, path: TrackedPath | None) -> bool:
+        """Go on along a new path; whether there is one."""
+        if path is None:
+            return False
+        self.path = path
+        self.step = self.step._replace(pursuit=PursuitState(limiter=self.step.pursuit.limiter))
+        self._clock = self._clock._replace(farthest=0.0)
+        return True
+
+    def _end_of_route(self, tick: int, pose: Pose, state: State) -> Ending | None:
+        """The ending of a robot that stands at the end of its route, unless it can still get to the goal."""
+        left = self.path.length - self.step.pursuit.arc
+        if left > self.path.goal_distance or not standing(state) or any(self.step.command):
+            return None
+        ending, guide, task = self._arrival(pose, state), self._guide, self._task
+        # The robot goes by its estimate: one that is at the goal by it stays, even if it missed it, and one that is not goes on.
+        if math.dist(pose[:2], task.goal) <= task.goal_tolerance:
+            return ending
+        if self._follow(guide.missed(tick, pose)) or guide.may_wait:
+            return None
+        return self._wrong_plan(tick) if guide.wrong else ending
+
+    def _wrong_plan(self, tick: int) -> Ending:
+        """The ending of a drive on which the planner has given a wrong plan."""
+        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.wrong}")
+
+    def _arrival(self, pose: Pose, state: State) -> Ending:
+        """How the drive ends if the robot stops here, where it believes that it is at a pose, without a contact."""
+        task, true = self._task, (state.x, state.y)
+        left, believed = math.dist(true, task.goal), math.dist(pose[:2], task.goal)
+        if left <= task.goal_tolerance:
+            return Ending(Outcome.SUCCEEDED)
+        why = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
+        if believed <= task.goal_tolerance:
+            why = (
+                f"the robot believed that it was at the goal, {believed:.2f} m from it, but was {left:.3f} m from it "
+                f"(the tolerance is {task.goal_tolerance:g} m): its estimate was wrong by {math.dist(pose[:2], true):.2f} m"
+            )
+        return Ending(Outcome.STUCK, why)
+
+
+def full_turn(robot: RobotSpec, hz: int) -> int:
+    """How many control periods a full turn on the spot takes."""
+    return round(2 * math.pi / robot.max_yaw_rate * hz)
+
+
+class OnePath(Guide):
+    """Always the same path."""
+
+    def __init__(self) -> None:
+        self.log, self.walls = [], []
+
+
+def follow(
+    engine: Engine,
+    controller: PurePursuit,
+    path: TrackedPath,
+    task: Task,
+    *,
+    limit: float,
+    control_hz: int = 60,
+    localiser: Localiser | None = None,
+    rules: Sequence[Rule] = (),
+    progress: Progress = unheard,
+) -> Drive:
+    """Drive along a path from the start of a task, for at most a time [s]; `rules` apply after pursuit."""
+    pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
+    driver = Driver(OnePath(), (pursuit, *rules), path, task, engine.robot, control_hz)
+    plant = Bullet(engine, task.start, control_hz)
+    ending = drive(plant, driver, localiser or Exact(), hz=control_hz, limit=limit, progress=progress)
+    return plant.finish(ending)

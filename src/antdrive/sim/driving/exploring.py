@@ -7,34 +7,26 @@ assumption*, ICRA 1997), and never for the speed, see `antdrive.sim.driving.stop
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from antdrive.base import Bounds, Floats, Pose
-from antdrive.planners import (
-    PlanResult,
-    PlanStatus,
-    Query,
-    Replanner,
-    answered,
-    blaming,
-    capabilities_of,
-    replanner_for,
-    smooth,
-)
-from antdrive.planners.plan import Cell
+from antdrive.planners import PlanResult, PlanStatus, smooth
 from antdrive.robots import TrackedPath, Twist
 from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
-from antdrive.sim.driving.blocking import closed_cells
+from antdrive.sim.driving.blockage import with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.own_map import PATIENCE
 from antdrive.sim.driving.parts import RouteGuide, Rows
 from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
-from antdrive.sim.driving.replan_causes import (
+from antdrive.sim.driving.routes import RoutePlanner, bounds_of
+from antdrive.sim.driving.survey import PATIENCE, Survey, table_logged
+from antdrive.sim.policy import (
     BACKED,
     DISCOVERED,
     HELD,
@@ -44,13 +36,8 @@ from antdrive.sim.driving.replan_causes import (
     MISSED,
     STALLED,
     STRAYED,
+    ReplanPolicy,
 )
-from antdrive.sim.driving.replanning import Replan
-from antdrive.sim.driving.routes import RoutePlanner
-from antdrive.sim.driving.survey import Survey
-from antdrive.sim.driving.traffic import Zone
-from antdrive.sim.log.streams import random_stream
-from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 
@@ -61,7 +48,6 @@ DETOUR = 1.15  # a way with less margin must be shorter by this factor
 CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of the plan, beyond the inflation [m]
 SAMPLES = 0.06  # spacing of the places on a route at which speed limits and lookaheads are worked out [m]
 SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
-KEPT = 4  # searches that are kept for repair: two margins within near and wide bounds
 INTERVAL = 0.15  # the shortest time between two plans [s]
 COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
 LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
@@ -86,13 +72,10 @@ class Exploration(RouteGuide):
         policy: ReplanPolicy,
         movers: MoversSeenAhead | None = None,
     ) -> None:
-        self._movers = movers
-        self.survey, self.log = survey, []
+        self._movers, self.survey = movers, survey
+        self.log, self.walls = [], []
         self._routes, self._policy = planner, policy
-        self._planner, self._task, self._hz = planner.planner, planner.task, planner.hz
-        self._robot, self._margin, self._cell = planner.robot, planner.margin, planner.cell
-        self._rng = self._fresh_rng()
-        self._replanners: dict[tuple[float, float, Bounds], tuple[Replanner, Cell]] = {}
+        self._task, self._hz, self._robot = planner.task, planner.hz, planner.robot
         self._ahead, self._needed = np.empty((0, 2)), np.empty(0)
         self._arcs = np.empty(0)
         self._looked = self._indexed = 0
@@ -103,8 +86,10 @@ class Exploration(RouteGuide):
         self._seen: list[tuple[int, Floats]] = []
         self._known_as: tuple[tuple[Any, ...], Task] = (), planner.task
 
-    def _fresh_rng(self) -> np.random.Generator:
-        return random_stream(self._routes.seed, "replanner")
+    @property
+    def wrong(self) -> str:
+        """What is wrong with a plan that the planner gave; empty if nothing is."""
+        return self._routes.wrong
 
     @property
     def may_wait(self) -> bool:
@@ -124,8 +109,7 @@ class Exploration(RouteGuide):
     def first(self) -> tuple[Grid, PlanResult]:
         """The grid and the plan from the start, through what the first scan shows. Later plans do not depend on it."""
         found = self.plan(self._task.start)
-        self._rng = self._fresh_rng()
-        self._replanners.clear()
+        self._routes.restart()
         return found
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
@@ -134,15 +118,17 @@ class Exploration(RouteGuide):
 
     # ---- plans
 
-    def plan(self, pose: Pose, avoided: list[Disc] | None = None) -> tuple[Grid, PlanResult]:
+    def plan(self, pose: Pose, avoided: Sequence[Disc] = ()) -> tuple[Grid, PlanResult]:
         """The grid and the plan from a pose, through what is known; with less margin where there is no path otherwise."""
         straight = math.dist(pose[:2], self._task.goal)
         best: tuple[Grid, PlanResult] | None = None
         for growth in GROWTH:
             for share in MARGINS:
-                grid, answer = found = self._planned(pose, self._bounds(growth, pose), share * self._margin, avoided)
+                task = self._known(pose, self._bounds(growth, pose))
+                grid = self._grid(task, share * self._routes.margin)
+                answer = self._routes.around(task, grid, avoided)
                 if answer.status is PlanStatus.INVALID:
-                    return found
+                    return grid, answer
                 if best is None or answer.cost < best[1].cost / DETOUR:
                     best = grid, answer
                 if answer.cost <= FAIR * straight:
@@ -153,15 +139,8 @@ class Exploration(RouteGuide):
         assert best is not None
         return best
 
-    def _planned(
-        self, pose: Pose, bounds: Bounds, margin: float, avoided: list[Disc] | None = None
-    ) -> tuple[Grid, PlanResult]:
-        """The grid and the plan from a pose, within bounds and with a margin [m]."""
-        task = self._known(pose, bounds)
-        grid = rasterise(task.world, self._cell, self._robot.radius + margin)
-        if not avoided:
-            return grid, self._ask(task, grid)
-        return grid, self._ask_around(task, grid, avoided)
+    def _grid(self, task: Task, margin: float) -> Grid:
+        return rasterise(task.world, self._routes.cell, self._robot.radius + margin)
 
     def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
         """The grid and the plan from a pose that keeps off the movers that are followed; and what the plan keeps off."""
@@ -170,11 +149,9 @@ class Exploration(RouteGuide):
             return (*self.plan(pose), [])
         if movers.heavy(tick, pose):
             task = self._known(pose, movers.bounds(self._bounds(GROWTH[0], pose)))
-            grid = rasterise(task.world, self._cell, self._robot.radius + self._margin)
+            grid = self._grid(task, self._routes.margin)
             zones, soon = movers.zones(tick, pose, grid), movers.discs(tick, pose)
-            around = movers.way_round(
-                pose, zones, soon, lambda near, zone: self._ask_around(task, grid, near + zone.discs, zone)
-            )
+            around = movers.way_round(pose, zones, soon, functools.partial(self._routes.around, task, grid))
             if around is not None:
                 return (grid, *around)
         discs = movers.discs(tick, pose)
@@ -184,37 +161,20 @@ class Exploration(RouteGuide):
                 return grid, answer, discs
         return (*self.plan(pose), [])
 
-    def _ask_around(self, task: Task, grid: Grid, discs: list[Disc], zone: Zone | None = None) -> PlanResult:
-        """A plan that keeps off discs, and out of a zone."""
-        planner = self._planner
-        if capabilities_of(planner).needs_world:
-            task = dataclasses.replace(task, world=_with(task.world, discs))
-            return self._ask(task, rasterise(task.world, grid.cell, grid.inflate))
-        query = Query.between(grid, task)
-        if query.unreachable:
-            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
-        # Movers change so many cells that a search is repaired no faster than made anew.
-        replanner = replanner_for(planner, query, self._rng)
-        with blaming(planner):
-            replanner.block(np.argwhere(closed_cells(query, discs, zone)))
-            answer = replanner.result()
-        return self._routes.checked(query, answered(planner, answer))
-
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         """Set out on a plan: its route, and the same prepared for the controller."""
         return self._route(self._task.start, grid, plan)
 
     def _route(
-        self, pose: Pose, grid: Grid, answer: PlanResult, avoided: list[Disc] | None = None
+        self, pose: Pose, grid: Grid, answer: PlanResult, avoided: Sequence[Disc] = ()
     ) -> tuple[Route, TrackedPath]:
-        bounds = _bounds_of(grid)
+        bounds = bounds_of(grid)
         task = self._known(pose, bounds)
         self._seen.append((self._tick, task.world.discs))
         line = np.vstack([[pose[:2]], grid.xy(answer.line), [self._task.goal]])
         discs = _kernels_hits.near_polyline(line, task.world.discs, grid.inflate + CORRIDOR)
         near = dataclasses.replace(task, world=_world(bounds, discs))
-        around = dataclasses.replace(near, world=_with(near.world, avoided)) if avoided else near
-        route = smooth(answer, grid, around, kind=self._routes.smoothing)
+        route = smooth(answer, grid, with_obstacles(near, avoided), kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
         self._watch(route, near.world, grid.inflate)
         return route, tracked
@@ -236,7 +196,7 @@ class Exploration(RouteGuide):
         key = self.survey.map, len(self.survey.scans), pose, tuple(round(side, 9) for side in bounds)
         if self._known_as[0] == key:
             return self._known_as[1]
-        discs = self.survey.discs(bounds)
+        discs = self.survey.map.discs(bounds)
         if self._movers is not None:
             discs = self._movers.without_trails(discs, pose)
         ends = np.array((pose[:2], self._task.goal))
@@ -244,30 +204,6 @@ class Exploration(RouteGuide):
         known = dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
         self._known_as = key, known
         return known
-
-    def _ask(self, task: Task, grid: Grid) -> PlanResult:
-        query = Query.between(grid, task)
-        if query.unreachable:
-            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
-        if capabilities_of(self._planner).own_replanner:
-            return self._routes.checked(query, self._repaired(query))
-        return self._routes.ask(query, self._rng)
-
-    def _repaired(self, query: Query) -> PlanResult:
-        grid, planner = query.grid, self._planner
-        key = grid.cell, grid.inflate, _bounds_of(grid)
-        with blaming(planner):
-            replanner, goal = self._replanners.get(key, (None, None))
-            if replanner is None or goal != query.goal:
-                replanner = planner.replanner(query, self._rng)  # type: ignore[attr-defined]
-                if len(self._replanners) >= KEPT:  # bounds follow a robot that has left them
-                    del self._replanners[next(iter(self._replanners))]
-                self._replanners[key] = replanner, query.goal
-            else:
-                replanner.change(grid)
-                replanner.move(query.start)
-            answer = replanner.result()
-        return answered(planner, answer)
 
     def _prepare(self, route: Route, world: World, margin: float) -> TrackedPath:
         robot = self._robot
@@ -294,15 +230,8 @@ class Exploration(RouteGuide):
         self._indexed = self.survey.whole
         x, y, _ = pose
         near = self._routes.controller.lookahead_max + path.tuning.lookahead_clearance + SPARE
-        discs = self.survey.discs((x - near, y - near, x + near, y + near))
+        discs = self.survey.map.discs((x - near, y - near, x + near, y + near))
         return path.among(unsorted(discs, path.obstacles.bounds))
-
-    def update(self, tick: int, pose: Pose, waiting: bool, path: TrackedPath, arc: float) -> TrackedPath | None:
-        """A new path, if one is due and there is one."""
-        trigger = self.trigger(tick, pose, waiting, path, arc)
-        new = self.replan(tick, pose, trigger) if trigger else None
-        self.wrong = self._routes.wrong
-        return new
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """A new path to a goal that the robot missed, unless it looks for a way already."""
@@ -347,26 +276,26 @@ class Exploration(RouteGuide):
         if trigger in (STALLED, HELD, BACKED, MADE_ROOM, LOOKED):
             recovers, way = self._recovered(now, pose, trigger)
             if way is not None:
-                self.log.append(Replan(now, trigger, True, way.length, 0, way.route.xy, time.perf_counter() - started))
+                self.note(now, trigger, time.perf_counter() - started, 0, way.length, way.route.xy)
             if recovers:
                 return way
         if self._failures >= PATIENCE and trigger != LOOKED:
             self._failures = 0
             self.survey.forget(pose)
         grid, plan, avoided = self._plan_around(tick, pose)
-        route, tracked = None, None
-        if plan.solved and len(plan.cells) and not self._routes.wrong:
+        self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.wrong)
+        if not self.lost:
+            self._failures = 0
             route, tracked = self._route(pose, grid, plan, avoided)
-        cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
-        self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, time.perf_counter() - started))
-        self.lost = route is None
-        self._failures = self._failures + 1 if self.lost else 0
-        if self.lost:
-            self._recovery.rests(now, pose)
+            self.note(now, trigger, time.perf_counter() - started, plan.work, plan.cost, route.xy)
+            return tracked
+        self.note(now, trigger, time.perf_counter() - started, plan.work)
+        self._failures += 1
+        self._recovery.rests(now, pose)
         if self._failures >= PATIENCE:
             self._gave_up_at = now
             self._recovery.begin_look(pose)
-        return tracked
+        return None
 
     def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
         """Whether a robot that did not get on does something else than to plan anew, and the way that it then follows."""
@@ -400,12 +329,7 @@ class Exploration(RouteGuide):
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
         """The array `seen` of a log: the discs that each plan was made among. Cells lie on grids that nobody else knows."""
-        seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < len(log.t)]
-        tables = [np.column_stack((np.full(len(discs), tick * per_tick), discs)) for tick, discs in seen]
-        return {
-            "seen": np.concatenate(tables or [np.empty((0, 4))]).astype(np.float32),
-            "cells": np.empty((0, 2), dtype=np.int32),
-        }
+        return {"seen": table_logged(self._seen, 4, log, per_tick), "cells": np.empty((0, 2), dtype=np.int32)}
 
     # ---- the route ahead
 
@@ -425,16 +349,3 @@ class Exploration(RouteGuide):
 
 def _world(bounds: Bounds, discs: Floats) -> World:
     return PointWorld.of("seen", bounds, discs)
-
-
-def _with(world: World, discs: list[Disc]) -> World:
-    """A world of points with more obstacles."""
-    more = np.array([(disc.x, disc.y, disc.radius) for disc in discs]).reshape(-1, 3)
-    return _world(world.bounds, np.concatenate((world.discs, more)))
-
-
-def _bounds_of(grid: Grid) -> Bounds:
-    rows, cols = grid.shape
-    x, y = grid.origin
-    half = grid.cell / 2
-    return x - half, y - half, x + (cols - 0.5) * grid.cell, y + (rows - 0.5) * grid.cell

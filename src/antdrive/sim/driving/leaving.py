@@ -10,7 +10,7 @@ from antdrive.base import Floats, Pose
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath, Twist, footprint_clearance
 from antdrive.robots.placing import gaps, name_of
 from antdrive.sim.driving.drive import drive
-from antdrive.sim.driving.given import Exact, GivenMap
+from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Decider, Ending, Step
 from antdrive.sim.driving.plants import Kinematic
 from antdrive.sim.log.outcome import Outcome
@@ -76,7 +76,7 @@ def _rehearsed(leaving: Leaving, world: World, robot: RobotSpec, start: Pose, hz
         lambda pose, twist: _way(pose, twist, 1 / hz, robot.radius),
         lambda way: bool((footprint_clearance(world, robot.footprint, way) <= 0).any()),
     )
-    return drive(plant, leaving, Exact(), GivenMap(), hz=hz, limit=REHEARSED), plant
+    return drive(plant, leaving, Exact(), hz=hz, limit=REHEARSED), plant
 
 
 def _room(world: World, pose: Pose) -> float:

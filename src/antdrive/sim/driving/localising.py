@@ -1,24 +1,53 @@
-"""Localisers: exact, by noisy pose fixes, by dead reckoning, or by the true pose.
+"""Localisers: exact, by noisy pose fixes, by dead reckoning (which scan matching may correct), or by the true pose.
 
-The same wheels slip and the same commands are late whichever way the robot localises itself.
+The same wheels slip and the same commands are late whichever way the robot localises itself. A new kind is a class here and a
+word of `LOCALISATIONS` in `antdrive.sim.settings`; what it needs is checked in `Scenario`, what its log must show in
+`antdrive.sim.log.consistency`. Scans correct the estimate in `antdrive.sim.driving.survey`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from antdrive.base import Pose
 from antdrive.robots import NoiseModel, RobotSpec, Twist
-from antdrive.robots.odometry import Odometry
-from antdrive.robots.spec import Noise
-from antdrive.sim.driving.given import Exact
+from antdrive.robots.spec import Noise, Odometry
 from antdrive.sim.driving.parts import Rows
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import State
 from antdrive.sim.sensing.dead_reckoning import DeadReckoning
+
+
+class Exact:
+    """A robot that knows its pose and whose wheels do as they are told.
+
+    Attributes:
+        noisy: false
+        estimates: empty: estimates are poses
+    """
+
+    noisy = False
+    estimates: Sequence[Pose] = ()
+
+    def sense(self, state: State) -> Pose:
+        """The true pose."""
+        return state.pose
+
+    def settle(self, estimate: Pose) -> Pose:
+        """The pose itself: commands take effect at once."""
+        return estimate
+
+    def actuate(self, command: Twist) -> Twist:
+        """The command itself."""
+        return command
+
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """Nothing: estimates are poses, and the motors are set to the commands."""
+        return {}
 
 
 class Fixes(NoiseModel):
@@ -96,4 +125,5 @@ def localiser_of(
     levels = robot.noise.scaled(noise)
     if not levels.nonzero:
         return Exact()
-    return (TruePose if kind == "true" else Fixes)(levels, robot.track, period, start, random_stream(seed, "noise"))
+    localiser = {"true": TruePose, "fixes": Fixes}[kind]
+    return localiser(levels, robot.track, period, start, random_stream(seed, "noise"))

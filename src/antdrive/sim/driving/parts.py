@@ -7,21 +7,24 @@ estimate, the guide says which path to follow, the rules make the command, and t
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
 from antdrive.robots import PursuitState, TrackedPath, Twist
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import ReplanRecord, finite_or_none
 
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult
-    from antdrive.sim.driving.driver import StuckClock
-    from antdrive.sim.driving.replanning import Replan
+    from antdrive.sim.driving.drive import StuckClock
+    from antdrive.sim.driving.rules import Schedule
     from antdrive.sim.physics.engine import State
     from antdrive.worlds import Grid, Route
+
+NO_ROUTE: Floats = np.empty((0, 2))
 
 
 class Ending(NamedTuple):
@@ -103,42 +106,26 @@ class Localiser(Protocol):
         """The twist that the wheels are set to."""
 
 
-class Map(Protocol):
-    """The map that a robot drives by: given, given and watched by lidar, or its own."""
-
-    def scan(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
-        """Take a scan from the true pose if one is due; the estimate, which the scan may correct."""
-
-
-class Others(Protocol):
-    """The movers as the robot perceives them: ground truth (`Told`), or tracks (`Tracked`)."""
-
-    @property
-    def guesses(self) -> bool:
-        """Whether movers may do something else than is predicted."""
-
-    def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
-        """The positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
-
-    def perceived(self, tick: int, robot: tuple[float, float]) -> tuple[npt.NDArray[np.int64], Floats]:
-        """The numbers (P,) of the perceived movers, and the positions of all by number (M, 2) [m]."""
-
-    def within_range(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
-        """The numbers (P,) of the perceived movers."""
-
-    def radius_of(self, mover: int) -> float:
-        """The radius of a mover [m]."""
-
-    def name_of(self, mover: int) -> str:
-        """What people call a mover."""
+#: Takes a scan in a control period from the true pose if one is due; returns the estimate, which the scan may correct.
+Scanning: TypeAlias = Callable[[int, Pose, Pose], Pose]
 
 
 class Guide(Protocol):
     """Says which path to follow during a drive. What is implemented here holds where it is always the same."""
 
-    log: list[Replan]  # the attempts to find a new route
-    wrong: str = ""  # what is wrong with a plan that the planner gave during the drive; empty if nothing is
-    blocked: str = ""  # which mover closes every way, once the robot has no patience left; empty before
+    log: list[ReplanRecord]  # the attempts to find a new route
+    walls: list[float]  # the wall times that they took [s]
+    schedule: Schedule | None = None  # where the robot should be at each time; None: at no time in particular
+
+    @property
+    def wrong(self) -> str:
+        """What is wrong with a plan that the planner gave during the drive; empty if nothing is."""
+        return ""
+
+    @property
+    def blocked(self) -> str:
+        """Which mover closes every way, once the robot has no patience left; empty before."""
+        return ""
 
     @property
     def may_wait(self) -> bool:
@@ -150,9 +137,9 @@ class Guide(Protocol):
         """Whether the robot makes a scan turn."""
         return False
 
-    def update(self, tick: int, pose: Pose, waiting: bool, path: TrackedPath, arc: float) -> TrackedPath | None:
-        """A new path, if one is due and there is one."""
-        return None
+    def trigger(self, tick: int, pose: Pose, waiting: bool, path: TrackedPath, arc: float) -> str:
+        """Why a new path is due now; empty if none is."""
+        return ""
 
     def refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
         """The same path with the obstacles near the robot that are known by now."""
@@ -173,6 +160,20 @@ class Guide(Protocol):
     def no_way(self, tick: int) -> str:
         """What the guide adds to the reason of a drive that gets stuck or times out; may be empty."""
         return ""
+
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """The guide's arrays for the log; usually none."""
+        return {}
+
+    def note(
+        self, t: float, trigger: str, wall_s: float = 0.0, work: int = 0, cost: float = math.inf, xy: Floats = NO_ROUTE
+    ) -> None:
+        """Log an attempt to find a new route (N, 2) [m], and what it cost [m]."""
+        points = tuple((x, y) for x, y in np.round(xy, 4).tolist())
+        self.log.append(
+            ReplanRecord(t=t, trigger=trigger, solved=len(xy) > 0, cost_m=finite_or_none(cost), work=work, route=points)
+        )
+        self.walls.append(wall_s)
 
 
 class RouteGuide(Guide, Protocol):

@@ -11,10 +11,10 @@ import numpy as np
 from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
 from antdrive.robots import Twist, footprint_clearance
-from antdrive.robots.footprint import shape_of
+from antdrive.robots.placing import shape_of
 from antdrive.sim.driving import _kernels_movers
 from antdrive.sim.driving.parts import Ending, Step
-from antdrive.sim.log.contacts import touches
+from antdrive.sim.log.contacts import Attribution
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Contact, Engine, State
 from antdrive.worlds import Trajectories
@@ -164,18 +164,18 @@ def _attribute(
 ) -> Ending:
     """Attribute the first touch to the robot or to the mover, and name the mover and both speeds."""
     discs = len(engine.world.obstacles)
-    first = touches(
-        contacts,
-        pose,
-        twist,
-        movers,
-        trajectories.jumps(t),
+    attribution = Attribution(
+        pose=pose,
+        twist=twist,
+        movers=movers,
+        jumps=trajectories.jumps(t),
         hz=engine.physics_hz,
         discs=discs,
         radii=trajectories.radii,
         footprint=engine.robot.footprint,
         deceleration=engine.robot.max_acceleration,
-    )[0]
+    )
+    first = attribution.touches(contacts)[0]
     m, before = first.obstacle - discs, max(first.step - 1, 0)
     if not 0 <= m < len(trajectories):
         return Ending(first.outcome)

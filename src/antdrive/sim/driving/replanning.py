@@ -1,69 +1,46 @@
 """New routes while driving: around movers, or back to the goal after straying from the route.
 
-How a planner replans:
+When: `trigger`, which asks `MoversAhead` about movers; a robot without a map has `antdrive.sim.driving.exploring` instead.
+Thresholds are those of `antdrive.sim.policy`. How:
 
 - Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown
   exactly as the grid's obstacles are; cells that movers have left are cleared.
 - Planners that need the world plan again in a world with discs in the movers' places.
 - Planners in space and time plan again when the robot is late.
-- Cell-by-cell planners choose one cell after the other; see `antdrive.sim.driving.cellwise`.
+- Cell-by-cell planners choose one cell after the other, as hasan's robot does.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import time
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from antdrive.base import Floats, Pose
+from antdrive.base.plane import polyline_length
 from antdrive.planners import (
+    AStar,
     PlanResult,
-    PlanStatus,
     Query,
     TimedPlan,
-    answered,
+    agent_for,
     blaming,
     capabilities_of,
-    replanner_for,
+    check_step,
     smooth,
 )
 from antdrive.robots import TrackedPath
-from antdrive.sim.driving.blockage import Blockage
-from antdrive.sim.driving.blocking import closed_cells, with_obstacles
-from antdrive.sim.driving.movers_ahead import MoversOnMap
-from antdrive.sim.driving.parts import Others
-from antdrive.sim.driving.replan_causes import LATE, MISSED, STRAYED, WAITED
+from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs, with_obstacles
+from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
+from antdrive.sim.driving.others import Others
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.schedule import Schedule
-from antdrive.sim.driving.traffic import Traffic, Zone
-from antdrive.sim.log.streams import random_stream
-from antdrive.sim.policy import ReplanPolicy
-from antdrive.worlds import Disc, Grid, Route, Task, rasterise
-
-if TYPE_CHECKING:
-    from antdrive.planners import Replanner
-
-
-@dataclass(frozen=True)
-class Replan:
-    """One attempt to find a new route."""
-
-    t: float  # simulated time of the attempt [s]
-    trigger: str  # what set it off, such as `OBSTRUCTED`
-    solved: bool  # whether a new route was found
-    cost: float  # length of the new plan [m]; inf without one
-    work: int  # the planner's effort, in units of `PlanResult.work_unit`
-    route: Floats  # the new route (N, 2) [m]; empty without one
-    wall_s: float  # wall time that the attempt took [s]
-
-    @classmethod
-    def failed(cls, t: float, trigger: str) -> Replan:
-        """An attempt for which nothing was planned."""
-        return cls(t, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0)
+from antdrive.sim.driving.rules import Schedule
+from antdrive.sim.log.record import DECISION
+from antdrive.sim.policy import LATE, MISSED, STRAYED, WAITED, ReplanPolicy
+from antdrive.worlds import Grid, Route, segment_clearance
 
 
 class Replanning(OneRoute):
@@ -73,59 +50,41 @@ class Replanning(OneRoute):
 
     Attributes:
         policy: when to replan
-        log: the attempts so far
-        schedule: where the robot should be at each time; None unless the route comes from a plan in space
-            and time
     """
 
     def __init__(self, planner: RoutePlanner, policy: ReplanPolicy, others: Others, keeps: float = 0.0) -> None:
         super().__init__(planner)
         self.policy = policy
-        self.schedule: Schedule | None = None
-        self._planner, self._rng, self._hz = planner.planner, random_stream(planner.seed, "replanner"), planner.hz
+        self._hz = planner.hz
         self._predictor, self._keeps = others, keeps
         self._task = dataclasses.replace(planner.task, world=dataclasses.replace(planner.task.world, movers=()))
         self._timed = capabilities_of(planner.planner).needs_motions
-        self._replanner: Replanner | None = None
         self._replanned_at = -math.inf
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         """Set out on a plan: its route, and the same prepared for the controller."""
         self._grid, policy = grid, self.policy
-        self._blocked = np.zeros(grid.shape, dtype=np.bool_)
-        self.blockage = Blockage(
-            self._task,
-            grid,
-            self._predictor,
-            self._hz,
-            interval=policy.min_interval,
-            patience=policy.patience,
-            keeps=self._keeps,
-        )
         others, robot, task = self._predictor, self._routes.robot, self._task
+        self.blockage = Blockage(task, grid, others, self._hz, policy, self._keeps)
         learns = policy.around_movers and others.guesses and not self._timed
         traffic = Traffic(others, robot.radius, task.world.bounds, self._hz) if learns else None
-        self._ahead = MoversOnMap(others, policy, task.goal, grid, self._hz, traffic, self.blockage.gaps)
+        self._ahead = MoversAhead(others, policy, task.goal, grid, self._hz, traffic, self.blockage)
         route, path = super().route(grid, plan)
         self._track(plan, route)
         return route, path
 
-    def update(self, tick: int, pose: Pose, waiting: bool, path: TrackedPath, arc: float) -> TrackedPath | None:
-        """A new path, if one is due and there is one."""
-        trigger = self.trigger(tick, pose, waiting, path, arc)
-        new = self.replan(tick, pose, trigger) if trigger else None
-        self.wrong, self.blocked = self._routes.wrong, self.blockage.reason
-        return new
+    @property
+    def blocked(self) -> str:
+        """Which mover closes every way, once the robot has no patience left; empty before."""
+        return self.blockage.reason
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """A new path for a robot that stands at the end of its route, but not at the goal."""
-        new = self.replan(tick, pose, MISSED)
-        self.wrong = self._routes.wrong
-        return new
+        return self.replan(tick, pose, MISSED)
 
     def closer(self, tick: int, robot: tuple[float, float]) -> Floats:
         """How much closer than usual the robot may pass each perceived mover (P,) [m]."""
-        return self.blockage.gaps.closer(tick, robot)
+        return self.blockage.closer(tick, robot)
 
     def _track(self, plan: PlanResult, route: Route) -> None:
         """Note that the robot sets out on a route that was made from a plan."""
@@ -145,7 +104,7 @@ class Replanning(OneRoute):
             return LATE if self.schedule is None or self.schedule.late(now, arc) else ""
         due = self._ahead.trigger(tick, pose, tracked, arc) if policy.around_movers else ""
         if due == WAITED:
-            self.blockage.gaps.note(tick, pose[:2], tracked, arc, self.blockage.standing(tick, pose[:2]))
+            self.blockage.note_gaps(tick, pose[:2], tracked, arc)
         return due
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
@@ -160,59 +119,139 @@ class Replanning(OneRoute):
         try:
             task = dataclasses.replace(self._task, start=pose)
         except ValueError:  # the estimated pose lies outside the world or in an obstacle
-            self.log.append(Replan.failed(now, trigger))
+            self.note(now, trigger)
             return None
         if self._timed:
-            plan = self._routes.ask(self._routes.query(self._grid, task, now), self._rng)
+            plan = self._routes.ask(self._routes.query(self._grid, task, now), self._routes.rng)
         else:
             zones = self._ahead.zones(tick, pose, self._grid) if around_movers and self._ahead.heavy(tick, pose) else []
-            around = self._ahead.way_round(pose, zones, discs, lambda near, zone: self._plan(task, near, zone))
-            plan, discs = around or (self._plan(task, discs), discs)
+            around = functools.partial(self._routes.around, task, self._grid)
+            plan, discs = self._ahead.way_round(pose, zones, discs, around) or (around(discs), discs)
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
             discs = self._ahead.discs(tick, pose)
-            plan = self._plan(task, discs)
+            plan = self._routes.around(task, self._grid, discs)
         route = None
         if plan.solved and len(plan.cells) and not self._routes.wrong:
             # A timed plan's times are those of its cells, so its route must follow the cells.
             smoothing = "none" if self._timed else self._routes.smoothing
             route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
             self._track(plan, route)
-        cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
         wall_s = time.perf_counter() - started
-        self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, wall_s))
-        if route:
-            self.blockage.found()
-        else:
+        if route is None:
+            self.note(now, trigger, wall_s, plan.work)
             self.blockage.failed(tick, pose)
-        return self._prepare(route) if route else None
+            return None
+        self.note(now, trigger, wall_s, plan.work, plan.cost, route.xy)
+        self.blockage.found()
+        return self._prepare(route)
 
     def _prepare(self, route: Route) -> TrackedPath:
         return self._routes.prepared(route, self._task.world, self._routes.margin)
-
-    def _plan(self, task: Task, discs: list[Disc], zone: Zone | None = None) -> PlanResult:
-        """A plan around discs, and a zone: by the planner itself if it needs the world, else by its replanner."""
-        if capabilities_of(self._planner).needs_world:
-            around = with_obstacles(task, discs + zone.discs if zone is not None else discs)
-            grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
-            query = Query.between(grid, around)
-            return self._routes.ask(query, self._rng)
-        query = Query.between(self._grid, task)
-        if self._replanner is None:
-            self._replanner = replanner_for(self._planner, query, self._rng)
-        blocked = closed_cells(query, discs, zone)
-        with blaming(self._planner):
-            self._replanner.clear(np.argwhere(self._blocked & ~blocked))
-            self._replanner.block(np.argwhere(blocked & ~self._blocked))
-            self._blocked = blocked
-            self._replanner.move(query.start)
-            answer = self._replanner.result()
-        answer = answered(self._planner, answer)
-        if query.unreachable:  # a replanner knows cells only, not that the robot cannot get to the first of them
-            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
-        return self._routes.checked(query, answer)
 
 
 def _point_at(route: Route, arc: float) -> tuple[float, float]:
     """The point of a route at a distance from its start [m]."""
     x, y = (float(np.interp(arc, route.arc, route.xy[:, k])) for k in (0, 1))
     return x, y
+
+
+DECISION_PAUSE = 0.2  # the shortest time between two decisions [s]
+DECIDE_BEFORE = 0.6  # a decision is due when less than this many cells of the route remain
+STRAIGHT_BACK = 1.5  # a robot within this many cells of its cell's centre goes back to it straight
+AT_CELL = 0.25  # a robot this close to its cell's centre, in cells, need not drive through it
+
+
+class CellByCell(Replanning):
+    """Decide cell by cell: the route never goes beyond the next cell."""
+
+    def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
+        """Set out; the whole route of the plan, which the robot leaves at its first decision."""
+        self._query = Query.between(grid, self._task)
+        self._online = agent_for(self._routes.planner, self._query, self._routes.rng)
+        self._goal = self._query.goal
+        self._noted_at = -math.inf
+        return super().route(grid, plan)
+
+    @property
+    def may_wait(self) -> bool:
+        """Whether a robot at the end of its route may wait there for a way on."""
+        return not self._online.arrived
+
+    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+        """A decision is due shortly before the robot reaches its cell, and repeatedly while it waits."""
+        if tick == 0:
+            return DECISION
+        since = tick / self._hz - self._replanned_at
+        if self._online.arrived or since < DECISION_PAUSE:
+            return ""
+        if since >= self.policy.max_wait:  # movers keep the robot from its cell
+            self._note_no_way(tick, pose)
+        if self.blockage.reason:
+            return ""
+        return DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
+
+    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
+        """The path to the next cell, prepared for the controller; None if the robot waits."""
+        if trigger == MISSED:  # a robot that has not arrived waits: its next decision will be due soon
+            return super().replan(tick, pose, trigger) if self._online.arrived else None
+        now, started = tick / self._hz, time.perf_counter()
+        self._replanned_at = now
+        covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
+        with blaming(self._routes.planner):
+            here, propagated = self._online.cell, self._online.stats.propagated
+            to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
+        self._routes.wrong = self._routes.wrong or check_step(self._query, here, to)
+        if self._routes.wrong:
+            self.note(now, trigger)
+            return None
+        xy = self._line(pose, here, to, tick)
+        if to is not None:
+            self.blockage.found()
+        else:
+            self._note_no_way(tick, pose)
+        if to is not None and bool(np.ptp(xy, axis=0).any()):
+            work = self._online.stats.propagated - propagated
+            self.note(now, trigger, time.perf_counter() - started, work, polyline_length(xy), xy)
+            return self._prepare(Route(xy))
+        if tick == 0:  # the robot waits where it is, and must not set out on the plan for the whole way
+            heading = np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])
+            return self._prepare(Route(np.array(pose[:2]) + 1e-4 * heading))
+        return None
+
+    def _note_no_way(self, tick: int, pose: Pose) -> None:
+        """Take note that the robot does not get on; the attempt at which it gives up is logged."""
+        now = tick / self._hz
+        if self.blockage.pause(tick, pose[:2]) or now - self._noted_at < self.policy.min_interval:
+            return
+        self._noted_at = now
+        self.blockage.failed(tick, pose)
+        if self.blockage.reason:
+            self.note(now, DECISION)
+
+    def _line(self, pose: Pose, here: tuple[int, int], to: tuple[int, int] | None, tick: int) -> Floats:
+        """From the robot to the next cell (2 or 3, 2) [m], by the centre of its own cell where it must."""
+        ends = self._grid.xy(np.array([here, to or here]))
+        if to == self._goal and self._clear(ends[0], self._task.goal):
+            ends[1] = self._task.goal
+        near = math.dist(pose[:2], ends[0]) <= AT_CELL * self._grid.cell or tick == 0
+        if near and self._clear(pose[:2], ends[1]):
+            return np.vstack([pose[:2], ends[1:]])
+        return np.vstack([self._way_back(pose, ends[0]), ends[1:]])
+
+    def _way_back(self, pose: Pose, centre: Floats) -> Floats:
+        """From the robot to the centre of its own cell (N, 2) [m]; around obstacles if avoiding movers took it far away."""
+        straight = np.array([pose[:2], centre])
+        far = math.dist(pose[:2], centre) > STRAIGHT_BACK * self._grid.cell
+        if not far or self._clear(pose[:2], centre):
+            return straight
+        try:
+            task = dataclasses.replace(self._task, start=pose, goal=(float(centre[0]), float(centre[1])))
+        except ValueError:  # the estimated pose lies outside the world or in an obstacle
+            return straight
+        plan = AStar().plan(Query.between(self._grid, task), self._routes.rng)
+        return smooth(plan, self._grid, task, kind="taut").xy if plan.solved else straight
+
+    def _clear(self, a: tuple[float, ...] | Floats, b: tuple[float, ...] | Floats) -> bool:
+        """Whether the straight line between two points keeps the grid's inflation from every obstacle."""
+        clearance = segment_clearance(self._task.world, np.array([a]), np.array([b]))[0]
+        return bool(clearance >= self._grid.inflate - 1e-9)

@@ -3,8 +3,8 @@
 Nothing is planned or decided, so the replay depends on physics alone. The noise of a noisy robot is drawn again from the
 record's seed: it must turn the logged commands into the logged targets, and the logged poses into the logged estimates. The
 scans that are in the log are taken again, too, and those of a robot without a map matched.
-On the machine and with the versions that wrote a
-log it gives the same bits; elsewhere rounding differs, and `ROUNDING` says how much is allowed.
+On the machine and with the versions that wrote a log it gives the same bits; elsewhere rounding differs, and `ROUNDING` says how
+much is allowed.
 """
 
 from __future__ import annotations
@@ -22,15 +22,11 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import Twist
-from antdrive.sim.driving.drive import drive
-from antdrive.sim.driving.given import Exact, GivenMap
-from antdrive.sim.driving.localising import localiser_of
-from antdrive.sim.driving.lookout import Scans
-from antdrive.sim.driving.own_map import forgetting_ticks
+from antdrive.sim.driving.drive import drive, unscanned
+from antdrive.sim.driving.localising import Exact, localiser_of
 from antdrive.sim.driving.parts import Decider, Ending, Step
 from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.driving.survey import Senses, Survey
-from antdrive.sim.driving.watching import Watch
+from antdrive.sim.driving.survey import Scans, Senses, Survey, Watch, forgetting_ticks
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine, State
@@ -65,12 +61,7 @@ class ReplayCheck:
 
 
 def replay(rollout: Rollout) -> ReplayCheck:
-    """Drive the logged targets of the motors again and compare.
-
-    Raises:
-        InputError: the log's movers find no place to start from.
-        FieldError: the control rate does not divide the physics rate.
-    """
+    """Drive the logged targets of the motors again and compare."""
     record = rollout.record
     substeps, rest = divmod(record.physics_hz, record.control_hz)
     if rest or substeps < 1:
@@ -112,12 +103,19 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     # A period's first row is the last of the period before; a contact ends the control of the robot.
     touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
     rows = range(0, min(touched, len(rollout.t) - 1), per_tick)
-    map, forgets = map_of(rollout)
+    scans, forgets = scans_of(rollout)
     plant, reader = Logged(rollout), Reader(rollout, len(rows), forgets)
     periods = len(rows) + _decided_at_the_end(rollout, per_tick)
-    drive(plant, reader, localiser, map, hz=record.control_hz, limit=periods / record.control_hz)
-    if len(rollout.scans):
-        yield from _other_scans(rollout, **map.logged(rollout, per_tick))
+    drive(
+        plant,
+        reader,
+        localiser,
+        scans.scan if scans else unscanned,
+        hz=record.control_hz,
+        limit=periods / record.control_hz,
+    )
+    if scans:
+        yield from _other_scans(rollout, **scans.logged(rollout, per_tick))
     if not localiser.noisy or not rows:
         return
     off = np.array(localiser.estimates[: len(rows)]) - rollout.estimate[rows]
@@ -176,11 +174,11 @@ class Reader(Decider):
         return None
 
 
-def map_of(rollout: Rollout) -> tuple[GivenMap | Scans | Survey, Mapping[int, Callable[[Pose], None]]]:
-    """What takes the scans of a log again, and in which control periods the map is reset."""
+def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pose], None]]]:
+    """What takes the scans of a log again, if it has any, and in which control periods the map is reset."""
     record, lidar = rollout.record, rollout.record.robot.lidar
     if not len(rollout.scans):
-        return GivenMap(), {}
+        return None, {}
     assert lidar is not None
     hz, noisy = record.control_hz, record.noise > 0
     senses = Senses.of(lidar, record.world, rollout.trajectories(), seed=record.seed, noisy=noisy, hz=hz)

@@ -1,27 +1,56 @@
-"""Routes in a known world: how a plan is asked for, checked, smoothed and prepared, and the guide that follows just one."""
+"""Routes: how plans are asked for, checked, smoothed and prepared, and the guide that follows just one."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
+from antdrive.base import Bounds
 from antdrive.base.reuse import Keyed, bits, reused
-from antdrive.planners import Planner, PlanResult, PlanStatus, Query, ask, checked, smooth
+from antdrive.planners import (
+    Planner,
+    PlanResult,
+    PlanStatus,
+    Query,
+    answered,
+    ask,
+    blaming,
+    capabilities_of,
+    checked,
+    replanner_for,
+    smooth,
+)
+from antdrive.planners.plan import Cell
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
+from antdrive.sim.driving.blockage import closed_cells, with_obstacles
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
 from antdrive.sim.driving.parts import RouteGuide
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.reasons import no_path_reason
-from antdrive.worlds import Grid, MoverMotion, Route, Task, World, rasterise
+from antdrive.worlds import Disc, Grid, MoverMotion, Route, Task, World, rasterise
 from antdrive.worlds.world import by_geometry
+
+if TYPE_CHECKING:
+    from antdrive.planners import Replanner
+    from antdrive.sim.driving.movers_ahead import Zone
+
+
+KEPT = 4  # searches that are kept for repair: two margins within near and wide bounds
 
 
 @dataclass(eq=False, kw_only=True)
 class RoutePlanner:
-    """Plans and prepares the routes of one drive."""
+    """Plans and prepares the routes of one drive: the first one, and those that movers or obstacles make necessary.
+
+    Attributes:
+        rng: the random numbers of replans
+        wrong: what is wrong with the planner's first wrong plan; empty if none was
+    """
 
     planner: Planner  # finds the paths
     planner_label: str  # its name in records
@@ -34,7 +63,16 @@ class RoutePlanner:
     hz: int  # control periods per second
     seed: int  # the seed of the drive's random numbers
     motions: tuple[MoverMotion, ...] = ()  # the motions of the movers, for planners in space and time
-    wrong: str = ""  # what is wrong with the planner's first wrong plan; empty if none was
+    mapped: bool = True  # whether all plans are made on the grid of the world's map
+
+    def __post_init__(self) -> None:
+        self.wrong = ""
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all searches, and draw the random numbers of replans from the beginning."""
+        self.rng = random_stream(self.seed, "replanner")
+        self._kept: dict[tuple[float, float, Bounds], tuple[Replanner, Cell, npt.NDArray[np.bool_]]] = {}
 
     @property
     def inflate(self) -> float:
@@ -58,6 +96,48 @@ class RoutePlanner:
             self.wrong = self.wrong or plan.reason
         return plan
 
+    def around(self, task: Task, grid: Grid, discs: Sequence[Disc] = (), zone: Zone | None = None) -> PlanResult:
+        """A new plan during the drive, which keeps off discs and out of a zone.
+
+        A planner that needs the world plans in one with more discs. Others are asked for a replanner, which is told of
+        closed cells; without a map and movers only those that have one of their own.
+        """
+        can, moving = capabilities_of(self.planner), bool(discs) or zone is not None
+        if can.needs_world and (self.mapped or moving):
+            task = with_obstacles(task, [*discs, *(zone.discs if zone is not None else ())])
+            grid = rasterise(task.world, grid.cell, grid.inflate)
+        query = Query.between(grid, task)
+        unreachable = PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+        if query.unreachable and not self.mapped:
+            return unreachable
+        if can.needs_world or not (self.mapped or moving or can.own_replanner):
+            return self.ask(query, self.rng)
+        with blaming(self.planner):
+            closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
+            # Without a map, movers change so many cells that a search is repaired no faster than made anew.
+            answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
+        answer = answered(self.planner, answer)
+        # A replanner knows cells only, not that the robot cannot get to the first of them.
+        return unreachable if query.unreachable else self.checked(query, answer)
+
+    def _replanner(self, query: Query, closed: npt.NDArray[np.bool_], *, kept: bool) -> Replanner:
+        """The planner's replanner, which knows of the closed cells; one that is kept for each grid, or a new one."""
+        key = query.grid.cell, query.grid.inflate, bounds_of(query.grid)
+        replanner, goal, before = self._kept.get(key, (None, None, closed)) if kept else (None, None, closed)
+        if replanner is None or goal != query.goal:
+            replanner, before = replanner_for(self.planner, query, self.rng), np.zeros_like(closed)
+            if kept and len(self._kept) >= KEPT:  # bounds follow a robot that has left them
+                del self._kept[next(iter(self._kept))]
+        elif not self.mapped:
+            replanner.change(query.grid)
+        for tell, cells in ((replanner.clear, before & ~closed), (replanner.block, closed & ~before)):
+            if cells.any():
+                tell(np.argwhere(cells))
+        replanner.move(query.start)
+        if kept:
+            self._kept[key] = replanner, query.goal, closed
+        return replanner
+
     def prepared(self, route: Route, world: World, margin: float, *options: Any, **settings: Any) -> TrackedPath:
         """A route that is prepared for the controller among what stands in a world."""
         period, tolerance = 1 / self.hz, self.task.goal_tolerance
@@ -68,8 +148,13 @@ class OneRoute(RouteGuide):
     """Follow the first route. Movers are not on its grid; a planner in space and time is given their motions."""
 
     def __init__(self, planner: RoutePlanner) -> None:
-        self.log = []
+        self.log, self.walls = [], []
         self._routes = planner
+
+    @property
+    def wrong(self) -> str:
+        """What is wrong with a plan that the planner gave; empty if nothing is."""
+        return self._routes.wrong
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start; without a path if the robot has too little room there to get away along it."""
@@ -130,6 +215,14 @@ def by_contents(grid: Grid, task: Task) -> Keyed[tuple[Grid, Task]]:
     numbers = bits(grid.cell, *grid.origin, grid.inflate, *task.start, *task.goal, task.goal_tolerance)
     cells = grid.shape, grid.free.tobytes(), grid.moves.tobytes()
     return Keyed((grid, task), (numbers, cells, by_geometry(task.world)))
+
+
+def bounds_of(grid: Grid) -> Bounds:
+    """The bounds of a grid's world, but for rounding [m]."""
+    rows, cols = grid.shape
+    x, y = grid.origin
+    half = grid.cell / 2
+    return x - half, y - half, x + (cols - 0.5) * grid.cell, y + (rows - 0.5) * grid.cell
 
 
 @reused(64)

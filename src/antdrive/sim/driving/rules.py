@@ -1,21 +1,65 @@
-"""The rules of control, in the order in which they apply: pursue, scan turn, schedule, avoidance, stopping constraint."""
+"""The rules of control, in the order in which they apply: pursue, scan turn, schedule, avoidance. The last is `StayInSight`."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from antdrive.base import Pose
+import numpy as np
+
+from antdrive.base import Floats, Pose
+from antdrive.base.plane import arc_lengths
+from antdrive.planners import TimedPlan
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, Twist
-from antdrive.sim.driving.parts import Guide, Moment, Others, Step
-from antdrive.sim.driving.schedule import slow_down
-from antdrive.sim.driving.stopping_constraint import SLOWEST, Caution
+from antdrive.sim.driving.others import Others
+from antdrive.sim.driving.parts import Guide, Moment, Step
 from antdrive.sim.physics.engine import State
-from antdrive.worlds import Task
+from antdrive.worlds import Route, Task
 
 if TYPE_CHECKING:
     from antdrive.sim.driving.exploring import Exploration
-    from antdrive.sim.driving.replanning import Replanning
+
+LOOKAHEAD = 0.4  # the speed limit leads to where the schedule is this much later [s]
+MAX_LAG = 0.5  # a robot farther behind its schedule than this is late [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """Where along its route the robot should be at each time; linear in between."""
+
+    t: Floats  # times (N,) [s]
+    arc: Floats  # distances along the route at those times (N,) [m]
+
+    @classmethod
+    def of(cls, plan: TimedPlan, route: Route) -> Schedule:
+        """The schedule of a timed plan, along the route through the plan's cells."""
+        covered = arc_lengths(plan.xy)
+        share = covered / covered[-1] if covered[-1] > 0 else covered
+        return cls(np.stack([plan.arrive, plan.leave], axis=1).ravel(), np.repeat(share * route.length, 2))
+
+    def due(self, t: float) -> float:
+        """How far along the route [m] the robot should be at time `t` [s]."""
+        return float(np.interp(t, self.t, self.arc))
+
+    def late(self, t: float, arc: float) -> bool:
+        """Whether a robot at distance `arc` [m] at time `t` [s] is more than `MAX_LAG` behind."""
+        return self.due(t) - arc > MAX_LAG
+
+    def speed_limit(self, t: float, arc: float) -> float:
+        """The speed [m/s] that keeps a robot at `arc` [m] from getting ahead at time `t` [s]; inf at the end."""
+        if t + LOOKAHEAD >= self.t[-1]:
+            return math.inf
+        return max(0.0, self.due(t + LOOKAHEAD) - arc) / LOOKAHEAD
+
+
+def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> Twist:
+    """A command slowed down to a speed limit on the same curve, as far as the robot can brake."""
+    if command.speed <= 0:
+        return command
+    v = max(min(command.speed, limit), min(command.speed, last.speed - max_change))
+    return Twist(v, command.yaw_rate * v / command.speed)
+
 
 STOPPED_SPEED = 0.01  # a robot slower than this has stopped [m/s], [rad/s]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
@@ -63,7 +107,7 @@ class LookRound:
 class KeepToSchedule:
     """Slow down to the schedule of a plan in space and time."""
 
-    def __init__(self, guide: Replanning, robot: RobotSpec, hz: int) -> None:
+    def __init__(self, guide: Guide, robot: RobotSpec, hz: int) -> None:
         self._guide, self._hz, self._max_change = guide, hz, robot.max_acceleration / hz
 
     def apply(self, now: Moment, step: Step) -> Step:
@@ -133,22 +177,6 @@ class Avoid:
         distance = command.speed * abs(command.speed) / (2 * self._robot.max_acceleration)
         end = (x + distance * math.cos(yaw), y + distance * math.sin(yaw))
         return max(math.dist((x, y), goal), math.dist(end, goal)) < self._goal_share * self._task.goal_tolerance
-
-
-class StayInSight:
-    """Slow down where the robot could not stop on ground that it has seen."""
-
-    def __init__(self, caution: Caution, guide: Exploration) -> None:
-        self._caution, self._guide = caution, guide
-
-    def apply(self, now: Moment, step: Step) -> Step:
-        """The command, slower where it leads out of sight."""
-        command, slowed = self._caution.limit(now.pose, now.before.command, step.command)
-        stands = abs(command.speed) < SLOWEST and abs(command.yaw_rate) < SLOWEST
-        self._guide.note_sight(now.tick, step.command if slowed and stands else None)
-        if not slowed:
-            return step
-        return step._replace(command=command, pursuit=step.pursuit._replace(limiter=OUT_OF_SIGHT))
 
 
 def standing(state: State) -> bool:

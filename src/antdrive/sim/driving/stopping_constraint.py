@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from antdrive.base import Pose
 from antdrive.robots import RobotSpec, Twist
+from antdrive.sim.driving.parts import Moment, Step
+from antdrive.sim.driving.rules import OUT_OF_SIGHT, stopping_time
 from antdrive.sim.driving.survey import Survey
 
 SLOWEST = 0.02  # of slower commands the turn counts, too, where `SHORT` is taken off [m/s]
@@ -14,16 +17,28 @@ ON_THE_SPOT = 1e-6  # arcs of a smaller radius than this are turns on the spot [
 STILL = Twist(0.0, 0.0)
 
 
-class Caution:
-    """Keeps the way in which the robot can stop within what it has seen.
+class StayInSight:
+    """Slow down where the robot could not stop on ground that it has seen.
 
     Every command is checked, however slow: a robot that creeps gets to an obstacle as well. A command is let through, or slowed
     down on its own arc, only if the robot can then stop on the arc, over ground that it has seen. Otherwise the robot brakes
     as hard as it can on the arc that it is on, which was checked in the control period before.
     """
 
-    def __init__(self, survey: Survey, robot: RobotSpec, hz: int, reaction: float) -> None:
+    def __init__(
+        self, survey: Survey, robot: RobotSpec, hz: int, reaction: float, note: Callable[[int, Twist | None], None]
+    ) -> None:
         self._survey, self._robot, self._period, self._reaction = survey, robot, 1 / hz, reaction
+        self._note = note
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """The command, slower where it leads out of sight."""
+        command, slowed = self.limit(now.pose, now.before.command, step.command)
+        stands = abs(command.speed) < SLOWEST and abs(command.yaw_rate) < SLOWEST
+        self._note(now.tick, step.command if slowed and stands else None)
+        if not slowed:
+            return step
+        return step._replace(command=command, pursuit=step.pursuit._replace(limiter=OUT_OF_SIGHT))
 
     def limit(self, pose: Pose, last: Twist, command: Twist) -> tuple[Twist, bool]:
         """The command, slower where it leads out of sight; and whether it was."""
@@ -40,7 +55,7 @@ class Caution:
         speed, rate = abs(command.speed), abs(command.yaw_rate)
         if command == STILL:
             return 1.0
-        stop = self._stopping_time(command)
+        stop = stopping_time(command, self._robot)
         going = (
             self._reaction + stop / 2
         )  # on the way until it stands, the robot gets as far as at full speed in this time
@@ -56,14 +71,9 @@ class Caution:
         reaction, seen = self._reaction, max(seen, 0.0)
         return 2 * seen / (math.sqrt(reaction**2 + 2 * seen * stop) + reaction)
 
-    def _stopping_time(self, twist: Twist) -> float:
-        """How long the robot takes to stop on the arc of a twist [s]."""
-        robot = self._robot
-        return max(abs(twist.speed) / robot.max_acceleration, abs(twist.yaw_rate) / robot.max_yaw_acceleration)
-
     def _braked(self, last: Twist) -> Twist:
         """The next command of a robot that brakes as hard as it can on its arc."""
-        stop = self._stopping_time(last)
+        stop = stopping_time(last, self._robot)
         return _scaled(last, 1 - self._period / stop) if stop > self._period else STILL
 
 

@@ -228,11 +228,7 @@ def _polygon_to_walls(corners: tuple[Point, ...], pose: Floats, bounds: Bounds) 
 
 
 def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.NDArray[np.int64], Floats]]:
-    """Rows (B,), some at a time, and the discs (N, 3) one of which is the nearest to the footprint in each of them.
-
-    Raises:
-        FieldError: more distances have to be computed than a minute is enough for.
-    """
+    """Rows (B,), some at a time, and the discs (N, 3) one of which is the nearest to the footprint in each of them."""
     if not len(discs):
         return
     count = 0

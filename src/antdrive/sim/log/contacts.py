@@ -37,55 +37,27 @@ class Touch(NamedTuple):
     outcome: Outcome  # COLLIDED, HIT_WHILE_STANDING or HIT_BY_TELEPORT
 
 
-def touches(
-    contacts: Floats,
-    pose: Floats,
-    twist: Floats,
-    movers: Floats,
-    jumps: npt.NDArray[np.bool_],
-    *,
-    hz: int,
-    discs: int,
-    radii: Floats,
-    footprint: Footprint,
-    deceleration: float,
-) -> list[Touch]:
-    """The touches among contact points, in the order of time."""
-    attribution = _Attribution(pose, twist, movers, jumps, hz, radii, footprint, deceleration)
-    found: list[Touch] = []
-    last = -math.inf
-    for step, obstacle in contacts[:, :2].astype(np.int64).tolist():
-        if step - last > TOUCH_GAP * hz:
-            found.append(Touch(step, obstacle, attribution.outcome(step, obstacle - discs)))
-        last = step
-    return found
-
-
 def touches_of(rollout: Rollout) -> list[Touch]:
-    """The touches of a logged drive, in the order of time.
-
-    Raises:
-        InputError: the log's movers find no place to start from.
-    """
+    """The touches of a logged drive, in the order of time."""
     if not len(rollout.contacts):
         return []
     record, movers = rollout.record, rollout.trajectories()
-    return touches(
-        rollout.contacts,
-        rollout.pose,
-        rollout.twist,
-        rollout.movers,
-        movers.jumps(rollout.t),
+    attribution = Attribution(
+        pose=rollout.pose,
+        twist=rollout.twist,
+        movers=rollout.movers,
+        jumps=movers.jumps(rollout.t),
         hz=record.physics_hz,
         discs=len(record.world.obstacles),
         radii=movers.radii,
         footprint=record.robot.footprint,
         deceleration=record.robot.max_acceleration,
     )
+    return attribution.touches(rollout.contacts)
 
 
-@dataclass(frozen=True, eq=False)
-class _Attribution:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Attribution:
     """The rows of a drive, to see who caused a contact."""
 
     pose: Floats
@@ -93,11 +65,22 @@ class _Attribution:
     movers: Floats
     jumps: npt.NDArray[np.bool_]
     hz: int
+    discs: int
     radii: Floats
     footprint: Footprint
     deceleration: float
 
-    def outcome(self, step: int, mover: int) -> Outcome:
+    def touches(self, contacts: Floats) -> list[Touch]:
+        """The touches among contact points, in the order of time."""
+        found: list[Touch] = []
+        last = -math.inf
+        for step, obstacle in contacts[:, :2].astype(np.int64).tolist():
+            if step - last > TOUCH_GAP * self.hz:
+                found.append(Touch(step, obstacle, self._outcome(step, obstacle - self.discs)))
+            last = step
+        return found
+
+    def _outcome(self, step: int, mover: int) -> Outcome:
         """The outcome of a touch; `mover` is outside 0 to M - 1 for what stands still."""
         if not 0 <= mover < self.movers.shape[1]:
             return Outcome.COLLIDED

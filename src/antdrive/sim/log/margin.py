@@ -1,4 +1,4 @@
-"""The safety margin: what a drive used it up for, and how much of it is enough.
+"""The safety margin: what a drive used it up for.
 
 Planners keep the disc around the robot `margin` metres away from every surface. A drive comes closer, for several reasons.
 """
@@ -6,24 +6,17 @@ Planners keep the disc around the robot `margin` metres away from every surface.
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.sim.log.metrics import nearest_on_route
-from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds import point_clearance
-
-if TYPE_CHECKING:
-    from antdrive.sim.pipeline import Run
 
 #: The causes of a loss of margin, with what each of them is.
 CAUSES: dict[str, str] = {
@@ -113,79 +106,6 @@ def budget(rollout: Rollout) -> Budget:
         contributions.append(Contribution(cause, most, float(rollout.t[at]), x, y, float(losses[cause][tightest])))
     x, y = true[tightest].tolist()
     return Budget(margin, float(left[tightest]), float(rollout.t[tightest]), x, y, tuple(contributions))
-
-
-@dataclass(frozen=True)
-class MarginTrial:
-    """All drives with one margin, up to the first that failed."""
-
-    margin: float  # the margin that was tried [m]
-    drives: int  # number of drives
-    impassable: int  # number of worlds that this margin closes; they are not counted as drives
-    # the seed of the drive that failed: no success, not certified, or too little clearance left; or None
-    failed: int | None
-    left: float  # the least clearance of all drives [m]
-
-    @property
-    def safe(self) -> bool:
-        """Whether there were drives and none failed."""
-        return self.failed is None and self.drives > 0
-
-
-def find_margin(
-    drive: Callable[[float, int], Run],
-    seeds: Sequence[int],
-    *,
-    reserve: float = 0.005,
-    most: float = 0.2,
-    resolution: float = 0.005,
-) -> Iterator[MarginTrial]:
-    """Search by bisection for the smallest margin with which the drives of all seeds succeed.
-
-    Trials come as they are made; the smallest margin of those that are safe is the answer.
-
-    Raises:
-        FieldError: a setting outside its range.
-    """
-    if not 0 < resolution < most:
-        raise FieldError("resolution", f"must be greater than 0 and less than {most:g}, got {resolution:g}")
-    hardest_first = list(seeds)
-    low, high = (
-        0,
-        math.ceil(most / resolution),
-    )  # in steps: the answer is at least low; high is safe or closes all worlds
-    trial = _try_margin(high * resolution, drive, hardest_first, reserve)
-    yield trial
-    if trial.failed is not None:
-        return
-    while low < high:
-        middle = (low + high) // 2
-        trial = _try_margin(middle * resolution, drive, hardest_first, reserve)
-        yield trial
-        if trial.failed is None:
-            high = middle
-        else:
-            low = middle + 1
-
-
-def _try_margin(
-    margin: float, drive: Callable[[float, int], Run], hardest_first: list[int], reserve: float
-) -> MarginTrial:
-    """Drive with one margin until a drive fails; a seed that fails moves to the front of `hardest_first`."""
-    left, drives, impassable = math.inf, 0, 0
-    for seed in hardest_first:
-        run = drive(margin, seed)
-        if run.outcome is Outcome.NO_PATH:
-            impassable += 1
-            continue
-        drives += 1
-        if run.rollout is not None:
-            left = min(left, budget(run.rollout).left)
-        if not run.succeeded or left < reserve:
-            hardest_first.remove(seed)
-            hardest_first.insert(0, seed)
-            return MarginTrial(margin, drives, impassable, seed, left)
-    return MarginTrial(margin, drives, impassable, None, left)
 
 
 def _as_commanded(rollout: Rollout) -> Floats:

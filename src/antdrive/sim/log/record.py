@@ -1,13 +1,14 @@
-"""The record of a drive: everything a log holds beside its arrays, key by key.
+"""The record of a drive: everything a log holds beside its arrays, key by key, and what it is about, as hashes.
 
 The record is stored as JSON. It is validated in one place, `DriveRecord.from_json`, so that no reader meets a missing
-key or an impossible value. `docs/reference/rollout-format.md` describes every key.
+key or an impossible value. `docs/reference/rollout-format.md` describes every key. Names and sources do not count in
+hashes of worlds and robots, and neither does the form of a file: what is compared is what the file means.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import inspect
+import hashlib
 import json
 import math
 import re
@@ -21,6 +22,7 @@ from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from antdrive.base.document import MAX_DEPTH
 from antdrive.base.errors import FieldError
+from antdrive.base.records import STRICT, attributes_of
 from antdrive.base.types import Point
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.outcome import Outcome
@@ -45,9 +47,6 @@ MARGIN_ROUNDING = 1e-9  # [m]
 
 #: The trigger of a replan by a planner that decides anew at every cell.
 DECISION = "decision"
-
-# pydantic reads this attribute: no guessing of types, no unknown keys, no NaN and no infinity, also in nested records.
-_RULES = {"strict": True, "extra": "forbid", "allow_inf_nan": False}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,6 +197,10 @@ class TimesRecord:
     replans_s: tuple[float, ...]
 
 
+#: A key that came later is left out where it says nothing, so that older logs and hashes stay as they are.
+LATER = {"left_out_if_default": True}
+
+
 def _to_task(value: Any) -> Task:
     if not isinstance(value, Mapping):
         raise ValueError(f"must be an object as in a world file, got {_shown(value)}")
@@ -248,7 +251,7 @@ class DriveRecord:
         FieldError: a value that no drive can have.
     """
 
-    __pydantic_config__ = _RULES
+    __pydantic_config__ = STRICT
 
     schema: int = SCHEMA
     task: Annotated[Task, PlainValidator(_to_task)]
@@ -275,9 +278,9 @@ class DriveRecord:
     reason: str
     versions: Mapping[str, str]
     times: TimesRecord
-    margin_choice: MarginRecord | None = None
-    sensing: SensingRecord | None = None
-    settings: Mapping[str, Any] | None = None
+    margin_choice: MarginRecord | None = dataclasses.field(default=None, metadata=LATER)
+    sensing: SensingRecord | None = dataclasses.field(default=None, metadata=LATER)
+    settings: Mapping[str, Any] | None = dataclasses.field(default=None, metadata=LATER)
     digest: str | None = None
 
     def __post_init__(self) -> None:
@@ -332,14 +335,7 @@ class DriveRecord:
 
     def as_dict(self) -> dict[str, Any]:
         """The record as plain values, for JSON."""
-        values = {field.name: plain_value(getattr(self, field.name)) for field in dataclasses.fields(self)}
-        for key in (
-            "margin_choice",
-            "sensing",
-            "settings",
-        ):  # logs without them are as they were before there were such things
-            if values[key] is None:
-                del values[key]
+        values: dict[str, Any] = plain_value(self)
         return values
 
     def to_json(self, *, without: Sequence[str] = ()) -> str:
@@ -424,7 +420,6 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, Task):
         return task_to_dict(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        # A field that came later is left out where it says nothing, so that older logs and hashes stay as they are.
         fields = [field for field in dataclasses.fields(value) if not _says_nothing(field, getattr(value, field.name))]
         return {field.name: plain_value(getattr(value, field.name)) for field in fields}
     if isinstance(value, Mapping):
@@ -466,52 +461,6 @@ def finite_or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-_NESTED: Mapping[str, type[Any]] = {
-    "planner": ComponentRecord,
-    "plan": PlanRecord,
-    "controller": ComponentRecord,
-    "smoothing": SmoothingRecord,
-    "perception": PerceptionRecord,
-    "replans": ReplanRecord,
-    "margin_choice": MarginRecord,
-    "sensing": SensingRecord,
-    "times": TimesRecord,
-}
-
-
-def record_keys() -> Iterator[tuple[str, str, str]]:
-    """Every key of a record with its type and description; keys of nested records are dotted."""
-    for field in dataclasses.fields(DriveRecord):
-        yield field.name, _json_type(str(field.type)), attributes_of(DriveRecord)[field.name]
-        if inner := _NESTED.get(field.name):
-            prefix = f"{field.name}[]" if field.name == "replans" else field.name
-            for part in dataclasses.fields(inner):
-                yield f"{prefix}.{part.name}", _json_type(str(part.type)), attributes_of(inner)[part.name]
-
-
-def attributes_of(kind: type[Any]) -> dict[str, str]:
-    """The descriptions of a record's fields, from the Attributes section of its docstring."""
-    _, _, section = (inspect.getdoc(kind) or "").partition("Attributes:\n")
-    section = section.split("\n\n")[0]
-    entries = re.split(r"^    (\w+): ", section, flags=re.MULTILINE)[1:]
-    return {name: " ".join(text.split()) for name, text in zip(entries[::2], entries[1::2], strict=True)}
-
-
-def _json_type(annotation: str) -> str:
-    """What JSON calls the type of a field."""
-    kind = annotation.removesuffix(" | None")
-    words = {"str": "text", "float": "number", "int": "whole number", "bool": "true or false"}
-    if kind in words:
-        word = words[kind]
-    elif kind.startswith("tuple"):
-        word = "list"
-    elif "Outcome" in kind:
-        word = "text"
-    else:
-        word = "object"
-    return f"{word} or null" if annotation.endswith(" | None") else word
-
-
 @cache
 def _adapter() -> TypeAdapter[DriveRecord]:
     return TypeAdapter(DriveRecord)
@@ -532,7 +481,7 @@ def _field_error(fault: ErrorDetails) -> FieldError:
     key = "record" + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])
     if fault["type"] == "missing":
         name = str(fault["loc"][-1])
-        described = attributes_of(DriveRecord).get(name, "a log that antdrive wrote has it")
+        described = attributes_of(DriveRecord.__doc__).get(name, "a log that antdrive wrote has it")
         return FieldError(key, f"missing; {described}")
     if fault["type"] == "unexpected_keyword_argument":
         return FieldError(key, "unknown key; a later version of antdrive may have written it")
@@ -554,3 +503,53 @@ def _shown(value: Any) -> str:
         return json.dumps(value)[:40]
     except (ValueError, RecursionError):
         return "a number too long"
+
+
+#: The keys of a record that say how the drive was planned and driven.
+DRIVEN_WITH = (
+    *("seed", "planner", "controller", "perception", "avoidance", "replanning"),
+    *("noise", "margin", "cell", "physics_hz", "control_hz", "time_limit"),
+)
+LABELS = ("name", "source")
+
+
+def hashes_of(record: DriveRecord) -> dict[str, str]:
+    """The SHA-256 of the world with start and goal, of the robot, and of the settings that a record holds.
+
+    Each is that of JSON with sorted keys and Python's default separators; `docs/explanation/certificate.md` describes them.
+    """
+    values = record.as_dict()
+    parts = {
+        "world": _meaning(record.task),
+        "robot": _meaning(record.robot),
+        "settings": {
+            **{key: values[key] for key in DRIVEN_WITH},
+            "smoothing": record.smoothing.asked,
+            **(record.settings or {}),
+        },
+    }
+    return {name: _sha256(part) for name, part in parts.items()}
+
+
+def canonical_hash(value: Task | RobotSpec) -> str:
+    """The SHA-256 of a world with start and goal, or of a robot: the one that `hashes_of` finds in the log of its drives."""
+    return _sha256(_meaning(value))
+
+
+def differences(record: DriveRecord, *, task: Task | None = None, robot: RobotSpec | None = None) -> Iterator[str]:
+    """What in a record is not as in the given world and robot, a sentence each."""
+    for name, found, wanted in (("world", record.task, task), ("robot", record.robot, robot)):
+        if wanted is None:
+            continue
+        logged, given = _meaning(found), _meaning(wanted)
+        keys = [key for key in sorted({*logged, *given}) if logged.get(key) != given.get(key)]
+        if keys:
+            yield f"{name}: the log is about another one; its {', '.join(keys)} {'differ' if keys[1:] else 'differs'}"
+
+
+def _sha256(value: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+
+
+def _meaning(value: Task | RobotSpec) -> Mapping[str, Any]:
+    return {key: inner for key, inner in plain_value(value).items() if key not in LABELS}

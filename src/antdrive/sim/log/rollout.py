@@ -1,7 +1,9 @@
 """The log of one drive: everything that metrics, certificates, figures and films read.
 
 The file is a `.npz` archive that numpy reads without pickles: one member for each array, and the member `record`, a JSON
-text. `docs/reference/rollout-format.md` describes the format.
+text. `docs/reference/rollout-format.md` describes the format. Anybody may have written a log: sizes are checked before
+anything is read, and every failure is one line. Ranges of a lidar are whole millimetres, with two numbers for what was not
+measured.
 """
 
 from __future__ import annotations
@@ -9,34 +11,147 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import itertools
-from collections.abc import Iterator
+import math
+import os
+import stat
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.atomic import written_whole
-from antdrive.base.errors import FieldError
-from antdrive.sim.log.archive import Archive, guarded_log, read_array
+from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK, MAX_NEAR_DISTANCES
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 
+Archive: TypeAlias = zipfile.ZipFile
+
+MAX_BYTES = 1 << 29  # of all members together, and of one array, when unpacked; an hour of a drive takes 0.1 GB
+MAX_MEMBERS = 64
+LONGEST_PROBLEM = 300  # characters of a message
+
+
+@contextmanager
+def guarded_log(path: str | Path) -> Iterator[Archive]:
+    """The archive of a log; whatever goes wrong inside becomes one line that names the file."""
+    try:
+        with open(path, "rb", opener=_without_waiting) as raw:
+            kind = os.fstat(raw.fileno())
+            if not stat.S_ISREG(kind.st_mode):
+                raise input_error(str(path), "not a rollout (no regular file)")
+            if kind.st_size > MAX_BYTES:
+                raise input_error(str(path), f"not a rollout (larger than {MAX_BYTES >> 20} MB)")
+            with zipfile.ZipFile(raw) as archive:
+                _check_members(archive)
+                yield archive
+    except FileNotFoundError:
+        raise input_error(str(path), "no such file") from None
+    except InputError as error:
+        text = str(error)
+        raise (error if text.startswith(f"{path}: ") else _problem(path, text)) from None
+    except FieldError as error:
+        raise _problem(path, str(error)) from None
+    except KeyError as error:
+        raise _problem(path, f"not a rollout: {error.args[0]}") from None
+    except MemoryError:
+        raise _problem(path, "not a rollout (needs more memory than there is)") from None
+    except RecursionError:
+        raise _problem(path, "not a rollout (nested too deeply)") from None
+    except Exception as error:
+        # Archives and headers of strangers fail in many ways: zlib and LZMA errors, unknown versions, syntax errors.
+        lines = (getattr(error, "strerror", None) or str(error)).splitlines()
+        raise _problem(path, f"not a rollout ({lines[0] if lines else type(error).__name__})") from None
+
+
+def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
+    """An array of a log, without pickles and only as large as its member."""
+    if f"{name}.npy" not in archive.namelist():
+        raise KeyError(f"{name} is not a file in the archive")
+    info = archive.getinfo(f"{name}.npy")
+    with archive.open(info) as member:
+        major, _ = np.lib.format.read_magic(member)
+        header = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
+        shape, fortran, dtype = header(member)
+        if dtype.hasobject or any(n < 0 for n in shape):
+            raise FieldError(name, f"must hold numbers, found {dtype}")
+        wanted = math.prod(shape) * dtype.itemsize
+        content = member.read(min(wanted, MAX_BYTES) + 1)
+        if len(content) != wanted:
+            raise FieldError(name, f"its header promises {wanted} bytes, the file has {_more(len(content), wanted)}")
+    flat = np.frombuffer(content, dtype=dtype) if wanted else np.empty(0, dtype=dtype)
+    return flat.reshape(shape, order="F" if fortran else "C")
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe without a writer would wait for ever."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _check_members(archive: Archive) -> None:
+    members = archive.infolist()
+    if len(members) > MAX_MEMBERS:
+        raise ValueError(f"more than {MAX_MEMBERS} members")
+    if len({info.filename for info in members}) < len(members):
+        raise ValueError("two members have the same name")
+    if sum(info.file_size for info in members) > MAX_BYTES:
+        raise ValueError(f"larger than {MAX_BYTES >> 20} MB when unpacked")
+    for info in members:
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{info.filename}: compressed in another way than numpy's")
+        if info.flag_bits & 1:
+            raise ValueError(f"{info.filename}: encrypted")
+
+
+def _more(found: int, wanted: int) -> str:
+    return "more" if found > wanted else str(found)
+
+
+def _problem(path: str | Path, text: str) -> InputError:
+    """An error on one line that is not too long."""
+    return input_error(str(path), text if len(text) <= LONGEST_PROBLEM else f"{text[:LONGEST_PROBLEM]}...")
+
+
 MAX_ROWS = 20_000_000  # a day at 240 Hz
 MAX_VALUE = 1e12  # of any number in the arrays; sums and squares of greater ones lose all meaning
 MAX_RECORD = 32_000_000  # characters of the record; a world of 20,000 cylinders takes 2 million
-#: The dtypes of the arrays that do not hold float64.
-DTYPES = {
-    "limiter": np.dtype("u1"),
-    "cells": np.dtype("<i4"),
-    "scans": np.dtype("<u2"),
-    "scan_rows": np.dtype("<i4"),
-    "seen": np.dtype("<f4"),
-    "tracks": np.dtype("<f4"),
-}
+ROWS, NOISY = "rows", "rows or none"  # in shapes: the rows of the log; as many, or none for a perfect robot
+#: The shape of each array, None for any length, and its dtype.
+FORMS: Mapping[str, tuple[tuple[int | str | None, ...], str]] = MappingProxyType(
+    {
+        "t": ((ROWS,), "<f8"),
+        "pose": ((ROWS, 3), "<f8"),
+        "twist": ((ROWS, 2), "<f8"),
+        "command": ((ROWS, 2), "<f8"),
+        "clearance": ((ROWS,), "<f8"),
+        "limiter": ((ROWS,), "u1"),
+        "movers": ((ROWS, None, 2), "<f8"),
+        "contacts": ((None, 4), "<f8"),
+        "route": ((None, 2), "<f8"),
+        "cells": ((None, 2), "<i4"),
+        "estimate": ((NOISY, 3), "<f8"),
+        "actuated": ((NOISY, 2), "<f8"),
+        "scans": ((None, None), "<u2"),
+        "scan_rows": ((None,), "<i4"),
+        "seen": ((None, 4), "<f4"),
+        "tracks": ((None, 7), "<f4"),
+    }
+)
+
+
+def _none_of(name: str) -> Callable[[], npt.NDArray[Any]]:
+    """What makes an array that holds nothing."""
+    shape, dtype = FORMS[name]
+    return lambda: np.empty([n if isinstance(n, int) else 0 for n in shape], dtype=dtype)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,22 +185,22 @@ class Rollout:
         record: everything else: scenario, plan and outcome
     """
 
-    t: npt.NDArray[np.float64]
-    pose: npt.NDArray[np.float64]
-    twist: npt.NDArray[np.float64]
-    command: npt.NDArray[np.float64]
-    clearance: npt.NDArray[np.float64]
+    t: Floats
+    pose: Floats
+    twist: Floats
+    command: Floats
+    clearance: Floats
     limiter: npt.NDArray[np.uint8]
-    movers: npt.NDArray[np.float64]
-    contacts: npt.NDArray[np.float64]
-    route: npt.NDArray[np.float64]
+    movers: Floats
+    contacts: Floats
+    route: Floats
     cells: npt.NDArray[np.int32]
-    estimate: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
-    actuated: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
-    scans: npt.NDArray[np.uint16] = field(default_factory=lambda: np.empty((0, 0), dtype=np.uint16))
-    scan_rows: npt.NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    seen: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 4), dtype=np.float32))
-    tracks: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 7), dtype=np.float32))
+    estimate: Floats = field(default_factory=_none_of("estimate"))
+    actuated: Floats = field(default_factory=_none_of("actuated"))
+    scans: npt.NDArray[np.uint16] = field(default_factory=_none_of("scans"))
+    scan_rows: npt.NDArray[np.int32] = field(default_factory=_none_of("scan_rows"))
+    seen: npt.NDArray[np.float32] = field(default_factory=_none_of("seen"))
+    tracks: npt.NDArray[np.float32] = field(default_factory=_none_of("tracks"))
     record: DriveRecord
 
     @property
@@ -128,7 +243,7 @@ class Rollout:
         """The arrays that files and digests hold."""
         return ARRAYS + tuple(name for name in SENSED if np.size(getattr(self, name)))
 
-    def legs(self) -> list[tuple[slice, npt.NDArray[np.float64]]]:
+    def legs(self) -> list[tuple[slice, Floats]]:
         """The routes (N, 2) [m] that were followed, each with its rows: the first route, then one for each replan."""
         renewals = [replan for replan in self.record.replans if replan.solved]
         routes = [self.route, *(np.array(replan.route, dtype=np.float64) for replan in renewals)]
@@ -188,13 +303,14 @@ class Rollout:
             yield "t: the log is empty"
         elif rows > MAX_ROWS:
             yield f"t: must have at most {MAX_ROWS} rows, found {rows}"
-        noisy = {name for name in ("estimate", "actuated") if np.size(getattr(self, name))}
-        for name, shape in _shapes(rows, noisy).items():
+        for name, (form, dtype) in FORMS.items():
             array = getattr(self, name)
+            lengths = {ROWS: rows, NOISY: rows if np.size(array) else 0}
+            shape = tuple(lengths[n] if isinstance(n, str) else n for n in form)
             if not _fits(array.shape, shape):
                 yield f"{name}: must have the shape {_shape_text(shape)}, found {array.shape}"
-            elif array.dtype != DTYPES.get(name, np.dtype("<f8")):
-                yield f"{name}: must hold {DTYPES.get(name, np.dtype('<f8'))}, found {array.dtype}"
+            elif array.dtype != np.dtype(dtype):
+                yield f"{name}: must hold {np.dtype(dtype)}, found {array.dtype}"
             elif not np.isfinite(array).all():
                 yield f"{name}: must hold finite numbers, found others"
             elif array.size and float(np.abs(array.astype(np.float64)).max()) > MAX_VALUE:
@@ -269,15 +385,11 @@ class Rollout:
 #: The names of the arrays that only logs of robots which use their lidar hold, in the order of the digest, after the others.
 SENSED = ("scans", "scan_rows", "seen", "tracks")
 #: The names of the arrays of every log, in the order of the digest.
-ARRAYS = tuple(entry.name for entry in dataclasses.fields(Rollout) if entry.name not in ("record", *SENSED))
+ARRAYS = tuple(name for name in FORMS if name not in SENSED)
 
 
 def read_record(path: str | Path) -> DriveRecord:
-    """The record of a log, without its arrays.
-
-    Raises:
-        InputError: there is no such file, it is not a rollout, or a key of the record is missing or impossible.
-    """
+    """The record of a log, without its arrays."""
     with guarded_log(path) as archive:
         return _record_in(archive)
 
@@ -294,31 +406,34 @@ def _record_in(archive: Archive) -> DriveRecord:
     return record
 
 
-def _shapes(rows: int, noisy: set[str]) -> dict[str, tuple[int | None, ...]]:
-    """The shape that each array must have; None stands for any length."""
-    return {
-        "t": (rows,),
-        "pose": (rows, 3),
-        "twist": (rows, 2),
-        "command": (rows, 2),
-        "clearance": (rows,),
-        "limiter": (rows,),
-        "movers": (rows, None, 2),
-        "contacts": (None, 4),
-        "route": (None, 2),
-        "cells": (None, 2),
-        "estimate": (rows if "estimate" in noisy else 0, 3),
-        "actuated": (rows if "actuated" in noisy else 0, 2),
-        "scans": (None, None),
-        "scan_rows": (None,),
-        "seen": (None, 4),
-        "tracks": (None, 7),
-    }
-
-
 def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
     return len(found) == len(shape) and all(m in (None, n) for n, m in zip(found, shape, strict=True))
 
 
 def _shape_text(shape: tuple[int | None, ...]) -> str:
     return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+
+
+NOTHING, TOO_NEAR = 0, 1  # nothing was in range; something was nearer than the lidar measures
+
+
+def millimetres(ranges: Floats) -> npt.NDArray[np.uint16]:
+    """Ranges as the log keeps them: 0 where nothing was in range, 1 where something was too near to measure."""
+    missing = np.where(ranges < 0, TOO_NEAR, NOTHING)
+    kept = np.where(np.isfinite(ranges), np.clip(np.round(ranges * 1000.0), TOO_NEAR + 1, 65535), missing)
+    return kept.astype(np.uint16)
+
+
+def ranges_of(scans: npt.NDArray[np.uint16]) -> Floats:
+    """Ranges [m] out of a log, as the scanner gave them but for the rounding."""
+    ranges: Floats = np.where(scans == NOTHING, np.inf, np.where(scans == TOO_NEAR, -np.inf, scans / 1000.0))
+    return ranges
+
+
+def scans_logged(taken: Iterable[tuple[int, Floats]], per_tick: int, rows: int) -> dict[str, npt.NDArray[np.generic]]:
+    """The arrays `scans` and `scan_rows` of a log."""
+    kept = [(tick * per_tick, ranges) for tick, ranges in taken if tick * per_tick < rows]
+    return {
+        "scans": millimetres(np.array([ranges for _, ranges in kept]) if kept else np.empty((0, 0))),
+        "scan_rows": np.array([row for row, _ in kept], dtype=np.int32),
+    }

@@ -11,14 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.base.plane import frame_at, laid
 from antdrive.base.types import Floats
-from antdrive.robots.footprint import shape_of
 from antdrive.robots.lidar import Lidar
+from antdrive.robots.placing import shape_of
 from antdrive.sim.log import _kernels_sights as kernels
-from antdrive.sim.log.frames import frame_at, laid
 from antdrive.sim.log.record import finite_or_none
-from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.log.scans import ranges_of
+from antdrive.sim.log.rollout import Rollout, ranges_of
 
 PASSED = 0.5  # the robot passed what its surface came this near to [m]
 CELL = 0.1  # side of the cells in which seen ground is counted [m]
@@ -72,11 +71,7 @@ class Sighting(NamedTuple):
 
 
 def lidar_of(rollout: Rollout) -> Lidar:
-    """The lidar that took a log's scans.
-
-    Raises:
-        ValueError: the log has no scans.
-    """
+    """The lidar that took a log's scans."""
     lidar = rollout.record.robot.lidar
     if lidar is None or not len(rollout.scans):
         raise ValueError("the log has no scans")
@@ -115,19 +110,11 @@ def first_meetings(rollout: Rollout) -> Floats:
 
 def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
     """First sight and nearest approach of every cylinder, those that the robot came nearest to first."""
-    discs, shape = rollout.record.world.discs, shape_of(rollout.record.robot.footprint)
     touched = set(rollout.contacts[:, 1].astype(int).tolist())
-    row, away = np.zeros(len(discs), dtype=np.int64), np.empty(len(discs))
-    kernels.nearest_approaches(rollout.pose, *shape, discs, row, away)
-    found = []
-    for j, (k, nearest) in enumerate(zip(row.tolist(), away.tolist(), strict=True)):
-        first, seen_from = float(met[j]), math.nan
-        if math.isfinite(first):
-            then = int(np.searchsorted(rollout.t, first - 1e-9))
-            at = np.empty(1)
-            kernels.nearest_approaches(rollout.pose[then : then + 1], *shape, discs[j : j + 1], row[:1].copy(), at)
-            seen_from = float(at[0])
-        found.append(Sighting(j, first, seen_from, float(rollout.t[k]), nearest, j in touched))
+    found = [
+        _sighting(rollout, j, first, rollout.pose, disc, touched=j in touched)
+        for j, (first, disc) in enumerate(zip(met.tolist(), rollout.record.world.discs, strict=True))
+    ]
     return sorted(found, key=lambda sight: (not sight.touched, sight.nearest))
 
 
@@ -139,36 +126,29 @@ def movers_met(rollout: Rollout) -> list[Sighting]:
     for k, row in enumerate(rows.tolist()):
         _meet(rollout, k, np.column_stack((rollout.movers[row], radii)), met)
     touched = set((rollout.contacts[:, 1].astype(int) - len(record.world.obstacles)).tolist())
-    followed, found = followed_rows(rollout), []
-    for j, radius in enumerate(radii.tolist()):
-        nearest_row, nearest = _approach(rollout, j, radius, slice(None))
-        seen_from = math.nan
-        if math.isfinite(met[j]):
-            then = int(np.searchsorted(rollout.t, met[j] - 1e-9))
-            _, seen_from = _approach(rollout, j, radius, slice(then, then + 1))
-        found.append(
-            Sighting(
-                j,
-                float(met[j]),
-                seen_from,
-                float(rollout.t[nearest_row]),
-                nearest,
-                j in touched,
-                mover=True,
-                followed_at=float(rollout.t[followed[j][0]]) if len(followed[j]) else math.inf,
-            )
-        )
+    found = []
+    for j, (first, followed) in enumerate(zip(met.tolist(), followed_rows(rollout), strict=True)):
+        poses, disc = rollout.pose.copy(), np.array([0.0, 0.0, radii[j]])
+        poses[:, :2] -= rollout.movers[:, j]  # as the mover sees the robot
+        at = float(rollout.t[followed[0]]) if len(followed) else math.inf
+        found.append(_sighting(rollout, j, first, poses, disc, touched=j in touched, mover=True, followed_at=at))
     return found
 
 
-def _approach(rollout: Rollout, mover: int, radius: float, rows: slice) -> tuple[int, float]:
-    """Among some rows, the one in which the footprint was nearest to a mover, from the first on, and how near [m]."""
-    poses = rollout.pose[rows].copy()
-    poses[:, :2] -= rollout.movers[rows, mover]  # as the mover sees the robot
-    row, away = np.zeros(1, dtype=np.int64), np.empty(1)
-    shape = shape_of(rollout.record.robot.footprint)
-    kernels.nearest_approaches(poses, *shape, np.array([[0.0, 0.0, radius]]), row, away)
-    return int(row[0]), float(away[0])
+def _sighting(rollout: Rollout, j: int, first: float, poses: Floats, disc: Floats, **more: Any) -> Sighting:
+    """What is first met at a time [s], if the robot's poses (T, 3) are seen from where a disc (3,) has its place."""
+    shape, row, away = shape_of(rollout.record.robot.footprint), np.zeros(1, dtype=np.int64), np.empty(1)
+
+    def approach(some: Floats) -> tuple[int, float]:
+        kernels.nearest_approaches(some, *shape, disc[None], row, away)
+        return int(row[0]), float(away[0])
+
+    nearest_row, nearest = approach(poses)
+    seen_from = math.nan
+    if math.isfinite(first):
+        then = int(np.searchsorted(rollout.t, first - 1e-9))
+        _, seen_from = approach(poses[then : then + 1])
+    return Sighting(j, first, seen_from, float(rollout.t[nearest_row]), nearest, **more)
 
 
 def followed_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:

@@ -74,9 +74,6 @@ def client() -> Iterator[int]:
 
     Within the block Bullet prints nothing on stdout, which may be JSON. Parameters of the engine may be left over from
     another world: set all of them.
-
-    Raises:
-        RuntimeError: PyBullet refuses another client.
     """
     p, stdout = bullet(), _c_stdout()
     stdout.shut()

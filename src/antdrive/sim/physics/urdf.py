@@ -15,8 +15,7 @@ from xml.sax.saxutils import quoteattr
 
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Point
-from antdrive.robots.feasible import yaw_inertia
-from antdrive.robots.spec import RobotSpec
+from antdrive.robots.spec import RobotSpec, yaw_inertia
 
 GROUND_CLEARANCE = 0.005  # height of the chassis above the floor [m]
 CASTER_GAP = 5e-4  # height of wheels and casters above the floor when the robot is placed [m]
@@ -48,9 +47,6 @@ def robot_urdf(robot: RobotSpec, com_drop: float) -> str:
     """The robot as URDF text. The base frame is the axle's centre.
 
     A chassis that is neither a disc nor a rectangle is the mesh `CHASSIS_FILE`, which `chassis_mesh` gives.
-
-    Raises:
-        FieldError: the footprint has round corners.
     """
     foot = robot.footprint
     if foot.rounding and not foot.is_disc and len(foot.corners) != 1:

@@ -1,10 +1,10 @@
 from .dead_reckoning import DeadReckoning as DeadReckoning
-from .ground import KnownGround as KnownGround
-from .ground import MappedGround as MappedGround
 from .mapping import OccupancyMap as OccupancyMap
+from .mapping import clear_distance as clear_distance
+from .mapping import clear_turn as clear_turn
 from .scanner import Scanner as Scanner
-from .sight import clear_distance as clear_distance
-from .sight import clear_turn as clear_turn
+from .tracking import KnownGround as KnownGround
+from .tracking import MappedGround as MappedGround
 from .tracking import MoverTracker as MoverTracker
 from .tracking import TrackedMovers as TrackedMovers
 from .tracking import TrackingPolicy as TrackingPolicy

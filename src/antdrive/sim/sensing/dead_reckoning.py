@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from antdrive.base import Pose
-from antdrive.robots.odometry import SAMPLE_RATE, Odometry
+from antdrive.robots.spec import SAMPLE_RATE, Odometry
 
 
 class DeadReckoning:

@@ -1,29 +1,32 @@
-"""A log, exported to what other programs read."""
+"""A log, exported to what other programs read: ROS 2 messages in bags, with a layout of panels, or tables of numbers."""
 
 from __future__ import annotations
 
+import csv
 import json
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from antdrive.base.atomic import folder_written_whole, written_whole
 from antdrive.base.errors import FieldError, input_error
+from antdrive.base.files import require_new
+from antdrive.base.plane import in_map
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.bags import metadata, write_mcap
-from antdrive.views.export.layout import foxglove_layout
-from antdrive.views.export.samples import samples
-from antdrive.views.export.scans import DriveScans
-from antdrive.views.export.scenery import scenery
-from antdrive.views.export.tables import write_tables
-from antdrive.views.export.topics import Topic
+from antdrive.views.export.samples import DriveScans, samples
+from antdrive.views.export.scenery import routes_of, scenery
+from antdrive.views.export.topics import Topic, metadata, write_mcap
 from antdrive.worlds.files.world_file import save_task
 
 LAYOUT = ".foxglove.json"
+SCENE = "3D!drive"
+MARGIN = 1.1  # how much more than the world the picture shows
+ASPECT = 0.75  # width over height of the scene's panel, at least: in a window of 1400 x 900 beside an open side bar
 
 
 def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False, scans: bool = True) -> list[Path]:
@@ -36,11 +39,8 @@ def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False,
     if target.suffix in (".mcap", ".csv") and to != "mcap":
         kind = "; a file that ends in .mcap is made with --to mcap" if target.suffix == ".mcap" else ""
         raise input_error(str(target), f"name a folder: {to} is several files{kind}")
-    for file in () if replace or to != "mcap" else (target, _layout_beside(target)):
-        if file.exists():
-            raise input_error(str(file), "exists; name another file, or replace it with --force")
-    rollout = Rollout.load(source)
-    return EXPORTS[to](rollout, source, target, scans)
+    require_new((target, target.with_suffix(LAYOUT)), replace=replace or to != "mcap")
+    return EXPORTS[to](Rollout.load(source), source, target, scans)
 
 
 def topics_of(rollout: Rollout, scans: DriveScans) -> list[Topic]:
@@ -68,22 +68,27 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
 
 
 def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
-    layout = _layout_beside(target)
-    scans = DriveScans.of(rollout, again=again)
+    layout = target.with_suffix(LAYOUT)
     with written_whole(layout) as beside, written_whole(target) as part:  # both or none
-        write_mcap(part, topics_of(rollout, scans), attachments_of(rollout, log), _notes(scans))
-        beside.write_text(_layout(rollout), encoding="utf-8")
+        _write_bag(rollout, log, part, beside, again)
     return [target, layout]
 
 
 def _to_rosbag2(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
     with folder_written_whole(target) as folder:
-        scans = DriveScans.of(rollout, again=again)
-        topics, notes, bag = topics_of(rollout, scans), _notes(scans), f"{target.name}.mcap"
-        write_mcap(folder / bag, topics, attachments_of(rollout, log), notes)
+        bag, beside = f"{target.name}.mcap", folder / f"{target.name}{LAYOUT}"
+        topics, notes = _write_bag(rollout, log, folder / bag, beside, again)
         (folder / "metadata.yaml").write_text(metadata(bag, topics, notes), encoding="utf-8")
-        (folder / f"{target.name}{LAYOUT}").write_text(_layout(rollout), encoding="utf-8")
     return [target]
+
+
+def _write_bag(rollout: Rollout, log: Path, bag: Path, layout: Path, again: bool) -> tuple[list[Topic], dict[str, str]]:
+    """Write a bag and its layout; its topics, and what a reader of it has to know."""
+    scans = DriveScans.of(rollout, again=again)
+    topics, notes = topics_of(rollout, scans), {"scans": scans.source}
+    write_mcap(bag, topics, attachments_of(rollout, log), notes)
+    layout.write_text(json.dumps(foxglove_layout(rollout), indent=2) + "\n", encoding="utf-8")
+    return topics, notes
 
 
 def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
@@ -92,17 +97,54 @@ def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path
     return [target]
 
 
-def _notes(scans: DriveScans) -> dict[str, str]:
-    """What a reader of a bag has to know of its messages."""
-    return {"scans": scans.source}
+def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
+    """The layout of Foxglove's and Lichtblick's panels as plain data: the scene from straight above, and curves beside it.
+
+    Topics have settings where the programs' own would not do: without intensities scans have no colour.
+    """
+    layout: dict[str, Any] = json.loads(Path(__file__).with_name("layout.json").read_text(encoding="utf-8"))
+    x0, y0, x1, y1 = rollout.record.world.bounds
+    corners = in_map(rollout.record.task.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    wide, tall = (high - low).tolist()
+    camera = layout["configById"][SCENE]["cameraState"]
+    camera["distance"] = MARGIN * max(wide / ASPECT, tall)  # how much is shown from bottom to top [m]
+    camera["targetOffset"] = [*((low + high) / 2).tolist(), 0]
+    return layout
 
 
-def _layout_beside(target: Path) -> Path:
-    return target.with_suffix(LAYOUT)
+def write_tables(rollout: Rollout, folder: Path) -> None:
+    """Write drive.csv with a line for each row of the log, plan.csv with the routes, and contacts.csv."""
+    _write_table(folder / "drive.csv", *_drive(rollout))
+    plan = ((number, at, x, y) for number, (at, points) in enumerate(routes_of(rollout)) for x, y in points.tolist())
+    _write_table(folder / "plan.csv", ("route", "from_s", "x_m", "y_m"), plan)
+    contacts = ((rollout.t[int(row)], int(thing), *rest) for row, thing, *rest in rollout.contacts.tolist())
+    _write_table(folder / "contacts.csv", ("t_s", "obstacle", "distance_m", "force_N"), contacts)
 
 
-def _layout(rollout: Rollout) -> str:
-    return json.dumps(foxglove_layout(rollout), indent=2) + "\n"
+def _drive(rollout: Rollout) -> tuple[list[str], Iterable[Sequence[Any]]]:
+    frame = rollout.record.task.frame
+    heads = ["t_s", "x_m", "y_m", "yaw_rad", "speed_m_s", "yaw_rate_rad_s"]
+    heads += ["command_speed_m_s", "command_yaw_rate_rad_s", "clearance_m", "limiter"]
+    columns = [rollout.t, *in_map(frame, rollout.pose).T, *rollout.twist.T, *rollout.command.T, rollout.clearance]
+    columns.append(np.array(rollout.record.limiters, dtype=object)[rollout.limiter])
+    if len(rollout.estimate):
+        heads += ["estimate_x_m", "estimate_y_m", "estimate_yaw_rad"]
+        columns += [*in_map(frame, rollout.estimate).T]
+    if len(rollout.actuated):
+        heads += ["actuated_speed_m_s", "actuated_yaw_rate_rad_s"]
+        columns += [*rollout.actuated.T]
+    for i in range(rollout.movers.shape[1]):
+        heads += [f"mover_{i}_x_m", f"mover_{i}_y_m"]
+        columns += [*in_map(frame, rollout.movers[:, i]).T]
+    return heads, zip(*(column.tolist() for column in columns), strict=True)
+
+
+def _write_table(path: Path, heads: Sequence[str], lines: Iterable[Sequence[Any]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(heads)
+        writer.writerows(lines)
 
 
 #: How to export a log, by what it becomes.

@@ -4,26 +4,15 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.log.frames import frame_at
-from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.scans import DriveScans
-from antdrive.views.export.topics import (
-    BASE,
-    ESTIMATE,
-    LIDAR,
-    ODOM,
-    ROBOT_MAP,
-    Floats,
-    Stamps,
-    Topic,
-    mover_frame,
-    nanoseconds,
-)
+from antdrive.base.plane import frame_at
+from antdrive.base.types import Floats, Ints
+from antdrive.sim.log.rollout import Rollout, ranges_of
+from antdrive.views.export.topics import BASE, ESTIMATE, LIDAR, ODOM, ROBOT_MAP, Topic, mover_frame, nanoseconds
 
 HEADER = b"\x00\x01\x00\x00"  # CDR, little endian
 
@@ -124,7 +113,7 @@ def _own_maps(rollout: Rollout) -> Floats:
     return frame_at(rollout.estimate, rollout.pose) if len(rollout.estimate) else np.zeros((len(rollout.t), 3))
 
 
-def transforms(topic: str, stamps: Stamps, frames: Sequence[tuple[str, str]], poses: Floats, z: float = 0.0) -> Topic:
+def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], poses: Floats) -> Topic:
     """Messages that place frames within others."""
     layout = CdrLayout()
     layout.length(len(frames))
@@ -133,11 +122,11 @@ def transforms(topic: str, stamps: Stamps, frames: Sequence[tuple[str, str]], po
         _header(layout, parent, str(i))
         layout.text(child)
         layout.number(f"pose{i}", "f8", 7)
-        values |= _stamp_values(stamps, str(i)) | {f"pose{i}": _pose7(poses[:, i], z)}
+        values |= _stamp_values(stamps, str(i)) | {f"pose{i}": _pose7(poses[:, i])}
     return Topic(topic, "tf2_msgs/msg/TFMessage", stamps, layout.messages(values))
 
 
-def odometry(topic: str, child: str, stamps: Stamps, pose: Floats, twist: Floats) -> Topic:
+def odometry(topic: str, child: str, stamps: Ints, pose: Floats, twist: Floats) -> Topic:
     """Poses with speeds; covariances are 0, which ROS reads as unknown."""
     layout = CdrLayout()
     _header(layout, ODOM)
@@ -150,21 +139,21 @@ def odometry(topic: str, child: str, stamps: Stamps, pose: Floats, twist: Floats
     return Topic(topic, "nav_msgs/msg/Odometry", stamps, layout.messages(values))
 
 
-def twists(topic: str, stamps: Stamps, twist: Floats) -> Topic:
+def twists(topic: str, stamps: Ints, twist: Floats) -> Topic:
     """Speeds."""
     layout = CdrLayout()
     layout.number("twist", "f8", 6)
     return Topic(topic, "geometry_msgs/msg/Twist", stamps, layout.messages({"twist": _twist6(twist)}))
 
 
-def numbers(topic: str, kind: str, number: str, stamps: Stamps, values: Any) -> Topic:
+def numbers(topic: str, kind: str, number: str, stamps: Ints, values: Any) -> Topic:
     """Single numbers."""
     layout = CdrLayout()
     layout.number("data", number)
     return Topic(topic, kind, stamps, layout.messages({"data": values}))
 
 
-def laser_scans(topic: str, stamps: Stamps, ranges: npt.NDArray[np.floating], values: dict[str, float]) -> Topic:
+def laser_scans(topic: str, stamps: Ints, ranges: npt.NDArray[np.floating], values: dict[str, float]) -> Topic:
     """Scans of a planar lidar."""
     layout = CdrLayout()
     _header(layout, LIDAR)
@@ -185,14 +174,14 @@ def _header(layout: CdrLayout, frame: str, mark: str = "") -> None:
     layout.text(frame)
 
 
-def _stamp_values(stamps: Stamps, mark: str = "") -> dict[str, Any]:
+def _stamp_values(stamps: Ints, mark: str = "") -> dict[str, Any]:
     return {f"sec{mark}": stamps // 10**9, f"nanosec{mark}": stamps % 10**9}
 
 
-def _pose7(pose: Floats, z: float = 0.0) -> Floats:
+def _pose7(pose: Floats) -> Floats:
     """Position and quaternion (N, 7) of poses in the plane (N, 3)."""
     found = np.zeros((len(pose), 7))
-    found[:, :2], found[:, 2] = pose[:, :2], z
+    found[:, :2] = pose[:, :2]
     found[:, 5], found[:, 6] = np.sin(pose[:, 2] / 2), np.cos(pose[:, 2] / 2)
     return found
 
@@ -201,3 +190,43 @@ def _twist6(twist: Floats) -> Floats:
     found = np.zeros((len(twist), 6))
     found[:, 0], found[:, 5] = twist[:, 0], twist[:, 1]
     return found
+
+
+LOGGED = "taken by the drive"
+TAKEN_AGAIN = "taken at export, without noise, from the logged poses; the log holds no scans"
+LEFT_OUT = "left out"
+NONE = "none; the robot has no lidar"
+
+
+class DriveScans(NamedTuple):
+    """The scans of a drive."""
+
+    source: str  # where they come from, in words
+    rows: Ints  # of the log, at which they were taken (S,)
+    # what was measured (S, beams) [m]; infinite where nothing was in range, minus infinity where something was too near
+    ranges: npt.NDArray[np.floating]
+
+    @classmethod
+    def of(cls, rollout: Rollout, *, again: bool = True) -> DriveScans:
+        """The scans of a drive."""
+        if len(rollout.scans):
+            return cls(LOGGED, rollout.scan_rows.astype(np.int64), ranges_of(rollout.scans))
+        if rollout.record.robot.lidar is not None and again:
+            return cls(TAKEN_AGAIN, *_taken_again(rollout))
+        source = NONE if rollout.record.robot.lidar is None else LEFT_OUT
+        return cls(source, np.empty(0, dtype=np.int64), np.empty((0, 0)))
+
+
+def _taken_again(rollout: Rollout) -> tuple[Ints, npt.NDArray[np.float32]]:
+    """The rows (S,) in which the lidar is due, and what it measures without noise from the logged poses (S, beams) [m]."""
+    from antdrive.sim.sensing import Scanner
+
+    record, lidar = rollout.record, rollout.record.robot.lidar
+    assert lidar is not None
+    per_tick = max(1, record.physics_hz // record.control_hz)
+    ticks = range(-(-len(rollout.t) // per_tick))
+    rows = np.array([tick * per_tick for tick in ticks if lidar.due(tick, record.control_hz)], dtype=np.int64)
+    scanner, radii = Scanner.of(lidar, record.world), np.array([mover.radius for mover in record.world.movers])
+    poses = rollout.pose[rows].tolist()
+    scans = [scanner.scan((x, y, yaw), rollout.movers[k], radii) for k, (x, y, yaw) in zip(rows, poses, strict=True)]
+    return rows, np.array(scans, dtype=np.float32).reshape(len(rows), lidar.beams)

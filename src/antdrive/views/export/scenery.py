@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base.plane import in_map
+from antdrive.base.types import Floats, Pose
+from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.description import description, wheel_places
-from antdrive.views.export.ground import GroundGrid, known_ground, planned_ground
 from antdrive.views.export.topics import (
     BASE,
-    IDENTITY,
     LIDAR,
     MAP,
     ODOM,
     ROBOT_MAP,
-    Floats,
     Topic,
     message_types,
     mover_frame,
@@ -26,14 +27,9 @@ from antdrive.views.export.topics import (
 )
 from antdrive.views.scene import Scene, contact_point
 
-CUBE, SPHERE, CYLINDER, LINE_STRIP = 1, 2, 3, 4  # kinds of markers
-KNOWN, UNSEEN, MOVING, TOUCHED = (
-    (0.45, 0.47, 0.52, 1.0),
-    (0.85, 0.2, 0.2, 1.0),
-    (0.95, 0.6, 0.1, 1.0),
-    (0.9, 0.0, 0.5, 1.0),
-)
-GOAL, WALL = (0.2, 0.7, 0.3, 0.4), (0.3, 0.32, 0.36, 1.0)
+SPHERE, CYLINDER, LINE_STRIP = 2, 3, 4  # kinds of markers
+KNOWN, UNSEEN, MOVING = (0.45, 0.47, 0.52, 1.0), (0.85, 0.2, 0.2, 1.0), (0.95, 0.6, 0.1, 1.0)
+TOUCHED, GOAL, WALL = (0.9, 0.0, 0.5, 1.0), (0.2, 0.7, 0.3, 0.4), (0.3, 0.32, 0.36, 1.0)
 FLAT, LINE, SPOT = 0.01, 0.05, 0.1  # height of the goal, width of a line, size of a contact [m]
 
 
@@ -110,13 +106,9 @@ def _grid(ground: GroundGrid, frame: str) -> Any:
 
 def _routes(rollout: Rollout) -> Topic:
     """Each route when the robot began to follow it, its points with the heading towards the next one."""
-    record = rollout.record
-    # A robot without a map plans where it believes to be.
-    frame, lies = (ROBOT_MAP, IDENTITY) if record.exploring else (MAP, record.task.frame)
+    frame = ROBOT_MAP if rollout.record.exploring else MAP
     times, contents = [], []
-    for rows, route in rollout.legs():
-        at = float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)])
-        points = in_map(lies, route)
+    for at, points in routes_of(rollout):
         steps = np.diff(points, axis=0, append=points[-1:])
         headings = np.arctan2(steps[:, 1], steps[:, 0])
         headings[-1] = headings[-2] if len(headings) > 1 else 0.0
@@ -127,6 +119,16 @@ def _routes(rollout: Rollout) -> Topic:
         times.append(at)
         contents.append(_of("nav_msgs/msg/Path", header=_header(frame, at), poses=poses))
     return _message("/plan", "nav_msgs/msg/Path", times, contents, latched=True)
+
+
+def routes_of(rollout: Rollout) -> Iterator[tuple[float, Floats]]:
+    """Each route with when the robot began to follow it [s], in the map's frame (N, 2) [m].
+
+    A robot without a map plans where it believes to be: its routes lie in the frame of its own map.
+    """
+    lies = (0.0, 0.0, 0.0) if rollout.record.exploring else rollout.record.task.frame
+    for rows, route in rollout.legs():
+        yield float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)]), in_map(lies, route)
 
 
 def _standing(rollout: Rollout) -> list[Any]:
@@ -203,7 +205,7 @@ def _marker(
     place: Sequence[float],
     size: Sequence[float],
 ) -> Any:
-    r, g, b, a = colour
+    (r, g, b, a), nothing = colour, np.empty(0, dtype=np.uint8)
     pose = _pose((place[0], place[1], 0.0))
     pose.position.z = size[2] / 2
     return _of(
@@ -217,18 +219,11 @@ def _marker(
         scale=_of("geometry_msgs/msg/Vector3", x=size[0], y=size[1], z=size[2]),
         color=_of("std_msgs/msg/ColorRGBA", r=r, g=g, b=b, a=a),
         lifetime=_of("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
-        frame_locked=False,
-        points=[],
-        colors=[],
-        texture_resource="",
-        texture=_of(
-            "sensor_msgs/msg/CompressedImage", header=_header("", 0.0), format="", data=np.empty(0, dtype=np.uint8)
-        ),
-        uv_coordinates=[],
-        text="",
-        mesh_resource="",
-        mesh_file=_of("visualization_msgs/msg/MeshFile", filename="", data=np.empty(0, dtype=np.uint8)),
-        mesh_use_embedded_materials=False,
+        texture=_of("sensor_msgs/msg/CompressedImage", header=_header("", 0.0), format="", data=nothing),
+        mesh_file=_of("visualization_msgs/msg/MeshFile", filename="", data=nothing),
+        **dict.fromkeys(("texture_resource", "text", "mesh_resource"), ""),
+        **dict.fromkeys(("frame_locked", "mesh_use_embedded_materials"), False),
+        **{name: [] for name in ("points", "colors", "uv_coordinates")},
     )
 
 
@@ -267,3 +262,102 @@ def _pose(pose: Sequence[float]) -> Any:
 
 def _turn(yaw: float) -> Any:
     return _of("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2)))
+
+
+FREE, OCCUPIED, UNKNOWN = 0, 100, -1  # as ROS has them
+PERIOD = 1.0  # between two maps of a robot that has none at first [s]
+
+
+@dataclass(frozen=True, eq=False)
+class GroundGrid:
+    """An occupancy grid."""
+
+    at: float  # when it was known [s]
+    cell: float  # side of a cell [m]
+    origin: Pose  # the pose of the lower left corner of cell (0, 0) in the grid's frame: x, y [m], yaw [rad]
+    cells: npt.NDArray[np.int8]  # FREE, OCCUPIED or UNKNOWN (rows, cols)
+
+
+def planned_ground(rollout: Rollout) -> GroundGrid:
+    """The grid that the drive was planned on, in the frame of the map: free where the robot's centre may be."""
+    from antdrive.worlds.grid import rasterise
+
+    record = rollout.record
+    free = rasterise(record.task.world, record.cell, record.inflate).free
+    x0, y0, _, _ = record.task.world.bounds
+    x, y, yaw = in_map(record.task.frame, [(x0, y0, 0.0)])[0].tolist()
+    return GroundGrid(float(rollout.t[0]), record.cell, (x, y, yaw), np.where(free, FREE, OCCUPIED).astype(np.int8))
+
+
+def known_ground(rollout: Rollout) -> Iterator[GroundGrid]:
+    """What a robot without a map had seen, in the frame of its estimated poses: at first, every second, and at last."""
+    from antdrive.views.recollection import Recollection
+
+    seen = Recollection(rollout, forgetting=True, meeting=False)
+    end = float(rollout.t[-1])
+    times = [*np.arange(float(rollout.t[0]), end, PERIOD).tolist(), end]
+    for at in times:
+        seen.advance(at)
+        occupied, free = seen.map.occupied, seen.map.seen_free
+        rows, cols = (np.flatnonzero((occupied | free).any(axis=axis)) for axis in (1, 0))
+        part = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+        cells = np.where(occupied[part], OCCUPIED, np.where(free[part], FREE, UNKNOWN)).astype(np.int8)
+        x, y, cell = *seen.map.origin, seen.map.cell
+        yield GroundGrid(at, cell, (x + cols[0] * cell, y + rows[0] * cell, 0.0), cells)
+
+
+GAP = 0.005  # height of the body above the floor [m]
+WHEEL_WIDTH = 0.3  # in wheel radii
+#: How XML writes the characters that an attribute cannot hold. The standard library's function loads all of urllib.
+ESCAPES = {ord(c): f"&#{ord(c)};" for c in '&<>"\n\r\t'}
+BODY_COLOUR, WHEEL_COLOUR = "0.16 0.44 0.72 1", "0.15 0.15 0.15 1"
+
+
+def wheel_places(robot: RobotSpec) -> dict[str, tuple[float, float, float]]:
+    """Where the wheels are in the robot's frame: x, y and z [m] by link."""
+    return {
+        f"{side}_wheel": (0.0, sign * robot.track / 2, robot.wheel_radius)
+        for side, sign in (("left", 1), ("right", -1))
+    }
+
+
+def description(robot: RobotSpec) -> str:
+    """The robot's shape as URDF text. The frame of the root link is on the floor, under the axle's centre.
+
+    The body is the footprint, a cylinder or the box around it; the wheels stand inside it.
+    """
+    body, x, y = _body(robot)
+    origin = f'<origin xyz="{x!r} {y!r} {GAP + robot.height / 2!r}"/>'
+    parts = [
+        f'<robot name="{robot.name.translate(ESCAPES)}">',
+        f'<link name="{BASE}">',
+        f"<visual>{origin}<geometry>{body}</geometry>{_colour('body', BODY_COLOUR)}</visual>",
+        f"<collision>{origin}<geometry>{body}</geometry></collision>",
+        "</link>",
+    ]
+    wheel = f'<cylinder radius="{robot.wheel_radius!r}" length="{WHEEL_WIDTH * robot.wheel_radius!r}"/>'
+    lying = f'<origin rpy="{math.pi / 2!r} 0 0"/>'
+    for link, place in wheel_places(robot).items():
+        parts += [
+            f'<link name="{link}">',
+            f"<visual>{lying}<geometry>{wheel}</geometry>{_colour('wheel', WHEEL_COLOUR)}</visual>",
+            "</link>",
+            f'<joint name="{link}_joint" type="fixed"><parent link="{BASE}"/><child link="{link}"/>',
+            f'<origin xyz="{" ".join(map(repr, place))}"/></joint>',
+        ]
+    return "\n".join([*parts, "</robot>"])
+
+
+def _body(robot: RobotSpec) -> tuple[str, float, float]:
+    """The body's geometry, and its middle in the robot's frame, x and y [m]; a polygon is described by the box around it."""
+    foot, height = robot.footprint, robot.height
+    if foot.is_disc or len(foot.corners) == 1:
+        x, y = foot.corners[0] if foot.corners else (0.0, 0.0)
+        return f'<cylinder radius="{foot.rounding!r}" length="{height!r}"/>', x, y
+    xmin, ymin, xmax, ymax = foot.bounds
+    size = f"{xmax - xmin!r} {ymax - ymin!r} {height!r}"
+    return f'<box size="{size}"/>', (xmin + xmax) / 2, (ymin + ymax) / 2
+
+
+def _colour(name: str, rgba: str) -> str:
+    return f'<material name="{name}"><color rgba="{rgba}"/></material>'

@@ -18,11 +18,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from antdrive.base.atomic import written_whole
-from antdrive.base.errors import InputError
+from antdrive.base.files import known_suffix
 from antdrive.base.types import Bounds
 from antdrive.sim.log.outcome import Outcome
+from antdrive.views.colours import INK, MUTED, VERDICTS, hexed
 from antdrive.views.scene import Scene
-from antdrive.views.style import INK, MUTED, VERDICTS, hexed
 
 SUFFIXES = (".png", ".pdf", ".svg")
 
@@ -121,12 +121,9 @@ def frame_map(axes: Any, shown: Bounds) -> None:
 
 def checked(path: str | Path | None) -> Path | None:
     """The path of a figure, checked before any work; None stays None."""
-    if path is None:
-        return None
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose one of {', '.join(SUFFIXES)}")
-    return target
+    if path is not None:
+        known_suffix(Path(path), SUFFIXES)
+    return None if path is None else Path(path)
 
 
 def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
@@ -141,6 +138,11 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
     with written_whole(target) as temporary:
         figure.savefig(temporary, format=kind, dpi=dpi, metadata=empty)
     return target
+
+
+def endings(suffixes: Sequence[str]) -> list[tuple[str, str]]:
+    """Each suffix that a figure is written with, and what the name of its file ends with: nothing for the first."""
+    return [(suffix, "" if k == 0 else f" {suffix[1:]}") for k, suffix in enumerate(suffixes)]
 
 
 def save_figure(figure: Figure, path: str | Path, *, dpi: float | None = None) -> Path:

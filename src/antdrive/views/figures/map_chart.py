@@ -5,40 +5,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 from matplotlib.path import Path
 
+from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
+from antdrive.views import colours
+from antdrive.views.colours import hexed
 from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, legend_above, thinned
 from antdrive.views.scene import Scene, contact_point
-from antdrive.views.style import (
-    BAD,
-    FIELD_STOPS,
-    GOAL,
-    KERB,
-    MOVER,
-    MUTED,
-    OBSTACLE,
-    ROUTE,
-    SHELL,
-    SPEED_STOPS,
-    START,
-    UNSEEN,
-    ZONE,
-    hexed,
-)
 
 if TYPE_CHECKING:
     from antdrive.worlds.grid import Grid
 
-Floats = npt.NDArray[np.float64]
 
-FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in FIELD_STOPS])
+FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in colours.FIELD_STOPS])
 MANY = 1000  # cylinders
-SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in SPEED_STOPS])
+SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in colours.SPEED_STOPS])
 
 
 def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
@@ -49,7 +34,7 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
     axes.set_aspect("equal", adjustable="box")
     axes.spines[:].set_visible(False)
     axes.grid(floor)
-    inside = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, ec=hexed(KERB), lw=3.0, zorder=4.5)
+    inside = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, ec=hexed(colours.KERB), lw=3.0, zorder=4.5)
     axes.add_patch(inside)
     known = scene.obstacles[~scene.unseen]
     if scene.has_zones:
@@ -60,28 +45,28 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
             _corners(*corners)
             for corners in ((x0, y0, x0 + i, y1), (x1 - i, y0, x1, y1), (x0, y0, x1, y0 + i), (x0, y1 - i, x1, y1))
         ]
-        pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
+        pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in colours.ZONE)
         layer = PathCollection([*zones, *zones_walls], facecolor=pale, edgecolor="none", zorder=1.2)
         if not floor:
-            layer.set(facecolor="none", edgecolor=hexed(ZONE), linewidth=0.6, alpha=0.8)
+            layer.set(facecolor="none", edgecolor=hexed(colours.ZONE), linewidth=0.6, alpha=0.8)
         axes.add_collection(layer)
         layer.set_clip_path(inside)
-    for chosen, colour in ((known, OBSTACLE), (scene.obstacles[scene.unseen], UNSEEN)):
+    for chosen, colour in ((known, colours.OBSTACLE), (scene.obstacles[scene.unseen], colours.UNSEEN)):
         edge = 0.4 if len(chosen) <= MANY else 0.0  # white edges of thousands would leave nothing else to see
         circles = _circles(chosen[:, :2], chosen[:, 2])
         bodies = PathCollection(circles, facecolor=hexed(colour), edgecolor="white", linewidth=edge, zorder=3)
         axes.add_collection(bodies)
         bodies.set_clip_path(inside)
     for piece in scene.tracks:
-        axes.plot(*piece.T, color=hexed(MOVER), lw=1.0, alpha=0.45, zorder=2.5, solid_capstyle="round")
+        axes.plot(*piece.T, color=hexed(colours.MOVER), lw=1.0, alpha=0.45, zorder=2.5, solid_capstyle="round")
     for (x, y), radius in zip(scene.movers, scene.mover_radii, strict=True):
-        body = Circle((x, y), radius, fc=hexed(MOVER), ec="white", lw=0.6, alpha=0.85, zorder=3.5)
+        body = Circle((x, y), radius, fc=hexed(colours.MOVER), ec="white", lw=0.6, alpha=0.85, zorder=3.5)
         axes.add_patch(body)
         body.set_clip_path(inside)
-    pale_goal = (*(channel / 255 for channel in GOAL), 0.18)
-    axes.add_patch(Circle(scene.goal, scene.goal_tolerance, fc=pale_goal, ec=hexed(GOAL), lw=1.4, zorder=4))
-    axes.plot(*scene.goal, marker="+", ms=7, mew=1.4, color=hexed(GOAL), zorder=7)
-    _draw_robot(axes, scene, scene.start, START, 4.0)
+    pale_goal = (*(channel / 255 for channel in colours.GOAL), 0.18)
+    axes.add_patch(Circle(scene.goal, scene.goal_tolerance, fc=pale_goal, ec=hexed(colours.GOAL), lw=1.4, zorder=4))
+    axes.plot(*scene.goal, marker="+", ms=7, mew=1.4, color=hexed(colours.GOAL), zorder=7)
+    _draw_robot(axes, scene, scene.start, colours.START, 4.0)
 
 
 def _circles(centres: Floats, radii: Floats) -> list[Path]:
@@ -114,9 +99,9 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
     """Draw the route, the driven path coloured by speed, the robot at the end, and the first contact."""
     handles: list[Any] = []
     if cells is not None and len(cells):
-        handles += axes.plot(*cells.T, ".", ms=2.6, color=hexed(MUTED), label="planned cells", zorder=4.6)
+        handles += axes.plot(*cells.T, ".", ms=2.6, color=hexed(colours.MUTED), label="planned cells", zorder=4.6)
     if len(rollout.route) > 1:
-        style = {"ls": (0, (4, 2.5)), "lw": 1.0, "color": hexed(ROUTE)}
+        style = {"ls": (0, (4, 2.5)), "lw": 1.0, "color": hexed(colours.ROUTE)}
         handles += axes.plot(*rollout.route.T, **style, label=scene.route_said, zorder=4.8)
         for k, (_, line) in enumerate(rollout.legs()[1:]):
             drawn = axes.plot(*line.T, **{**style, "lw": 0.7, "alpha": 0.45}, label="new routes", zorder=4.7)
@@ -127,7 +112,7 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
         lines = draw_along(axes, rollout.pose[keep, :2], np.abs(rollout.twist[keep[:-1], 0]), **style)
         colour_bar(figure, lines, axes, "driven path: speed [m/s]", **BELOW)
         x, y, yaw = rollout.pose[-1].tolist()
-        _draw_robot(axes, scene, (x, y, yaw), SHELL, 6)
+        _draw_robot(axes, scene, (x, y, yaw), colours.SHELL, 6)
     draw_legend(axes, [*handles, *draw_contact(axes, scene, rollout)], scene)
 
 
@@ -145,20 +130,22 @@ def draw_contact(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
         return []
     row = min(int(rollout.contacts[0, 0]), len(rollout.t) - 1)
     at = contact_point(scene, rollout.pose[row], int(rollout.contacts[0, 1]), rollout.movers[row])
-    drawn: list[Any] = axes.plot(*at, "X", ms=9, color=hexed(BAD), mec="white", label="contact", zorder=9, ls="none")
+    drawn: list[Any] = axes.plot(
+        *at, "X", ms=9, color=hexed(colours.BAD), mec="white", label="contact", zorder=9, ls="none"
+    )
     return drawn
 
 
 def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
     """Draw the map's legend above its upper left corner: `handles`, then obstacles, movers and zones."""
-    known = [Patch(fc=hexed(OBSTACLE), label="obstacle" if scene.mapped else "obstacle, on no map")]
+    known = [Patch(fc=hexed(colours.OBSTACLE), label="obstacle" if scene.mapped else "obstacle, on no map")]
     if scene.unseen.any():
-        known.append(Patch(fc=hexed(UNSEEN), label=scene.unseen_said))
+        known.append(Patch(fc=hexed(colours.UNSEEN), label=scene.unseen_said))
     if scene.mover_radii:
-        known.append(Patch(fc=hexed(MOVER), label=scene.movers_said))
+        known.append(Patch(fc=hexed(colours.MOVER), label=scene.movers_said))
     if scene.has_zones:
-        pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
-        known.append(Patch(fc=pale, ec=hexed(ZONE), lw=0.5, label=f"inflated by {scene.inflate:.2f} m"))
+        pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in colours.ZONE)
+        known.append(Patch(fc=pale, ec=hexed(colours.ZONE), lw=0.5, label=f"inflated by {scene.inflate:.2f} m"))
     legend_above(axes, [*handles, *known], handlelength=1.6)
 
 

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from antdrive.base.types import Floats, Ints
+from antdrive.runs.statistics.intervals import medians_by_world
+from antdrive.views.colours import INK, MUTED, hexed, planner_style
 from antdrive.views.figures.canvas import colour_bar, sheet
-from antdrive.views.style import INK, MUTED, hexed, planner_style
 
 if TYPE_CHECKING:
     from antdrive.planners.plan import History, PlanResult, Query
 
-Floats = npt.NDArray[np.float64]
+POINTS = 80  # of a curve
+RESAMPLES = 500  # for the intervals
+NO_PATH = 1e9  # stands for infinity where medians are taken
+HIGHEST = 6.0  # lengths above so many times the shortest are cut off
+TWICE = 0.35  # how far a colour goes towards ink where a planner has two curves in a panel
 
 
 def history_figure(
@@ -26,7 +32,6 @@ def history_figure(
     path: str | Path | None = None,
     *,
     optimum: float | None = None,
-    unit: str = "m",
     dpi: float = 160,
 ) -> Figure:
     """Draw the best path length so far by iteration for one or more planners."""
@@ -37,42 +42,26 @@ def history_figure(
             longest = max(len(run) for run in runs)
             best = np.array([np.pad(run.best, (0, longest - len(run)), mode="edge") for run in runs if len(run)])
             best = np.where(np.isfinite(best), best, np.nan)
-            iterations = np.arange(1, longest + 1)
             known = np.isfinite(best).all(axis=0)
-            axes.plot(
-                iterations[known],
-                np.median(best[:, known], axis=0),
-                color=hexed(colour),
-                ls=dash,
-                lw=2.0,
-                label=name,
-                drawstyle="steps-post",
-            )
+            iterations, best = np.arange(1, longest + 1)[known], best[:, known]
+            line: dict[str, Any] = {"color": hexed(colour), "ls": dash, "lw": 2.0, "drawstyle": "steps-post"}
+            axes.plot(iterations, np.median(best, axis=0), label=name, **line)
             if len(runs) > 1:
-                axes.fill_between(
-                    iterations[known],
-                    best[:, known].min(axis=0),
-                    best[:, known].max(axis=0),
-                    step="post",
-                    color=hexed(colour),
-                    alpha=0.15,
-                    lw=0,
-                )
+                band: dict[str, Any] = {"step": "post", "color": hexed(colour), "alpha": 0.15, "lw": 0}
+                axes.fill_between(iterations, best.min(axis=0), best.max(axis=0), **band)
         if optimum is not None:
             axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest with these moves")
-        axes.set(xlabel="iteration", ylabel=f"best path so far [{unit}]")
+        axes.set(xlabel="iteration", ylabel="best path so far [m]")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper right")
     return figure
 
 
-def maps_figure(
-    paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], path: str | Path | None = None, *, dpi: float = 160
-) -> Figure:
+def maps_figure(paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], path: str | Path | None = None) -> Figure:
     """Draw paths on maps as the papers do: blocked cells black, the start a red square, the goal a blue one."""
     across = min(len(paths), 3)
     down = -(-len(paths) // across)
-    with sheet(path, (3.3 * across, 4.1 * down), dpi) as figure:
+    with sheet(path, (3.3 * across, 4.1 * down)) as figure:
         layout: Any = figure.get_layout_engine()
         layout.set(h_pad=0.16, hspace=0.06)  # room for titles above and legends below the maps
         for k, (title, (query, plans)) in enumerate(paths.items()):
@@ -80,14 +69,12 @@ def maps_figure(
             axes.imshow(query.grid.free, cmap="gray", origin="lower", vmin=0, vmax=1, interpolation="nearest")
             for number, (name, plan) in enumerate(plans.items()):
                 colour = ("#1f4fd8", "#d81f1f", hexed(planner_style(name)[0]))[min(number, 2)]
+                length = f"{plan.line_length:.2f}" if plan.solved else "no path"
+                line = np.empty((0, 2))
                 if plan.solved:
-                    length = f"{name}: {plan.line_length:.2f}"
-                    line = (
-                        query.grid.fractional(query.grid.xy(plan.cells)) if plan.waypoints is None else plan.waypoints
-                    )
-                    axes.plot(line[:, 1], line[:, 0], color=colour, lw=1.6, label=length)
-                else:
-                    axes.plot([], [], color=colour, lw=1.6, label=f"{name}: no path")
+                    cells = query.grid.fractional(query.grid.xy(plan.cells))
+                    line = cells if plan.waypoints is None else plan.waypoints
+                axes.plot(line[:, 1], line[:, 0], color=colour, lw=1.6, label=f"{name}: {length}")
             for cell, colour in ((query.start, "#d81f1f"), (query.goal, "#1f4fd8")):
                 axes.plot(cell[1], cell[0], "s", ms=6, color=colour, clip_on=False, zorder=4)
             axes.set_title(title)
@@ -130,17 +117,12 @@ def ants_figure(
 
 
 def sweep_figure(
-    pc: Sequence[float],
-    pm: Sequence[float],
-    lengths: Mapping[bool, Floats],
-    path: str | Path | None = None,
-    *,
-    dpi: float = 160,
+    pc: Sequence[float], pm: Sequence[float], lengths: Mapping[bool, Floats], path: str | Path | None = None
 ) -> Figure:
     """Draw the mean path length by crossover and mutation probability, with and without elitism side by side."""
     both = np.concatenate([np.ravel(values) for values in lengths.values()])
     finite = both[np.isfinite(both)]
-    with sheet(path, (9.4, 3.9), dpi) as figure:
+    with sheet(path, (9.4, 3.9)) as figure:
         for k, elitism in enumerate((True, False)):
             title = "with elitism" if elitism else "without elitism"
             axes: Any = figure.add_subplot(1, 2, k + 1, label=title)
@@ -154,14 +136,116 @@ def sweep_figure(
             axes.grid(False)
             for (i, j), value in np.ndenumerate(values):
                 dark = value > (finite.min() + finite.max()) / 2
-                axes.text(
-                    j,
-                    i,
-                    f"{value:.2f}" if math.isfinite(value) else "–",
-                    ha="center",
-                    va="center",
-                    fontsize=7.5,
-                    color="white" if dark else hexed(INK),
-                )
+                words, colour = f"{value:.2f}" if math.isfinite(value) else "–", "white" if dark else hexed(INK)
+                axes.text(j, i, words, ha="center", va="center", fontsize=7.5, color=colour)
         colour_bar(figure, drawn, figure.axes, "mean path length [cells]", shrink=0.85, aspect=26, pad=0.05)
     return figure
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ConvergenceCurve:
+    """The runs of one planner on the maps of one panel."""
+
+    name: str  # the planner with its setting
+    planner: str  # the planner's name, for its style
+    best: Sequence[Floats]  # for each run, the best length so far by iteration [cells]; inf while there is none
+    maps: Ints  # the number of each run's map (N,)
+    # how many ant steps each run took (N,), every iteration counting the same; None: iterations are shown
+    steps: Floats | None
+    optimum: float  # the shortest length [cells]
+    printed: float | None  # the length that the paper prints [cells]; None: it prints none
+
+
+def convergence_figure(
+    curves: Mapping[str, Sequence[ConvergenceCurve]], path: str | Path | None = None, *, single: bool = False
+) -> Figure:
+    """Draw the best length so far while planners iterate, a panel for each map."""
+    across = 2 if len(curves) == 4 else min(len(curves), 3)
+    with sheet(path, (3.9 * across, 3.2 * -(-len(curves) // across))) as figure:
+        for k, (title, on_map) in enumerate(curves.items()):
+            axes: Any = figure.add_subplot(-(-len(curves) // across), across, k + 1, label=title)
+            spans = [_draw(axes, curve, number, on_map, single) for number, curve in enumerate(on_map)]
+            optimum = on_map[0].optimum
+            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest")
+            counted = on_map[0].steps is not None
+            axes.set(
+                title=title, xlabel="million ant steps" if counted else "iteration", ylabel="best path so far [cells]"
+            )
+            low = min([optimum, *(span[0] for span in spans)])
+            top = min(max(span[1] for span in spans), HIGHEST * optimum)
+            axes.set_ylim(low - 0.06 * (top - low) - 0.1, top + 0.06 * (top - low) + 0.1)
+            axes.set_xlim(left=0.0)
+            axes.legend(loc="upper right", fontsize=7)
+    return figure
+
+
+def _draw(
+    axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool
+) -> tuple[float, float]:
+    """Draw a curve; the least and the largest length that should be seen."""
+    colour, dash = _style(curve, number, among, single)
+    scale = 1.0 if curve.steps is None else 1e-6
+    if single:
+        run = _typical(curve)
+        taken = None if curve.steps is None else curve.steps[run : run + 1]
+        x = _grid([curve.best[run]], taken)
+        middle = _sampled([curve.best[run]], taken, x)[0]
+        low = high = middle
+    else:
+        x = _grid(curve.best, curve.steps)
+        values = np.minimum(_sampled(curve.best, curve.steps, x), NO_PATH)
+        alone = len(set(curve.maps.tolist())) == 1
+        maps = np.arange(len(values)) if alone else curve.maps
+        middle = np.median(values, axis=0)
+        low, high = np.array(medians_by_world(values, maps, RESAMPLES)).T
+    known = middle < NO_PATH / 10
+    x = x * scale
+    axes.plot(x[known], middle[known], color=colour, ls=dash, lw=1.8, label=curve.name, drawstyle="steps-post")
+    if not single and len(curve.best) > 1:
+        ceiling = np.minimum(high, HIGHEST * 2 * curve.optimum)
+        axes.fill_between(x[known], low[known], ceiling[known], step="post", color=colour, alpha=0.22, lw=0)
+    if curve.printed is not None and len(x):
+        label = "in the paper" if all(other.printed is None for other in among[:number]) else None
+        axes.plot(x[-1], curve.printed, "s", ms=5, color=colour, mfc="white", clip_on=False, zorder=4, label=label)
+    shown = [*middle[known], *high[known][-1:], *low[known][-1:], *([] if curve.printed is None else [curve.printed])]
+    finite = [float(value) for value in shown if value < NO_PATH / 10] or [curve.optimum]
+    return min(finite), max(finite)
+
+
+def _style(curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool) -> tuple[str, Any]:
+    """Colour and dashes: a paper's red and blue for a single run; a planner's second curve is darker and dotted."""
+    if single:
+        return ("#1f4fd8", "#d81f1f", "#222222")[min(number, 2)], "-"
+    colour, dash = planner_style(curve.planner)
+    if any(other.planner == curve.planner for other in among[:number]):
+        share = TWICE * sum(other.planner == curve.planner for other in among[:number])
+        red, green, blue = (round((1 - share) * part + share * ink) for part, ink in zip(colour, INK, strict=True))
+        colour = (red, green, blue)
+        dash = (":", "-.")[number % 2]
+    return hexed(colour), dash
+
+
+def _typical(curve: ConvergenceCurve) -> int:
+    """The run on the first map whose path is the median one."""
+    on_first = [k for k in range(len(curve.best)) if curve.maps[k] == curve.maps[0]]
+    ends = sorted(on_first, key=lambda k: float(curve.best[k][-1]) if len(curve.best[k]) else math.inf)
+    return ends[(len(ends) - 1) // 2]
+
+
+def _grid(best: Sequence[Floats], steps: Floats | None) -> Floats:
+    """Where the curves of some runs are sampled (K,): iterations, or ant steps."""
+    if steps is None:
+        longest = max(len(run) for run in best)
+        return np.unique(np.linspace(1, longest, min(longest, POINTS)).round())
+    end = float(np.median(steps))
+    return np.linspace(end / POINTS, end, POINTS)
+
+
+def _sampled(best: Sequence[Floats], steps: Floats | None, x: Floats) -> Floats:
+    """The best length of each run at `x` (N, K); inf before the first path."""
+    rows = []
+    for k, run in enumerate(best):
+        each = 1.0 if steps is None else float(steps[k]) / max(1, len(run))
+        place = np.minimum(np.floor(x / each + 1e-9).astype(int), len(run)) - 1
+        rows.append(np.where(place >= 0, run[place] if len(run) else math.inf, math.inf))
+    return np.array(rows)

@@ -10,23 +10,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from antdrive.views.figures.canvas import colour_bar, frame_map, head, map_size, sheet
-from antdrive.views.figures.curves import draw_history
+from antdrive.base.types import Floats
+from antdrive.views.colours import BAD, MUTED, ROUTE, SHELL, START, hexed
+from antdrive.views.figures.canvas import colour_bar, endings, frame_map, head, legend_above, map_size, sheet
 from antdrive.views.figures.map_chart import FIELD, draw_field, draw_legend, draw_map
 from antdrive.views.figures.paper_figures import history_figure
 from antdrive.views.scene import Scene
-from antdrive.views.style import BAD, MUTED, ROUTE, SHELL, hexed
 
 if TYPE_CHECKING:
-    from antdrive.planners.plan import PlanResult
+    from antdrive.planners.plan import History, PlanResult
     from antdrive.robots.spec import RobotSpec
     from antdrive.worlds.grid import Grid
     from antdrive.worlds.world import Task
 
-Floats = npt.NDArray[np.float64]
 
 #: The stems of the files that `plan_figures` writes, by the name of the figure.
 FILES = {"plan": "plan", "tour": "tour", "history": "history", "bars": "field-bars", "contours": "field-contours"}
@@ -90,11 +88,28 @@ def plan_figure(
             figure.supxlabel("\n".join(below), x=0.012, ha="left", fontsize=9, weight="bold", color=colour)
         draw_legend(chart, handles, scene)
         if iterations:
-            draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
+            _draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
         length = f"{plan.cost:.2f} m" if len(plan.cells) else plan.status.value
         length += ", stopped early" if len(plan.cells) and not plan.solved else ""
         head(figure, f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}")
     return figure
+
+
+def _draw_history(axes: Any, history: History) -> None:
+    """Draw path lengths by iteration."""
+    axes.set(xlabel="iteration")
+    axes.set_title("path length [m]", pad=22)
+    iterations = np.arange(1, len(history) + 1)
+    for values, style in (
+        (history.iteration_mean, {"color": "#9aa5b5", "lw": 1.1, "label": "iteration's mean"}),
+        (history.iteration_best, {"color": hexed(START), "lw": 1.1, "label": "iteration's best"}),
+        (history.best, {"color": hexed(SHELL), "lw": 2.2, "label": "best so far", "drawstyle": "steps-post"}),
+    ):
+        shown = np.where(np.isfinite(values), values, np.nan)
+        if np.isfinite(shown).any():
+            axes.plot(iterations[: len(shown)], shown, **style)
+    legend_above(axes)
+    axes.set_xlim(1, max(2, len(history)))
 
 
 def _said_below(plan: PlanResult, *, mapped: bool) -> str:
@@ -118,8 +133,7 @@ def plan_figures(
     """Draw every figure of a plan: with the field, alone, by iteration, and its field as bars and as contours."""
     found: dict[str, Path] = {}
     bare = dataclasses.replace(plan, field=None, history=type(plan.history)())
-    for suffix in suffixes:
-        end = "" if suffix == suffixes[0] else f" {suffix[1:]}"
+    for suffix, end in endings(suffixes):
         files = {key: folder / f"{stem}{suffix}" for key, stem in FILES.items()}
         plan_figure(task, grid, plan, robot, files["plan"], mapped=mapped)
         drawn = ["plan"]
@@ -162,14 +176,7 @@ def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dp
 
 
 def contours_figure(
-    task: Task,
-    grid: Grid,
-    plan: PlanResult,
-    robot: RobotSpec,
-    path: str | Path | None = None,
-    *,
-    mapped: bool = True,
-    dpi: float = 160,
+    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path | None = None, *, mapped: bool = True
 ) -> Figure:
     """Draw a planner's field as contours on the map, with the planned path."""
     scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
@@ -178,7 +185,7 @@ def contours_figure(
     x = grid.origin[0] + grid.cell * np.arange(grid.shape[1])
     y = grid.origin[1] + grid.cell * np.arange(grid.shape[0])
     finite = values[np.isfinite(values)]
-    with sheet(path, (6.6, 5.9), dpi) as figure:
+    with sheet(path, (6.6, 5.9)) as figure:
         axes: Any = figure.add_subplot(label="map")
         if len(finite) and finite.max() > finite.min():
             levels = np.unique(np.quantile(finite, np.linspace(0.6, 0.998, 9)))

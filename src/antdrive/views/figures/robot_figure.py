@@ -14,19 +14,14 @@ from antdrive.base.types import Floats
 from antdrive.robots.drawing import footprint_text, wheel_thickness
 from antdrive.robots.importing.hull import convex_hull
 from antdrive.robots.spec import RobotSpec
+from antdrive.views.colours import GOAL, INK, MUTED, ROUTE, hexed
 from antdrive.views.figures.canvas import sheet
-from antdrive.views.style import GOAL, INK, MUTED, ROUTE, hexed
 
 WIDTH = 5.6  # of the figure [inches]
 
 
 def robot_figure(
-    robot: RobotSpec,
-    path: str | Path | None = None,
-    *,
-    pieces: Sequence[Floats] = (),
-    above: Sequence[Floats] = (),
-    dpi: float = 160,
+    robot: RobotSpec, path: str | Path | None = None, *, pieces: Sequence[Floats] = (), above: Sequence[Floats] = ()
 ) -> Figure:
     """Draw a robot from above, heading right, in metres from the axle's centre."""
     outline = np.array(robot.footprint.outline(48))
@@ -34,7 +29,7 @@ def robot_figure(
     low, high = everything.min(axis=0) - 0.15 * robot.radius, everything.max(axis=0) + 0.15 * robot.radius
     low, high = np.minimum(low, -1.08 * robot.radius), np.maximum(high, 1.08 * robot.radius)
     wide, tall = high - low
-    with sheet(path, (WIDTH, float(np.clip(WIDTH * tall / wide, 3.0, 9.0)) + 0.9), dpi) as figure:
+    with sheet(path, (WIDTH, float(np.clip(WIDTH * tall / wide, 3.0, 9.0)) + 0.9)) as figure:
         axes = figure.add_subplot(label="map")
         handles = _draw_pieces(axes, pieces, above)
         handles.append(axes.add_patch(Polygon(outline, fill=False, ec=hexed(ROUTE), lw=2.0, label="footprint")))

@@ -7,25 +7,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
+from antdrive.base.types import Floats
 from antdrive.sim.log.certificate import Certificate, in_metres
 from antdrive.sim.log.metrics import tracking_error
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, head, map_size, sheet, thinned
-from antdrive.views.figures.curves import draw_clearance, draw_limiters, draw_speed
-from antdrive.views.figures.map_chart import draw_along, draw_driven, draw_legend, draw_map
+from antdrive.views.colours import BAD, CONTACT, GOOD, MUTED, ROUTE, SHELL, START, VERDICTS, hexed, planner_style
+from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, head, legend_above, map_size, sheet, thinned
+from antdrive.views.figures.map_chart import draw_along, draw_contact, draw_driven, draw_legend, draw_map
 from antdrive.views.scene import Scene
-from antdrive.views.style import BAD, GOOD, ROUTE, SHELL, hexed, planner_style
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
 
-Floats = npt.NDArray[np.float64]
 
 ERROR = LinearSegmentedColormap.from_list("error", ["#ffd9a0", "#ff7a0e", "#7a1f00"])
+
+#: One colour per rule that limits the speed; most are Okabe and Ito's, safe for any colour vision.
+LIMITER_COLOURS = (
+    *("#c9ced6", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#cc79a7"),
+    *("#d55e00", "#5b6576", "#f0e442", "#7a4b9e", "#1b2333", "#a3d9c9"),
+)
+
+MOST_LIMITERS = 6  # in a row of the legend
+THEN, NOW = hexed(START), hexed(SHELL)
 
 
 def overview(
@@ -55,12 +63,66 @@ def overview(
         draw_driven(figure, chart, scene, rollout, cells)
         frame_map(chart, shown)
         clearance = figure.add_subplot(grid[0, 1], label="clearance")
-        draw_clearance(clearance, scene, rollout)
-        draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance, label="speed"), scene, rollout)
-        draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance, label="limiters"), rollout)
+        _draw_clearance(clearance, scene, rollout)
+        _draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance, label="speed"), scene, rollout)
+        _draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance, label="limiters"), rollout)
         planner = rollout.record.planner.name
         head(figure, f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", rollout.outcome)
     return figure
+
+
+def _draw_clearance(axes: Any, scene: Scene, rollout: Rollout) -> None:
+    """Draw clearance over time, with the planned margin, the minimum, and the first contact."""
+    axes.set(title="clearance [m]")
+    if not len(rollout.t):
+        return
+    low = int(np.argmin(rollout.clearance))
+    top = float(np.quantile(rollout.clearance, 0.98)) * 1.1
+    if scene.margin > 0:
+        axes.axhspan(0, scene.margin, color="#f6e3cf", lw=0, zorder=1)
+        axes.text(rollout.t[-1], scene.margin, " margin", va="center", ha="left", fontsize=8, color="#a86300")
+    axes.axhline(0, color=hexed(BAD), lw=1.2, zorder=2)
+    axes.plot(rollout.t, rollout.clearance, color=hexed(START), lw=1.4, zorder=3)
+    axes.plot(rollout.t[low], rollout.clearance[low], "o", ms=5, color=hexed(BAD), mec="white", zorder=4)
+    minimum = f"minimum {rollout.clearance[low] + 0.0:.3f} m at {rollout.t[low]:.1f} s"
+    axes.set_title(minimum, loc="right", fontsize=9, weight="normal")
+    axes.set_ylim(min(-0.06 * top, 1.2 * float(rollout.clearance[low])), max(top, 2.5 * scene.margin, 0.05))
+    axes.set_xlim(0, max(float(rollout.t[-1]), 1e-3))
+    axes.tick_params(labelbottom=False)
+    for when in np.unique(rollout.contacts[:, 0].astype(int))[:1]:
+        axes.axvline(rollout.t[min(when, len(rollout.t) - 1)], color=hexed(BAD), lw=1.0, ls=":")
+
+
+def _draw_speed(axes: Any, scene: Scene, rollout: Rollout) -> None:
+    """Draw commanded and measured speed over time."""
+    axes.set_title("speed [m/s]", pad=20)  # above its legend
+    axes.plot(rollout.t, rollout.command[:, 0], color=hexed(SHELL), lw=2.4, alpha=0.55, label="commanded")
+    axes.plot(rollout.t, rollout.twist[:, 0], color=hexed(ROUTE), lw=1.0, label="measured")
+    axes.axhline(scene.robot.max_speed, color=hexed(MUTED), lw=0.9, ls="--", label="robot's top speed")
+    axes.tick_params(labelbottom=False)
+    legend_above(axes, bbox_to_anchor=(0.0, 0.98), handlelength=1.4, columnspacing=2.0)
+
+
+def _draw_limiters(axes: Any, rollout: Rollout) -> None:
+    """Draw a strip that shows which rule limited the speed over time."""
+    names = rollout.record.limiters
+    axes.set(xlabel="time [s]", yticks=[])
+    axes.grid(False)
+    axes.spines["left"].set_visible(False)
+    if not len(rollout.t) or not names:
+        return
+    count = len(names)
+    colours = ListedColormap([LIMITER_COLOURS[k % len(LIMITER_COLOURS)] for k in range(count)])
+    keep = thinned(len(rollout.t), 2000)
+    edges = np.append(rollout.t[keep], rollout.t[-1] + 1e-6)
+    axes.pcolormesh(
+        edges, [0, 1], rollout.limiter[keep][None], cmap=colours, vmin=-0.5, vmax=count - 0.5, rasterized=True
+    )
+    used = [k for k in np.unique(rollout.limiter) if k < count]
+    handles = [Patch(fc=LIMITER_COLOURS[k % len(LIMITER_COLOURS)], label=names[k]) for k in used]
+    title: dict[str, Any] = {"title": "speed limited by", "title_fontsize": 8, "alignment": "left"}
+    place: dict[str, Any] = {"bbox_to_anchor": (0.0, 0.95), "borderaxespad": 0.1, "columnspacing": 1.0}
+    legend_above(axes, handles, ncols=min(len(handles), MOST_LIMITERS), handlelength=0.9, **place, **title)
 
 
 def picture_of(run: Run, path: str | Path) -> None:
@@ -71,7 +133,7 @@ def picture_of(run: Run, path: str | Path) -> None:
     if run.rollout is not None:
         overview(run.rollout, path)
     else:
-        plan_figure(s.task, run.grid, run.plan, s.robot, path, mapped=not s.exploring)
+        plan_figure(s.task, run.grid, run.plan, s.robot, path, mapped=s.map == "given")
 
 
 def certificate_figure(
@@ -159,3 +221,65 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
             )
         draw_legend(axes, handles, scene)
     return figure
+
+
+def then_and_now(
+    then: Rollout,
+    now: Rollout,
+    path: str | Path | None = None,
+    *,
+    parted: tuple[float, float, float] | None = None,
+    dpi: float = 130,
+) -> Figure:
+    """Draw two drives of the same scenario on one map, with their clearances and their distance over time."""
+    scene = Scene.of(now)
+    wide, high = map_size(scene)
+    with sheet(path, (wide + 5.2, high + 0.9), dpi) as figure:
+        areas = figure.add_gridspec(2, 2, width_ratios=[wide, 4.8])
+        chart: Any = figure.add_subplot(areas[:, 0], label="map")
+        draw_map(chart, scene)
+        handles: list[Any] = []
+        for log, colour, name, width in ((then, THEN, "baseline", 3.6), (now, NOW, "now", 1.8)):
+            end = f"{name}: {VERDICTS[log.outcome][0].lstrip('✓✕ ').lower()} after {log.t[-1]:.1f} s"
+            handles += chart.plot(
+                *log.pose[thinned(len(log.t)), :2].T,
+                color=colour,
+                lw=width,
+                label=end,
+                zorder=5,
+                solid_capstyle="round",
+            )
+            chart.plot(*log.pose[-1, :2], "o", color=colour, ms=5, mec="white", zorder=6)
+        if parted is not None:
+            style: dict[str, Any] = {"ms": 13, "mfc": "none", "mec": hexed(CONTACT), "mew": 2.0, "ls": "none"}
+            handles += chart.plot(*parted[1:], "o", label=f"they part at {parted[0]:.1f} s", zorder=8, **style)
+        draw_legend(chart, [*handles, *draw_contact(chart, scene, now)], scene)
+        above: Any = figure.add_subplot(areas[0, 1], label="clearance")
+        below: Any = figure.add_subplot(areas[1, 1], sharex=above, label="distance")
+        _draw_over_time(above, below, then, now, None if parted is None else parted[0])
+        head(figure, f"{scene.name}   ·   {now.record.planner.name}   ·   {scene.robot.name}: baseline and now")
+    return figure
+
+
+def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, parted: float | None) -> None:
+    """Draw both clearances, and the distance between the two robots; `parted` is when the drives part [s]."""
+    above.set(title="clearance [m]")
+    above.axhline(0, color=hexed(BAD), lw=1.0)
+    for log, colour in ((then, THEN), (now, NOW)):
+        above.plot(log.t, log.clearance, color=colour, lw=1.4)
+    above.tick_params(labelbottom=False)
+    below.set(title="distance between the two [m]", xlabel="time [s]")
+    moments, apart = _apart(then, now)
+    below.plot(moments, apart, color=hexed(MUTED), lw=1.4)
+    below.set_ylim(0, None)
+    for axes in (above, below):
+        if parted is not None:
+            axes.axvline(parted, color=hexed(CONTACT), lw=1.0, ls=":")
+        axes.set_xlim(0, moments[-1])
+
+
+def _apart(then: Rollout, now: Rollout) -> tuple[Floats, Floats]:
+    """Moments (N,) [s], and how far the two robots are apart then (N,) [m]."""
+    moments = np.linspace(0.0, max(float(then.t[-1]), float(now.t[-1])), 600)
+    x, y = (np.interp(moments, now.t, now.pose[:, k]) - np.interp(moments, then.t, then.pose[:, k]) for k in (0, 1))
+    return moments, np.hypot(x, y)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.collections import PatchCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -14,27 +13,11 @@ from matplotlib.patches import Circle, Patch
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, sightings
+from antdrive.views.colours import BAD, BEAM, GOOD, HATCH, HIT, INK, MOVER, MUTED, OBSTACLE, PALE, ROUTE, SHELL, hexed
 from antdrive.views.figures.canvas import frame_map, head, legend_above, map_size, sheet
 from antdrive.views.figures.map_chart import draw_map
 from antdrive.views.recollection import Recollection, containers
 from antdrive.views.scene import Scene
-from antdrive.views.style import (
-    BAD,
-    BEAM,
-    GOOD,
-    HATCH,
-    HIT,
-    INK,
-    MOVER,
-    MUTED,
-    OBSTACLE,
-    PALE,
-    ROUTE,
-    SHELL,
-    hexed,
-)
-
-Floats = npt.NDArray[np.float64]
 
 LISTED = 14  # obstacles whose first sight is drawn: those that the robot came nearest to
 CURVE = 160  # points of the curve of explored ground

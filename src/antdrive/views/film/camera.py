@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from antdrive.base.types import Flags, Floats
+
+Picture: TypeAlias = npt.NDArray[np.uint8]  # (H, W, 3), red, green, blue
 
 CAMERAS: tuple[str, ...] = ("oblique", "top", "follow")
 
 _TILT = {"oblique": 52.0, "top": 90.0, "follow": 46.0}  # above the horizon [degrees]
-_FOV = {
-    "oblique": 30.0,
-    "top": 6.0,
-    "follow": 34.0,
-}  # vertical [degrees]
+PAD = 0.04  # free at each edge of a picture, as a share of its side
+_FOV = {"oblique": 30.0, "top": 6.0, "follow": 34.0}  # vertical [degrees]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +29,7 @@ class Camera:
     size: tuple[int, int]  # width and height of the picture [px]
 
     @classmethod
-    def framing(
-        cls,
-        points: Floats,
-        size: tuple[int, int],
-        *,
-        tilt: float,
-        fov: float,
-        turned: bool = False,
-        pad: tuple[float, float, float, float] = (0.04, 0.04, 0.04, 0.04),
-    ) -> Camera:
+    def framing(cls, points: Floats, size: tuple[int, int], *, tilt: float, fov: float, turned: bool = False) -> Camera:
         """The nearest camera that sees all points (N, 3) [m]."""
         right, up, back = _axes(math.radians(tilt), turned)
         basis = np.array([right, up, back])
@@ -48,8 +39,8 @@ class Camera:
         tan_x = tan_y * size[0] / size[1]
         # A point is right of the left edge if x - cx >= left (depth - cz): linear in the camera's position cx, cz.
         # The same holds for the other edges, so the nearest position follows from the extreme points alone.
-        left, right_edge = -tan_x * (1 - 2 * pad[0]), tan_x * (1 - 2 * pad[1])
-        top, bottom = tan_y * (1 - 2 * pad[2]), -tan_y * (1 - 2 * pad[3])
+        left, right_edge = -tan_x * (1 - 2 * PAD), tan_x * (1 - 2 * PAD)
+        top, bottom = tan_y * (1 - 2 * PAD), -tan_y * (1 - 2 * PAD)
         ax, bx = float((x - left * depth).min()), float((x - right_edge * depth).max())
         ay, by = float((y - bottom * depth).min()), float((y - top * depth).max())
         cz = min((ax - bx) / (right_edge - left), (ay - by) / (top - bottom))
@@ -77,13 +68,7 @@ class Camera:
         if height:
             clip = clip + np.outer(self.full[:, 2], [0.0, 0.0, height])
         width, height = self.size
-        return np.array(
-            [
-                0.5 * width * (clip[3] + clip[0]),
-                0.5 * height * (clip[3] - clip[1]),
-                clip[3],
-            ]
-        )
+        return np.array([0.5 * width * (clip[3] + clip[0]), 0.5 * height * (clip[3] - clip[1]), clip[3]])
 
     @property
     def pixel(self) -> float:
@@ -101,11 +86,11 @@ class Camera:
         ndc = clip[:, :2] / clip[:, 3:]
         return np.column_stack([(1 + ndc[:, 0]) * width / 2, (1 - ndc[:, 1]) * height / 2])
 
-    def sees(self, centres: Floats, radii: Floats) -> npt.NDArray[np.bool_]:
+    def sees(self, centres: Floats, radii: Floats) -> Flags:
         """Which balls at centres (N, 3) with radii (N,) [m] may be in sight; none that reaches behind the camera."""
         x, y, z = (centres @ self.view[:3, :3].T + self.view[:3, 3]).T
         depth = -z
-        inside: npt.NDArray[np.bool_] = depth > radii
+        inside: Flags = depth > radii
         for aside, scale in ((x, self.projection[0, 0]), (y, self.projection[1, 1])):
             inside &= np.abs(aside) * scale <= depth + radii * math.hypot(1.0, scale)
         return inside
@@ -141,11 +126,5 @@ def _axes(tilt: float, turned: bool) -> tuple[Floats, Floats, Floats]:
 
 
 def _perspective(tan_x: float, tan_y: float, near: float, far: float) -> Floats:
-    return np.array(
-        [
-            [1 / tan_x, 0, 0, 0],
-            [0, 1 / tan_y, 0, 0],
-            [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)],
-            [0, 0, -1, 0],
-        ]
-    )
+    depth = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
+    return np.array([[1 / tan_x, 0, 0, 0], [0, 1 / tan_y, 0, 0], depth, [0, 0, -1, 0]])

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image, ImageDraw
 
-from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
+from antdrive.base.files import known_suffix
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.film import _kernels_paint as kernels
-from antdrive.views.film.camera import turns
-from antdrive.views.film.encoder import encoding, known_suffix
+from antdrive.views.colours import BAND, CALM, INK, MUTED, VERDICTS, planner_style
+from antdrive.views.film.camera import Picture, turns
+from antdrive.views.film.options import ENCODERS, FilmInfo, FilmOptions
 from antdrive.views.film.shot import Shot
-from antdrive.views.film.text import fitted, font, pill, text_width
-from antdrive.views.film.video import HOLD, FilmInfo, check_options, frame_times
+from antdrive.views.film.text import fitted, font, pill, put, text_width
+from antdrive.views.film.video import HOLD, encoded, frame_times
 from antdrive.views.scene import Scene
-from antdrive.views.style import BAND, CALM, INK, MUTED, VERDICTS, planner_style
-
-Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 MAX_RUNS = 6
 FULL = (1280, 720)  # of a film whose size nobody chose [px]
@@ -47,21 +43,15 @@ def compare_film(
 ) -> FilmInfo:
     """Film two to six runs side by side. A run that ends before the others keeps its last picture."""
     target = Path(path)
-    known_suffix(target)
-    check_options(camera, size or FULL, fps, speed)
+    known_suffix(target, ENCODERS)
+    options = FilmOptions(camera, size or FULL, fps, speed).checked()
     if not 2 <= len(rollouts) <= MAX_RUNS:
         raise InputError(f"compare: needs 2 to {MAX_RUNS} runs, got {len(rollouts)}")
-    started = time.perf_counter()
-    size = size or fitting_size(rollouts, camera)
+    options = replace(options, size=size or fitting_size(rollouts, camera))
     times = frame_times(max(float(log.t[-1] - log.t[0]) for log in rollouts), fps, speed)
-    total = len(times) + round(2 * HOLD * fps)
-    screen = SplitScreen(rollouts, camera, size, titles, mark)
-    with written_whole(target) as temporary, encoding(temporary, size, fps) as send:
-        for k, at in enumerate(itertools.chain(times, itertools.repeat(np.inf, total - len(times)))):
-            send(screen.frame(float(at)))
-            if progress is not None:
-                progress((k + 1) / total)
-    return FilmInfo(target, total, size, float(fps), camera, time.perf_counter() - started)
+    screen = SplitScreen(rollouts, camera, options.size, titles, mark)
+    moments = [*times.tolist(), *itertools.repeat(math.inf, round(2 * HOLD * fps))]
+    return encoded(target, options, len(moments), map(screen.frame, moments), progress)
 
 
 class Mark(NamedTuple):
@@ -148,7 +138,7 @@ class Tile:
             facts.pop(0)
         draw.text((1.2 * unit, 1.9 * unit), "  ·  ".join(facts), font=font(small), fill=MUTED)
         head = np.array(image)
-        kernels.put_sprite(head, verdict, wide - verdict.shape[1] - round(0.5 * unit), round(0.25 * unit), 1.0)
+        put(head, verdict, wide - verdict.shape[1] - round(0.5 * unit), 0.25 * unit)
         return np.vstack([head, view])
 
 

@@ -9,38 +9,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.base.types import Floats
+from antdrive.views import colours
+from antdrive.views.colours import Colour
 from antdrive.views.film import _kernels_paint as kernels
-from antdrive.views.film.camera import Camera
-from antdrive.views.film.ground import dashes, kerb_width, paint_ground
+from antdrive.views.film.camera import Camera, Picture
+from antdrive.views.film.ground import capsules, dashes, kerb_width, paint_ground
 from antdrive.views.film.meshes import Part, cylinder, kerb, robot_height, robot_parts
-from antdrive.views.film.raycast import Solids
 from antdrive.views.film.sight import FanPainter, SightPainter
-from antdrive.views.film.text import glow
-from antdrive.views.film.triangles import Box, Solid, draw_solids, merged, overlap, placed
+from antdrive.views.film.solids import Box, Solid, Solids, draw_solids, merged, overlap, placed
+from antdrive.views.film.text import glow, put
 from antdrive.views.scene import Scene
-from antdrive.views.style import (
-    FOLLOWED,
-    KERB,
-    MOVER,
-    OBSTACLE,
-    ROUTE,
-    SHELL,
-    UNSEEN,
-    Colour,
-    field_colours,
-    speed_colours,
-)
 
 if TYPE_CHECKING:
     from antdrive.worlds import Grid
 
-Floats = npt.NDArray[np.float64]
-Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 HIDDEN_OPACITY = 0.16  # of a robot behind a cylinder, so that it is never lost
 SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
@@ -59,6 +48,22 @@ class Backdrop:
     depth: npt.NDArray[np.float32]
     bodies: npt.NDArray[np.int32]  # at the same resolution the number of the obstacle in sight, -1 for ground
 
+    @cached_property
+    def forward(self) -> Floats:
+        """The homogeneous map (3, 3) from the ground to pixels."""
+        return self.camera.ground
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """The homogeneous map (3, 3) from pixels to the ground."""
+        return np.asarray(np.linalg.inv(self.forward))
+
+    def blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float, *, over: bool = False) -> None:
+        """Blend capsules (N, 5) of one colour into the ground of a frame, or over everything."""
+        visible = np.ones_like(self.visible) if over else self.visible
+        tint = np.array(colour, dtype=np.float64)
+        kernels.blend_capsules(frame, visible, self.forward, self.inverse, rows, tint, strength)
+
 
 class Compositor:
     """Draws frames of one scene for one camera.
@@ -69,13 +74,7 @@ class Compositor:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        camera: Camera,
-        *,
-        route: Floats,
-        fine: int = 2,
-        sight: FanPainter | None = None,
+        self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, sight: FanPainter | None = None
     ) -> None:
         self.scene = scene
         self.camera = camera
@@ -97,34 +96,29 @@ class Compositor:
         """Render the backdrop through a camera, with the labels and the trail so far."""
         self.camera = camera
         self.backdrop = self._render_still(camera)
-        self._forward = camera.ground
-        self._inverse = np.linalg.inv(self._forward)
-        height, width = self.backdrop.visible.shape
         self._canvas = self.backdrop.pixels.copy()
-        self._painted = np.zeros((height, width, 4), dtype=np.uint8)
+        self._painted = np.zeros((*self.backdrop.visible.shape, 4), dtype=np.uint8)
         for label in self._labels:
             self._put_on_ground(*label)
         if self._trail:
-            rows, colours = (np.concatenate(part) for part in zip(*self._trail, strict=True))
+            rows, tints = (np.concatenate(part) for part in zip(*self._trail, strict=True))
             ends = rows[:, :4].reshape(-1, 2, 2)
             middles = np.column_stack([ends.mean(axis=1), np.zeros(len(rows))])
             seen = camera.sees(middles, np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2 + self._trail_width)
-            self._paint_trail(rows[seen], colours[seen])
+            self._paint_trail(rows[seen], tints[seen])
 
     def extend_trail(self, points: Floats, speeds: npt.ArrayLike) -> None:
         """Continue the driven path along points (N, 2) [m], N >= 2, coloured by the speeds (N,) there [m/s]."""
         share = np.abs(np.asarray(speeds, dtype=np.float64)) / self.scene.robot.max_speed
-        half = np.full(len(points) - 1, self._trail_width / 2)
-        rows = np.ascontiguousarray(np.column_stack([points[:-1], points[1:], half]))
-        colours = speed_colours((share[:-1] + share[1:]) / 2)
-        self._trail.append((rows, colours))
-        self._paint_trail(rows, colours)
+        rows = capsules(points[:-1], points[1:], self._trail_width / 2)
+        tints = colours.speed_colours((share[:-1] + share[1:]) / 2)
+        self._trail.append((rows, tints))
+        self._paint_trail(rows, tints)
 
     def show_route(self, route: Floats, replanned_at: Floats) -> None:
         """Replace the route that later frames show."""
-        half = 1.5 * self.camera.pixel
-        dots = np.column_stack([replanned_at, replanned_at, np.full(len(replanned_at), 2.4 * half)])
-        self._changing_route = (dashes(route, 7 * half, 5 * half, 0.9 * half), np.ascontiguousarray(dots))
+        width = 1.5 * self.camera.pixel
+        self._changing_route = (dashes(route, width), capsules(replanned_at, replanned_at, 2.4 * width))
 
     def frame(
         self,
@@ -140,12 +134,12 @@ class Compositor:
         frame = self._canvas.copy()
         if self._sight is not None:
             if isinstance(self._sight, SightPainter):
-                self._sight.cover(frame, self.backdrop, self._inverse, self.fine)
-            self._sight.lay_fan(frame, self.backdrop, self._forward, self._inverse)
+                self._sight.cover(frame, self.backdrop, self.fine)
+            self._sight.lay_fan(frame, self.backdrop)
             for label in self._labels:
                 self._put_label(frame, *label)
         for rows in self._changing_route:
-            self._blend(frame, rows, ROUTE, 0.85)
+            self.backdrop.blend(frame, rows, colours.ROUTE, 0.85)
         if velocities is not None:
             self._draw_forecast(frame, places, np.asarray(velocities, dtype=np.float64).reshape(-1, 2))
         self._draw_shadows(frame, np.array([x, y, yaw]), places)
@@ -163,16 +157,15 @@ class Compositor:
     def field_frame(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
         """The picture (H, W, 3) without a robot, with a planner's field on the ground and a path over it."""
         frame = self.backdrop.pixels.copy()
-        tints = field_colours(np.linspace(0, 1, 256))
-        visible, (x, y) = self.backdrop.visible, grid.origin
-        kernels.lay_field(frame, visible, self._inverse, np.ascontiguousarray(levels), x, y, grid.cell, tints)
-        half = np.full(max(0, len(path) - 1), 1.6 * self.camera.pixel)
-        rows = np.ascontiguousarray(np.column_stack([path[:-1], path[1:], half]))
-        painted = np.zeros((*visible.shape, 4), dtype=np.uint8)
-        colours = np.tile(np.array(SHELL, dtype=np.float64), (len(rows), 1))
-        kernels.draw_trail(frame, frame.copy(), visible, painted, self._forward, self._inverse, rows, colours)
-        for sprite, x, y, reach in self._labels:
-            self._put_label(frame, sprite, x, y, reach)
+        tints = colours.field_colours(np.linspace(0, 1, 256))
+        back, (x, y) = self.backdrop, grid.origin
+        kernels.lay_field(frame, back.visible, back.inverse, np.ascontiguousarray(levels), x, y, grid.cell, tints)
+        rows = capsules(path[:-1], path[1:], 1.6 * self.camera.pixel)
+        painted = np.zeros((*back.visible.shape, 4), dtype=np.uint8)
+        tints = np.tile(np.array(colours.SHELL, dtype=np.float64), (len(rows), 1))
+        kernels.draw_trail(frame, frame.copy(), back.visible, painted, back.forward, back.inverse, rows, tints)
+        for label in self._labels:
+            self._put_label(frame, *label)
         return frame
 
     def add_label(self, sprite: Picture, x: float, y: float, reach: float) -> None:
@@ -192,7 +185,7 @@ class Compositor:
         rim = [self.pixel(x + reach * math.cos(a), y + reach * math.sin(a))[1] for a in turn]
         top = max(rim) + 1 if max(rim) + 1 + high < height else min(rim) - 1 - high
         left = min(max(px - wide / 2, 0), width - wide) if -wide < px < width + wide else px
-        kernels.put_sprite(frame, sprite, round(left), round(top), 1.0)
+        put(frame, sprite, left, top)
 
     def pixel(self, x: float, y: float, z: float = 0.0) -> tuple[float, float]:
         """Where a point of the world [m] appears: column and row [px]."""
@@ -210,29 +203,21 @@ class Compositor:
         kernels.resolve(rgb, image, seg, self.fine, visible, pixels)
         return Backdrop(camera, pixels, visible, depth, seg)
 
-    def _paint_trail(self, rows: Floats, colours: Floats) -> None:
-        visible = self.backdrop.visible
+    def _paint_trail(self, rows: Floats, tints: Floats) -> None:
+        back = self.backdrop
         kernels.draw_trail(
-            self._canvas,
-            self.backdrop.pixels,
-            visible,
-            self._painted,
-            self._forward,
-            self._inverse,
-            rows,
-            colours,
+            self._canvas, back.pixels, back.visible, self._painted, back.forward, back.inverse, rows, tints
         )
 
     def _draw_forecast(self, frame: Picture, places: Floats, velocities: Floats) -> None:
         """Draw a line from each mover to where it will be at constant velocity, with a dot at each half second."""
         half = 1.1 * self.camera.pixel
         ahead = places + FORECAST * velocities
-        lines = np.column_stack([places, ahead, np.full(len(places), half)])
-        stops = [places + share * (ahead - places) for share in (1 / 3, 2 / 3, 1.0)]
         moving = np.hypot(*velocities.T) > 0.01
-        dots = np.vstack([np.column_stack([stop, stop, np.full(len(stop), 2.2 * half)])[moving] for stop in stops])
-        for rows, strength in ((lines[moving], 0.45), (dots, 0.75)):
-            self._blend(frame, np.ascontiguousarray(rows), MOVER, strength)
+        self.backdrop.blend(frame, capsules(places, ahead, half)[moving], colours.MOVER, 0.45)
+        stops = [places + share * (ahead - places) for share in (1 / 3, 2 / 3, 1.0)]
+        dots = np.vstack([capsules(stop, stop, 2.2 * half)[moving] for stop in stops])
+        self.backdrop.blend(frame, dots, colours.MOVER, 0.75)
 
     def _draw_followed(self, frame: Picture, followed: Floats) -> None:
         """Draw a ring where the robot believes a mover to be, and a line to where it will be at the estimated velocity."""
@@ -240,17 +225,9 @@ class Compositor:
         half = 1.2 * self.camera.pixel
         circle = np.column_stack([np.cos(turn), np.sin(turn)])
         rims = [np.array([x, y]) + (radius + RING_OFF) * circle for x, y, _, _, radius in followed]
-        rows = [np.column_stack([rim[:-1], rim[1:], np.full(RING_SIDES, half)]) for rim in rims]
-        ahead = followed[:, :2] + FORECAST * followed[:, 2:4]
-        rows.append(np.column_stack([followed[:, :2], ahead, np.full(len(followed), half)]))
-        everywhere = np.ones_like(self.backdrop.visible)
-        lines, tint = np.ascontiguousarray(np.concatenate(rows)), np.array(FOLLOWED, dtype=np.float64)
-        kernels.blend_capsules(frame, everywhere, self._forward, self._inverse, lines, tint, 0.8)
-
-    def _blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float) -> None:
-        """Blend capsules (N, 5) of one colour into the ground."""
-        tint = np.array(colour, dtype=np.float64)
-        kernels.blend_capsules(frame, self.backdrop.visible, self._forward, self._inverse, rows, tint, strength)
+        places, ahead = followed[:, :2], followed[:, :2] + FORECAST * followed[:, 2:4]
+        rows = [*(capsules(rim[:-1], rim[1:], half) for rim in rims), capsules(places, ahead, half)]
+        self.backdrop.blend(frame, np.concatenate(rows), colours.FOLLOWED, 0.8, over=True)
 
     def _draw_shadows(self, frame: Picture, pose: Floats, movers: Floats) -> None:
         """Draw the soft shadows of robot and movers, and a glow under a robot that is small in the picture."""
@@ -262,32 +239,21 @@ class Compositor:
             off = (x + 1j * y) * turn
             place = np.array([pose[0] + off.real, pose[1] + off.imag, pose[2]])
             shape = np.array([(xmax - xmin) / 2 - foot.rounding, (ymax - ymin) / 2 - foot.rounding, foot.rounding])
-        self._draw_shadow(frame, place, shape, tall, SHADOW_BLUR + 0.3 * tall)
+        self._draw_shadow(frame, place, shape, tall)
         wide = round(2 * foot.radius / self.camera.pixel)
         if wide < 0.05 * frame.shape[1]:
             px, py = self.pixel(pose[0], pose[1], tall / 2)
-            halo = glow(2 * wide + round(0.02 * frame.shape[1]), SHELL)
-            kernels.put_sprite(frame, halo, round(px - len(halo) / 2), round(py - len(halo) / 2), 1.0)
+            halo = glow(2 * wide + round(0.02 * frame.shape[1]), colours.SHELL)
+            put(frame, halo, px - len(halo) / 2, py - len(halo) / 2)
         for (x, y), radius in zip(movers, self.scene.mover_radii, strict=True):
-            tall = drawn_height(self.scene)
             disc = np.array([0.0, 0.0, radius])
-            self._draw_shadow(frame, np.array([x, y, 0.0]), disc, tall, SHADOW_BLUR + 0.3 * tall)
+            self._draw_shadow(frame, np.array([x, y, 0.0]), disc, drawn_height(self.scene))
 
-    def _draw_shadow(self, frame: Picture, pose: Floats, shape: Floats, tall: float, soft: float) -> None:
+    def _draw_shadow(self, frame: Picture, pose: Floats, shape: Floats, tall: float) -> None:
         """Darken the ground beside a body, where it keeps off the sun, and below it, where it keeps off the sky."""
-        sun = np.array(self._sun) * tall
-        for reach, blur, strength in ((sun, soft, 0.30), (np.zeros(2), 0.5 * shape.sum(), 0.22)):
-            kernels.shade_body(
-                frame,
-                self.backdrop.visible,
-                self._forward,
-                self._inverse,
-                pose,
-                shape,
-                reach,
-                float(blur),
-                strength,
-            )
+        sun, soft, back = np.array(self._sun) * tall, SHADOW_BLUR + 0.3 * tall, self.backdrop
+        for reach, blur, strength in ((sun, soft, 0.30), (np.zeros(2), float(0.5 * shape.sum()), 0.22)):
+            kernels.shade_body(frame, back.visible, back.forward, back.inverse, pose, shape, reach, blur, strength)
 
     def _robot_at(self, x: float, y: float, yaw: float, wheels: tuple[float, float]) -> list[Solid]:
         poses = [(part, part_pose(part, x, y, yaw, wheels)) for part in self._parts]
@@ -296,7 +262,7 @@ class Compositor:
     def _movers_at(self, places: Floats) -> list[list[Solid]]:
         turn = (0.0, 0.0, 0.0, 1.0)
         return [
-            [Solid(mesh, MOVER, placed((x, y, 0.0), turn))]
+            [Solid(mesh, colours.MOVER, placed((x, y, 0.0), turn))]
             for mesh, (x, y) in zip(self._mover_meshes, places.tolist(), strict=True)
         ]
 
@@ -340,7 +306,8 @@ def still_solids(scene: Scene, tall: Floats) -> Solids:
     kerbs = [mesh.vertices for mesh in kerb(scene.bounds, width, 0.8 * width)]
     boxes = np.array([np.concatenate([corners.min(axis=0), corners.max(axis=0)]) for corners in kerbs])
     cylinders = np.column_stack([scene.obstacles[:, :3], tall])
-    return Solids.of(cylinders, [UNSEEN if unseen else OBSTACLE for unseen in scene.unseen], boxes, KERB)
+    tints = [colours.UNSEEN if unseen else colours.OBSTACLE for unseen in scene.unseen]
+    return Solids.of(cylinders, tints, boxes, colours.KERB)
 
 
 def part_pose(

@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.plane import segment_lengths
+from antdrive.base.types import Floats
+from antdrive.views.colours import GOAL, GRID, GROUND, PAPER, ROUTE, START, ZONE, Colour
 from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film.camera import Camera
 from antdrive.views.scene import Scene
-from antdrive.views.style import GOAL, GRID, GROUND, PAPER, ROUTE, START, ZONE, Colour
 
-Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 SHADOW_DEPTH = 0.30  # how much light the deepest shadow takes away
@@ -28,16 +28,8 @@ def paint_ground(
     under = kerb_width(scene) / 2  # the floor continues under the kerb, so that its edge is hidden
     bounds = np.array(scene.bounds) + np.array([-under, -under, under, under])
     step = grid_step(camera)
-    kernels.lay_floor(
-        brush.rgb,
-        ground,
-        brush.inside,
-        brush.inverse,
-        bounds,
-        step,
-        1.0,
-        np.array([GROUND, PAPER, GRID], dtype=np.float64),
-    )
+    tints = np.array([GROUND, PAPER, GRID], dtype=np.float64)
+    kernels.lay_floor(brush.rgb, ground, brush.inside, brush.inverse, bounds, step, 1.0, tints)
     line = 1.5 * camera.pixel
     if scene.has_zones:
         brush.zones(scene, line)
@@ -47,7 +39,7 @@ def paint_ground(
     kernels.cast_shadows(shade, brush.forward, brush.inverse, cylinders, *sun, SHADOW_DEPTH)
     kernels.multiply(brush.rgb, shade)
     if len(route) > 1:
-        brush.capsules(dashes(route, 7 * line, 5 * line, 0.9 * line), ROUTE, 0.85)
+        brush.capsules(dashes(route, line), ROUTE, 0.85)
     brush.start(scene, line)
     brush.goal(scene, line)
     return brush.rgb
@@ -68,14 +60,20 @@ def grid_step(camera: Camera) -> float:
     return 100.0
 
 
-def dashes(line: Floats, on: float, off: float, half: float) -> Floats:
-    """Capsules (M, 5) that draw a polyline (N, 2) dashed."""
+def capsules(starts: Floats, ends: Floats, half: float | Floats) -> Floats:
+    """Capsules (N, 5) from points (N, 2) to others: ax, ay, bx, by, half width [m]."""
+    return np.ascontiguousarray(np.column_stack([starts, ends, np.full(len(starts), half)]))
+
+
+def dashes(line: Floats, width: float) -> Floats:
+    """Capsules (M, 5) that draw a polyline (N, 2) dashed, for lines of a width [m]."""
+    on, off = 7 * width, 5 * width
     steps = segment_lengths(line)
     arc = np.concatenate([[0.0], np.cumsum(steps)])
     starts = np.arange(0.0, arc[-1], on + off)
     at = np.unique(np.concatenate([arc, starts, np.minimum(starts + on, arc[-1])]))
     points = np.column_stack([np.interp(at, arc, line[:, 0]), np.interp(at, arc, line[:, 1])])
-    rows = np.column_stack([points[:-1], points[1:], np.full(len(at) - 1, half)])
+    rows = capsules(points[:-1], points[1:], 0.9 * width)
     return np.ascontiguousarray(rows[(at[:-1] + at[1:]) / 2 % (on + off) < on])
 
 

@@ -8,13 +8,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from antdrive.base.types import Point
+from antdrive.base.types import Floats, Ints, Point
 from antdrive.robots.spec import Footprint, RobotSpec
-from antdrive.views.style import SHELL, TURRET, WHITE, Colour
-
-Floats = npt.NDArray[np.float64]
+from antdrive.views.colours import SHELL, TURRET, WHITE, Colour
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +20,11 @@ class Mesh:
 
     vertices: Floats  # points (V, 3) [m]; those on a sharp edge occur once for each face
     normals: Floats  # a unit vector per vertex (V, 3)
-    triangles: npt.NDArray[np.int64]  # vertex numbers (T, 3), counter-clockwise as seen from outside
+    triangles: Ints  # vertex numbers (T, 3), counter-clockwise as seen from outside
+
+    def turned(self, turn: Floats) -> Mesh:
+        """The mesh turned by a matrix (3, 3)."""
+        return Mesh(self.vertices @ turn, self.normals @ turn, self.triangles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +55,11 @@ def cylinder(radius: float, low: float, high: float, *, sides: int = 48, x: floa
     floor, roof = (np.column_stack([rim, np.full(sides, z)]) for z in (low, high))
     out = np.column_stack([ring, np.zeros(sides)])
     here, there = np.arange(sides), (np.arange(sides) + 1) % sides
-    side = np.vstack(
-        [np.column_stack([here, there, there + sides]), np.column_stack([here, there + sides, here + sides])]
-    )
+    upper, lower = np.column_stack([here, there, there + sides]), np.column_stack([here, there + sides, here + sides])
     lid = np.column_stack([np.full(sides, 3 * sides), here + 2 * sides, there + 2 * sides])
     up = np.tile([0.0, 0.0, 1.0], (sides + 1, 1))
     vertices = np.vstack([floor, roof, roof, [[x, y, high]]])
-    return Mesh(vertices, np.vstack([out, out, up]), np.vstack([side, lid]))
+    return Mesh(vertices, np.vstack([out, out, up]), np.vstack([upper, lower, lid]))
 
 
 def prism(outline: Floats, low: float, high: float, *, chamfer: float = 0.0) -> Mesh:
@@ -131,10 +130,7 @@ def robot_parts(body: RobotSpec) -> tuple[Part, ...]:
     back, core = middle_x - 0.08 * length, np.array([middle_x, middle_y])
     smaller = (outline - core) * (0.60 if foot.is_disc else 0.66) + [back, middle_y]
     turret = prism(smaller, deck, roof, chamfer=0.05 * size)
-    arrow = [
-        replace(part, vertices=part.vertices + [0, middle_y, 0])
-        for part in _arrow(back, 0.50 * size, roof, 0.012 * size)
-    ]
+    arrow = [replace(p, vertices=p.vertices + [0, middle_y, 0]) for p in _arrow(back, 0.50 * size, roof, 0.012 * size)]
     lamps = _lamps(foot, (middle_x, middle_y), (length, width), deck)
     parts = [Part(join(*shell), SHELL), Part(turret, TURRET), Part(join(*arrow, *lamps), WHITE)]
     for side in (1, -1):
@@ -182,15 +178,13 @@ def _drum(radius: float, tread: float) -> Mesh:
 
 def _about_y(mesh: Mesh) -> Mesh:
     """The mesh turned so that its z axis becomes the y axis."""
-    turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    return Mesh(mesh.vertices @ turn, mesh.normals @ turn, mesh.triangles)
+    return mesh.turned(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]))
 
 
 def _turned(mesh: Mesh, angle: float) -> Mesh:
     """The mesh turned about the y axis by an angle [rad]."""
     c, s = math.cos(angle), math.sin(angle)
-    turn = np.array([[c, 0, -s], [0, 1.0, 0], [s, 0, c]])
-    return Mesh(mesh.vertices @ turn, mesh.normals @ turn, mesh.triangles)
+    return mesh.turned(np.array([[c, 0, -s], [0, 1.0, 0], [s, 0, c]]))
 
 
 def _arrow(x: float, reach: float, low: float, thin: float) -> list[Mesh]:
@@ -202,8 +196,9 @@ def _arrow(x: float, reach: float, low: float, thin: float) -> list[Mesh]:
     ]
 
 
-def _outline(foot: Footprint, *, steps: int = 16) -> Floats:
+def _outline(foot: Footprint) -> Floats:
     """A footprint's outline (K, 2), counter-clockwise."""
+    steps = 16  # of each corner
     if foot.corners:
         return np.array(foot.outline(steps))
     corner = max(foot.rounding, 0.0)
@@ -235,19 +230,10 @@ def _band(low: tuple[Floats, float], high: tuple[Floats, float]) -> Mesh:
     (a, za), (b, zb) = low, high
     count = len(a)
     following = (np.arange(count) + 1) % count
-    quads = np.stack(
-        [
-            np.column_stack([a, np.full(count, za)]),
-            np.column_stack([a[following], np.full(count, za)]),
-            np.column_stack([b[following], np.full(count, zb)]),
-            np.column_stack([b, np.full(count, zb)]),
-        ],
-        axis=1,
-    )
+    corners = ((a, za), (a[following], za), (b[following], zb), (b, zb))
+    quads = np.stack([np.column_stack([points, np.full(count, z)]) for points, z in corners], axis=1)
     normal = np.cross(quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     first = 4 * np.arange(count)
-    triangles = np.vstack(
-        [np.column_stack([first, first + 1, first + 2]), np.column_stack([first, first + 2, first + 3])]
-    )
-    return Mesh(quads.reshape(-1, 3), np.repeat(normal, 4, axis=0), triangles)
+    halves = [np.column_stack([first, first + k, first + k + 1]) for k in (1, 2)]
+    return Mesh(quads.reshape(-1, 3), np.repeat(normal, 4, axis=0), np.vstack(halves))

@@ -6,41 +6,18 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image, ImageDraw
 
 from antdrive.sim.log.outcome import Outcome
-from antdrive.views.film import _kernels_paint as kernels
+from antdrive.views import colours
+from antdrive.views.film.camera import Picture
 from antdrive.views.film.replay import SLOW_MOTION
-from antdrive.views.film.text import Sprite, fitted, font, pill, plate, text_width, wrapped
+from antdrive.views.film.text import Sprite, fitted, font, pill, plate, put, text_width, wrapped
 from antdrive.views.scene import Scene
-from antdrive.views.style import (
-    BAD,
-    BAND,
-    BEAM,
-    CALM,
-    FOLLOWED,
-    HATCH,
-    HIT,
-    INK,
-    MOVER,
-    MUTED,
-    PALE,
-    ROUTE,
-    SHELL,
-    UNSEEN,
-    VERDICTS,
-    ZONE,
-    Colour,
-    field_colours,
-    speed_colours,
-)
 
-Picture = npt.NDArray[np.uint8]  # (H, W, 3)
-
-DRIVING = ("DRIVING", CALM)
-PLANNING = ("PLANNING", CALM)
-SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", BAD)
+DRIVING = ("DRIVING", colours.CALM)
+PLANNING = ("PLANNING", colours.CALM)
+SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", colours.BAD)
 
 #: The names of the band's four numbers during the drive and during planning.
 DRIVE_FIELDS = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
@@ -131,7 +108,7 @@ class Band:
     ) -> None:
         self.layout = layout
         unit, width, wide = layout.unit, layout.width, layout.wide
-        self._blank = Image.new("RGB", (width, layout.height), BAND)
+        self._blank = Image.new("RGB", (width, layout.height), colours.BAND)
         draw = ImageDraw.Draw(self._blank)
         draw.line([(0, 0), (width, 0)], fill=(210, 216, 225), width=max(1, unit // 8))
         pad, big, small = unit, round(1.35 * unit), layout.small
@@ -140,39 +117,37 @@ class Band:
         shown = "" if layout.note else fitted(note or "", layout.note_room, small, True)
         room = numbers - 2 * pad if wide else width - _widest_verdict(unit) - 3 * pad
         subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
-        draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=INK)
-        draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=MUTED)
+        draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=colours.INK)
+        draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=colours.MUTED)
         draw.text(
-            (width - pad, (3.75 if wide else 3.3) * unit),
-            shown,
-            font=font(small, True),
-            fill=CALM,
-            anchor="rm",
+            (width - pad, (3.75 if wide else 3.3) * unit), shown, font=font(small, True), fill=colours.CALM, anchor="rm"
         )
         for k, line in enumerate(layout.note):
             middle = (layout.numbers_units - 0.1 + (k + 0.5) * NOTE_LINE) * unit
-            draw.text((pad, middle), line, font=font(small, True), fill=CALM, anchor="lm")
+            draw.text((pad, middle), line, font=font(small, True), fill=colours.CALM, anchor="lm")
         for (x, y), name in zip(self._fields, names, strict=True):
-            draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=MUTED)
+            draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=colours.MUTED)
         if layout.rows:
             _draw_rows(draw, legend, layout)
 
-    def draw(self, values: Values, verdict: tuple[str, Colour]) -> Picture:
+    def draw(self, values: Values, verdict: tuple[str, colours.Colour]) -> Picture:
         """The band (h, W, 3) of one frame, with its four numbers and a label."""
         unit = self.layout.unit
         image = self._blank.copy()
         draw = ImageDraw.Draw(image)
         for (x, y), (text, bad) in zip(self._fields, values, strict=True):
-            draw.text((x, y + 1.15 * unit), text, font=font(round(1.4 * unit), True), fill=BAD if bad else INK)
+            draw.text(
+                (x, y + 1.15 * unit), text, font=font(round(1.4 * unit), True), fill=colours.BAD if bad else colours.INK
+            )
         band = np.array(image)
         plate_ = pill(verdict[0], round(1.08 * unit), verdict[1])
-        kernels.put_sprite(band, plate_, self.layout.width - unit - plate_.shape[1], round(0.5 * unit), 1.0)
+        put(band, plate_, self.layout.width - unit - plate_.shape[1], 0.5 * unit)
         return band
 
 
 def _widest_verdict(unit: int) -> int:
     size = round(1.08 * unit)
-    widest = max(text_width(text, size, True) for text, _ in (*VERDICTS.values(), DRIVING, PLANNING, SLOWED))
+    widest = max(text_width(text, size, True) for text, _ in (*colours.VERDICTS.values(), DRIVING, PLANNING, SLOWED))
     return widest + 2 * round(0.75 * size)
 
 
@@ -189,7 +164,7 @@ class LegendEntry(NamedTuple):
     """A line of the legend."""
 
     kind: str  # how its sample is drawn: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot` or `scale`
-    colour: Colour  # of the sample
+    colour: colours.Colour  # of the sample
     text: str  # its meaning
     width: float = 0.0  # of a scale bar [px]
 
@@ -207,28 +182,33 @@ def legend_entries(
 ) -> list[LegendEntry]:
     """The legend's lines: one for each kind of thing in the picture."""
     if planning:
-        found = [LegendEntry("field", INK, "planner's field"), LegendEntry("line", SHELL, "best path so far")]
+        found = [
+            LegendEntry("field", colours.INK, "planner's field"),
+            LegendEntry("line", colours.SHELL, "best path so far"),
+        ]
     else:
         speeds = f"speed, 0 to {scene.robot.max_speed:.3g} m/s"
-        found = [LegendEntry("ramp", INK, speeds), LegendEntry("dash", ROUTE, "planned route")]
+        found = [LegendEntry("ramp", colours.INK, speeds), LegendEntry("dash", colours.ROUTE, "planned route")]
     if replans:
-        found.append(LegendEntry("dot", ROUTE, "new route"))
+        found.append(LegendEntry("dot", colours.ROUTE, "new route"))
     if scene.has_zones:
-        found.append(LegendEntry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
+        found.append(LegendEntry("zone", colours.ZONE, f"inflated by {scene.inflate:.2f} m"))
     if scene.unseen.any():
-        found.append(LegendEntry("dot", UNSEEN, scene.unseen_said))
+        found.append(LegendEntry("dot", colours.UNSEEN, scene.unseen_said))
     if beams:
-        found.append(LegendEntry("zone", BEAM, "beams of the lidar"))
+        found.append(LegendEntry("zone", colours.BEAM, "beams of the lidar"))
     if sight:
         found += [
-            LegendEntry("dot", HIT, "hit, on the robot's map"),
-            LegendEntry("hatch", HATCH, "not known to be free"),
+            LegendEntry("dot", colours.HIT, "hit, on the robot's map"),
+            LegendEntry("hatch", colours.HATCH, "not known to be free"),
         ]
     if scene.mover_radii:
-        found.append(LegendEntry("dot", MOVER, "moving obstacle" if followed else "moving obstacle, 1.5 s ahead"))
+        found.append(
+            LegendEntry("dot", colours.MOVER, "moving obstacle" if followed else "moving obstacle, 1.5 s ahead")
+        )
     if followed:
-        found.append(LegendEntry("line", FOLLOWED, "mover by lidar, 1.5 s ahead"))
-    return [*found, LegendEntry("scale", INK, f"{step:g} m (grid)", step / pixel)]
+        found.append(LegendEntry("line", colours.FOLLOWED, "mover by lidar, 1.5 s ahead"))
+    return [*found, LegendEntry("scale", colours.INK, f"{step:g} m (grid)", step / pixel)]
 
 
 def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
@@ -242,7 +222,7 @@ def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
     for k, entry in enumerate(entries):
         middle = pad + line * k + line / 2
         _draw_sample(draw, entry, pad, middle, key, size)
-        draw.text((pad + key + size // 2, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+        draw.text((pad + key + size // 2, middle), entry.text, font=font(size), fill=colours.INK, anchor="lm")
     return np.array(image)
 
 
@@ -295,7 +275,7 @@ def _draw_rows(draw: ImageDraw.ImageDraw, legend: LegendRows, layout: Layout) ->
         x, middle = float(unit), top + (number + 0.5) * LEGEND_ROW * unit
         for entry, (sample, text) in zip(row, widths, strict=True):
             _draw_sample(draw, entry, round(x), middle, round(sample), size)
-            draw.text((x + sample + 0.5 * size, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+            draw.text((x + sample + 0.5 * size, middle), entry.text, font=font(size), fill=colours.INK, anchor="lm")
             x += sample + text + min(gap, 2.5 * size)
 
 
@@ -304,8 +284,8 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
     kind, colour = entry.kind, entry.colour
     r = 0.42 * size
     if kind in ("ramp", "field"):
-        colours = speed_colours if kind == "ramp" else field_colours
-        for i, tint in enumerate(colours(np.linspace(0, 1, wide))):
+        tints = colours.speed_colours if kind == "ramp" else colours.field_colours
+        for i, tint in enumerate(tints(np.linspace(0, 1, wide))):
             draw.line([(x + i, y - 0.22 * size), (x + i, y + 0.22 * size)], fill=tuple(int(c) for c in tint))
     elif kind == "dash":
         for start in np.arange(x, x + wide - 1, wide / 3):
@@ -317,7 +297,7 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
         draw.rounded_rectangle((x, y - 0.4 * size, x + wide, y + 0.4 * size), size // 4, fill=pale, outline=colour)
     elif kind == "hatch":
         high = round(0.4 * size)
-        draw.rectangle((x, y - high, x + wide, y + high), fill=PALE)
+        draw.rectangle((x, y - high, x + wide, y + high), fill=colours.PALE)
         for at in range(x + high, x + wide - high, max(4, size // 2)):
             draw.line([(at - high, y + high), (at + high, y - high)], fill=colour, width=max(1, size // 9))
     elif kind == "dot":
@@ -334,7 +314,7 @@ def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "") -> Spr
 
     A robot is stuck for one of several reasons: where one is given, it stands for the general sentence.
     """
-    name, colour = VERDICTS[outcome]
+    name, colour = colours.VERDICTS[outcome]
     sentence = "stuck" if reason and outcome is Outcome.STUCK else outcome.value
     sentence = sentence[0].upper() + sentence[1:]
     size = round(1.5 * layout.unit)

@@ -5,7 +5,6 @@ A log holds no field. The path is planned again from the log's seed, which gives
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 import zlib
@@ -13,18 +12,15 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base import InputError
+from antdrive.base.types import Floats
 from antdrive.planners import Iteration, Query, as_iterative, load_planner
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.film.compositor import Compositor
+from antdrive.views.film.camera import Picture
 from antdrive.views.film.overlay import Values
 from antdrive.views.film.shot import Shot
 from antdrive.worlds import Grid, rasterise
-
-Picture = npt.NDArray[np.uint8]  # (H, W, 3)
-Floats = npt.NDArray[np.float64]
 
 
 def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
@@ -61,16 +57,9 @@ def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> It
         assert state.field is not None
         levels = field_levels(grid, state.field)
         path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
-        yield shot.planning_frame(
-            _values(number, total, state),
-            functools.partial(_draw_field, grid=grid, levels=levels, path=path),
-        )
+        yield shot.planning_frame(_values(number, total, state), grid, levels, path)
     if not np.array_equal(state.cells, rollout.cells):
         raise InputError("prelude: planning again led to another path; the log is of another version or machine")
-
-
-def _draw_field(compositor: Compositor, grid: Grid, levels: Floats, path: Floats) -> Picture:
-    return compositor.field_frame(grid, levels, path)
 
 
 def field_levels(grid: Grid, field: Floats) -> Floats:

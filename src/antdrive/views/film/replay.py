@@ -6,13 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from antdrive.base.types import Floats
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.scene import Scene, contact_point, jumps
-
-Floats = npt.NDArray[np.float64]
 
 CAMERA_WINDOW = 0.6  # a following camera looks at the robot's mean position over this time before and after [s]
 

@@ -2,42 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
+from antdrive.views.colours import CONTACT, GOAL, ROUTE, START, VERDICTS, Colour
 from antdrive.views.film import _kernels_paint as kernels
-from antdrive.views.film.camera import Camera, camera_for
+from antdrive.views.film import overlay
+from antdrive.views.film.camera import Camera, Picture, camera_for
 from antdrive.views.film.compositor import Compositor, drawn_height
 from antdrive.views.film.ground import grid_step
 from antdrive.views.film.meshes import robot_height
-from antdrive.views.film.overlay import (
-    DRIVE_FIELDS,
-    DRIVING,
-    MOST_BAND,
-    PLAN_FIELDS,
-    PLANNING,
-    SLOWED,
-    Band,
-    Layout,
-    LegendRows,
-    Values,
-    banner,
-    drive_values,
-    legend_card,
-    legend_entries,
-    legend_rows,
-)
+from antdrive.views.film.options import FilmOptions
 from antdrive.views.film.replay import ReplanEvent, Replay
 from antdrive.views.film.sight import FanPainter, SightPainter
-from antdrive.views.film.text import Sprite, burst, label
+from antdrive.views.film.text import Sprite, burst, label, put
 from antdrive.views.scene import Scene
-from antdrive.views.style import CONTACT, GOAL, ROUTE, START, VERDICTS, Colour
-
-Floats = npt.NDArray[np.float64]
-Picture = npt.NDArray[np.uint8]  # (H, W, 3)
+from antdrive.worlds import Grid
 
 FLASH = 0.45  # the picture's border flashes this long after a contact [s]
 MOST_LEGEND_ROWS = 4
@@ -45,80 +28,54 @@ REPLAN_CAPTION = 1.5  # the cause of a replan is shown this long [s]
 
 
 class Shot:
-    """The frames of a run as one camera sees it. Ask for moments in increasing order."""
+    """The frames of a run as one camera sees it, with the options of a film. Ask for moments in increasing order."""
 
-    def __init__(
-        self,
-        rollout: Rollout,
-        *,
-        camera: str,
-        size: tuple[int, int],
-        note: str | None = None,
-        speed: float = 1.0,
-        planning: bool = False,
-        bare: bool = False,
-    ) -> None:
+    def __init__(self, rollout: Rollout, *, planning: bool = False, bare: bool = False, **options: Any) -> None:
+        self.options = FilmOptions(**options)
+        size, note, speed = self.options.size, self.options.note, self.options.speed
         self.replay = Replay(rollout)
         self.slow_motion = self.replay.slow_motion(speed)
         self._flash = FLASH * speed
         self.scene = scene = Scene.of(rollout)
         self.outcome = rollout.outcome
-        self._follows = camera == "follow"
+        self._follows = self.options.camera == "follow"
         self._follows_movers = not planning and len(rollout.tracks) > 0
         self._sight = SightPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
         self._fan = self._sight or (FanPainter(rollout) if not planning and len(rollout.scans) else None)
         replans = not planning and any(event.caption for event in self.replay.replans)
-        legend = self._lay_out(rollout, camera, size, note or "", planning=planning, replans=replans, bare=bare)
+        legend = self._lay_out(rollout, planning=planning, replans=replans, bare=bare)
         planner = rollout.record.planner.name
         subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
-        fields = PLAN_FIELDS if planning else DRIVE_FIELDS
-        self._band = Band(self._layout, scene.name, subtitle, None if planning else note, legend, fields)
+        fields = overlay.PLAN_FIELDS if planning else overlay.DRIVE_FIELDS
+        self._band = overlay.Band(self._layout, scene.name, subtitle, None if planning else note, legend, fields)
         fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
         fixed = not (planning or self.replay.replans or self._fan)  # a route that changes is drawn in every frame
-        self._compositor = Compositor(
-            scene,
-            self._camera,
-            route=rollout.route[: None if fixed else 0],
-            fine=fine,
-            sight=self._fan,
-        )
+        route = rollout.route[: None if fixed else 0]
+        self._compositor = Compositor(scene, self._camera, route=route, fine=fine, sight=self._fan)
         self._replan_caption = REPLAN_CAPTION * speed
         self._route, self._replans_shown = rollout.route, 0
         self._legend_width = 0 if self._legend is None else self._legend.shape[1] + 2 * self._layout.unit  # [px]
         room = max(size[0] - self._legend_width, size[0] // 2)
-        self._banner = banner(self.outcome, self._layout, room, rollout.record.reason)
+        self._banner = overlay.banner(self.outcome, self._layout, room, rollout.record.reason)
         self.shown = 0.0  # the trail reaches to this moment [s]
         self._add_labels()
         if self.replay.replans or self._fan:
             self._show_route(0)
 
-    def _lay_out(
-        self,
-        rollout: Rollout,
-        camera: str,
-        size: tuple[int, int],
-        note: str,
-        *,
-        planning: bool,
-        replans: bool,
-        bare: bool,
-    ) -> LegendRows:
+    def _lay_out(self, rollout: Rollout, *, planning: bool, replans: bool, bare: bool) -> overlay.LegendRows:
         """Choose layout, camera and legend: a card in a corner or, if it would cover the world, rows of the band."""
-        shows = {
-            "beams": self._fan is not None,
-            "sight": self._sight is not None,
-            "followed": self._follows_movers,
-        }
+        shows = {"beams": self._fan is not None, "sight": self._sight is not None, "followed": self._follows_movers}
+        size = self.options.size
         for rows in range(1 + MOST_LEGEND_ROWS):
-            layout = Layout.of(size, rows, note)
-            if rows > 1 and layout.height > MOST_BAND * size[1]:
+            layout = overlay.Layout.of(size, rows, self.options.note or "")
+            if rows > 1 and layout.height > overlay.MOST_BAND * size[1]:
                 break
             self._layout = layout
-            self._camera = self._aim(camera, rollout, (size[0], size[1] - (0 if bare else layout.height)))
+            self._camera = self._aim(rollout, (size[0], size[1] - (0 if bare else layout.height)))
             step, pixel = grid_step(self._camera), self._camera.pixel
-            entries = legend_entries(self.scene, step, pixel, planning=planning, replans=replans, **shows)
-            legend = legend_rows(entries, layout)
-            self._legend = None if rows or bare else legend_card(entries, layout)
+            entries = overlay.legend_entries(self.scene, step, pixel, planning=planning, replans=replans, **shows)
+            legend = overlay.legend_rows(entries, layout)
+            self._legend = None if rows or bare else overlay.legend_card(entries, layout)
             if bare or (legend.whole if self._legend is None else self._fits_beside_world(self._legend)):
                 break
         return legend
@@ -126,7 +83,7 @@ class Shot:
     def frame(self, at: float) -> Picture:
         """The frame (H, W, 3) at a moment of the run [s]."""
         slow = self.slow_motion is not None and self.slow_motion[0] <= at < self.slow_motion[1]
-        return self._with_band(self.view(at), at, SLOWED if slow else DRIVING)
+        return self._with_band(self.view(at), at, overlay.SLOWED if slow else overlay.DRIVING)
 
     def last_frame(self) -> Picture:
         """The frame (H, W, 3) at the run's end, with the outcome as a sentence."""
@@ -137,14 +94,14 @@ class Shot:
         low = robot_high or self._legend_width + self._banner.shape[1] > view.shape[1]
         top = view.shape[0] - self._banner.shape[0] - round(1.2 * unit) if low else round(1.2 * unit)
         left = max((view.shape[1] - self._banner.shape[1]) // 2, 0 if low else self._legend_width)
-        kernels.put_sprite(view, self._banner, left, top, 1.0)
+        put(view, self._banner, left, top)
         return self._with_band(view, at, VERDICTS[self.outcome])
 
-    def planning_frame(self, values: Values, draw: Callable[[Compositor], Picture]) -> Picture:
-        """A frame (H, W, 3) of planning."""
-        view = draw(self._compositor)
+    def planning_frame(self, values: overlay.Values, grid: Grid, levels: Floats, path: Floats) -> Picture:
+        """A frame (H, W, 3) of planning: a planner's field, and its best path (N, 2) [m] so far."""
+        view = self._compositor.field_frame(grid, levels, path)
         self._put_legend(view)
-        return np.vstack([view, self._band.draw(values, PLANNING)])
+        return np.vstack([view, self._band.draw(values, overlay.PLANNING)])
 
     def extend_trail(self, at: float) -> None:
         """Continue the driven path to a moment [s]."""
@@ -184,29 +141,25 @@ class Shot:
         """Mark a place on the ground in a picture, with a text above it."""
         size = 2 * round(1.1 * self._layout.unit)
         px, py = self._compositor.pixel(x, y)
-        kernels.put_sprite(view, burst(size, CONTACT), round(px - size / 2), round(py - size / 2), 1.0)
-        sprite = label(text, round(0.95 * self._layout.unit), CONTACT)
-        left = min(max(px - sprite.shape[1] / 2, 0), view.shape[1] - sprite.shape[1])
-        kernels.put_sprite(view, sprite, round(left), round(max(py - size - sprite.shape[0], 0)), 1.0)
+        put(view, burst(size, CONTACT), px - size / 2, py - size / 2)
+        _put_above(view, label(text, round(0.95 * self._layout.unit), CONTACT), px, py - size)
 
     def _with_band(self, view: Picture, at: float, verdict: tuple[str, Colour]) -> Picture:
         replay = self.replay
-        values = drive_values(at, replay.speed(at), replay.clearance(at), replay.min_clearance(at))
+        values = overlay.drive_values(at, replay.speed(at), replay.clearance(at), replay.min_clearance(at))
         return np.vstack([view, self._band.draw(values, verdict)])
 
     def _put_legend(self, view: Picture) -> None:
         if self._legend is not None:
-            kernels.put_sprite(view, self._legend, self._layout.unit, self._layout.unit, 1.0)
+            put(view, self._legend, self._layout.unit, self._layout.unit)
 
-    def _aim(self, camera: str, rollout: Rollout, size: tuple[int, int]) -> Camera:
-        """The camera of a name: it sees the whole run or, if it follows, the robot's surroundings."""
-        scene = self.scene
-        tall = drawn_height(scene)
-        if camera == "follow":
-            reach = max(1.2, 7 * scene.robot.footprint.radius)
-            return camera_for(camera, (-reach, -0.6 * reach), (reach, 0.6 * reach), tall, size)
-        low, high = scene.region(np.vstack([rollout.pose[:, :2], rollout.route]))
-        return camera_for(camera, low, high, tall, size)
+    def _aim(self, rollout: Rollout, size: tuple[int, int]) -> Camera:
+        """The camera: it sees the whole run or, if it follows, the robot's surroundings."""
+        low, high = self.scene.region(np.vstack([rollout.pose[:, :2], rollout.route]))
+        if self._follows:
+            reach = max(1.2, 7 * self.scene.robot.footprint.radius)
+            low, high = np.array([-reach, -0.6 * reach]), np.array([reach, 0.6 * reach])
+        return camera_for(self.options.camera, low, high, drawn_height(self.scene), size)
 
     def _fits_beside_world(self, card: Sprite) -> bool:
         """Whether a card in the upper left corner covers no part of the world."""
@@ -223,11 +176,8 @@ class Shot:
         return not bool((at < reach).all(axis=1).any())
 
     def _add_labels(self) -> None:
-        size = self._layout.unit
-        scene = self.scene
-        radius = scene.robot.footprint.radius
-        text = round(0.95 * size)
-        self._compositor.add_label(label("START", text, START), *scene.start[:2], 1.3 * radius)
+        scene, text = self.scene, round(0.95 * self._layout.unit)
+        self._compositor.add_label(label("START", text, START), *scene.start[:2], 1.3 * scene.robot.footprint.radius)
         self._compositor.add_label(label("GOAL", text, GOAL), *scene.goal, scene.goal_tolerance)
 
     def _show_route(self, count: int) -> None:
@@ -247,9 +197,7 @@ class Shot:
         sprite = label(event.caption, self._layout.unit, ROUTE)
         x, y, _ = self.replay.pose(at)
         px, py = self._compositor.pixel(x, y, robot_height(self.scene.robot))
-        left = min(max(px - sprite.shape[1] / 2, 0), view.shape[1] - sprite.shape[1])
-        top = py - 2.2 * self._layout.unit - sprite.shape[0]
-        kernels.put_sprite(view, sprite, round(left), round(max(top, 0)), 1.0)
+        _put_above(view, sprite, px, py - 2.2 * self._layout.unit)
 
     def _mark_contact(self, view: Picture, at: float, flash: float, last: bool) -> None:
         """Mark the point of the first contact; let the picture's border flash while a contact is recent."""
@@ -259,8 +207,14 @@ class Shot:
         x, y, age = contact
         size = 2 * round(2.2 * self._layout.unit)
         px, py = self._compositor.pixel(x, y, robot_height(self.scene.robot) / 2)
-        kernels.put_sprite(view, burst(size, CONTACT), round(px - size / 2), round(py - size / 2), 1.0)
+        put(view, burst(size, CONTACT), px - size / 2, py - size / 2)
         fresh = max(0.0, 1.0 - age / flash)
         edge, tint = (0.75, 0.0) if last else (fresh, 0.25 * fresh)
         if edge > 0:
             kernels.flash(view, np.array(CONTACT, dtype=np.float64), 0.9 * self._layout.unit, edge, tint)
+
+
+def _put_above(view: Picture, sprite: Sprite, x: float, bottom: float) -> None:
+    """Put a small picture above a point of a picture, all of it in sight."""
+    left = min(max(x - sprite.shape[1] / 2, 0), view.shape[1] - sprite.shape[1])
+    put(view, sprite, left, max(bottom - sprite.shape[0], 0))

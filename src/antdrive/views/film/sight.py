@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import beams_of, lidar_of
 from antdrive.views import _kernels_seen as kernels
+from antdrive.views.colours import BEAM, HATCH, HIT, PALE
 from antdrive.views.film import _kernels_paint as painting
+from antdrive.views.film.camera import Picture
+from antdrive.views.film.ground import capsules
 from antdrive.views.recollection import Recollection, containers, laid_in_world
 from antdrive.views.scene import Scene
-from antdrive.views.style import BEAM, HATCH, HIT, PALE
 
 if TYPE_CHECKING:
     from antdrive.views.film.compositor import Backdrop
 
-Floats = npt.NDArray[np.float64]
-Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 VEIL, LINES = 0.62, 0.75  # how much of ground not known to be free is covered by the veil, and by its hatching
 PALENESS = 0.80  # of obstacles that were never seen
@@ -40,22 +40,13 @@ class FanPainter:
         """Go on to a moment [s]."""
         self._last = max(0, int(np.searchsorted(self._times, at + 1e-9, side="right")) - 1)
 
-    def lay_fan(
-        self,
-        frame: Picture,
-        backdrop: Backdrop,
-        forward: npt.NDArray[np.floating[Any]],
-        inverse: npt.NDArray[np.floating[Any]],
-    ) -> None:
+    def lay_fan(self, frame: Picture, backdrop: Backdrop) -> None:
         """Lay the beams of the last scan on the ground."""
         lidar, (eye, first, reaches) = self._lidar, beams_of(self._rollout, self._last)
         every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
-        style = np.array([TINT, BEAMS, backdrop.camera.pixel])
-        closed, colour = lidar.full_circle, np.array(BEAM, dtype=np.float64)
-        visible = backdrop.visible
-        kernels.lay_fan(
-            frame, visible, forward, inverse, eye, first, lidar.spacing, closed, reaches, every, style, colour
-        )
+        style, colour = np.array([TINT, BEAMS, backdrop.camera.pixel]), np.array(BEAM, dtype=np.float64)
+        fan = (eye, first, lidar.spacing, lidar.full_circle, reaches, every)
+        kernels.lay_fan(frame, backdrop.visible, backdrop.forward, backdrop.inverse, *fan, style, colour)
 
 
 class SightPainter(FanPainter):
@@ -81,16 +72,14 @@ class SightPainter(FanPainter):
         """Where places (N, 2) on the robot's map lie in the world now [m]."""
         return laid_in_world(points, self._drift)
 
-    def cover(self, frame: Picture, backdrop: Backdrop, inverse: npt.NDArray[np.floating[Any]], fine: int) -> None:
+    def cover(self, frame: Picture, backdrop: Backdrop, fine: int) -> None:
         """Hatch the ground that is not known to be free, and pale the obstacles that no beam has met."""
         seen, pixel = self._recollection.map, backdrop.camera.pixel
         style = np.array([VEIL, LINES, HATCHING * pixel, pixel])
         tints = np.array([PALE, HATCH], dtype=np.float64)
-        arrays, bounds = seen.arrays, np.array(self._scene.bounds)
-        visible = backdrop.visible
-        kernels.veil(
-            frame, visible, inverse, bounds, self._drift, arrays.free, arrays.occupied, arrays.frame, style, tints
-        )
+        arrays, bounds, visible = seen.arrays, np.array(self._scene.bounds), backdrop.visible
+        ground = (arrays.free, arrays.occupied, arrays.frame)
+        kernels.veil(frame, visible, backdrop.inverse, bounds, self._drift, *ground, style, tints)
         unmet = np.isinf(self._recollection.met)[self._around]
         if unmet.any():
             kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
@@ -99,9 +88,7 @@ class SightPainter(FanPainter):
         """Put the hits on the robot's map over everything, at the height of the beams."""
         camera = backdrop.camera
         plane = camera.plane(min(self._recollection.lidar.height, 0.3))
-        x, y, radius = self._discs.T
-        rows = np.column_stack([x, y, x, y, np.maximum(radius, 1.1 * camera.pixel)])
-        everywhere = np.ones_like(backdrop.visible)
-        inverse = np.linalg.inv(plane)
-        colour = np.array(HIT, dtype=np.float64)
-        painting.blend_capsules(frame, everywhere, plane, inverse, np.ascontiguousarray(rows), colour, 0.9)
+        places, radii = self._discs[:, :2], np.maximum(self._discs[:, 2], 1.1 * camera.pixel)
+        everywhere, colour = np.ones_like(backdrop.visible), np.array(HIT, dtype=np.float64)
+        rows = capsules(places, places, radii)
+        painting.blend_capsules(frame, everywhere, plane, np.linalg.inv(plane), rows, colour, 0.9)

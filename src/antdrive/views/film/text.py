@@ -12,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
-from antdrive.views.style import INK, Colour
+from antdrive.views.colours import Colour
+from antdrive.views.film import _kernels_paint as kernels
+from antdrive.views.film.camera import Picture
 
 Sprite: TypeAlias = npt.NDArray[np.uint8]  # (h, w, 4) RGBA
 
@@ -55,22 +57,22 @@ def wrapped(text: str, width: int, size: int, bold: bool = False, *, most: int) 
     return lines
 
 
-def label(text: str, size: int, colour: Colour = INK, *, bold: bool = True) -> Sprite:
+def label(text: str, size: int, colour: Colour) -> Sprite:
     """A text with a soft white rim, readable on any background."""
     rim = max(2, size // 7)
-    wide, high = text_width(text, size, bold) + 2 * rim, round(1.25 * size) + 2 * rim
+    wide, high = text_width(text, size, True) + 2 * rim, round(1.25 * size) + 2 * rim
     image = Image.new("RGBA", (wide, high), (255, 255, 255, 0))
     draw = ImageDraw.Draw(image)
     draw.text(
-        (rim, rim),
-        text,
-        font=font(size, bold),
-        fill=colour,
-        stroke_width=rim - 1,
-        stroke_fill=(255, 255, 255, 215),
+        (rim, rim), text, font=font(size, True), fill=colour, stroke_width=rim - 1, stroke_fill=(255, 255, 255, 215)
     )
-    draw.text((rim, rim), text, font=font(size, bold), fill=colour)
+    draw.text((rim, rim), text, font=font(size, True), fill=colour)
     return np.asarray(image)
+
+
+def put(frame: Picture, sprite: Sprite, left: float, top: float) -> None:
+    """Blend a small picture into a frame, with its upper left corner at a pixel; parts outside are cut off."""
+    kernels.put_sprite(frame, sprite, round(left), round(top), 1.0)
 
 
 def pill(text: str, size: int, colour: Colour, more: Sequence[str] = (), small: int = 0) -> Sprite:

@@ -6,59 +6,39 @@ when it is complete.
 
 from __future__ import annotations
 
+import functools
 import itertools
+import subprocess
+import tempfile
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import uuid
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image
 
 from antdrive.base.atomic import written_whole
-from antdrive.base.errors import InputError
+from antdrive.base.files import file_name, known_suffix
+from antdrive.base.types import Floats
+from antdrive.runs.pool import Pool, cores
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.film.camera import CAMERAS
-from antdrive.views.film.encoder import encoding, known_suffix
-from antdrive.views.film.parallel import MIN_FRAMES, process_count, render_frames
+from antdrive.views.film.camera import Picture
+from antdrive.views.film.options import ENCODERS, STILLS, FilmInfo, FilmOptions
 from antdrive.views.film.prelude import check_field, planning_frames
 from antdrive.views.film.replay import SLOW_MOTION, Replay
 from antdrive.views.film.shot import Shot
 
-Floats = npt.NDArray[np.float64]
-Picture = npt.NDArray[np.uint8]  # (H, W, 3)
-
-STILLS: dict[str, dict[str, Any]] = {".png": {}, ".webp": {"quality": 82, "method": 4}}  # how pictures are written
-
 HOLD = 1.0  # the last picture stays this long [s]
-
-
-@dataclass(frozen=True)
-class FilmInfo:
-    """Facts about a film that was written.
-
-    Attributes:
-        path: the file
-        frames: the number of frames
-        size: width and height [px]
-        fps: frames per second
-        camera: the camera's name
-        wall_s: how long rendering and encoding took [s]
-    """
-
-    path: Path
-    frames: int
-    size: tuple[int, int]
-    fps: float
-    camera: str
-    wall_s: float
-
-    @property
-    def duration_s(self) -> float:
-        """The film's length [s]."""
-        return self.frames / self.fps
+CHUNK = 16  # frames that a process renders before it hands them over
+MIN_FRAMES = 300  # starting processes takes as long as rendering this many frames
+MAX_PROCESSES = 8  # each takes some 150 MB
+FAILURE_SIZE = (960, 540)  # of films of a campaign's failures [px]
+LONGEST_FAILURE = 30.0  # a longer drive is shown faster, in this time [s]
 
 
 def film(
@@ -95,22 +75,15 @@ def film(
         OSError: the encoder could not write the film.
     """
     target = Path(path)
-    known_suffix(target)
-    check_options(camera, size, fps, speed)
-    started = time.perf_counter()
-    setting = {"camera": camera, "size": size, "note": note, "speed": speed}
+    known_suffix(target, ENCODERS)
+    options = FilmOptions(camera, size, fps, speed, note).checked()
     replay = Replay(rollout)
     times = frame_times(replay.duration, fps, speed, replay.slow_motion(speed))
     before, hold = round(prelude * fps), round(HOLD * fps)
-    total = before + len(times) + hold
     if before:
         check_field(rollout)
-    with written_whole(target) as temporary, encoding(temporary, size, fps) as send:
-        for k, picture in enumerate(_frames(rollout, setting, before, times, hold, jobs)):
-            send(picture)
-            if progress is not None:
-                progress((k + 1) / total)
-    return FilmInfo(target, total, size, float(fps), camera, time.perf_counter() - started)
+    frames = _frames(rollout, asdict(options), before, times, hold, jobs)
+    return encoded(target, options, before + len(times) + hold, frames, progress)
 
 
 def _frames(
@@ -157,11 +130,8 @@ def still(
         InputError: an unknown camera, a suffix other than .png and .webp, or a size that is out of range.
     """
     target = Path(path)
-    kind = target.suffix.lower()
-    if kind not in STILLS:
-        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose {' or '.join(STILLS)}")
-    check_options(camera, size, 1.0, 1.0)
-    shot = Shot(rollout, camera=camera, size=size, note=note)
+    kind = known_suffix(target, STILLS)
+    shot = Shot(rollout, **asdict(FilmOptions(camera, size, note=note).checked()))
     picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.replay.duration))
     with written_whole(target) as temporary:
         Image.fromarray(picture).save(temporary, format=kind[1:], **STILLS[kind])
@@ -177,12 +147,135 @@ def frame_times(duration: float, fps: float, speed: float, slow: tuple[float, fl
     return np.asarray(np.interp(np.arange(int(shown[-1] * fps + 1e-9) + 1) / fps, shown, run))
 
 
-def check_options(camera: str, size: tuple[int, int], fps: float, speed: float) -> None:
-    """Check a film's options before any work."""
-    if camera not in CAMERAS:
-        raise InputError(f"camera: unknown camera {camera!r}; choose one of {', '.join(CAMERAS)}")
-    if len(size) != 2 or any(side % 2 or not 160 <= side <= 4096 for side in size):
-        raise InputError(f"size: width and height must be even numbers from 160 to 4096, got {size}")
-    for key, value in (("fps", fps), ("speed", speed)):
-        if not 0 < value <= 240:
-            raise InputError(f"{key}: must be greater than 0 and at most 240, got {value:g}")
+def encoded(
+    target: Path,
+    options: FilmOptions,
+    total: int,
+    frames: Iterable[Picture],
+    progress: Callable[[float], None] | None = None,
+) -> FilmInfo:
+    """Render and encode the frames of a film, whole or not at all; facts about it."""
+    started = time.perf_counter()
+    with written_whole(target) as temporary, encoding(temporary, options.size, options.fps) as send:
+        for k, picture in enumerate(frames):
+            send(picture)
+            if progress is not None:
+                progress((k + 1) / total)
+    wall_s = time.perf_counter() - started
+    return FilmInfo(target, total, options.size, float(options.fps), options.camera, wall_s)
+
+
+@contextmanager
+def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
+    """A function that appends a frame (H, W, 3) to a film, which is complete when the `with` block ends.
+
+    Ffmpeg runs in its own process and is fed through a pipe.
+    """
+    import imageio_ffmpeg
+
+    rate = str(Fraction(fps).limit_denominator(100_000))
+    command = [
+        *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
+        *("-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-", "-an", *ENCODERS[path.suffix.lower()], str(path)),
+    ]
+    with tempfile.TemporaryFile() as messages:
+        # In its own session: Ctrl-C then reaches only this process, which stops ffmpeg and removes the file.
+        process = subprocess.Popen(  # noqa: S603
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=messages,
+            start_new_session=True,
+            bufsize=0,
+        )
+        pipe = process.stdin
+        assert pipe is not None
+        try:
+            yield lambda picture: _write_all(pipe, picture)
+            pipe.close()
+            process.wait()
+        except (BrokenPipeError, ConnectionResetError):
+            process.wait()
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+            pipe.close()
+        if process.returncode != 0:
+            messages.seek(0)
+            lines = messages.read().decode(errors="replace").strip().splitlines()
+            raise OSError(f"ffmpeg failed to write the film ({lines[0] if lines else process.returncode})")
+
+
+def _write_all(pipe: IO[bytes], picture: Picture) -> None:
+    left = np.ascontiguousarray(picture).data.cast("B")
+    while left:
+        left = left[pipe.write(left) :]
+
+
+def process_count() -> int:
+    """How many processes render at once by default: one per available core, at most `MAX_PROCESSES`."""
+    return min(MAX_PROCESSES, cores())
+
+
+def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs: int) -> Iterator[Picture]:
+    """The frames (H, W, 3) in order, rendered in several processes: with a moving camera each needs a backdrop of its own.
+
+    They are the same for any number of processes; `jobs` x `CHUNK` are held at once.
+    """
+    chunks = [(first, min(first + CHUNK, len(times))) for first in range(0, len(times), CHUNK)]
+    render = functools.partial(_render, uuid.uuid4().hex, rollout, setting, times)
+    with Pool(0 if jobs == 1 else jobs) as pool:
+        for k in range(0, len(chunks), jobs):
+            for rendered in pool.results(render, chunks[k : k + jobs]):
+                yield from rendered
+
+
+#: The shot of the film that a worker process renders, under the film's id.
+_shots: dict[str, Shot] = {}
+
+
+def _render(
+    number: str, rollout: Rollout, setting: dict[str, Any], times: Floats, chunk: tuple[int, int]
+) -> list[Picture]:
+    first, end = chunk
+    shot = _shots.get(number)
+    if shot is None:
+        _shots.clear()
+        shot = _shots[number] = Shot(rollout, **setting)
+    for at in times[:first][times[:first] > shot.shown]:
+        shot.extend_trail(at)
+    return [shot.frame(at) for at in times[first:end]]
+
+
+def film_failures(
+    rows: Iterable[Mapping[str, Any]],
+    logs: str | Path,
+    folder: str | Path,
+    *,
+    size: tuple[int, int] = FAILURE_SIZE,
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, Path]:
+    """Film every run of a campaign that did not arrive and whose log is there; the films, earlier ones too, by the runs' keys.
+
+    The line below the picture names the run, how it ended, and why. A drive longer than 30 s is shown in
+    30 s. A film that is newer than its log, or whose log is gone, is not made again.
+    """
+    failed = [row for row in rows if not row["succeeded"] and row["rollout"]]
+    films = {}
+    for k, row in enumerate(failed):
+        log = Path(logs) / row["rollout"]
+        name = f"{row['world']}-{row['planner']}-{row['robot']}-{row['seed']}-{row['key'][:8]}.mp4"
+        path = Path(folder) / file_name(name)
+        kept = log.exists()
+        if kept and (not path.exists() or path.stat().st_mtime < log.stat().st_mtime):
+            cause = ": ".join(text for text in (row["outcome"], row["reason"]) if text)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            drive = Rollout.load(log)
+            speed = max(1.0, float(drive.t[-1]) / LONGEST_FAILURE)
+            film(drive, path, size=size, speed=speed, note=f"seed {row['seed']}, {cause}")
+        if kept or path.exists():
+            films[row["key"]] = path
+        if progress is not None:
+            progress((k + 1) / len(failed))
+    return films

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
-from urllib.parse import quote
 
-from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.atomic import write_text
+from antdrive.base.errors import FieldError, input_error
+from antdrive.base.files import known_suffix
 from antdrive.runs.campaigns.results import common_folder, read_runs
 from antdrive.runs.statistics.runs import HASHES, RunTable
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
-from antdrive.views.pages.headline import headline
-from antdrive.views.pages.payload import json_column, json_texts, page_data
-from antdrive.views.pages.rendering import rendered, write_text
-from antdrive.views.pages.summary import CampaignSummary, measure_title, summarise
+from antdrive.views.pages.rendering import json_column, json_texts, link_to, page_data, rendered
+from antdrive.views.pages.summary import CampaignSummary, headline, measure_title, summarise
 from antdrive.views.pages.tables import (
     WORDS,
     all_cells,
@@ -72,16 +70,9 @@ def summarise_campaign(
     folders = _folders(folder)
     try:
         table, size = read_runs(folders, where, planners)
-        return summarise(
-            table,
-            title=title or ", ".join(one.resolve().name for one in folders),
-            size=size,
-            metrics=metrics,
-            against=against,
-            planners=planners,
-            allow=allow,
-            strict=strict,
-        )
+        named = title or ", ".join(one.resolve().name for one in folders)
+        asked: dict[str, Any] = {"against": against, "planners": planners, "allow": allow, "strict": strict}
+        return summarise(table, title=named, size=size, metrics=metrics, **asked)
     except FieldError as error:
         raise input_error(" ".join(map(str, folders)), str(error)) from None
 
@@ -130,43 +121,31 @@ def report_campaign(
 
 def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
     """Write a report about a campaign in the format of the file's suffix."""
-    check_suffix(out)
-    return WRITERS[out.suffix.lower()](summary, folder, out)
+    return WRITERS[check_suffix(out)](summary, folder, out)
 
 
-def check_suffix(out: Path) -> None:
-    """Refuse a file of a kind that is not written, before any work."""
-    if out.suffix.lower() not in WRITERS:
-        raise InputError(f"{out}: unknown suffix {out.suffix!r}; choose one of {', '.join(WRITERS)}")
+def check_suffix(out: Path) -> str:
+    """The suffix of a report, checked before any work."""
+    return known_suffix(out, WRITERS)
 
 
 def _write_markdown(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
     failures = [k for k, good in enumerate(summary.table.success) if not good]
-    table = summary.table
-    listed = [
-        {name: table.texts(name)[k] for name in ("world", "planner", "seed", "outcome", "reason", "command")}
-        for k in failures[:MARKDOWN_FAILURES]
-    ]
-    text = rendered(
-        "page.md.j2",
-        **_common(summary),
-        tables=all_cells(summary),
-        words=WORDS,
-        most=MARKDOWN_ROWS,
-        failures=listed,
-        failed=len(failures),
-    )
-    return write_text(out, text)
+    facts = {name: summary.table.texts(name) for name in ("world", "planner", "seed", "outcome", "reason", "command")}
+    listed = [{name: texts[k] for name, texts in facts.items()} for k in failures[:MARKDOWN_FAILURES]]
+    tables = {"tables": all_cells(summary), "words": WORDS, "most": MARKDOWN_ROWS}
+    text = rendered("page.md.j2", **_common(summary), **tables, failures=listed, failed=len(failures))
+    return [write_text(out, text)]
 
 
 def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
+    from antdrive.views.colours import label_styles
     from antdrive.views.pages.charts import campaign_charts
-    from antdrive.views.pages.colours import label_styles
 
     names = dict(zip(summary.table.texts("planner"), summary.table.texts("planner_name"), strict=True))
     planners = summary.paired.planners
     styles = label_styles(planners, [names[label] or label for label in planners])
-    base = quote(Path(os.path.relpath(folder.resolve(), out.resolve().parent)).as_posix()) + "/"
+    base = link_to(folder, out.parent) + "/"
     text = rendered(
         "page.html.j2",
         **_common(summary),
@@ -184,7 +163,7 @@ def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]
         rows=len(summary.table),
         data=campaign_data(summary.table, planners, base),
     )
-    return write_text(out, text)
+    return [write_text(out, text)]
 
 
 def campaign_data(table: RunTable, planners: Sequence[str], base: str) -> str:
@@ -198,7 +177,7 @@ def campaign_data(table: RunTable, planners: Sequence[str], base: str) -> str:
     return page_data(
         kept,
         [name for name in (*SHOWN[:2], *different, *options, *SHOWN[2:], *MEASURED) if name in names],
-        {name: _title(name) for name in names},
+        {column["name"]: _title(column["name"]) for column in kept},
         [bool(value) for value in table.success],
         planners,
         sentences=SENTENCES,
@@ -217,23 +196,18 @@ def _commands(table: RunTable) -> dict[str, Any]:
 
 
 def _title(name: str) -> str:
-    if name in METRICS or name.endswith("_m"):
-        return measure_title(name) if name in METRICS else f"{name.removesuffix('_m').replace('_', ' ')} [m]"
-    return name.removeprefix("option.").replace("_", " ") if name.startswith("option.") else name.replace("_", " ")
+    if name not in METRICS and name.endswith("_m"):
+        return f"{name.removesuffix('_m').replace('_', ' ')} [m]"
+    return measure_title(name) if name in METRICS else name.removeprefix("option.").replace("_", " ")
 
 
 def _common(summary: CampaignSummary) -> dict[str, Any]:
-    return {
-        "title": summary.title,
-        "summary": summary,
-        "cards": headline(summary),
-        "notes": summary.notes,
-        "definitions": {name: METRICS[name].definition for name in summary.comparisons if name in METRICS},
-    }
+    definitions = {name: METRICS[name].definition for name in summary.comparisons if name in METRICS}
+    parts = {"cards": headline(summary), "notes": summary.notes, "definitions": definitions}
+    return {"title": summary.title, "summary": summary, **parts}
 
 
-Writer = Callable[[CampaignSummary, Path, Path], list[Path]]
-WRITERS: Mapping[str, Writer] = MappingProxyType(
+WRITERS: Mapping[str, Callable[[CampaignSummary, Path, Path], list[Path]]] = MappingProxyType(
     {
         ".html": _write_page,
         ".md": _write_markdown,

@@ -6,22 +6,19 @@ import io
 import math
 import re
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
-import numpy.typing as npt
 from matplotlib.cbook import boxplot_stats
 from matplotlib.figure import Figure
 
+from antdrive.base.types import Flags, Floats
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.runs.statistics.profiles import StepCurve, distributions, performance_profiles
+from antdrive.runs.statistics.success import StepCurve, distributions, performance_profiles
+from antdrive.views.colours import INK, MUTED, LabelStyle, hexed
 from antdrive.views.figures.canvas import new_figure, styled
-from antdrive.views.pages.colours import LabelStyle
 from antdrive.views.pages.summary import CampaignSummary, known_metrics, measure_title
-from antdrive.views.style import INK, MUTED, hexed
-
-Floats: TypeAlias = npt.NDArray[np.float64]
 
 WORST = 10_000.0  # times the best value: the right end of a profile
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
@@ -119,9 +116,7 @@ def _thinned(x: Floats, share: Floats, low: float, high: float, log: bool) -> tu
     return x[last], share[last]
 
 
-def _size_boxes(
-    paired: PairedRuns, name: str, common: npt.NDArray[np.bool_], styles: Sequence[LabelStyle]
-) -> list[Chart]:
+def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[LabelStyle]) -> list[Chart]:
     """Boxes over groups of worlds of like size, a panel for each planner, on instances that all planners solved."""
     for column in (AREA, OPTIMUM):
         known = np.nan_to_num(paired.table.numbers(column), nan=-np.inf)

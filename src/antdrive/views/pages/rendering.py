@@ -1,15 +1,145 @@
-"""The templates of pages and of their Markdown."""
+"""How pages are written: values as text, runs as JSON, and the templates of pages and of their Markdown."""
 
 from __future__ import annotations
 
+import json
+import math
+import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
+from urllib.parse import quote
 
-from antdrive.base.atomic import written_whole
+from antdrive.runs.statistics.intervals import Interval
+
+NONE = "–"
+LONGEST = 200  # characters of a text
+
+
+class TextTable(NamedTuple):
+    """A table of text."""
+
+    title: str  # what it shows
+    headings: tuple[str, ...]  # of its columns
+    rows: list[tuple[str, ...]]  # its cells
+
+
+def percent(share: float) -> str:
+    """A share in percent, with one digit; 100.0 and 0.0 only where they are exact."""
+    if math.isnan(share):
+        return NONE
+    shown = f"{100 * share + 0.0:.1f}"
+    if shown == "100.0" and share < 1:
+        return f"{math.floor(10_000 * share) / 100:.2f}"
+    return "0.0" if shown == "-0.0" else shown
+
+
+def percents(interval: Interval) -> str:
+    """An interval of shares in percent."""
+    return NONE if math.isnan(interval.low) else f"{percent(interval.low)} to {percent(interval.high)}"
+
+
+def short(value: float) -> str:
+    """A number with three significant digits."""
+    if not math.isfinite(value):
+        return NONE if math.isnan(value) else "∞"
+    if value == 0:
+        return "0"
+    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    text = f"{value:.{min(digits, 6)}f}"
+    return "0" if float(text) == 0 else text
+
+
+def with_interval(value: float, interval: Interval) -> str:
+    """A number with its interval in brackets."""
+    return f"{short(value)} ({short(interval.low)} to {short(interval.high)})"
+
+
+def probability(p: float) -> str:
+    """A p-value."""
+    if math.isnan(p):
+        return NONE
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+
+
+def number(value: Any) -> float | None:
+    """Return a finite number; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        found = float(value)
+    except OverflowError:
+        return None
+    return found if math.isfinite(found) else None
+
+
+def shown(value: Any, longest: int = LONGEST) -> str:
+    """A value as text on one line of printable characters, cut to a length."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None:
+        return NONE
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    text = repr(value) if isinstance(value, list | dict) else str(value)
+    text = "".join(c if c.isprintable() else " " for c in text[: 4 * longest])
+    text = " ".join(text.split())
+    return text if len(text) <= longest else f"{text[:longest]}…"
+
+
+SIGNIFICANT = 6  # digits of numbers in the page
+
+
+def page_data(
+    columns: Sequence[Mapping[str, Any]],
+    shown: Sequence[str],
+    titles: Mapping[str, str],
+    good: Sequence[bool],
+    planners: Sequence[str],
+    **more: Any,
+) -> str:
+    """Return the runs of a page as JSON that may stand in a script element."""
+    data = {
+        "rows": len(good),
+        "planners": list(planners),
+        "columns": columns,
+        "shown": shown,
+        "titles": titles,
+        "good": [int(value) for value in good],
+        **more,
+    }
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def json_column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
+    """Return a column by its kind: numbers, or texts; None if it is empty."""
+    if all(value is None for value in values):
+        return None
+    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
+        return {"name": name, "numbers": [_number(value) for value in values]}
+    return {"name": name, **json_texts([None if value is None else str(value) for value in values])}
+
+
+def json_texts(values: Sequence[str | None]) -> dict[str, Any]:
+    """Return texts, or the different ones and the place of each row's text among them."""
+    different = {value: k for k, value in enumerate(dict.fromkeys(value for value in values if value is not None))}
+    if len(different) == len(values):
+        return {"texts": list(values)}
+    return {"texts": list(different), "places": [-1 if value is None else different[value] for value in values]}
+
+
+def _number(value: Any) -> float | int | None:
+    if value is None or not math.isfinite(value):
+        return None
+    if isinstance(value, int):
+        return value
+    rounded = float(f"{value:.{SIGNIFICANT}g}")
+    return int(rounded) if rounded.is_integer() and abs(rounded) < 1e15 else rounded
+
 
 #: Parts of a page or of its Markdown that not every one has.
 NO_PARTS: Mapping[str, Any] = MappingProxyType(
@@ -20,13 +150,6 @@ NO_PARTS: Mapping[str, Any] = MappingProxyType(
         **dict.fromkeys(("failed", "undetailed", "uncounted"), 0),
     }
 )
-
-
-def write_text(out: Path, text: str) -> list[Path]:
-    """Write a file whole or not at all."""
-    with written_whole(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return [out]
 
 
 def rendered(template: str, **content: Any) -> str:
@@ -40,6 +163,11 @@ def rendered(template: str, **content: Any) -> str:
     )
     environment.filters |= {"md": markdown_text, "fence": fence_for}
     return environment.get_template(template).render(**{**NO_PARTS, **content}, version=metadata.version("antdrive"))
+
+
+def link_to(path: Path, base: Path) -> str:
+    """The path of a file relative to the page's folder, quoted for a URL."""
+    return quote(Path(os.path.relpath(path.resolve(), base.resolve())).as_posix())
 
 
 def markdown_text(value: object) -> str:

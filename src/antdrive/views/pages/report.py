@@ -15,12 +15,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
+from antdrive.base.atomic import write_text
 from antdrive.base.errors import InputError
+from antdrive.base.files import known_suffix
 from antdrive.sim.pipeline import Run
-from antdrive.views.pages.payload import json_column, page_data
-from antdrive.views.pages.rendering import rendered, write_text
+from antdrive.views.pages.rendering import json_column, link_to, page_data, rendered, shown
 from antdrive.views.pages.runs import (
     COLUMN_NOTES,
     MEASURED,
@@ -34,7 +34,6 @@ from antdrive.views.pages.runs import (
     run_columns,
     run_table,
 )
-from antdrive.views.pages.texts import shown
 
 EMBEDDED_BYTES = 4_500_000  # of all embedded figures together, as base64
 MAX_PIXELS = 100_000_000  # of a figure
@@ -84,11 +83,8 @@ def write_report(
         InputError: no runs there, a broken `result.json`, or an unknown suffix.
     """
     target = Path(out)
-    kind = target.suffix.lower()
-    if kind not in (".html", ".md"):
-        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose .html or .md")
+    page = known_suffix(target, (".html", ".md")) == ".html"
     given: list[Any] = [runs] if isinstance(runs, Run | str | os.PathLike) else list(runs)
-    page = kind == ".html"
     reported: list[ReportedRun] = []
     for source in given:
         if isinstance(source, Run):
@@ -119,7 +115,7 @@ def write_report(
 
 def _page(runs: list[ReportedRun], title: str) -> str:
     """The web page."""
-    from antdrive.views.pages.colours import label_styles
+    from antdrive.views.colours import label_styles
 
     planners = sorted({run.planner for run in runs})
     columns = [column for name, values in run_columns(runs).items() if (column := json_column(name, values))]
@@ -213,16 +209,13 @@ def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
         if kind is None or not _lies_in(path, run.folder):
             continue
         if path.stat().st_mtime < driven:
-            run.links.append(Attachment(f"{path.name} ({other})", _link(path, base)))
+            run.links.append(Attachment(f"{path.name} ({other})", link_to(path, base)))
             continue
-        source = _data_uri(kind, path.read_bytes()) if embed_films else _link(path, base)
+        source = _data_uri(kind, path.read_bytes()) if embed_films else link_to(path, base)
         run.films.append(Attachment(path.name, source, is_video=kind.startswith("video/")))
-    for names, found in (
-        (("rollout.npz", "result.json"), run.links),
-        (("overview.png", "plan.png"), run.pictures),
-    ):
+    for names, found in ((("rollout.npz", "result.json"), run.links), (("overview.png", "plan.png"), run.pictures)):
         found += [
-            Attachment(name, _link(run.folder / name, base))
+            Attachment(name, link_to(run.folder / name, base))
             for name in names
             if _lies_in(run.folder / name, run.folder)
         ]
@@ -246,7 +239,7 @@ def _attach_figures(runs: list[ReportedRun], base: Path, used: int) -> None:
                 used += len(figure.source)
                 run.figures.append(figure)
             else:
-                run.links.append(Attachment(name, _link(path, base)))
+                run.links.append(Attachment(name, link_to(path, base)))
 
 
 def _embedded(path: Path, caption: str) -> Attachment:
@@ -271,11 +264,6 @@ def _embedded(path: Path, caption: str) -> Attachment:
 
 def _data_uri(kind: str, content: bytes) -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
-
-
-def _link(path: Path, base: Path) -> str:
-    """The path of a file relative to the page's folder, quoted for a URL."""
-    return quote(Path(os.path.relpath(path.resolve(), base.resolve())).as_posix())
 
 
 def _cards(runs: list[ReportedRun]) -> list[tuple[str, str]]:

@@ -11,30 +11,21 @@ from typing import Any
 
 from antdrive.base.errors import InputError, input_error
 from antdrive.sim.log.certificate import Certificate, certify
-from antdrive.sim.log.claims import false_claims, logged_settings, read_result
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
-from antdrive.views.pages.texts import NONE, TextTable, number, shown
+from antdrive.sim.verifying import false_claims, logged_settings, read_result
+from antdrive.views.pages.rendering import NONE, TextTable, number, shown
 
 LONGEST_COMMAND = 4000  # characters
 UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs that have no log
 CONTACT = (Outcome.COLLIDED.key, Outcome.INVALID_PLAN.key)  # outcomes with a red badge
 CLAIMED = (
-    *(
-        "smoothing",
-        "noise",
-        "margin_m",
-        "margin_auto",
-        "cell_m",
-        "physics_hz",
-        "control_hz",
-        "time_limit_s",
-        "settings",
-    ),
+    *("smoothing", "noise", "margin_m", "margin_auto", "cell_m", "physics_hz", "control_hz", "time_limit_s"),
+    "settings",
 )
 REQUIRED = ("world", "planner", "robot", "seed", "outcome")  # keys of result.json
 
@@ -71,19 +62,15 @@ SENSED = {"map": "given", "localisation": "fixes"}  # unless the log says otherw
 LISTED_SIGHTS = 40  # of the cylinders that a robot passed those that it came nearest to
 
 #: What the less obvious columns mean.
-COLUMN_NOTES = (
-    ("path", "length of the planned path, before smoothing"),
-    (
-        "gap",
-        "how much longer the smoothed route is than the shortest path among the inflated obstacles; only with the map",
-    ),
-    ("min clearance", "smallest distance to an obstacle at any logged pose"),
-    ("planning", "wall time of the plan, with the kernels loaded"),
-    (
-        "explored",
-        "ground that the lidar of a robot without a map saw, near or far; on the robot's own map there is less",
-    ),
-    ("proved", "distance that the certificate guarantees between logged poses, too"),
+COLUMN_NOTES = tuple(
+    {
+        "path": "length of the planned path, before smoothing",
+        "gap": "how much longer the smoothed route is than the shortest path among the inflated obstacles; only with the map",
+        "min clearance": "smallest distance to an obstacle at any logged pose",
+        "planning": "wall time of the plan, with the kernels loaded",
+        "explored": "ground that the lidar of a robot without a map saw, near or far; on the robot's own map there is less",
+        "proved": "distance that the certificate guarantees between logged poses, too",
+    }.items()
 )
 
 
@@ -127,41 +114,22 @@ class ReportedRun:
     pictures: list[Attachment] = field(default_factory=list)  # figures beside the page, for the Markdown report
     # settings that differ between the runs, as shown, by the keys of `SETTINGS`
     differing: dict[str, str] = field(default_factory=dict)
+    world: str = field(init=False)  # the world's name
+    planner: str = field(init=False)  # the planner's name
+    robot: str = field(init=False)  # the robot's name
+    seed: str = field(init=False)  # the random seed
+    reason: str = field(init=False)  # what the outcome leaves open
+    command: str = field(init=False)  # the command that repeats the run, as result.json claims it
 
-    @property
-    def world(self) -> str:
-        """The world's name."""
-        return shown(self.log.record.task.world.name if self.log else self.result["world"])
-
-    @property
-    def planner(self) -> str:
-        """The planner's name."""
-        return shown(self.log.record.planner.name if self.log else self.result["planner"])
-
-    @property
-    def robot(self) -> str:
-        """The robot's name."""
-        return shown(self.log.record.robot.name if self.log else self.result["robot"])
-
-    @property
-    def seed(self) -> str:
-        """The random seed."""
-        return shown(self.log.record.seed if self.log else self.result["seed"])
-
-    @property
-    def reason(self) -> str:
-        """What the outcome leaves open."""
-        return shown((self.log.record.reason if self.log else self.result.get("reason")) or "")
-
-    @property
-    def command(self) -> str:
-        """The command that repeats the run, as result.json claims it."""
-        return shown(self.result.get("command") or "", LONGEST_COMMAND)
-
-    @property
-    def anchor(self) -> str:
-        """The id of the run's section."""
-        return f"run-{self.number}"
+    def __post_init__(self) -> None:
+        names = {key: self.result.get(key) for key in ("world", "planner", "robot", "seed", "reason")}
+        if self.log is not None:
+            r = self.log.record
+            found = (r.task.world.name, r.planner.name, r.robot.name, r.seed, r.reason)
+            names = dict(zip(names, found, strict=True))
+        self.world, self.planner, self.robot, self.seed = (shown(names[key]) for key in list(names)[:4])
+        self.reason = shown(names["reason"] or "")
+        self.command = shown(self.result.get("command") or "", LONGEST_COMMAND)
 
     @property
     def claimed(self) -> bool:
@@ -385,19 +353,13 @@ def _option_texts(runs: Sequence[ReportedRun]) -> list[str]:
 def _sight_pairs(sights: Sequence[Sighting]) -> list[tuple[str, str]]:
     """When each cylinder was first seen and how near the robot came, those that it came nearest to, in the order of time."""
     nearest = sorted(sights, key=lambda sight: (not sight.touched, sight.nearest))[:LISTED_SIGHTS]
-    return [
-        (
-            sight.name,
-            (
-                f"seen {sight.seen_at:.2f} s, {sight.seen_from:.2f} m; "
-                if math.isfinite(sight.seen_at)
-                else "never seen; "
-            )
-            + (f"followed {sight.followed_at:.2f} s; " if math.isfinite(sight.followed_at) else "")
-            + f"{'touched' if sight.touched else 'nearest'} {sight.nearest_at:.2f} s, {sight.nearest:.2f} m",
-        )
-        for sight in sorted(nearest, key=lambda sight: sight.nearest_at)
-    ]
+    found = []
+    for sight in sorted(nearest, key=lambda sight: sight.nearest_at):
+        seen = f"seen {sight.seen_at:.2f} s, {sight.seen_from:.2f} m" if math.isfinite(sight.seen_at) else "never seen"
+        followed = f"followed {sight.followed_at:.2f} s; " if math.isfinite(sight.followed_at) else ""
+        came = f"{'touched' if sight.touched else 'nearest'} {sight.nearest_at:.2f} s, {sight.nearest:.2f} m"
+        found.append((sight.name, f"{seen}; {followed}{came}"))
+    return found
 
 
 def _pairs(values: Any) -> list[tuple[str, str]]:

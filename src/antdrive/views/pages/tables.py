@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text, written_whole
 from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.runs.statistics.success import PlannerSuccess
-from antdrive.views.pages.rendering import write_text
+from antdrive.views.pages.rendering import NONE, TextTable, percent, percents, probability, short, with_interval
 from antdrive.views.pages.summary import CampaignSummary, measure_title
-from antdrive.views.pages.texts import NONE, TextTable, percent, percents, probability, short, with_interval
 
 #: Headings of columns that hold words.
 WORDS = ("planner", "first", "second", "better", "lower", "against", "measure", "not worse")
@@ -130,34 +129,31 @@ def success_note(row: PlannerSuccess) -> str:
 def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
     """Plain numbers, for programs: shares between 0 and 1, an empty cell where there is none."""
     names = list(summary.medians)
-    with written_whole(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        medians = [f"{name}{end}" for name in names for end in ("_median", "_low", "_high")]
-        outcomes = sorted({name for row in summary.success for name in row.outcomes})
-        counts = ["planner", "runs", "elsewhere", "counted", "succeeded"]
-        shares = ["share", "low", "high", "worlds_low", "worlds_high"]
-        writer.writerow([*counts, *shares, *medians, *(f"outcome.{name}" for name in outcomes)])
-        for k, row in enumerate(summary.success):
-            found = [value for name in names for value in (summary.medians[name][k][0], *summary.medians[name][k][1])]
-            counted = [row.planner, row.runs, row.elsewhere, row.counted, row.successes]
-            ended = [row.outcomes.get(name, 0) for name in outcomes]
-            writer.writerow(_cells([*counted, row.share, *row.interval, *row.over_worlds, *found, *ended]))
-    rows = [row for comparisons in summary.comparisons.values() for row in comparisons]
-    if not rows:
+    medians = [f"{name}{end}" for name in names for end in ("_median", "_low", "_high")]
+    outcomes = sorted({name for row in summary.success for name in row.outcomes})
+    counts = ["planner", "runs", "elsewhere", "counted", "succeeded"]
+    shares = ["share", "low", "high", "worlds_low", "worlds_high"]
+    lines: list[list[Any]] = [[*counts, *shares, *medians, *(f"outcome.{name}" for name in outcomes)]]
+    for k, row in enumerate(summary.success):
+        found = [value for name in names for value in (summary.medians[name][k][0], *summary.medians[name][k][1])]
+        counted = [row.planner, row.runs, row.elsewhere, row.counted, row.successes]
+        ended = [row.outcomes.get(name, 0) for name in outcomes]
+        lines.append([*counted, row.share, *row.interval, *row.over_worlds, *found, *ended])
+    _write_lines(out, lines)
+    pairs = [row for comparisons in summary.comparisons.values() for row in comparisons]
+    if not pairs:
         return [out]
+    flat = [{**row.as_dict(), "low": row.interval.low, "high": row.interval.high} for row in pairs]
+    keys = [key for key in flat[0] if key != "interval"]
     other = out.with_name(f"{out.stem}-pairs{out.suffix}")
-    with written_whole(other) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        flat = [{**row.as_dict(), "low": row.interval.low, "high": row.interval.high} for row in rows]
-        keys = [key for key in flat[0] if key != "interval"]
-        writer.writerow(keys)
-        for one in flat:
-            writer.writerow(_cells([one[key] for key in keys]))
+    _write_lines(other, [keys, *([one[key] for key in keys] for one in flat)])
     return [out, other]
 
 
-def _cells(values: Sequence[Any]) -> list[Any]:
-    return ["" if value != value else value for value in values]
+def _write_lines(path: Path, lines: Sequence[Sequence[Any]]) -> None:
+    """Write comma-separated values, an empty cell for what is not a number."""
+    with written_whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows(["" if value != value else value for value in line] for line in lines)
 
 
 def write_latex(summary: CampaignSummary, out: Path) -> list[Path]:
@@ -166,7 +162,7 @@ def write_latex(summary: CampaignSummary, out: Path) -> list[Path]:
     for table in all_cells(summary):
         lines += ["", f"% {latex_text(table.title)}", *_latex_table(table)]
     lines += ["", *(f"% {latex_text(note)}" for note in summary.notes)]
-    return write_text(out, "\n".join(lines).rstrip() + "\n")
+    return [write_text(out, "\n".join(lines).rstrip() + "\n")]
 
 
 def _latex_table(table: TextTable) -> list[str]:

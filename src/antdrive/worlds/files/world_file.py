@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import yaml
 from pydantic import BaseModel, Field
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text
 from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of, suggest, yaml_number
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
@@ -210,8 +210,7 @@ def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingP
             f"{size / 1e6:.1f} MB and {values} values, and a world file has at most {MAX_BYTES / 1e6:g} MB and "
             f"{MAX_VALUES} values; use fewer, larger cylinders (for maps, a larger overhang)",
         )
-    with written_whole(path) as part:
-        part.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def ends_to_dict(task: Task) -> dict[str, Any]:
@@ -311,3 +310,10 @@ def _flow(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(_flow, value)) + "]"
     return yaml_number(value) if isinstance(value, float) else str(value)
+
+
+def require_no_movers(task: Task, path: str | Path) -> None:
+    """Refuse a task with movers, which no format but our own can hold."""
+    if task.world.movers:
+        problem = f"cannot hold {task.world.name}'s movers; export a world in which nothing moves"
+        raise input_error(str(path), problem)

@@ -143,9 +143,6 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
 
     Free cells stay separated where the map separates them: no way leads between or past the discs. Blocked cells that
     no free cell touches are left out.
-
-    Raises:
-        InputError: the overhang is too small for the disc around a cell, or the map has too many cells.
     """
     from antdrive.worlds.formats import _kernels_cover as kernels
 
@@ -250,11 +247,7 @@ def file_task(
     cell: float | None,
     goal_tolerance: float | None,
 ) -> Task:
-    """`map_task` for a map from a file, which gives the world's name and is named in errors.
-
-    Raises:
-        InputError: as for `map_task`.
-    """
+    """`map_task` for a map from a file, which gives the world's name and is named in errors."""
     name = "".join(filter(str.isprintable, file.stem))[:200] or "map"
     tolerance = TOLERANCE if goal_tolerance is None else goal_tolerance
     try:

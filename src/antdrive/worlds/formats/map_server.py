@@ -21,16 +21,16 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text, written_whole
 from antdrive.base.checks import OneLine, check, yaml_number
 from antdrive.base.document import read_document
 from antdrive.base.errors import FieldError, input_error
+from antdrive.base.files import require_new
 from antdrive.base.plane import in_map, out_of_map
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats, Point, Pose
-from antdrive.worlds.files.world_file import Goal, Start, Triple
+from antdrive.worlds.files.world_file import Goal, Start, Triple, require_no_movers
 from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
-from antdrive.worlds.formats.checks import require_new, require_no_movers
 from antdrive.worlds.limits import MAX_CELLS, Size
 from antdrive.worlds.world import Task
 
@@ -149,11 +149,7 @@ def import_map_server(
 
 
 def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
-    """The other tasks that `export_map_server` added to a map, by name; empty for a map that antdrive did not write.
-
-    Raises:
-        InputError: the file is wrong, or a task does not lie in the world.
-    """
+    """The other tasks that `export_map_server` added to a map, by name; empty for a map that antdrive did not write."""
     document = read_document(path)
     entry = check(MapFile, document)
     found = {}
@@ -171,11 +167,7 @@ def _out_of_map(frame: Pose, end: Any) -> Any:
 
 
 def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> ServedMap:
-    """The map that a YAML file describes.
-
-    Raises:
-        InputError: a file cannot be read or is wrong.
-    """
+    """The map that a YAML file describes."""
     document = read_document(path)
     if isinstance(document.data, dict) and "image" not in document.data:
         raise document.error((), "names no image, so it is not a map of map_server")
@@ -199,9 +191,6 @@ def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
     """The brightness of the pixels, 0..255, and which pixels are opaque; both (R, C), the image's top row first.
 
     Brightness is the mean of the channels; in its trinary mode map_server counts the alpha channel among them.
-
-    Raises:
-        ValueError: the image cannot be read; the message says why.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -283,8 +272,7 @@ def export_map_server(
         )
     with written_whole(image) as part:
         part.write_bytes(b"P5\n%d %d\n255\n" % (cols, rows) + picture.tobytes())
-    with written_whole(target) as part:
-        part.write_text(text, encoding="utf-8", newline="\n")
+    write_text(target, text, newline="\n")
     return image
 
 

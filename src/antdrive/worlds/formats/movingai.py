@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import write_text, written_whole
 from antdrive.base.errors import input_error
-from antdrive.base.reading import read_bytes
+from antdrive.base.files import read_bytes
 from antdrive.base.types import Point, Pose
+from antdrive.worlds.files.world_file import require_no_movers
 from antdrive.worlds.formats.cellmap import CellMap, cell_map, file_task
-from antdrive.worlds.formats.checks import require_no_movers
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import Task
 
@@ -256,5 +256,4 @@ def export_movingai_problems(problems: Iterable[MapProblem], shape: tuple[int, i
         (r0, c0), (r1, c1) = p.start, p.goal
         values = (p.bucket, p.map_name, cols, rows, c0, rows - 1 - r0, c1, rows - 1 - r1, p.printed)
         lines.append("\t".join(map(str, values)))
-    with written_whole(path) as part:
-        part.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(lines) + "\n", newline="\n")

@@ -1,25 +1,25 @@
-"""XML from strangers: bounded in size and depth, without document types and entities."""
+"""XML from strangers: bounded in size and depth, without document types and entities; and the turns that it writes."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
+import numpy as np
+
 from antdrive.base.errors import input_error
-from antdrive.base.reading import read_bytes
+from antdrive.base.files import read_bytes
+from antdrive.base.types import Floats
 
 MAX_BYTES = 50_000_000  # BARN's worlds have 0.7 MB
 MAX_DEPTH = 100
 
 
 def parse_xml(path: Path) -> ET.Element:
-    """The root element of an XML file.
-
-    Raises:
-        InputError: the file cannot be read, is not XML, or declares a document type or entities.
-    """
+    """The root element of an XML file."""
     content = read_bytes(path, MAX_BYTES, "an XML file")
     parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
 
@@ -52,3 +52,15 @@ def parse_xml(path: Path) -> ET.Element:
             raise input_error(str(path), f"not XML: {error}") from None
         raise
     return builder.close()
+
+
+def turned(roll: float, pitch: float, yaw: float) -> Floats:
+    """The turn (3, 3) about the fixed axes x, y and z [rad]."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

@@ -7,14 +7,15 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base.errors import FieldError, input_error, require_positive
+from antdrive.base.reuse import reused
 from antdrive.base.types import Point
 from antdrive.worlds.formats.barn import BARN_BOUNDS, BARN_CELL, BARN_GOAL, BARN_START, BARN_TOLERANCE
-from antdrive.worlds.generators.automaton import crossable, cylinders, grow_field
 from antdrive.worlds.geometry import point_clearance
 from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
 from antdrive.worlds.world import Disc, Task, World
@@ -203,12 +204,7 @@ GENERATORS: Mapping[str, Callable[..., Task]] = MappingProxyType({"forest": fore
 
 
 def generate(
-    kind: str,
-    rng: np.random.Generator,
-    options: Mapping[str, str],
-    *,
-    name: str | None = None,
-    note: str = "",
+    kind: str, rng: np.random.Generator, options: Mapping[str, str], *, name: str | None = None, note: str = ""
 ) -> Task:
     """A random world, with options as texts.
 
@@ -240,6 +236,12 @@ def generate(
         raise input_error(kind, *([error.key] if error.key != kind else []), error.problem) from None
     source = "; ".join(part for part in (task.world.source, note) if part)
     return replace(task, world=replace(task.world, name=name or kind, source=source))
+
+
+@reused(64)
+def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
+    """The random world that {generate: KIND, seed: SEED} with options stands for in a file."""
+    return generate(kind, np.random.default_rng(seed), dict(options), name=f"{kind}-{seed}", note=f"seed {seed}")
 
 
 def _value(kind: str, key: str, text: str, default: Any) -> Any:
@@ -274,3 +276,69 @@ def _connected(grid: Grid, task: Task) -> bool:
                 seen.add(there)
                 todo.append(there)
     return False
+
+
+Picture: TypeAlias = npt.NDArray[np.bool_]  # (rows, columns), True where filled
+
+SIDE = 30  # rows and columns of the automaton
+RUNWAY = 34  # rows before the field; the first row is a wall
+HEIGHT = 0.5  # of a cylinder [m]
+
+
+def grow_field(rng: np.random.Generator, fill: float, rounds: int) -> Picture:
+    """A random field after smoothing, (30, 30), rows in the direction from start to goal."""
+    field = rng.random((SIDE, SIDE)) < fill
+    field[:, [0, -1]] = True
+    for _ in range(rounds):
+        count = _neighbours(field)
+        field = (field & (count > 1)) | (count >= 5)
+        field[:, [0, -1]] = True
+    return field
+
+
+def _neighbours(field: Picture) -> npt.NDArray[np.int64]:
+    """The number of filled neighbours of each cell. Beyond the side walls all cells count as filled, beyond the ends none."""
+    rows, cols = field.shape
+    padded = np.zeros((rows + 2, cols + 2), dtype=np.int64)
+    padded[:, [0, -1]] = 1
+    padded[1:-1, 1:-1] = field
+    count = np.zeros(field.shape, dtype=np.int64)
+    for dr, dc in DIRECTIONS:
+        count += padded[1 + dr : 1 + dr + rows, 1 + dc : 1 + dc + cols]
+    return count
+
+
+def crossable(field: Picture, robot_radius: float) -> bool:
+    """Whether cells with room for the robot join the field's ends: a cheap test that every crossable field passes."""
+    reach = math.floor((robot_radius / BARN_CELL) + 0.5)
+    free = np.ones(field.shape, dtype=np.bool_)
+    rows, cols = field.shape
+    for row, col in np.ndindex(2 * reach + 1, 2 * reach + 1):
+        dr, dc = row - reach, col - reach
+        if math.hypot(dr, dc) * BARN_CELL - BARN_CELL / 2 <= robot_radius:
+            to_row, to_col = slice(max(0, dr), rows + min(0, dr)), slice(max(0, dc), cols + min(0, dc))
+            from_row, from_col = slice(max(0, -dr), rows - max(0, dr)), slice(max(0, -dc), cols - max(0, dc))
+            free[to_row, to_col] &= ~field[from_row, from_col]
+    reached = np.zeros(field.shape, dtype=np.bool_)
+    reached[0] = free[0]
+    count: Any = -1
+    while np.count_nonzero(reached) != count:
+        count = np.count_nonzero(reached)
+        reached[1:] |= reached[:-1]
+        reached[:-1] |= reached[1:]
+        reached[:, 1:] |= reached[:, :-1]
+        reached[:, :-1] |= reached[:, 1:]
+        reached &= free
+    return bool(reached[-1].any())
+
+
+def cylinders(field: Picture) -> tuple[Disc, ...]:
+    """The cylinders of a world: one for each filled cell of the field and of the walled runway before it."""
+    runway = np.zeros((RUNWAY, SIDE), dtype=np.bool_)
+    runway[0] = True
+    runway[:, [0, -1]] = True
+    x0, y0 = BARN_BOUNDS[0] + BARN_CELL / 2, BARN_BOUNDS[1] + BARN_CELL / 2
+    return tuple(
+        Disc(round(x0 + BARN_CELL * col, 3), round(y0 + BARN_CELL * row, 3), BARN_CELL / 2, HEIGHT)
+        for row, col in np.argwhere(np.vstack([runway, field])).tolist()
+    )

@@ -10,16 +10,15 @@ import pytest
 
 from antdrive.base.plane import in_map
 from antdrive.worlds import load_task, load_tasks
-from tests.cli.calling import Call
 
 
-def test_a_world_exported_to_gazebo_comes_back_the_same(antdrive: Call) -> None:
+def test_a_world_exported_to_gazebo_comes_back_the_same(antdrive):
     assert antdrive("worlds", "export", "slalom", "-o", "s.sdf") == (0, "  sdf      s.sdf\n", "")
     assert antdrive("worlds", "import", "s.sdf", "-o", "s.yaml")[0] == 0
     assert load_task("s.yaml") == load_task("slalom")
 
 
-def test_a_world_exported_to_maps_comes_back_with_its_task(antdrive: Call) -> None:
+def test_a_world_exported_to_maps_comes_back_with_its_task(antdrive):
     code, out, _ = antdrive("worlds", "export", "slalom", "-o", "m.map", "--resolution", "0.25", "--json")
     assert (code, json.loads(out)["files"]) == (0, {"map": "m.map", "problem": "m.map.scen"})
     code, out, _ = antdrive(
@@ -33,7 +32,7 @@ def test_a_world_exported_to_maps_comes_back_with_its_task(antdrive: Call) -> No
     assert (code, json.loads(out)["outcome"]) == (0, "succeeded")
 
 
-def test_a_map_keeps_the_other_tasks_of_its_world_and_other_formats_say_that_they_do_not(antdrive: Call) -> None:
+def test_a_map_keeps_the_other_tasks_of_its_world_and_other_formats_say_that_they_do_not(antdrive):
     name = "dock: \"2\", 'b'"
     Path("w.yaml").write_text(
         "schema: 1\nbounds: [0, 0, 4, 3]\nstart: [0.6, 0.6, 0]\ngoal: [3.4, 0.6]\ncell: 0.1\nframe: [5, 1, 0.5]\n"
@@ -56,7 +55,7 @@ def test_a_map_keeps_the_other_tasks_of_its_world_and_other_formats_say_that_the
     )
 
 
-def test_a_map_without_a_path_gets_no_problem_file_and_a_replaced_one_is_removed(antdrive: Call) -> None:
+def test_a_map_without_a_path_gets_no_problem_file_and_a_replaced_one_is_removed(antdrive):
     assert antdrive("worlds", "export", "empty", "-o", "m.map")[1] == "  map      m.map\n  problem  m.map.scen\n"
     assert antdrive("worlds", "export", "no-path", "-o", "m.map", "--force")[1] == "  map      m.map\n"
     assert not Path("m.map.scen").exists()
@@ -66,7 +65,7 @@ def test_a_map_without_a_path_gets_no_problem_file_and_a_replaced_one_is_removed
     ("out", "there"),
     [("w.sdf", "w.sdf"), ("w.yaml", "w.yaml"), ("w.yaml", "w.pgm"), ("w.map", "w.map"), ("w.map", "w.map.scen")],
 )
-def test_no_file_is_replaced_or_removed_without_force(antdrive: Call, out: str, there: str) -> None:
+def test_no_file_is_replaced_or_removed_without_force(antdrive, out, there):
     Path(there).write_text("mine")
     for world in ("slalom", "no-path"):  # the latter has no problem file, which an export removes with --force
         said = f"antdrive: {there}: exists; name another file, or replace it with --force\n"
@@ -82,7 +81,7 @@ IN_MAP = (
 )
 
 
-def test_sdf_has_a_world_where_it_lies_in_its_map_and_gives_it_back_to_the_last_bit(antdrive: Call) -> None:
+def test_sdf_has_a_world_where_it_lies_in_its_map_and_gives_it_back_to_the_last_bit(antdrive):
     Path("w.yaml").write_text(IN_MAP)
     assert antdrive("worlds", "export", "w.yaml", "-o", "w.sdf") == (0, "  sdf      w.sdf\n", "")
     models = {model.get("name"): model for model in ET.parse("w.sdf").getroot().iterfind("world/model")}
@@ -104,7 +103,7 @@ def test_sdf_has_a_world_where_it_lies_in_its_map_and_gives_it_back_to_the_last_
     assert load_task("again.yaml").world.discs.tolist() == load_task("w.yaml").world.discs.tolist()
 
 
-def test_a_cylinder_that_was_moved_in_gazebo_is_moved_in_the_world(antdrive: Call) -> None:
+def test_a_cylinder_that_was_moved_in_gazebo_is_moved_in_the_world(antdrive):
     """A model's own pose, one in the <state>, and a start that is given in the file's coordinates."""
     Path("w.yaml").write_text(IN_MAP)
     antdrive("worlds", "export", "w.yaml", "-o", "w.sdf")
@@ -124,7 +123,7 @@ def test_a_cylinder_that_was_moved_in_gazebo_is_moved_in_the_world(antdrive: Cal
         assert load_task("m.yaml").start == pytest.approx((0.5, 0.7, 0.2))
 
 
-def test_a_movingai_map_says_where_it_lay(antdrive: Call) -> None:
+def test_a_movingai_map_says_where_it_lay(antdrive):
     Path("w.yaml").write_text(IN_MAP)
     code, out, _ = antdrive("worlds", "export", "w.yaml", "-o", "w.map")
     says = (
@@ -133,20 +132,3 @@ def test_a_movingai_map_says_where_it_lay(antdrive: Call) -> None:
     assert (code, out.splitlines()[-1]) == (0, says)
     found = json.loads(antdrive("worlds", "export", "w.yaml", "-o", "w.map", "--force", "--json")[1])
     assert (found["cell"], found["corner_in_map"]) == (0.1, pytest.approx([12.3, -3.1, 0.7]))
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["slalom", "-o", "w.png"], "--out w.png: worlds are written as .sdf, .world, .yaml (map_server) or .map"),
-        (["slalom", "-o", "w.sdf", "--resolution", "1"], "--resolution: an SDF world has no cells"),
-        (["slalom", "-o", "w.map", "--resolution", "0.0001"], "resolution: 0.0001 m cuts this world into"),
-        (["slalom", "-o", "w.map", "--resolution", "nan"], "Invalid value for '--resolution'"),
-        (["slaolm", "-o", "w.sdf"], "did you mean slalom?"),
-        (["slalom", "-o", "/proc/nowhere/w.yaml"], "cannot be written"),
-    ],
-)  # fmt: skip
-def test_a_refused_export_is_one_line_and_exit_code_2(antdrive: Call, words: list[str], says: str) -> None:
-    code, out, err = antdrive("worlds", "export", *words)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert says in err

@@ -1,33 +1,22 @@
 """`antdrive worlds import`."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from antdrive.worlds import load_task
-from tests.cli.calling import Call, Refused
 
 
-def test_a_gazebo_world_is_imported_and_driven(antdrive: Call, tmp_path: Path) -> None:
+def test_a_gazebo_world_is_imported_and_driven(antdrive, tmp_path):
     (tmp_path / "one.world").write_text(
         "<sdf version='1.6'><world name='one'><model name='c'><static>1</static><pose>2 1 0 0 0 0</pose><link name='l'>"
         "<collision name='c'><geometry><cylinder><radius>0.2</radius><length>1</length></cylinder></geometry></collision>"
         "</link></model></world></sdf>"
     )
     code, _, err = antdrive(
-        "worlds",
-        "import",
-        "one.world",
-        "-o",
-        "one.yaml",
-        "--start",
-        "0,0,0",
-        "--goal",
-        "4,2",
-        "--bounds=-1,-1,5,3",
+        "worlds", "import", "one.world", "-o", "one.yaml", "--start", "0,0,0", "--goal", "4,2", "--bounds=-1,-1,5,3"
     )
     assert code == 0, err
     task = load_task("one.yaml")
@@ -36,7 +25,7 @@ def test_a_gazebo_world_is_imported_and_driven(antdrive: Call, tmp_path: Path) -
 
 
 #: A building of 8 x 6 m, 0.1 m to a character: four rooms, three doors of 0.9 m, a table, and a corner that nobody has seen.
-def _building() -> list[str]:
+def _building():
     rows = [["#" if r in (0, 59) or c in (0, 79) else " " for c in range(80)] for r in range(60)]
     for c in range(80):
         rows[30][c] = " " if 12 <= c < 21 or 58 <= c < 67 else "#"
@@ -49,7 +38,7 @@ def _building() -> list[str]:
     return ["".join(row) for row in rows]
 
 
-def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive: Call, tmp_path: Path) -> None:
+def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive, tmp_path):
     levels = [[{"#": 0, " ": 254, "?": 205}[mark] for mark in row] for row in _building()]
     text = "\n".join(" ".join(map(str, row)) for row in levels)
     (tmp_path / "office.pgm").write_text(f"P2\n80 60\n255\n{text}\n")
@@ -81,7 +70,7 @@ def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive: Call, tmp_
 
 
 @pytest.fixture
-def dynabarn(tmp_path: Path) -> Callable[..., Path]:
+def dynabarn(tmp_path):
     """Write a DynaBARN file with worlds of these names."""
     mover = {"radius": 0.5, "loop": "teleport", "keyframes_t_x_y": [[0, 5, 8], [8, 5, 9]]}
     world = {
@@ -92,7 +81,7 @@ def dynabarn(tmp_path: Path) -> Callable[..., Path]:
         "movers": [mover],
     }
 
-    def write(*names: str) -> Path:
+    def write(*names):
         path = tmp_path / "set.json"
         path.write_text(json.dumps([{"name": name, **world} for name in names]))
         return path
@@ -100,7 +89,7 @@ def dynabarn(tmp_path: Path) -> Callable[..., Path]:
     return write
 
 
-def test_a_dynabarn_set_becomes_one_file_for_each_world(antdrive: Call, dynabarn: Callable[..., Path]) -> None:
+def test_a_dynabarn_set_becomes_one_file_for_each_world(antdrive, dynabarn):
     code, out, _ = antdrive("worlds", "import", dynabarn("one", "a/b"), "-o", "worlds")
     assert code == 0
     assert [line.split()[-1] for line in out.splitlines()] == ["worlds/one.yaml", "worlds/a_b.yaml"]
@@ -109,22 +98,20 @@ def test_a_dynabarn_set_becomes_one_file_for_each_world(antdrive: Call, dynabarn
     assert (code, json.loads(out)["metrics"]["contacts_driving"]) == (0, 0)
 
 
-def test_a_dynabarn_set_is_listed_as_json(antdrive: Call, dynabarn: Callable[..., Path]) -> None:
+def test_a_dynabarn_set_is_listed_as_json(antdrive, dynabarn):
     code, out, _ = antdrive("worlds", "import", dynabarn("one", "a/b"), "-o", "worlds", "--json")
     listed = json.loads(out)["worlds"]
     assert code == 0
     assert [world["files"]["world"] for world in listed] == ["worlds/one.yaml", "worlds/a_b.yaml"]
 
 
-def test_two_worlds_of_one_name_are_refused_before_anything_is_written(
-    refused: Refused, dynabarn: Callable[..., Path]
-) -> None:
+def test_two_worlds_of_one_name_are_refused_before_anything_is_written(refused, dynabarn):
     says = refused("worlds", "import", dynabarn("one", "one"), "-o", "twice")
     assert "two worlds would be written to twice/one.yaml" in says
     assert not Path("twice").exists()
 
 
-def test_no_import_overwrites_its_source_or_an_unnamed_file(antdrive: Call, tmp_path: Path) -> None:
+def test_no_import_overwrites_its_source_or_an_unnamed_file(antdrive, tmp_path):
     made = tmp_path / "made.map"
     made.write_text("type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n")
     words = ["worlds", "import", "made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5"]
@@ -138,68 +125,3 @@ def test_no_import_overwrites_its_source_or_an_unnamed_file(antdrive: Call, tmp_
     assert antdrive("worlds", "export", "made.yaml", "-o", "made.yaml")[2].endswith(
         "is the world itself; choose another name\n"
     )
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["map.pgm"], "map.pgm: is an image; give the map's .yaml file"),
-        (
-            ["map.txt"],
-            "map.txt: cannot be imported; files that can be end in .sdf, .world, .yaml (map_server), .map (MovingAI)",
-        ),
-        (["w.yaml"], "w.yaml: names no image"),
-        (["none.yaml"], "none.yaml: no such file"),
-        (["none.map"], "none.map: no such file"),
-        (["made.map"], "made.map: start and goal: maps have none; give it on free ground, within x 0 to 3"),
-        (["made.map", "--problem", "0"], "made.map.scen: no such file"),
-        (
-            ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--unknown", "free"],
-            "--unknown: a MovingAI map takes",
-        ),
-        (["made.map", "--bounds", "0,0,1,1"], "--bounds: a MovingAI map brings its own"),
-        (["made.map", "--barn"], "--barn: a MovingAI map takes start, goal, cell, overhang"),
-        (
-            ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--overhang", "0.1"],
-            "made.map: overhang: must be at",
-        ),
-        (
-            ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--overhang", "nan"],
-            "Invalid value for '--overhang'",
-        ),
-        (
-            ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--resolution", "nan"],
-            "Invalid value for '--resolution'",
-        ),
-        (["w.yaml", "--unknown", "perhaps"], "--unknown: must be blocked or free, got 'perhaps'"),
-        (["w.yaml", "--resolution", "1"], "--resolution: a map_server map takes"),
-        (["w.world", "--overhang", "1"], "--overhang: an SDF world takes"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_a_refused_import_is_one_line_and_writes_nothing(
-    antdrive: Call, words: list[str], says: str, tmp_path: Path
-) -> None:
-    (tmp_path / "made.map").write_text("type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n")
-    (tmp_path / "w.yaml").write_text("schema: 1\n")
-    code, out, err = antdrive("worlds", "import", *words, "-o", "out.yaml")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert says in err
-    assert not Path("out.yaml").exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (
-            ["worlds", "import", "x.world", "-o", "w.yaml", "--barn", "--goal", "1,2"],
-            "--goal: a BARN world brings its own",
-        ),
-        (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: no such file"),
-        (["worlds", "import", "nothing.json", "-o", "folder"], "nothing.json: no such file"),
-        (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "--goal: a DynaBARN set brings its own"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str) -> None:
-    assert says in refused(*words)

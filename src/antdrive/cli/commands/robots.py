@@ -1,0 +1,134 @@
+"""`antdrive robots`: list, print, show and import."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+from antdrive.base.errors import InputError
+from antdrive.cli import options
+from antdrive.cli.console import file_lines, show, table
+from antdrive.cli.options import argument, flag, option
+from antdrive.cli.parse import import_target, numbers, pair
+
+
+def list_all(json: options.Json = False) -> None:
+    """List the robots in the catalogue."""
+    from antdrive.robots import list_robots, load_robot, robot_to_dict
+
+    specs = [load_robot(name) for name in list_robots()]
+    rows = (
+        (spec.name, f"{spec.radius:.3f}", f"{spec.max_speed:g}", f"{spec.max_acceleration:g}", spec.source or "")
+        for spec in specs
+    )
+    heads = ("robot", "radius m", "m/s", "m/s2", "about")
+    show(json, {spec.name: robot_to_dict(spec) for spec in specs}, table(heads, rows))
+
+
+def print_robot(
+    name: Annotated[str, argument("NAME", "A robot of the catalogue.")], json: options.Json = False
+) -> None:
+    """Print the file of a robot in the catalogue, to start another from."""
+    from antdrive.robots import list_robots, load_robot, robot_to_dict
+
+    known = list_robots()
+    if name not in known:
+        raise InputError(f"{name}: no robot of the catalogue; choose from {', '.join(known)}")
+    show(json, robot_to_dict(load_robot(name)), [known[name].read_text(encoding="utf-8").rstrip()])
+
+
+def show_robot(
+    robot: Annotated[str, argument("ROBOT", "Name of a robot in the catalogue, or a robot file.")],
+    out: Annotated[Path | None, option("FILE", "Draw the robot: .png, .svg or .pdf.")] = None,
+    json: options.Json = False,
+) -> None:
+    """Describe a robot, and draw it from above."""
+    from antdrive.robots import load_robot, robot_to_dict
+    from antdrive.robots.drawing import facts_of
+
+    spec = load_robot(robot)
+    if out is not None:
+        from antdrive.views.figures.robot_figure import robot_figure
+
+        robot_figure(spec, out)
+    said = {"robot": spec.name, **facts_of(spec), "radius": f"{spec.radius:.4g} m around the axle"}
+    lines = [f"{key:14} {value}" for key, value in said.items()]
+    lines += [] if out is None else file_lines({"figure": out})
+    show(json, {**robot_to_dict(spec), "radius": spec.radius}, lines)
+
+
+def import_robot(
+    path: Annotated[Path, argument("FILE", "A robot's .urdf or .xacro.")],
+    out: Annotated[
+        Path | None, option("FILE", "The robot file to write.  [default: FILE's name, in this folder]")
+    ] = None,
+    figure: Annotated[
+        Path | None, option("FILE", "Draw the footprint over the collision geometry: .png, .svg or .pdf.")
+    ] = None,
+    left: Annotated[str | None, option("NAME", "Joint or link of the left driven wheel.")] = None,
+    right: Annotated[str | None, option("NAME", "Joint or link of the right driven wheel.")] = None,
+    below: Annotated[
+        float | None,
+        option(
+            "METRES",
+            "Leave collision geometry that lies higher above the floor out of the footprint [m].  [default: none is left out]",
+            min=0.0,
+        ),
+    ] = None,
+    footprint: Annotated[str, option("KIND", "disc, rectangle, polygon, or auto: the first that fits.")] = "auto",
+    wheel_radius: Annotated[float | None, option("METRES", "Radius of the driven wheels [m].", min=0.0)] = None,
+    given: Annotated[
+        list[str] | None,
+        option("KEY=VALUE", "A value of the robot file, such as mass=12. May be repeated.", "--set", "-s"),
+    ] = None,
+    meshes: Annotated[Path | None, option("FOLDER", "Where the file's meshes are.")] = None,
+    without_meshes: Annotated[bool, flag("Leave out meshes that are not found.", "--without-meshes")] = False,
+    arguments: Annotated[
+        list[str] | None, option("NAME=VALUE", "Value of an argument of a .xacro. May be repeated.", "--arg")
+    ] = None,
+    packages: Annotated[
+        list[str] | None,
+        option(
+            "NAME=FOLDER",
+            "Where a ROS package is.  [default: a folder of its name beside FILE or above it] May be repeated.",
+            "--package",
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Write the robot file of a differential-drive robot in URDF.
+
+    A comment says where each value comes from.
+    """
+    from antdrive.base.atomic import write_text
+    from antdrive.robots import robot_to_dict
+    from antdrive.robots.importing.model import checked_packages
+    from antdrive.robots.importing.urdf import import_urdf
+
+    values = {"wheel_radius": wheel_radius} if wheel_radius is not None else {}
+    for key, text in map(pair, given or ()):
+        read = numbers(f"--set {key}", text, 1)
+        assert read is not None
+        values[key] = read[0]
+    usual = Path(f"{path.name.removesuffix('.xacro').removesuffix('.urdf')}.yaml")
+    target = import_target(path, out, usual, "robot")
+    found = import_urdf(
+        path,
+        left=left,
+        right=right,
+        below=math.inf if below is None else below,
+        footprint=footprint,
+        meshes=meshes,
+        without_meshes=without_meshes,
+        given=values,
+        arguments=dict(pair(word, "--arg") for word in arguments or ()),
+        packages=checked_packages(dict(pair(word, "--package") for word in packages or ())),
+    )
+    files = {"robot": str(target)}
+    if figure is not None:
+        from antdrive.views.figures.robot_figure import robot_figure
+
+        robot_figure(found.robot, figure, pieces=found.pieces, above=found.above)
+        files["figure"] = str(figure)
+    write_text(target, found.text)
+    facts = {**robot_to_dict(found.robot), "files": files, "left_out": list(found.left_out)}
+    show(json, facts, [found.text.rstrip(), *file_lines(files)])

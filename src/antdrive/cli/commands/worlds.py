@@ -1,0 +1,264 @@
+"""`antdrive worlds`: list, show, generate, import and export."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import file_name
+from antdrive.cli import options
+from antdrive.cli.console import bar, file_lines, show, table
+from antdrive.cli.options import argument, flag, option
+from antdrive.cli.parse import import_target, numbers, pair
+from antdrive.cli.scenario import Ends, random_world
+
+if TYPE_CHECKING:
+    from antdrive.worlds import Task
+
+MANY = 5000  # cylinders; from here on, planning takes seconds
+UNITS = {
+    "frame": " m, m, rad",
+    "bounds": " m",
+    "start": " m, m, rad",
+    "goal": " m",
+    "goal_tolerance": " m",
+    "cell": " m",
+}
+
+
+def list_worlds(json: options.Json = False) -> None:
+    """List the worlds in the catalogue."""
+    from antdrive.worlds import list_worlds as catalogue
+    from antdrive.worlds import load_task
+
+    found = {name: _facts(load_task(name)) for name in catalogue()}
+    heads = ("world", "size m", "obstacles", "movers", "cell m", "about")
+    show(json, found, table(heads, (_row(name, facts) for name, facts in found.items())))
+
+
+def _row(name: str, facts: Mapping[str, Any]) -> tuple[str, ...]:
+    xmin, ymin, xmax, ymax = facts["bounds"]
+    counts = (str(facts["obstacles"]), str(facts["movers"]))
+    return name, f"{xmax - xmin:g} x {ymax - ymin:g}", *counts, f"{facts['cell']:g}", facts["source"] or ""
+
+
+def _facts(task: "Task") -> dict[str, Any]:
+    """A task in short, as plain values."""
+    return {
+        "name": task.world.name,
+        "source": task.world.source,
+        "bounds": list(task.world.bounds),
+        "start": list(task.start),
+        "goal": list(task.goal),
+        "goal_tolerance": task.goal_tolerance,
+        "cell": task.cell,
+        **({"frame": list(task.frame)} if any(task.frame) else {}),
+        "obstacles": len(task.world.obstacles),
+        "movers": len(task.world.movers),
+    }
+
+
+@options.with_settings(("margin",))
+def show_world(
+    *,
+    world: options.World,
+    robot: options.Robot = "turtlebot",
+    ends: Ends,
+    out: Annotated[Path | None, option("FILE", "Draw the world: .png, .svg or .pdf.")] = None,
+    json: options.Json = False,
+    **asked: Any,
+) -> None:
+    """Describe a world, and whether a robot can cross it."""
+    from antdrive.base.plane import in_map
+    from antdrive.planners import Query, load_planner, reachable
+    from antdrive.robots import list_robots, load_robot, overlap_at
+    from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
+
+    margin = asked["margin"]
+    if margin == "auto":
+        raise InputError("--margin auto: is chosen for a drive; write a number of metres")
+    given, spec = ends.of(world), load_robot(robot)
+    shown = load_task(given) if isinstance(given, str) else given
+    grid = rasterise(shown.world, shown.cell, spec.radius + margin)
+    query, named = Query.between(grid, shown), list(load_tasks(world))
+    known = {name: load_robot(name) for name in list_robots()}
+    starts = {each.name: overlap_at(shown.world, each, shown.start) for each in (*known.values(), spec)}
+    passable = not starts[spec.name] and query.blocked_end is None and reachable(query)
+    if out is not None:
+        import numpy as np
+
+        from antdrive.views.figures.plan_figures import plan_figure
+
+        plan_figure(shown, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
+    facts = {"passable": passable, "robot": spec.name, "margin": margin, "starts": starts, "tasks": named}
+    said = {key + UNITS.get(key, ""): "-" if value is None else value for key, value in _facts(shown).items()}
+    if any(shown.frame):
+        for key, pose in {"start": shown.start, "goal": shown.goal}.items():
+            said[f"{key} in its map"] = in_map(shown.frame, [pose])[0].round(4).tolist()
+    said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m"
+    said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
+    lines = [f"{key:18} {value}" for key, value in said.items()]
+    lines += [f"start for {name} {overlap}" for name, overlap in starts.items() if overlap]
+    lines += [f"{'tasks':18} {', '.join(named)}"] if named else []
+    lines += [] if out is None else file_lines({"figure": out})
+    show(json, {**task_to_dict(shown), **facts}, lines)
+
+
+@options.with_settings(("seed",))
+def generate_world(
+    kind: Annotated[str, argument("KIND", "forest (Han's rule) or barn (the BARN cellular automaton).")],
+    out: Annotated[Path, option("FILE", "The world file to write.")],
+    settings: Annotated[
+        list[str] | None,
+        option(
+            "KEY=VALUE",
+            "Set an option of the generator, such as count=20 for a forest or fill=0.25 for a barn. May be repeated.",
+            "--set",
+            "-s",
+        ),
+    ] = None,
+    **given: Any,
+) -> None:
+    """Write a random world."""
+    from antdrive.worlds import save_task
+
+    values = dict(pair(text) for text in settings or ())
+    save_task(random_world(f"generate: unknown kind {kind!r}", kind, given["seed"], values, out.stem), out)
+    show(False, None, file_lines({"world": out}))
+
+
+@options.with_settings(("cell",))
+def import_world(
+    path: Annotated[
+        Path, argument("FILE", "Gazebo SDF (.sdf, .world), map_server (.yaml), MovingAI (.map) or DynaBARN (.json).")
+    ],
+    out: Annotated[
+        Path | None,
+        option(
+            "FILE",
+            "The world file to write; for DynaBARN's .json a folder of them.  [default: FILE's name, in this folder]",
+        ),
+    ] = None,
+    barn: Annotated[bool, flag("SDF: use the start and goal of the BARN challenge.", "--barn")] = False,
+    start: Annotated[str | None, option("X,Y,YAW", "Start pose [m, m, rad]; maps have none of their own.")] = None,
+    goal: Annotated[str | None, option("X,Y", "Goal [m]; maps have none of their own.")] = None,
+    bounds: Annotated[
+        str | None,
+        option("XMIN,YMIN,XMAX,YMAX", "SDF: where the walls stand [m].  [default: 1 m around the cylinders]"),
+    ] = None,
+    skip_unsupported: Annotated[
+        bool, flag("SDF: skip whatever is not an upright cylinder.", "--skip-unsupported")
+    ] = False,
+    unknown: Annotated[
+        str | None, option("KIND", "map_server: treat unknown cells as blocked or free.  [default: blocked]")
+    ] = None,
+    overhang: Annotated[
+        float | None,
+        option(
+            "METRES",
+            "Maps: how far cylinders may protrude from blocked cells [m].  [default: 0.207 cells]",
+            min=0,
+            max=1e6,
+        ),
+    ] = None,
+    resolution: Annotated[
+        float | None, option("METRES", "MovingAI: side of a cell [m].  [default: 1]", min=1e-6, max=1e6)
+    ] = None,
+    problem: Annotated[
+        int | None,
+        option("NUMBER", "MovingAI: take start and goal from this problem of FILE.scen, counted from 0.", min=0),
+    ] = None,
+    json: options.Json = False,
+    **given: Any,
+) -> None:
+    """Turn a world or map of another program into a world file.
+
+    Worlds are made of upright cylinders. Those of an SDF file stay as they are. A map is converted: every blocked
+    cell beside free ground that the start or the goal can reach is fully covered by cylinders, so that no passage is
+    wider than on the map. The key `source` of the world file says how far cylinders protrude from blocked cells.
+    """
+    from antdrive.worlds import import_file, save_task
+    from antdrive.worlds.formats.cellmap import watch_conversion
+    from antdrive.worlds.formats.importing import IMPORTS, import_format
+    from antdrive.worlds.formats.map_server import kept_tasks
+
+    try:
+        file_format = import_format(path, barn=barn)
+        with bar("converting") as progress, watch_conversion(progress):
+            tasks = import_file(
+                path,
+                start=numbers("--start", start, 3, "X,Y,YAW"),
+                goal=numbers("--goal", goal, 2, "X,Y"),
+                bounds=numbers("--bounds", bounds, 4),
+                cell=given["cell"],
+                barn=barn,
+                skip_unsupported=skip_unsupported or None,
+                unknown=unknown,
+                overhang=overhang,
+                resolution=resolution,
+                problem=problem,
+            )
+    except FieldError as error:
+        raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
+    is_set = file_format is IMPORTS["dynabarn"]
+    usual = Path(f"{path.stem}.yaml")
+    files = _targets(path, out or Path(path.stem), tasks) if is_set else [import_target(path, out, usual, "world")]
+    for task, file in zip(tasks, files, strict=True):
+        # A map that antdrive wrote has the other tasks in its file.
+        save_task(task, file, kept_tasks(path, task) if file_format is IMPORTS["map_server"] else {})
+    found = [{**_facts(task), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
+    lines = []
+    if len(tasks) == 1:
+        world = tasks[0].world
+        lines.append(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")
+        if file_format.is_map and len(world.obstacles) > MANY:
+            lines.append(f"  more than {MANY} make planning take seconds; a larger --overhang needs fewer of them")
+    lines += [line for file in files for line in file_lines({"world": file})]
+    show(json, {"worlds": found} if is_set else found[0], lines)
+
+
+def _targets(path: Path, folder: Path, tasks: "Sequence[Task]") -> list[Path]:
+    """A file in a folder for each world of a set."""
+    files = [folder / f"{file_name(task.world.name)}.yaml" for task in tasks]
+    twice = next((file for i, file in enumerate(files) if file in files[:i]), None)
+    if twice is not None:
+        raise InputError(f"{path}: two worlds would be written to {twice}; give them different names")
+    return files
+
+
+def export_world(
+    world: options.World,
+    out: Annotated[
+        Path, option("FILE", "Gazebo: .sdf or .world; map_server: .yaml (and .pgm); MovingAI: .map (and .scen).")
+    ],
+    resolution: Annotated[
+        float | None,
+        option("METRES", "Maps: side of a cell [m].  [default: the world's own cell size]", min=1e-6, max=1e6),
+    ] = None,
+    force: Annotated[bool, flag("Replace files that exist, also those beside FILE.", "--force")] = False,
+    json: options.Json = False,
+) -> None:
+    """Write a world for another program.
+
+    FILE's suffix decides the format. SDF keeps the world, its start and its goal. In a map, every cell that a cylinder
+    reaches into is blocked; importing the map again gives a similar world, not the same. A .yaml keeps the world's
+    other tasks, too. A .map gets a .scen file beside it with the path from start to goal, if there is one on its cells.
+    A world that was made from a map is written where it lies in that map, but for a .map, which has no coordinates.
+    """
+    from antdrive.base.files import require_new
+    from antdrive.views.export.worlds import SDF, SUFFIXES, file_beside, write_world
+    from antdrive.worlds import load_task, load_tasks
+
+    suffix = out.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"--out {out}: worlds are written as .sdf, .world, .yaml (map_server) or .map (MovingAI)")
+    task, tasks = load_task(world), load_tasks(world)
+    if out.exists() and Path(world).exists() and out.samefile(world):
+        raise InputError(f"--out {out}: is the world itself; choose another name")
+    if suffix in SDF and resolution is not None:
+        raise InputError("--resolution: an SDF world has no cells")
+    beside = file_beside(out)
+    require_new((out, *([] if beside is None else [beside])), replace=force)
+    facts, lost = write_world(task, tasks, out, resolution)
+    lines = [*file_lines(facts["files"]), *(f"  without {what}" for what in lost)]
+    show(json, {"world": task.world.name, **facts}, lines)

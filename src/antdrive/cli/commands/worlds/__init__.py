@@ -1,1 +1,0 @@
-"""The commands of `antdrive worlds`, one file each."""

@@ -1,0 +1,167 @@
+"""Confidence intervals: for proportions, for paired differences of them, and over worlds by bootstrap.
+
+Bootstraps resample worlds and then the runs within each world.
+Runs in one world resemble each other, so that resampling single runs gives intervals that are too narrow for statements
+about other worlds (Field and Welsh 2007). Samples are drawn among the runs that count: a repetition that is no evidence has
+no part in them, so that an interval is the same however often a drive was repeated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from antdrive.base.errors import FieldError
+from antdrive.base.optional import statistics_library
+from antdrive.base.types import Flags, Floats, Ints
+
+CONFIDENCE = 0.95
+
+
+class Interval(NamedTuple):
+    """A confidence interval."""
+
+    low: float  # its lower end
+    high: float  # its upper end
+
+
+NOWHERE = Interval(math.nan, math.nan)
+
+
+def wilson(successes: int, total: int, confidence: float = CONFIDENCE) -> Interval:
+    """Wilson's score interval for a proportion (Wilson 1927)."""
+    if not 0 <= successes <= total or total < 1:
+        raise FieldError("successes", f"must be 0 to total, and total at least 1; got {successes} of {total}")
+    proportion = statistics_library("statsmodels.stats.proportion")
+    low, high = proportion.proportion_confint(successes, total, alpha=1 - confidence, method="wilson")
+    # At 0 and at `total` the interval ends exactly there; rounding may leave it 1e-17 off.
+    return Interval(0.0 if successes == 0 else float(low), 1.0 if successes == total else float(high))
+
+
+def paired_difference(both: int, first: int, second: int, neither: int, confidence: float = CONFIDENCE) -> Interval:
+    """An interval for the difference of two paired proportions (Newcombe 1998, method 10).
+
+    It combines the Wilson intervals of the two proportions and takes their correlation into account.
+    """
+    n = both + first + second + neither
+    p1, p2 = (both + first) / n, (both + second) / n
+    one, two = wilson(both + first, n, confidence), wilson(both + second, n, confidence)
+    margins = (both + first) * (second + neither) * (both + second) * (first + neither)
+    cross = float(both * neither - first * second)
+    if cross > 0:  # Newcombe's continuity correction of a positive correlation
+        cross = max(0.0, cross - n / 2)
+    phi = cross / math.sqrt(margins) if margins else 0.0
+    below = _combined(p1 - one.low, two.high - p2, phi)
+    above = _combined(one.high - p1, p2 - two.low, phi)
+    return Interval(p1 - p2 - below, p1 - p2 + above)
+
+
+def _combined(x: float, y: float, phi: float) -> float:
+    return math.sqrt(max(0.0, x * x - 2 * phi * x * y + y * y))
+
+
+RESAMPLES = 2000
+SEED = 19_790_101  # the same table gives the same intervals
+BLOCK = 4_000_000  # numbers held at once
+
+
+def resampled(world: Ints, resamples: int = RESAMPLES, seed: int = SEED) -> Iterator[Ints]:
+    """Blocks of rows (b, N) that say how often each run is drawn, `resamples` rows in total."""
+    rng = np.random.default_rng(seed)
+    names, inverse, sizes = np.unique(world, return_inverse=True, return_counts=True)
+    members = np.split(np.argsort(inverse, kind="stable"), np.cumsum(sizes)[:-1])
+    rows = max(1, BLOCK // max(1, len(world)))
+    for start in range(0, resamples, rows):
+        count = min(rows, resamples - start)
+        drawn = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), size=count)
+        weights = np.zeros((count, len(world)), dtype=np.int64)
+        for k, runs in enumerate(members):
+            weights[:, runs] = rng.multinomial(drawn[:, k] * len(runs), np.full(len(runs), 1 / len(runs)))
+        yield weights
+
+
+def medians_by_world(
+    values: Floats,
+    world: Ints,
+    resamples: int = RESAMPLES,
+    *,
+    counted: Flags | None = None,
+    confidence: float = CONFIDENCE,
+) -> list[Interval]:
+    """Percentile intervals for the median of each column of values (N, K), nan left out."""
+    found = np.full((resamples, values.shape[1]), np.nan)
+    for rows, columns in _columns_alike(values, counted):
+        chosen = [_Sorted.of(values[rows, k]) for k in columns]
+        first = 0
+        for weights in resampled(world[rows], resamples):
+            for k, column in zip(columns, chosen, strict=True):
+                found[first : first + len(weights), k] = column.medians(weights)
+            first += len(weights)
+    return [_percentiles(found[:, k], confidence) for k in range(values.shape[1])]
+
+
+def means_by_world(
+    values: Floats,
+    world: Ints,
+    resamples: int = RESAMPLES,
+    *,
+    counted: Flags | None = None,
+    confidence: float = CONFIDENCE,
+) -> list[Interval]:
+    """Percentile intervals for the mean of each column of values (N, K), nan left out."""
+    found = np.full((resamples, values.shape[1]), np.nan)
+    for rows, columns in _columns_alike(values, counted):
+        known = ~np.isnan(values[rows][:, columns])
+        filled = np.where(known, values[rows][:, columns], 0.0)
+        first = 0
+        for weights in resampled(world[rows], resamples):
+            totals = weights @ known.astype(float)
+            with np.errstate(invalid="ignore"):
+                found[first : first + len(weights), columns] = (weights @ filled) / np.where(totals > 0, totals, np.nan)
+            first += len(weights)
+    return [_percentiles(found[:, k], confidence) for k in range(values.shape[1])]
+
+
+def _columns_alike(values: Floats, counted: Flags | None) -> Iterator[tuple[Ints, Ints]]:
+    """Rows that are counted, and the columns for which they are: these see the same samples."""
+    if counted is None:
+        yield np.arange(len(values)), np.arange(values.shape[1])
+        return
+    masks, inverse = np.unique(counted, axis=1, return_inverse=True)
+    for k, mask in enumerate(masks.T):
+        if mask.any():
+            yield np.flatnonzero(mask), np.flatnonzero(inverse.ravel() == k)
+
+
+class _Sorted:
+    """A column's values in order, so that the median of every resample is a place in a running sum of weights."""
+
+    def __init__(self, values: Floats, order: Ints) -> None:
+        self.values = values
+        self.order = order
+
+    @classmethod
+    def of(cls, column: Floats) -> _Sorted:
+        order = np.argsort(column, kind="stable")[: int((~np.isnan(column)).sum())]
+        return cls(column[order], order)
+
+    def medians(self, weights: Ints) -> Floats:
+        """The median of each resample, nan where it holds no value."""
+        if not len(self.values):
+            return np.full(len(weights), np.nan)
+        running = np.cumsum(weights[:, self.order], axis=1)
+        total = running[:, -1:]
+        lower, upper = (2 * running >= total).argmax(axis=1), (2 * running > total).argmax(axis=1)
+        return np.where(total[:, 0] > 0, (self.values[lower] + self.values[upper]) / 2, np.nan)
+
+
+def _percentiles(statistics: Floats, confidence: float) -> Interval:
+    known = statistics[~np.isnan(statistics)]
+    if not len(known):
+        return Interval(np.nan, np.nan)
+    tail = (1 - confidence) / 2
+    low, high = np.quantile(known, [tail, 1 - tail])
+    return Interval(float(low), float(high))

@@ -1,0 +1,74 @@
+"""The options of a film: what may be asked of `film`, `still` and `compare_film`, and facts about the film that was made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from antdrive.base.errors import InputError
+from antdrive.views.film.camera import CAMERAS
+
+#: The file suffixes of films, each with ffmpeg's options for its format.
+ENCODERS: dict[str, tuple[str, ...]] = {
+    ".mp4": (
+        *("-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
+        *("-vf", "scale=out_color_matrix=bt709", "-colorspace", "bt709"),
+        *("-color_primaries", "bt709", "-color_trc", "bt709"),
+    ),
+    ".gif": (
+        # A palette per frame: for one palette, ffmpeg would have to hold the whole film in memory.
+        *("-vf", "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"),
+        *("-c:v", "gif", "-loop", "0"),
+    ),
+    ".webp": ("-c:v", "libwebp_anim", "-pix_fmt", "yuv420p", "-quality", "70", "-compression_level", "2", "-loop", "0"),
+}
+STILLS: dict[str, dict[str, Any]] = {".png": {}, ".webp": {"quality": 82, "method": 4}}  # how pictures are written
+
+
+@dataclass(frozen=True)
+class FilmOptions:
+    """How a run is filmed. A new option is a field here and an argument of `film`; its colours stand in `views/colours.py`."""
+
+    camera: str = "oblique"  # the camera's name
+    size: tuple[int, int] = (1280, 720)  # width and height [px]
+    fps: float = 30.0  # frames per second
+    speed: float = 1.0  # of the film, relative to the run
+    note: str | None = None  # a line for the band below the picture
+
+    def checked(self) -> FilmOptions:
+        """The same options; wrong ones are refused before any work."""
+        if self.camera not in CAMERAS:
+            raise InputError(f"camera: unknown camera {self.camera!r}; choose one of {', '.join(CAMERAS)}")
+        if len(self.size) != 2 or any(side % 2 or not 160 <= side <= 4096 for side in self.size):
+            raise InputError(f"size: width and height must be even numbers from 160 to 4096, got {self.size}")
+        for key, value in (("fps", self.fps), ("speed", self.speed)):
+            if not 0 < value <= 240:
+                raise InputError(f"{key}: must be greater than 0 and at most 240, got {value:g}")
+        return self
+
+
+@dataclass(frozen=True)
+class FilmInfo:
+    """Facts about a film that was written.
+
+    Attributes:
+        path: the file
+        frames: the number of frames
+        size: width and height [px]
+        fps: frames per second
+        camera: the camera's name
+        wall_s: how long rendering and encoding took [s]
+    """
+
+    path: Path
+    frames: int
+    size: tuple[int, int]
+    fps: float
+    camera: str
+    wall_s: float
+
+    @property
+    def duration_s(self) -> float:
+        """The film's length [s]."""
+        return self.frames / self.fps

@@ -1,0 +1,195 @@
+"""The papers: their figures, and a film of each, in which its colony plans on one of its maps and a robot drives the plan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from antdrive.base import Pose
+from antdrive.planners import capabilities_of
+from antdrive.robots import load_robot
+from antdrive.runs.papers import maps
+from antdrive.runs.papers.claims import Arm
+from antdrive.runs.papers.experiments import PAPERS, Experiment
+from antdrive.runs.papers.maps import HAN_ANTS
+from antdrive.runs.papers.trials import Trial, solve
+from antdrive.sim.pipeline import run
+from antdrive.sim.scenario import Scenario
+from antdrive.views.figures.canvas import endings
+from antdrive.views.figures.paper_figures import (
+    ConvergenceCurve,
+    ants_figure,
+    convergence_figure,
+    maps_figure,
+    sweep_figure,
+)
+from antdrive.views.film.video import film
+from antdrive.worlds import Disc, Task, World
+from antdrive.worlds.formats.cellmap import CellMap, map_task
+
+if TYPE_CHECKING:
+    from antdrive.planners import PlanResult, Query
+
+PAINTED = 3  # planners whose paths are drawn on one map
+CURVES = 3  # planners whose lengths are drawn by iteration for one map
+PC, PM = (0.1, 0.25, 0.5, 0.75, 0.9), (0.05, 0.1, 0.2, 0.4, 0.6)  # crossover, mutation: han2007's sweep
+CELL = 0.8  # side of a cell of a picture [m]: a turtlebot passes between two blocked ones
+HAN_UNIT = 0.7  # a unit of han2007 [m]
+SIZE, FPS = (480, 360), 20.0
+PRELUDE, DRIVE = 3.0, 9.0  # how long the planning and the drive are shown [s]
+
+Measured: TypeAlias = Sequence[tuple[Experiment, list[Trial]]]
+
+
+def draw_figures(paper: str, found: Measured, folder: Path, seeds: int, suffixes: Sequence[str]) -> dict[str, str]:
+    """Draw a paper's figures; their paths by name.
+
+    Length by iteration is drawn twice: `history` shows all seeds, with intervals, and `run` one run, as the papers do.
+    """
+    files: dict[str, str] = {}
+    curves = _curves(found)
+    for suffix, end in endings(suffixes):
+        if curves:
+            for name, single in (("history", False), ("run", True)):
+                path = folder / f"{paper}-{name}{suffix}"
+                convergence_figure(curves, path, single=single)
+                files[f"{paper} {name}{end}"] = str(path)
+        drawn_on = folder / f"{paper}-maps{suffix}"
+        maps_figure(_drawn(found), drawn_on)
+        files[f"{paper} maps{end}"] = str(drawn_on)
+        if paper == "han2007":
+            drawn = _han_figures(found, folder, seeds, suffix)
+            files |= {f"{name}{end}": str(path) for name, path in drawn.items()}
+    return files
+
+
+def _curves(found: Measured) -> dict[str, list[ConvergenceCurve]]:
+    """By map, the histories of its first `CURVES` planners that have any."""
+    curves: dict[str, list[ConvergenceCurve]] = {}
+    for experiment, trials in _printed_first(found):
+        on_map = curves.setdefault(experiment.map, [])
+        if len(on_map) == CURVES or not any(len(trial.result.history) for trial in trials):
+            continue
+        counted = math.isfinite(experiment.work)
+        on_map.append(
+            ConvergenceCurve(
+                name=experiment.name,
+                planner=experiment.planner,
+                best=[trial.result.history.best for trial in trials],
+                maps=np.array([trial.world for trial in trials], dtype=np.int64),
+                steps=np.array([trial.work for trial in trials]) if counted else None,
+                optimum=float(np.median([trial.optimum for trial in trials])),
+                printed=experiment.printed,
+            )
+        )
+    return {name: on_map for name, on_map in curves.items() if on_map}
+
+
+def _printed_first(found: Measured) -> Measured:
+    """The experiments that a paper prints a value for and, on maps with only one of them, the others, too."""
+    printed = [(e.map, e.name) for e, _ in found if e.printed is not None]
+    several = {place for place, _ in printed if sum(place == other for other, _ in printed) > 1}
+    return [(e, trials) for e, trials in found if e.printed is not None or e.map not in several]
+
+
+def _drawn(found: Measured) -> dict[str, tuple[Query, dict[str, PlanResult]]]:
+    """The first map of each experiment with the path of its median seed, for `PAINTED` planners of a map."""
+    maps_drawn: dict[str, tuple[Query, dict[str, PlanResult]]] = {}
+    for experiment, trials in _printed_first(found):
+        if experiment.name == "steps":  # the same plans as those of the total costs
+            continue
+        query = experiment.query(experiment.world(trials[0].seed))
+        plans = maps_drawn.setdefault(experiment.map, (query, {}))[1]
+        on_it = sorted((t for t in trials if t.world == trials[0].world), key=lambda trial: trial.length)
+        if len(plans) < PAINTED:
+            plans[experiment.name] = on_it[(len(on_it) - 1) // 2].result
+    return maps_drawn
+
+
+def _han_figures(found: Measured, folder: Path, seeds: int, suffix: str) -> dict[str, Path]:
+    """Draw han2007's figures: path length by number of ants, and by the parameters of the genetic algorithm."""
+    with_ants = [(e, trials) for e, trials in found if e.planner == "aco-han" and e.printed is not None]
+    lengths = {int(e.options["ants"]): [t.length for t in trials if t.result.solved] for e, trials in with_ants}
+    printed = {int(experiment.options["ants"]): experiment.printed or math.nan for experiment, _ in with_ants}
+    ants, sweep = folder / f"han2007-ants{suffix}", folder / f"han2007-sweep{suffix}"
+    ants_figure(lengths, ants, planner="aco-han", printed=printed, unit="cells", optimum=maps.optimum(maps.han_ants()))
+    sweep_figure(PC, PM, _sweep(seeds), sweep)
+    return {"han2007 ants": ants, "han2007 sweep": sweep}
+
+
+def _sweep(seeds: int) -> dict[bool, Any]:
+    """Mean length of the genetic algorithm's paths by crossover and mutation, with and without elitism."""
+    query = maps.han_genes()
+    found = {}
+    for elitism in (True, False):
+        values = np.full((len(PC), len(PM)), np.nan)
+        for (i, j), _ in np.ndenumerate(values):
+            options = {"crossover": PC[i], "mutation": PM[j], "elitism": elitism}
+            trials = [solve("ga-han", options, query, seed) for seed in range(seeds)]
+            lengths = [trial.length if elitism else trial.last for trial in trials if trial.result.solved]
+            values[i, j] = np.mean(lengths) if lengths else np.nan
+        found[elitism] = values
+    return found
+
+
+#: By paper, the experiment whose first map is filmed.
+SCENES: Mapping[str, Arm] = MappingProxyType(
+    {
+        "han2007": Arm("14 obstacles", "100 ants"),
+        "suganthi2019": Arm("20×20", "iaco"),
+        "ibraheem2016": Arm("20×20, 10 obstacles", "maco"),
+        "lee2008": Arm("2: 50×44", "pfaco"),
+        "hasan": Arm("1a curved walls", "mmas-dstar"),
+    }
+)
+
+
+def paper_scenario(paper: str) -> Scenario:
+    """The drive that a paper's film shows: its planner with its parameters, on the first of its maps."""
+    scene = SCENES[paper]
+    experiment = next(e for e in PAPERS[paper]() if (e.map, e.name) == (scene.map, scene.name))
+    if paper == "han2007":
+        task = _han_task()
+    else:
+        query = experiment.query(0)
+        (r0, c0), (r1, c1) = query.start, query.goal
+        heading = math.atan2(r1 - r0, c1 - c0)
+        start: Pose = ((c0 + 0.5) * CELL, (r0 + 0.5) * CELL, heading)
+        goal = ((c1 + 0.5) * CELL, (r1 + 0.5) * CELL)
+        task = map_task(CellMap(query.grid.free, CELL, (0.0, 0.0)), start, goal, name=f"{paper} {scene.map}")
+    return Scenario.of(task, experiment.planner, options=experiment.options, seed=0)
+
+
+def film_paper(paper: str, folder: Path) -> Path | None:
+    """Drive a paper's scenario and film it, the planning first where the planner shows it; None if no drive came about."""
+    scenario = paper_scenario(paper)
+    result = run(scenario)
+    if result.rollout is None:
+        return None
+    target = folder / f"{paper}.mp4"
+    film(
+        result.rollout,
+        target,
+        camera="top",
+        size=SIZE,
+        fps=FPS,
+        speed=max(1.0, float(result.rollout.t[-1]) / DRIVE),
+        note=f"{paper}: {scenario.planner_name}",
+        prelude=PRELUDE if capabilities_of(scenario.planner).iterative else 0.0,
+    )
+    return target
+
+
+def _han_task() -> Task:
+    """The map of han2007's ants in metres. The thesis' robot is a point: discs are smaller by the robot's radius and margin."""
+    low, high = 0.0, 21.0 * HAN_UNIT
+    radius = HAN_UNIT - load_robot("turtlebot").radius - 0.03
+    discs = tuple(Disc(x * HAN_UNIT, y * HAN_UNIT, radius) for x, y in HAN_ANTS)
+    world = World("han2007 ants", (low, low, high, high), discs)
+    start: Pose = (HAN_UNIT, HAN_UNIT, math.pi / 4)
+    return Task(world, start, (20 * HAN_UNIT, 20 * HAN_UNIT), cell=HAN_UNIT)

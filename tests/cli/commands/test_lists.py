@@ -1,0 +1,70 @@
+"""Commands that list, describe and generate."""
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from antdrive.base.files import as_json
+from antdrive.planners import PLANNERS
+from antdrive.worlds import list_worlds, load_task
+
+
+def test_every_planner_is_listed_with_its_options(antdrive):
+    code, out, err = antdrive("planners", "--json")
+    found = json.loads(out)
+    assert (code, err) == (0, "")
+    assert list(found)[: len(PLANNERS)] == list(PLANNERS)
+    assert found["aco-han-elite"]["options"]["elitism"] == 100
+    code, out, _ = antdrive("planners")
+    assert code == 0
+    assert "aco-han" in out
+    assert "elitism=100" in out
+
+
+@pytest.mark.parametrize("words", [[], ["world"], ["robot"], ["suite"], ["campaign"]], ids=" ".join)
+def test_the_schema_of_a_file_is_printed(antdrive, words):
+    code, out, err = antdrive("schema", *words)
+    assert (code, err) == (0, "")
+    assert json.loads(out)["title"] == f"antdrive {words[0] if words else 'world'}"
+
+
+def test_every_world_is_listed(antdrive):
+    assert "han2007-aco" in antdrive("worlds", "list")[1]
+    code, out, err = antdrive("worlds", "list", "--json")
+    assert (code, err) == (0, "")
+    assert list(json.loads(out)) == list(list_worlds())
+
+
+def test_show_reports_whether_a_robot_can_cross(antdrive, tmp_path):
+    code, out, _ = antdrive("worlds", "show", "gate", "--out", tmp_path / "gate.png")
+    assert code == 0
+    assert "passable           yes" in out
+    assert (tmp_path / "gate.png").exists()
+    assert not json.loads(antdrive("worlds", "show", "no-path", "--json")[1])["passable"]
+
+
+@pytest.mark.parametrize("words", [["forest", "--set", "count=8"], ["barn", "--set", "fill=0.2"]])
+def test_one_seed_generates_one_world(antdrive, words):
+    for name in ("a.yaml", "b.yaml"):
+        assert antdrive("worlds", "generate", *words, "--seed", "5", "-o", name)[0] == 0
+    a, b = load_task("a.yaml"), load_task("b.yaml")
+    assert a.world.obstacles == b.world.obstacles
+    assert antdrive("worlds", "generate", *words, "--seed", "6", "-o", "c.yaml")[0] == 0
+    assert load_task("c.yaml").world.obstacles != a.world.obstacles
+
+
+def test_a_table_is_no_wider_than_the_terminal(antdrive, monkeypatch):
+    full = antdrive("worlds", "list")[1].splitlines()
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "90")
+    cut = antdrive("worlds", "list")[1].splitlines()
+    assert max(map(len, full)) > 90
+    assert cut == [line if len(line) <= 90 else line[:89] + "…" for line in full]
+
+
+def test_json_holds_null_where_a_number_is_not_finite():
+    value = {"a": math.inf, "b": [math.nan, np.float64(1.5)], 3: (np.int64(2), None)}
+    assert json.loads(as_json(value)) == {"a": None, "b": [None, 1.5], "3": [2, None]}

@@ -1,0 +1,51 @@
+"""Commands that read the log of a drive: `antdrive export`, `render` and `margin`."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+def test_a_drive_becomes_tables(small_run, antdrive):
+    small_run.rollout.save("rollout.npz")
+    code, out, err = antdrive("export", "rollout.npz", "--to", "csv", "-o", "new")
+    assert (code, out.split(), err) == (0, ["csv", "new"], "")
+    assert (Path("new") / "drive.csv").stat().st_size > 0
+
+
+def test_a_log_is_filmed_again_from_another_camera(antdrive, small_run, tmp_path):
+    log = small_run.rollout.save(tmp_path / "run.npz")
+    code, out, _ = antdrive(
+        "render", log, "-o", "top.mp4", "--camera", "top", "--size", "320x240", "--speed", "4", "--json"
+    )
+    assert code == 0
+    assert json.loads(out)["size"] == [320, 240]
+    assert Path("top.mp4").stat().st_size > 1000
+
+
+def test_the_margin_of_a_noisy_drive_is_broken_down_by_cause(antdrive, small):
+    code, out, _ = antdrive("run", small, "--noise", "1", "--smoothing", "taut", "--out", "r", "--json")
+    facts = json.loads(out)
+    assert code == 0
+    with np.load("r/rollout.npz") as log:
+        assert log["estimate"].shape == log["pose"].shape
+    code, out, _ = antdrive("margin", facts["files"]["rollout"], "--json")
+    spent = json.loads(out)
+    assert code == 0
+    assert spent["left"] >= facts["certificate"]["min_clearance_m"] - 1e-9  # of the disc around a disc robot
+    assert sum(share["at_tightest"] for share in spent["contributions"]) == pytest.approx(
+        spent["margin"] - spent["left"]
+    )
+    code, out, _ = antdrive("margin", facts["files"]["rollout"])
+    assert code == 0
+    assert "localisation" in out
+    assert "the largest loss is due to" in out
+    assert "nothing was used" not in out
+
+
+def test_a_drive_that_kept_the_margin_is_said_to_have_used_nothing(antdrive):
+    assert antdrive("run", "empty", "--out", "r")[0] == 0
+    _, out, _ = antdrive("margin", "r")
+    assert "nothing was used: the robot never came closer to an obstacle than the margin" in out
+    assert "the largest loss is due to" not in out

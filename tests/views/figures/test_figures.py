@@ -1,0 +1,404 @@
+"""Figures of plans, papers and drives, of what a robot without a map knew, and of a drive and an earlier one."""
+
+import math
+import re
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from PIL import Image
+
+from antdrive.base import InputError
+from antdrive.planners import History, PlanResult, PlanStatus, Query, load_planner
+from antdrive.robots import load_robot
+from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.log.outcome import Outcome
+from antdrive.views.colours import BAD, CONTACT, GOOD, SHELL, START, planner_style
+from antdrive.views.figures import plan_figures as module
+from antdrive.views.figures.canvas import panels, save_figure
+from antdrive.views.figures.paper_figures import (
+    ConvergenceCurve,
+    ants_figure,
+    convergence_figure,
+    history_figure,
+    sweep_figure,
+)
+from antdrive.views.figures.plan_figures import bars_figure, contours_figure, plan_figure, plan_figures
+from antdrive.views.figures.robot_figure import robot_figure
+from antdrive.views.figures.run_figures import certificate_figure, comparison_figure, overview, then_and_now
+from antdrive.views.figures.sight_figure import LISTED, sight_figure
+from antdrive.views.recollection import Recollection
+from antdrive.worlds import Disc, Keyframed, Task, Wandering, World, rasterise
+from tests.made_up_drive import scanned, undriven
+from tests.records import changed
+
+ROBOT = load_robot("turtlebot")
+
+
+@pytest.fixture(scope="module")
+def planned():
+    world = World("three", (0.0, 0.0, 5.0, 4.0), (Disc(1.5, 2.0, 0.4), Disc(3.0, 1.2, 0.3), Disc(3.6, 3.0, 0.3)))
+    task = Task(world, (0.5, 0.5, 0.0), (4.4, 3.5), cell=0.25)
+    grid = rasterise(world, 0.25, 0.23)
+    plan = load_planner("as", ants=10, iterations=8).plan(Query.between(grid, task), np.random.default_rng(0))
+    return task, grid, plan
+
+
+@pytest.fixture(scope="module")
+def searched(planned):
+    """A plan without history and field."""
+    task, grid, _ = planned
+    return load_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
+
+
+def pixels(figure):
+    """What was written, from the file, or as the figure's canvas still holds it."""
+    if isinstance(figure, Path):
+        with Image.open(figure) as picture:
+            return np.asarray(picture.convert("RGB")).astype(int)
+    return np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
+
+
+def near(picture, colour, within=12):
+    return int((np.abs(picture - np.array(colour)).max(axis=-1) < within).sum())
+
+
+def test_a_plan_has_all_kinds_of_figures_in_pixels_and_vectors(planned, tmp_path):
+    made = plan_figures(*planned, ROBOT, tmp_path, name="as", suffixes=(".png", ".pdf"))
+    kinds = {"plan", "tour", "history", "bars", "contours"}
+    assert set(made) == kinds | {f"{kind} pdf" for kind in kinds}
+    assert all(path.stat().st_size > 3000 for path in made.values())
+    assert near(pixels(made["tour"]), (255, 122, 14)) > 300, "the tour"
+    assert near(pixels(made["tour"]), (121, 136, 160)) > 1000, "obstacles"
+
+
+def test_bars_rise_with_the_field(planned, tmp_path):
+    _, grid, _ = planned
+    field = np.zeros(grid.shape)
+    flat = pixels(bars_figure(grid, field, tmp_path / "flat.png", dpi=60))
+    field[2, 2] = 1
+    peak = pixels(bars_figure(grid, field, tmp_path / "peak.png", dpi=60))
+    assert (np.abs(flat - peak).max(axis=-1) > 40).sum() > 50
+
+
+def test_a_large_field_is_drawn_with_fewer_bars_that_keep_its_peaks(tmp_path, monkeypatch):
+    grid = rasterise(World("wide", (0, 0, 20, 20)), 0.1, 0.1)
+    heights = []
+    from mpl_toolkits.mplot3d import Axes3D
+
+    monkeypatch.setattr(Axes3D, "bar3d", lambda self, x, y, z, dx, dy, dz, **_: heights.append(dz))
+    field = np.zeros(grid.shape)
+    field[:, 100] = 3.0
+    bars_figure(grid, field, tmp_path / "a.png", dpi=50)
+    assert len(heights[0]) <= module.MAX_BARS**2
+    assert heights[0].max() == pytest.approx(3.0)
+
+
+def test_an_iterative_planner_gets_its_history_and_field(planned, searched, tmp_path):
+    task, grid, _ = planned
+    best = searched.cost * (1 + np.exp(-np.arange(30) / 6))
+    mean = best + 1
+    mean[:4] = math.inf
+    history = History(best=best, iteration_best=best + 0.2, iteration_mean=mean, arrived=np.full(30, 9))
+    learnt = replace(searched, history=history, field=np.random.default_rng(0).random(grid.shape))
+    picture = pixels(plan_figure(task, grid, learnt, ROBOT, tmp_path / "learnt.png", dpi=80))
+    assert near(picture, (18, 63, 122), 40) > 500, "the field's dark end"
+    plain = pixels(plan_figure(task, grid, searched, ROBOT, tmp_path / "plain.png", dpi=80))
+    assert picture.shape[1] > 1.3 * plain.shape[1]
+
+
+def test_a_failed_plan_gives_the_reason(planned, tmp_path):
+    task, grid, _ = planned
+    failed = PlanResult(status=PlanStatus.NO_PATH, reason="walled in")
+    figure = plan_figure(task, grid, failed, ROBOT, tmp_path / "failed.png", dpi=80)
+    assert near(pixels(figure), (204, 32, 42), 24) > 40
+
+
+def test_a_long_reason_covers_nothing_of_the_map(planned):
+    task, grid, _ = planned
+    reason = "the widest disc that passes has a radius of 0.4 m, " * 8
+    figure = plan_figure(task, grid, PlanResult(status=PlanStatus.NO_PATH, reason=reason), ROBOT)
+    figure.draw_without_rendering()
+    map_, words = panels(figure)["map"], figure._supxlabel
+    assert words.get_text().replace("\n", " ") == reason.strip()
+    assert words.get_window_extent().y1 < map_.get_tightbbox().y0
+    assert words.get_window_extent().x1 < figure.bbox.x1
+
+
+def test_the_first_plan_of_a_robot_without_a_map_is_said_to_be_one_and_lies_in_the_picture(planned):
+    """It leads through a cylinder that was not seen, and out of the world."""
+    task, _, _ = planned
+    wider = rasterise(World("seen", (-4.0, -4.0, 9.0, 8.0)), 0.25, 0.23)
+    cells = np.array([wider.cell_at(*task.start[:2]), wider.cell_at(1.5, -3.0), wider.cell_at(*task.goal)])
+    plan = PlanResult(status=PlanStatus.SOLVED, cells=cells)
+    blind, known = (plan_figure(task, wider, plan, ROBOT, mapped=mapped) for mapped in (False, True))
+    (x, y), axes = wider.xy(cells).T, panels(blind)["map"]
+    assert axes.get_xlim()[0] < x.min() < x.max() < axes.get_xlim()[1]
+    assert axes.get_ylim()[0] < y.min() < y.max() < axes.get_ylim()[1]
+    assert blind._supxlabel.get_text().replace("\n", " ") == module.FIRST
+    assert known._supxlabel is None
+    words = [{text.get_text() for text in panels(one)["map"].get_legend().get_texts()} for one in (blind, known)]
+    assert "obstacle, on no map" in words[0]
+    assert "obstacle" in words[1]
+
+
+def history(start, n=20):
+    best = start + np.exp(-np.arange(n) / 4)
+    return History(best=best, iteration_best=best, iteration_mean=best + 1, arrived=np.full(n, 5))
+
+
+def test_each_planner_keeps_its_colour(tmp_path):
+    for name in ("ants", "mmas"):
+        picture = pixels(
+            history_figure({name: [history(4), history(5)]}, tmp_path / f"{name}.png", dpi=80, optimum=3.9)
+        )
+        other = "mmas" if name == "ants" else "ants"
+        assert near(picture, planner_style(name)[0]) > 100
+        assert near(picture, planner_style(other)[0]) == 0
+
+
+def test_lengths_by_ants_and_sweeps_are_drawn(tmp_path):
+    lengths = {10: [41.0, 44.0], 100: [38.0, 39.0], 500: [36.0, 36.5]}
+    picture = pixels(
+        ants_figure(lengths, tmp_path / "a.png", planner="aco-han", optimum=30.0, printed={10: 45.0}, dpi=80)
+    )
+    assert near(picture, planner_style("aco-han")[0]) > 100
+    table = {True: np.array([[30.0, 31.0], [32.0, np.nan]]), False: np.array([[33.0, 34.0], [35.0, 36.0]])}
+    sweep_figure([0.2, 0.4], [0.1, 0.3], table, tmp_path / "s.pdf")
+    assert (tmp_path / "s.pdf").stat().st_size > 3000
+
+
+#: Three runs on the maps 0, 1 and 0; the last finds its first path in the third of four iterations.
+RUNS = [np.array([9.0, 8.0, 7.0, 6.0]), np.array([12.0, 9.0, 5.0, 5.0]), np.array([np.inf, np.inf, 8.0, 7.0])]
+
+
+def curve(name, steps=None, printed=None):
+    return ConvergenceCurve(
+        name=name, planner="as", best=RUNS, maps=np.array([0, 1, 0]), steps=steps, optimum=4.0, printed=printed
+    )
+
+
+def line(figure, name):
+    (found,) = (drawn for drawn in figure.axes[0].lines if drawn.get_label() == name)
+    return found.get_xdata(), found.get_ydata()
+
+
+def test_the_median_of_all_runs_is_drawn_within_its_interval():
+    figure = convergence_figure({"a map": [curve("as", printed=4.5), curve("as, again")]})
+    x, y = line(figure, "as")
+    assert x.tolist() == [1, 2, 3, 4]
+    assert y.tolist() == [12, 9, 7, 6]  # no path counts as longer than any
+    (first, second) = figure.axes[0].collections
+    assert {color for band in (first, second) for color in map(tuple, band.get_facecolor()[:, :3])}.__len__() == 2
+    corners = first.get_paths()[0].vertices
+    assert corners[:, 1].min() <= 5
+    assert line(figure, "in the paper")[1] == [4.5]
+    low, high = figure.axes[0].get_ylim()
+    assert low < 4.0
+    assert high > 12.0
+
+
+def test_a_single_run_is_the_median_one_of_the_first_map():
+    x, y = line(convergence_figure({"a map": [curve("as")]}, single=True), "as")
+    assert (x.tolist(), y.tolist()) == ([1, 2, 3, 4], RUNS[0].tolist())
+
+
+def test_ant_steps_take_the_place_of_iterations():
+    figure = convergence_figure({"a map": [curve("as", steps=np.array([4e6, 8e6, 4e6]))]})
+    assert figure.axes[0].get_xlabel() == "million ant steps"
+    x, y = line(figure, "as")
+    assert x[-1] == pytest.approx(4.0)
+    assert y[-1] == 7.0  # at four million steps the second run is half done, at 9
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+def test_the_same_run_gives_the_same_file(made_up_drive, tmp_path, suffix):
+    drive = made_up_drive()
+    files = [tmp_path / f"{name}{suffix}" for name in ("one", "other", "saved")]
+    for path in files[:2]:
+        overview(drive, path, dpi=60)
+    save_figure(overview(drive, dpi=60), files[2])
+    one, other, saved = (path.read_bytes() for path in files)
+    assert one == other == saved
+    assert one[:5] in (b"\x89PNG\r", b"%PDF-", b"<?xml")
+
+
+def test_an_overview_shows_obstacles_trail_and_contact(made_up_drive, tmp_path):
+    drive = made_up_drive(collide=True)
+    full = pixels(overview(drive, tmp_path / "full.png", dpi=80))
+    world = drive.record.task.world
+    world = replace(world, obstacles=world.obstacles[-1:])
+    record = changed(drive.record, "task", world=world)
+    bare = replace(drive, contacts=drive.contacts * [1, 0, 1, 1], record=record)
+    few = pixels(overview(bare, tmp_path / "few.png", dpi=80))
+    assert near(full, (121, 136, 160)) > 3 * near(few, (121, 136, 160))
+    stuck = replace(drive.record, outcome=Outcome.STUCK)
+    clean = replace(drive, contacts=np.empty((0, 4)), record=stuck)
+    untouched = pixels(overview(clean, tmp_path / "clean.png", dpi=80))
+    assert near(full, (204, 32, 42)) > near(untouched, (204, 32, 42)) + 50
+
+
+def test_unseen_obstacles_have_their_own_colour(made_up_drive, tmp_path):
+    drive = made_up_drive()
+    task = drive.record.task
+    known = changed(task, "world", obstacles=task.world.obstacles[2:])
+    record = replace(drive.record, task=known, unseen=task.world.obstacles[:2])
+    marked = replace(drive, record=record)
+    assert near(pixels(overview(marked, tmp_path / "marked.png", dpi=80)), (196, 74, 138)) > 100
+
+
+def test_movers_and_their_tracks_are_drawn(made_up_drive, planned, searched, tmp_path):
+    amber = (228, 177, 65)
+    pictures = [pixels(overview(made_up_drive(movers=n), tmp_path / f"{n}.png", dpi=80)) for n in (0, 2)]
+    assert near(pictures[1], amber) > near(pictures[0], amber) + 100
+    (task, grid, _), plan = planned, searched
+    mover = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 3.0), (5.0, 2.5, 3.5)))
+    moving = changed(task, "world", movers=(mover, Wandering(radius=0.1, cell=0.5, period=1.0)))
+    picture = pixels(plan_figure(moving, grid, plan, ROBOT, tmp_path / "moving.png", dpi=80))
+    plain = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plain.png", dpi=80))
+    assert near(picture, amber) > near(plain, amber) + 100
+
+
+def test_the_legend_says_when_movers_are_where_they_are_drawn(made_up_drive, planned, searched):
+    drive = made_up_drive(movers=1)
+    (task, grid, _), plan = planned, searched
+    mover = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 3.0), (5.0, 2.5, 3.5)))
+    moving = changed(task, "world", movers=(mover,))
+    for figure, at in ((overview(drive), drive.t[-1]), (plan_figure(moving, grid, plan, ROBOT), 0.0)):
+        named = [text.get_text() for text in panels(figure)["map"].get_legend().get_texts()]
+        assert f"moving obstacle, at {at:.1f} s" in named
+
+
+def test_a_run_that_never_drove_has_an_overview(made_up_drive, tmp_path):
+    overview(undriven(made_up_drive()), tmp_path / "empty.png", dpi=60)
+    assert (tmp_path / "empty.png").stat().st_size > 5000
+
+
+def test_figures_work_in_a_thread_without_pyplot_and_leave_settings_alone(made_up_drive, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)  # importing it fails
+    before = matplotlib.rcParams.copy()
+    thread = threading.Thread(target=overview, args=(made_up_drive(), tmp_path / "a.png"), kwargs={"dpi": 50})
+    thread.start()
+    thread.join()
+    assert (tmp_path / "a.png").exists()
+    assert matplotlib.rcParams.copy() == before
+
+
+@pytest.mark.parametrize("certified", [True, False])
+def test_a_certificate_is_drawn_with_its_verdict(made_up_drive, tmp_path, certified):
+    found = Certificate(certified, 0 if certified else 3, 0.05, 0.04, () if certified else ("it touched",))
+    picture = pixels(certificate_figure(made_up_drive(), found, tmp_path / "c.png", dpi=80))
+    assert (near(picture, GOOD, 12) > near(picture, BAD, 12)) == certified
+
+
+def test_several_planners_on_one_map(made_up_drive, tmp_path):
+    one = made_up_drive()
+    other = replace(one, pose=one.pose + [0, 0.2, 0])
+    picture = pixels(comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80))
+    assert near(picture, planner_style("astar")[0], 12) > 50
+    assert near(picture, planner_style("mmas")[0], 12) > 100
+
+
+def test_every_figure_gives_its_axes_back_to_be_labelled_and_saved(made_up_drive, planned, searched, tmp_path):
+    drive, (task, grid, _), plan = made_up_drive(), planned, searched
+    history = History(*(np.full(5, 3.0) for _ in range(3)), arrived=np.full(5, 2))
+    learnt = replace(plan, field=grid.free * np.arange(grid.shape[1], dtype=float), history=history)
+    table = {True: np.ones((1, 2)), False: np.full((1, 2), 2.0)}
+    figures = [
+        (overview(drive), ["map", "clearance", "speed", "limiters"]),
+        (certificate_figure(drive, certify(drive)), ["map", "distance", "readings"]),
+        (comparison_figure({"astar": drive, "ants": drive}), ["map"]),
+        (then_and_now(drive, drive), ["map", "clearance", "distance"]),
+        (plan_figure(task, grid, learnt, ROBOT), ["map", "history"]),
+        (bars_figure(grid, learnt.field), ["field"]),
+        (contours_figure(task, grid, learnt, ROBOT), ["map"]),
+        (history_figure({"as": [history]}), ["history"]),
+        (robot_figure(ROBOT), ["map"]),
+        (ants_figure({10: [3.0]}, planner="aco-han", optimum=2.0), ["lengths"]),
+        (sweep_figure([0.1], [0.2, 0.3], table), ["with elitism", "without elitism"]),
+    ]
+    for figure, names in figures:
+        assert list(panels(figure)) == names
+    assert not list(tmp_path.iterdir()), "without a path nothing is written"
+    drawn, path = figures[0][0], tmp_path / "mine.svg"
+    panels(drawn)["map"].set_title("a title of my own")
+    assert save_figure(drawn, path) == path
+    assert "a title of my own" in path.read_text()
+    with pytest.raises(InputError, match="choose one of"):
+        save_figure(drawn, tmp_path / "a.bmp")
+
+
+def test_the_example_of_the_page_runs(tmp_path):
+    page = Path(__file__).parents[3] / "docs" / "how-to" / "figures.md"
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "slalom.pdf").stat().st_size > 10_000
+
+
+def test_both_drives_and_their_parting_are_drawn(made_up_drive, tmp_path):
+    then = made_up_drive()
+    now = replace(then, pose=then.pose + [0, 0.2, 0])
+    plain = then_and_now(then, now, tmp_path / "a.png", dpi=60)
+    marked = then_and_now(then, now, tmp_path / "b.png", parted=(0.3, 1.0, 1.0), dpi=60)
+    assert near(pixels(plain), START) > 100
+    assert near(pixels(plain), SHELL) > 100
+    assert near(pixels(marked), CONTACT) > near(pixels(plain), CONTACT) + 20
+
+
+def test_a_contact_is_marked(made_up_drive, tmp_path):
+    then, now = made_up_drive(), made_up_drive(collide=True)
+    plain = then_and_now(then, then, tmp_path / "a.png", dpi=60)
+    hit = then_and_now(then, now, tmp_path / "b.png", dpi=60)
+    assert near(pixels(hit), BAD) > near(pixels(plain), BAD) + 20
+
+
+@pytest.fixture(scope="module")
+def log(made_up_drive):
+    return scanned(made_up_drive(size=(6.0, 4.0), obstacles=40), max_range=2.5)
+
+
+def test_the_figure_shows_the_map_and_the_first_sights(log, tmp_path):
+    figure = sight_figure(log, tmp_path / "sight.png", dpi=60)
+    named = panels(figure)
+    assert set(named) == {"map", "known ground", "first sights"}
+    seen = Recollection(log)
+    seen.advance(log.t[-1])
+    _, explored = named["known ground"].lines[0].get_data()
+    assert float(np.asarray(explored)[-1]) == pytest.approx(seen.explored)
+    assert len(named["first sights"].get_yticklabels()) == LISTED
+    listed = {label.get_text() for label in named["first sights"].get_yticklabels()}
+    assert listed <= {text.get_text() for text in named["map"].texts}
+    assert (tmp_path / "sight.png").stat().st_size < 400_000
+
+
+def test_an_overview_calls_the_first_route_one_and_shows_all_of_it(log):
+    away = replace(log, route=np.array([[1.0, 2.0], [2.0, -1.5], [5.0, 2.0]]))
+    for figure in (overview(away), sight_figure(away)):
+        assert panels(figure)["map"].get_ylim()[0] < -1.5
+    words = {text.get_text() for text in panels(overview(away))["map"].get_legend().get_texts()}
+    assert {"first route, before the world was seen", "obstacle, on no map"} <= words
+
+
+def test_the_words_beside_the_curves_lie_in_the_picture_and_on_nothing_else(log):
+    """Every rule limited the speed in turn."""
+    count = len(log.record.limiters)
+    busy = replace(log, limiter=(np.arange(len(log.t)) % count).astype(np.uint8))
+    figure = overview(busy)
+    figure.draw_without_rendering()
+    named = panels(figure)
+    for name in ("speed", "limiters"):
+        box = named[name].get_legend().get_window_extent()
+        assert box.x1 <= figure.bbox.x1
+    title = named["speed"].title.get_window_extent()
+    assert not title.overlaps(named["speed"].get_legend().get_window_extent())
+
+
+def test_a_log_without_scans_has_no_such_figure(made_up_drive):
+    with pytest.raises(ValueError, match="no scans"):
+        sight_figure(made_up_drive())
