@@ -13,7 +13,7 @@ from antdrive import Disc, Outcome, Scenario
 from antdrive.base.errors import InputError
 from antdrive.cli.commands.run import run as command
 from antdrive.cli.testing import check_case
-from antdrive.planners.own_code import is_importable_elsewhere
+from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.margins.choice import Calibration
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.suites import Baseline, load_suite, scenario_of, select

@@ -16,7 +16,7 @@ from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import Planner, PlannerError
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible
-from antdrive.planners.own_code import is_importable_elsewhere
+from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_planner
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
