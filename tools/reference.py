@@ -10,7 +10,6 @@ import argparse
 import dataclasses
 import inspect
 import json
-import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -28,7 +27,7 @@ SIGNS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusive
 def cell(text: str) -> str:
     """Return a description as one cell of a Markdown table: one line, no pipe, no emphasis, no HTML outside code."""
     parts = re.split(r"(`[^`]*`)", " ".join(text.split()))
-    plain = [one if one.startswith("`") else re.sub(r"([*<\[\]])", r"\\\1", one) for one in parts]
+    plain = [one if one.startswith("`") else re.sub(r"([*<])", r"\\\1", one) for one in parts]
     return "".join(plain).replace("|", "\\|")
 
 
@@ -110,7 +109,9 @@ def _commands(command: Any, context: Any, level: str) -> Iterator[str]:
         yield from (cell(paragraph), "")
     for kind in ("argument", "option"):
         records = (one.get_help_record(context) for one in command.params if one.param_type_name == kind)
-        rows = [(code(" ".join(record[0].split()).replace("|", "\\|")), cell(record[1])) for record in records if record]
+        rows = [
+            (code(" ".join(record[0].split()).replace("|", "\\|")), cell(record[1])) for record in records if record
+        ]
         yield from table(f"{kind}, meaning", rows)
     for name in command.list_commands(context) if hasattr(command, "list_commands") else ():
         inner = command.get_command(context, name)
@@ -219,14 +220,22 @@ def worlds() -> list[str]:
 def robots() -> list[str]:
     """Return each robot of the catalogue with its footprint, limits, lidar and source."""
     from antdrive.robots import list_robots, load_robot
+    from antdrive.robots.drawing import footprint_text
 
     def row(name: str) -> Row:
         robot = load_robot(name)
         lidar = robot.lidar
         sensor = f"{lidar.rate:g} Hz, {lidar.max_range:g} m" if lidar else "none"
         top = f"{robot.max_speed:g} m/s, {robot.max_yaw_rate:g} rad/s"
-        after = re.split(r"(?<=\w\w)[.:;] |, \d|: \d", " ".join((robot.source or "").split()))[0]
-        return code(name), _picture("robots", name), cell(str(robot.footprint)), top, sensor, cell(after)
+        after = re.split(r"[:;(]|\. |, (?=[a-z\d])", " ".join((robot.source or "").split()))[0]
+        return (
+            code(name),
+            _picture("robots", name),
+            cell(footprint_text(robot)),
+            top,
+            sensor,
+            cell(after.strip().removeprefix("After ")),
+        )
 
     return table("robot, picture, footprint, top speeds, lidar, source", map(row, list_robots()))
 
@@ -312,18 +321,17 @@ def pages() -> list[Path]:
 
 def main(words: list[str]) -> int:
     """Write or check the generated parts."""
-    from antdrive.base.atomic import written_whole
+    from antdrive.base.atomic import atomic_write
 
     parser = argparse.ArgumentParser(prog="python -m tools.reference", description="Generate parts of pages.")
     parser.add_argument("--check", action="store_true", help="write nothing, list pages that differ")
     check = parser.parse_args(words).check
-    os.environ["COLUMNS"] = "80"
     stale = [path for path in pages() if written(path.read_text(encoding="utf-8")) != path.read_text(encoding="utf-8")]
     for path in stale:
         sys.stdout.write(f"{path.relative_to(ROOT)}{' differs' if check else ''}\n")
         if not check:
             text = written(path.read_text(encoding="utf-8"))
-            with written_whole(path) as temporary:
+            with atomic_write(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
     return 1 if check and stale else 0
 
