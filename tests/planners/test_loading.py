@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, GridPlanner, Query, load_planner, watch
+from antdrive.planners import PLANNERS, GridPlanner, Query, load_planner, on_progress
 from antdrive.planners.loading import kernels_loaded, tiny_query
 
 # Each planner gets a process of its own, in which no kernel is loaded yet. It prints what its first plan loads by itself.
@@ -136,7 +136,7 @@ def test_the_rehearsal_is_not_watched_and_leaves_the_random_numbers_alone(name):
     query, seen = tiny_query(Query, motions=False, task=True), []
     planner = load_planner(name, iterations=7)
     rng, other = np.random.default_rng(5), np.random.default_rng(5)
-    with watch(lambda state: seen.append(state.total)):
+    with on_progress(lambda state: seen.append(state.total)):
         first = planner.plan(query, rng)
     assert set(seen) <= {7}
     again = planner.plan(query, other)

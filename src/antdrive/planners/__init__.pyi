@@ -34,7 +34,7 @@ from .iterative import IterativePlanner as IterativePlanner
 from .iterative import Progress as Progress
 from .iterative import as_iterative as as_iterative
 from .iterative import keep_best as keep_best
-from .iterative import watch as watch
+from .iterative import on_progress as on_progress
 from .plan import Capabilities as Capabilities
 from .plan import Cell as Cell
 from .plan import Cells as Cells

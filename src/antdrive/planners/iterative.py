@@ -72,21 +72,21 @@ class Progress(NamedTuple):
     best: float
 
 
-_watcher: ContextVar[Callable[[Progress], None] | None] = ContextVar("_watcher", default=None)
+_progress_callback: ContextVar[Callable[[Progress], None] | None] = ContextVar("_progress_callback", default=None)
 
 
 @contextmanager
-def watch(see: Callable[[Progress], None]) -> Iterator[None]:
-    """Within this block, planners call `see` after every iteration.
+def on_progress(callback: Callable[[Progress], None]) -> Iterator[None]:
+    """Within this block, planners call `callback` after every iteration.
 
     Args:
-        see: called with the progress; what it raises ends the planning
+        callback: called with the progress; what it raises ends the planning
     """
-    token = _watcher.set(see)
+    token = _progress_callback.set(callback)
     try:
         yield
     finally:
-        _watcher.reset(token)
+        _progress_callback.reset(token)
 
 
 _keeping: ContextVar[bool] = ContextVar("_keeping", default=False)
@@ -175,11 +175,11 @@ class IterativePlanner(GridPlanner):
 
     def _improve(self, states: Iterator[Iteration], done: list[Iteration]) -> str:
         deadline = math.inf if self.time_budget is None else time.perf_counter() + self.time_budget
-        see = _watcher.get()
+        callback = _progress_callback.get()
         for state in itertools.islice(states, self.iterations):
             done.append(state)
-            if see is not None:
-                see(Progress(len(done), self.iterations, done[-1].best))
+            if callback is not None:
+                callback(Progress(len(done), self.iterations, done[-1].best))
             if time.perf_counter() >= deadline and len(done) < self.iterations:
                 spent = f"{len(done)} of {self.iterations} iterations"
                 return f"stopped by the time budget of {self.time_budget:g} s after {spent}"
