@@ -34,7 +34,7 @@ RELATIVE = 1e-9  # how far a cost may be off, as a fraction
 NEAR = 1e-6  # m: how far a waypoint may be off, and how much a line may come too close
 
 
-def ask(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
+def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
     """A planner's answer to a query. It is not checked.
 
     Args:
@@ -47,13 +47,13 @@ def ask(planner: Planner, query: Query, rng: np.random.Generator, name: str = ""
         InputError: the planner says that the query is wrong.
         PlannerError: the planner raised anything else, or its answer is no `PlanResult`.
     """
-    with blaming(planner, name):
+    with planner_errors(planner, name):
         answer: Any = planner.plan(query, rng)
-    return answered(planner, answer, name)
+    return require_result(planner, answer, name)
 
 
 @contextlib.contextmanager
-def blaming(planner: Planner, name: str = "") -> Iterator[None]:
+def planner_errors(planner: Planner, name: str = "") -> Iterator[None]:
     """Whatever is raised within becomes a `PlannerError`, but for `InputError`, Ctrl-C and SIGTERM.
 
     Args:
@@ -72,7 +72,7 @@ def blaming(planner: Planner, name: str = "") -> Iterator[None]:
         raise PlannerError(name or type(planner).__name__, f"raised {says} ({_place(planner, error)})") from error
 
 
-def answered(planner: Planner, answer: Any, name: str = "") -> PlanResult:
+def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
     """The answer of a planner, or of what it made, if it is a `PlanResult`.
 
     Args:
