@@ -223,7 +223,7 @@ def test_a_planner_that_raises_is_named_with_the_place():
     with pytest.raises(PlannerError) as found:
         request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
     assert found.value.planner == "mine"
-    assert str(found.value) == f"planner mine raised KeyError: 'row\\n2' (test_checking.py:{line})"
+    assert str(found.value) == f"planner mine raised KeyError: 'row\\n2' (test_validation.py:{line})"
     assert isinstance(found.value.__cause__, KeyError)
 
 
@@ -232,18 +232,22 @@ def test_the_place_is_in_the_planners_module_and_not_in_what_it_calls():
         def plan(self, query, rng):
             return np.linalg.inv(np.zeros((2, 2)))
 
-    with pytest.raises(PlannerError, match=rf"LinAlgError.*test_checking.py:{Caller.plan.__code__.co_firstlineno + 1}"):
+    with pytest.raises(
+        PlannerError, match=rf"LinAlgError.*test_validation.py:{Caller.plan.__code__.co_firstlineno + 1}"
+    ):
         request_plan(Caller(None), QUERY, RNG(0))
 
 
 @pytest.mark.parametrize("answer", [None, 3, RIGHT.cells, (RIGHT,)], ids=["None", "3", "cells", "tuple"])
 def test_an_answer_that_is_no_plan_result_is_a_planner_error(answer):
-    with pytest.raises(PlannerError, match=r"planner Broken returned .* where a PlanResult is due \(test_checking.py:"):
+    with pytest.raises(
+        PlannerError, match=r"planner Broken returned .* where a PlanResult is due \(test_validation.py:"
+    ):
         request_plan(Broken(answer), QUERY, RNG(0))
 
 
 def test_a_planner_that_exits_is_its_error_and_no_success():
-    with pytest.raises(PlannerError, match=r"planner Broken raised SystemExit: 0 \(test_checking.py:"):
+    with pytest.raises(PlannerError, match=r"planner Broken raised SystemExit: 0 \(test_validation.py:"):
         request_plan(Broken(SystemExit(0)), QUERY, RNG(0))
 
 

@@ -31,7 +31,7 @@ from antdrive.planners.plan import (
     path_cost,
 )
 
-REHEARSED = 2  # iterations in which kernels are loaded: the second evaporates and reuses what the first left
+WARMUP_ITERATIONS = 2  # iterations in which kernels are loaded: the second evaporates and reuses what the first left
 
 
 class Iteration(NamedTuple):
@@ -131,9 +131,9 @@ class IterativePlanner(GridPlanner):
         """What this planner can do and what it needs."""
         return Capabilities(iterative=True)
 
-    def rehearsal(self) -> IterativePlanner:
+    def for_warmup(self) -> IterativePlanner:
         """This planner with few iterations, which call the same kernels."""
-        return dataclasses.replace(self, iterations=min(self.iterations, REHEARSED), time_budget=None)
+        return dataclasses.replace(self, iterations=min(self.iterations, WARMUP_ITERATIONS), time_budget=None)
 
     @abc.abstractmethod
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:

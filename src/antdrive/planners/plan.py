@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from antdrive.base import Floats, Point
 from antdrive.base.errors import FieldError, input_error
-from antdrive.planners.loading import kernels_loaded
+from antdrive.planners.warmup import kernels_loaded
 from antdrive.worlds import MoverMotion, Task
 from antdrive.worlds.route import cells_beside
 
@@ -363,7 +363,7 @@ class GridPlanner(abc.ABC):
         options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return dataclasses.replace(result, options=options, wall_s=spent)
 
-    def rehearsal(self) -> GridPlanner:
+    def for_warmup(self) -> GridPlanner:
         """This planner with as little work as calls the same kernels, which are loaded so before the clock starts."""
         return self
 
