@@ -220,11 +220,11 @@ class Broken:
 
 def test_a_planner_that_raises_is_named_with_the_place():
     line = Broken.plan.__code__.co_firstlineno + 2
-    with pytest.raises(PlannerError) as found:
+    with pytest.raises(PlannerError) as error:
         request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
-    assert found.value.planner == "mine"
-    assert str(found.value) == f"planner mine raised KeyError: 'row\\n2' (test_validation.py:{line})"
-    assert isinstance(found.value.__cause__, KeyError)
+    assert error.value.planner == "mine"
+    assert str(error.value) == f"planner mine raised KeyError: 'row\\n2' (test_validation.py:{line})"
+    assert isinstance(error.value.__cause__, KeyError)
 
 
 def test_the_place_is_in_the_planners_module_and_not_in_what_it_calls():
@@ -252,10 +252,10 @@ def test_a_planner_that_exits_is_its_error_and_no_success():
 
 
 def test_a_planner_error_gets_to_another_process():
-    with pytest.raises(PlannerError) as found:
+    with pytest.raises(PlannerError) as error:
         request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
-    copy = pickle.loads(pickle.dumps(found.value))
-    assert (str(copy), copy.planner, copy.problem) == (str(found.value), "mine", found.value.problem)
+    copy = pickle.loads(pickle.dumps(error.value))
+    assert (str(copy), copy.planner, copy.problem) == (str(error.value), "mine", error.value.problem)
 
 
 def test_what_is_wrong_with_the_query_and_ctrl_c_pass():

@@ -55,7 +55,7 @@ def overloads():
 
 loaded, driving = set(), False
 
-def watched(method):
+def recorded(method):
     def replan(self, *args):
         before = overloads()
         path = method(self, *args)
@@ -65,7 +65,7 @@ def watched(method):
     return replan
 
 for kind in (Replanning, CellByCell):
-    kind.replan = watched(kind.replan)
+    kind.replan = recorded(kind.replan)
 for words in sys.argv[1:]:
     if os.fork():
         os.wait()
@@ -91,7 +91,7 @@ def printed(script, *words):
     assert done.returncode == 0, done.stderr
     lines = [line.split(" - ") for line in done.stdout.splitlines()]
     assert len(lines) == len(words), done.stderr
-    return {name: found.split() for name, found in lines}
+    return {name: rest.split() for name, rest in lines}
 
 
 @needs_kernels

@@ -17,7 +17,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import require
-from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import (
     Capabilities,
     Cells,
@@ -158,7 +158,7 @@ class IterativePlanner(GridPlanner):
             states: the iterations, as `iterate` yields them
         """
         if not reachable(query):
-            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit=self.work_unit)
+            return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work_unit=self.work_unit)
         if query.start == query.goal:
             here = np.array([query.start], dtype=np.int32)
             return PlanResult(status=PlanStatus.SOLVED, cells=here, cost=0.0, work_unit=self.work_unit)

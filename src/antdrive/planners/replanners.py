@@ -46,7 +46,7 @@ class ReplanFromScratch(CachedReplanner):
         super().__init__(query)
         self._planner, self._rng = planner, rng
 
-    def _plan_anew(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
+    def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
         return dataclasses.replace(request_plan(self._planner, query, self._rng), waypoints=None, length=None)
 
 

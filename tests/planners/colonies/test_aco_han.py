@@ -104,11 +104,11 @@ def test_elitism_concentrates_pheromone_on_the_best_path():
     query = catalogue()["forest"]
 
     def share_on_path(elitism):
-        shares = []
+        fractions = []
         for seed in range(3):
             result = AcoHan(ants=100, iterations=20, elitism=elitism).plan(query, np.random.default_rng(seed))
-            shares.append(result.field[tuple(result.cells.T)].sum() / result.field.sum())
-        return float(np.mean(shares))
+            fractions.append(result.field[tuple(result.cells.T)].sum() / result.field.sum())
+        return float(np.mean(fractions))
 
     assert share_on_path(100) > 1.3 * share_on_path(0)
 

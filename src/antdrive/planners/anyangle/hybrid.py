@@ -110,7 +110,7 @@ class Hybrid(ViaPointPlanner):
                     candidate = self._pulled(query, ends, state.cells)
                     # Paths are compared once they are tight: the shortest path of cells need not give the shortest line.
                     length = float(_kernels_ga.tighten_all(candidate, fixed, land, ROUNDS))
-                    if incumbent.offer(candidate, length):
+                    if incumbent.keep_if_shorter(candidate, length):
                         via = candidate
                 yield state._replace(cells=incumbent.cells, best=incumbent.best, waypoints=incumbent.waypoints)
                 if number >= self.ant_iterations and pulled:
