@@ -4,14 +4,14 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from antdrive.base.atomic import claimed
+from antdrive.base.atomic import folder_lock
 from antdrive.cli import options
 from antdrive.cli.console import file_lines, planning, show
 from antdrive.cli.options import option
 from antdrive.cli.output import chosen_margin, in_brackets, plain
 from antdrive.cli.scenario import Ends, Setup
 from antdrive.cli.warm import compile_once
-from antdrive.views.folder import suffixes
+from antdrive.views.run_folder import suffixes
 
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult
@@ -46,7 +46,7 @@ def plan(
         from antdrive.views.figures.plan_figures import plan_figures
 
         named: dict[str, Any] = {"name": setup.planner, "suffixes": suffixes(vector)}
-        with claimed(out):
+        with folder_lock(out):
             made = plan_figures(scenario.task, grid, answer, scenario.robot, out, **named)
         files = {name: str(path) for name, path in made.items()}
     facts = {

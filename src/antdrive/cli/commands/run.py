@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from antdrive.base.atomic import claimed
+from antdrive.base.atomic import folder_lock
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import bar, planning, show, this_command
@@ -12,7 +12,7 @@ from antdrive.cli.output import film_drives, run_lines
 from antdrive.cli.scenario import Ends, Setup
 from antdrive.cli.warm import compile_once
 from antdrive.sim.settings import SETTINGS
-from antdrive.views.folder import check_film, check_folder, default_folder, write_result, write_run
+from antdrive.views.run_folder import check_film, check_folder, default_folder, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -48,7 +48,7 @@ def run(
     _check_views(scenario, film, prelude, gui)
     check_folder(folder)
     compile_once()
-    with claimed(folder):
+    with folder_lock(folder):
         with planning(f"planning with {scenario.planner_name}"), keep_best():  # Ctrl-C keeps the best path so far
             planned = plan(scenario)
         with bar("driving") as progress:

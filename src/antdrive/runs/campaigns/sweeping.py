@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
@@ -202,6 +202,6 @@ def _begin(store: Store, campaign: Campaign, expansion: Expansion, jobs: Sequenc
         if not (store.folder / path).exists():
             save_task(task, store.folder / path)
     for path, source in {**expansion.robots, **expansion.planners}.items():
-        with written_whole(store.folder / path) as part:
+        with atomic_write(store.folder / path) as part:
             shutil.copyfile(source, part)
     store.begin(manifest, grid_table(jobs))

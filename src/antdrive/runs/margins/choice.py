@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import TypeAdapter
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.kernel_cache import cache_folder
 from antdrive.base.records import STRICT
@@ -214,7 +214,7 @@ def _keep(calibration: Calibration) -> None:
     if path is None:
         return
     try:
-        with written_whole(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_bytes(_adapter().dump_json(calibration, indent=1))
     except (InputError, OSError):
         return  # a full disk costs the next run a calibration, nothing else

@@ -27,7 +27,7 @@ import numpy.typing as npt
 import antdrive.planners
 import antdrive.runs.papers
 import antdrive.worlds
-from antdrive.base.atomic import write_text, written_whole
+from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError
 from antdrive.planners import History, PlanResult, PlanStatus
 from antdrive.runs.papers.claims import (
@@ -101,7 +101,7 @@ def save_runs(runs: Sequence[PaperRun], path: Path, key: str) -> None:
     }
     for name in HISTORY:
         arrays[name] = np.concatenate([getattr(History(), name), *(getattr(plan.history, name) for plan in plans)])
-    with written_whole(path) as temporary, temporary.open("wb") as file:
+    with atomic_write(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
 
 
@@ -362,7 +362,7 @@ def _write_table(heads: Sequence[str], rows: Iterable[Sequence[str]], path: Path
 
 
 def _write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> str:
-    with written_whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+    with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         if rows:
             writer.writerow(list(rows[0]))
