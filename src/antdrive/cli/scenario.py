@@ -56,7 +56,7 @@ class Ends:
             raise InputError(f"--frame {self.frame}: choose from {', '.join(FRAMES)}")
         if self.task is None and self.start is None and self.goal is None:
             return world
-        from antdrive.base.plane import out_of_map
+        from antdrive.base.plane import map_to_world
         from antdrive.worlds import load_task
 
         ends = {"start": numbers("--start", self.start, 3, "X,Y,YAW"), "goal": numbers("--goal", self.goal, 2, "X,Y")}
@@ -64,7 +64,7 @@ class Ends:
         try:
             found = load_task(world, self.task)
             if self.frame == MAP_FRAME:
-                given = {key: tuple(out_of_map(found.frame, [value])[0].tolist()) for key, value in given.items()}
+                given = {key: tuple(map_to_world(found.frame, [value])[0].tolist()) for key, value in given.items()}
             return dataclasses.replace(found, **given)
         except FieldError as error:
             there = " (places are in the world's frame)" if self.frame == MAP_FRAME and any(found.frame) else ""

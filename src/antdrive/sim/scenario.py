@@ -15,7 +15,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
-from antdrive.base.plane import place_name
+from antdrive.base.plane import format_position
 from antdrive.planners import Planner, capabilities_of
 from antdrive.robots import RobotSpec, overlap_at
 from antdrive.robots.spec import Odometry
@@ -94,7 +94,7 @@ class Scenario(Settings):
             raise FieldError("control_hz", problem)
         overlap = overlap_at(self.task.world, self.robot, self.task.start, self.unseen)
         if overlap:
-            at = place_name(self.task.frame, *self.task.start[:2], "g")
+            at = format_position(self.task.frame, *self.task.start[:2], "g")
             raise FieldError("start", f"{self.robot.name} at {at} {overlap}; move the start away from it")
 
     def _check_kinds(self) -> None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import frame_at, laid
+from antdrive.base.plane import relative_frame, transform_points
 from antdrive.base.types import Floats
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.placing import shape_of
@@ -158,7 +158,7 @@ def followed_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
     """
     rows = rollout.tracks[:, 0].astype(np.int64)
     believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
-    places = laid(rollout.tracks[:, 2:4].astype(np.float64), frame_at(believed, true))
+    places = transform_points(rollout.tracks[:, 2:4].astype(np.float64), relative_frame(believed, true))
     return [
         rows[np.hypot(*(places - rollout.movers[rows, j]).T) <= mover.radius]
         for j, mover in enumerate(rollout.record.world.movers)

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.plane import in_map
+from antdrive.base.plane import world_to_map
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import Disc, Task, World
@@ -272,7 +272,7 @@ def _reachable(cells: CellMap, start: Pose, goal: Point) -> tuple[CellMap, bool]
 
 def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
     spot = cells.cell_at(x, y)
-    there_x, there_y = in_map(cells.frame, [(x, y)])[0].tolist()
+    there_x, there_y = world_to_map(cells.frame, [(x, y)])[0].tolist()
     if spot is None:
         raise input_error(key, f"({there_x:g}, {there_y:g}) is not on the map, which spans {_span(cells)}")
     if not cells.free[spot]:
@@ -285,7 +285,7 @@ def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
 def _span(cells: CellMap) -> str:
     """The box around the cells in the map that people know."""
     x0, y0, x1, y1 = cells.bounds
-    corners = in_map(cells.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    corners = world_to_map(cells.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     return f"x {xmin:g} to {xmax:g} and y {ymin:g} to {ymax:g} m"
 
