@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Noise, NoiseModel, Twist, footprint_clearance, load_robot, overlap_at
-from antdrive.robots.drawing import robot_svg
-from antdrive.robots.placing import gaps
+from antdrive.robots.card import robot_svg
+from antdrive.robots.clearance import gaps
 from antdrive.worlds import Disc, World
 
 DT = 1 / 60

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from antdrive.base import FieldError
 from antdrive.robots import Footprint, footprint_clearance, load_robot
+from antdrive.robots.clearance import gaps
 from antdrive.robots.control._kernels_obstacles import turn_clearance
-from antdrive.robots.placing import gaps
 from antdrive.robots.spec import yaw_inertia
 from antdrive.sim.driving._kernels_movers import lower_by_movers
 from antdrive.sim.log.certificate import _polygon_to_points, _polygon_to_walls

@@ -207,7 +207,7 @@ class RobotSpec:
 
     def _repr_html_(self) -> str:
         """The robot as notebooks show it."""
-        from antdrive.robots.drawing import robot_card
+        from antdrive.robots.card import robot_card
 
         return robot_card(self)
 

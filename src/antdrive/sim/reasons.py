@@ -10,7 +10,7 @@ from antdrive.base.plane import format_position
 from antdrive.planners import AStar, Query
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible, widest_passage
 from antdrive.planners.graph.search import reachable
-from antdrive.robots.placing import name_of
+from antdrive.robots.clearance import name_of
 from antdrive.worlds import Grid, Task, point_clearance, rasterise
 
 if TYPE_CHECKING:

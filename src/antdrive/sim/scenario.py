@@ -24,7 +24,7 @@ from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import Perception, usual_perception
 from antdrive.sim.settings import SETTINGS, SLOWEST_CONTROL, Settings, part_of_key
 from antdrive.worlds import Disc, Task, Trajectories, World
-from antdrive.worlds.drawing import card, world_svg
+from antdrive.worlds.svg import card, world_svg
 
 DRIFTING = "odometry", "matching"  # localisation without fixes
 FINE = 0.05  # without a map, plans are made on cells of this side at most [m]

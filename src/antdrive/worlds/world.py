@@ -12,10 +12,10 @@ import numpy as np
 from antdrive.base.caches import Keyed, bits
 from antdrive.base.errors import FieldError, require_finite, require_positive
 from antdrive.base.types import Bounds, Floats, Point, Pose
-from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.limits import MAX_CELLS, MAX_WALK, Coordinate, Size
 from antdrive.worlds.motions import Motion, first_cell, motion_of, require_few_draws, way_ahead
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
+from antdrive.worlds.svg import card, world_svg
 
 WAY_DRAWN = 20.0  # how far ahead notebooks show the ways of movers [s]
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from antdrive.base.plane import relative_frame, transform_points
 from antdrive.robots import load_robot
-from antdrive.robots.placing import footprint_clearance
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.sim import METRICS
 from antdrive.sim.log.rollout import millimetres, ranges_of
 from antdrive.sim.log.sights import PASSED, first_meetings, movers_met, passed, seen_ground, sightings

@@ -43,7 +43,7 @@ def show_robot(
 ) -> None:
     """Describe a robot, and draw it from above."""
     from antdrive.robots import load_robot, robot_to_dict
-    from antdrive.robots.drawing import facts_of
+    from antdrive.robots.card import facts_of
 
     spec = load_robot(robot)
     if out is not None:

@@ -26,7 +26,7 @@ def verify(
     Exit code 0: every log proves that the robot touched nothing.
     Exit code 2: one cannot be read; the others are certified all the same.
     """
-    from antdrive.robots.files import load_robot
+    from antdrive.robots.robot_file import load_robot
     from antdrive.sim.verifying import verified
     from antdrive.worlds.files.world_file import load_task
 

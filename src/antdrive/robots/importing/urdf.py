@@ -17,13 +17,13 @@ import numpy as np
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
-from antdrive.robots.files import footprint_to_dict, robot_from_text
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.model import UrdfModel, read_model
 from antdrive.robots.importing.sensors import found_lidar, lidar_entry
 from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
+from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
 from antdrive.robots.spec import GRAVITY, RobotSpec, yaw_inertia_of
 
 ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # that are assumed where the motors allow them [m/s^2], [rad/s^2]

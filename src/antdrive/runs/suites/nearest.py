@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.base.records import STRICT
-from antdrive.robots.placing import gaps, name_of
+from antdrive.robots.clearance import gaps, name_of
 from antdrive.runs.suites.demands import CYLINDER, MOVER, UNSEEN, WALL
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.margin import budget

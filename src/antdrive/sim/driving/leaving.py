@@ -8,7 +8,7 @@ import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath, Twist, footprint_clearance
-from antdrive.robots.placing import gaps, name_of
+from antdrive.robots.clearance import gaps, name_of
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Decider, Ending, Step

@@ -11,7 +11,7 @@ import numpy as np
 from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
 from antdrive.robots import Twist, footprint_clearance
-from antdrive.robots.placing import shape_of
+from antdrive.robots.clearance import shape_of
 from antdrive.sim.driving import _kernels_movers
 from antdrive.sim.driving.parts import Ending, Step
 from antdrive.sim.log.contacts import Attribution

@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from antdrive.base.plane import relative_frame, transform_points
 from antdrive.base.types import Floats
+from antdrive.robots.clearance import shape_of
 from antdrive.robots.lidar import Lidar
-from antdrive.robots.placing import shape_of
 from antdrive.sim.log import _kernels_sights as kernels
 from antdrive.sim.log.record import finite_or_none
 from antdrive.sim.log.rollout import Rollout, ranges_of

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.base.errors import require_positive
+from antdrive.robots.clearance import shape_of
 from antdrive.robots.lidar import Lidar
-from antdrive.robots.placing import shape_of
 from antdrive.robots.spec import Footprint
 from antdrive.sim.sensing import _kernels_mapping as kernels
 from antdrive.sim.sensing import _kernels_sight

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from antdrive.worlds.drawing import card
+from antdrive.worlds.svg import card
 
 if TYPE_CHECKING:  # a robot draws itself with this module
     from antdrive.robots.lidar import Lidar
