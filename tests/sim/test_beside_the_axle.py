@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from antdrive.robots import Footprint, list_robots, load_robot
-from antdrive.robots.importing.urdf import import_urdf
+from antdrive.robots.importing.urdf_import import import_urdf
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.log.certificate import _between_steps, _clearances
 from antdrive.views.film.meshes import robot_parts

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.robots import Lidar
-from antdrive.robots.importing.urdf import import_urdf
+from antdrive.robots.importing.urdf_import import import_urdf
 
 BURGER = (Path(__file__).parent / "urdf" / "burger.urdf").read_text()
 SENSOR = (

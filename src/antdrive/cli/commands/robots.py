@@ -102,7 +102,7 @@ def import_robot(
     from antdrive.base.atomic import write_text
     from antdrive.robots import robot_to_dict
     from antdrive.robots.importing.model import checked_packages
-    from antdrive.robots.importing.urdf import import_urdf
+    from antdrive.robots.importing.urdf_import import import_urdf
 
     values = {"wheel_radius": wheel_radius} if wheel_radius is not None else {}
     for key, text in map(pair, given or ()):
