@@ -10,7 +10,7 @@ from antdrive.base.plane import format_position
 from antdrive.planners import AStar, Query
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible, widest_passage
 from antdrive.planners.graph.search import reachable
-from antdrive.robots.clearance import name_of
+from antdrive.robots.clearance import obstacle_name
 from antdrive.worlds import Grid, Task, point_clearance, rasterise
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def _narrowest_place(s: RoutePlanner) -> str:
         return "not even a point gets through"
     at = format_position(task.frame, *passage.at)
     ends = ((task.start[:2], "the start has no more room"), (task.goal, "the goal has no more room"))
-    where = " and ".join(name_of(task.world, k) for k in passage.between)
+    where = " and ".join(obstacle_name(task.world, k) for k in passage.between)
     where = f"between {where}" if where else next(says for end, says in ends if end == passage.at)
     return (
         f"the widest disc that passes has a radius of {passage.radius:.3g} m, at {at}, {where}; "

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from antdrive.base.plane import relative_frame, transform_points
 from antdrive.base.types import Floats
-from antdrive.robots.clearance import shape_of
+from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.log import _kernels_sights as kernels
 from antdrive.sim.log.record import finite_or_none
@@ -137,7 +137,7 @@ def movers_met(rollout: Rollout) -> list[Sighting]:
 
 def _sighting(rollout: Rollout, j: int, first: float, poses: Floats, disc: Floats, **more: Any) -> Sighting:
     """What is first met at a time [s], if the robot's poses (T, 3) are seen from where a disc (3,) has its place."""
-    shape, row, away = shape_of(rollout.record.robot.footprint), np.zeros(1, dtype=np.int64), np.empty(1)
+    shape, row, away = kernel_shape(rollout.record.robot.footprint), np.zeros(1, dtype=np.int64), np.empty(1)
 
     def approach(some: Floats) -> tuple[int, float]:
         kernels.nearest_approaches(some, *shape, disc[None], row, away)
