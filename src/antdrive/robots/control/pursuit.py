@@ -102,7 +102,7 @@ class TrackedPath:
         """Length of the route [m]."""
         return float(self.samples.arc[-1])
 
-    def among(self, obstacles: ObstacleIndex) -> TrackedPath:
+    def with_obstacles(self, obstacles: ObstacleIndex) -> TrackedPath:
         """The same path among other obstacles.
 
         Args:
@@ -113,12 +113,12 @@ class TrackedPath:
         )
 
     @property
-    def for_any_turn(self) -> TrackedPath:
+    def ignoring_turn_clearance(self) -> TrackedPath:
         """The same path for a robot that turns on the spot the shorter way round, whatever is in its way."""
         return replace(self, tuning=self.tuning._replace(half_length=0.0, half_width=0.0, corners=np.empty((0, 2))))
 
     @property
-    def without_turning(self) -> TrackedPath:
+    def preferring_arcs(self) -> TrackedPath:
         """The same path for a robot that takes every clear arc a driving robot would take, instead of turning first."""
         return replace(self, tuning=self.tuning._replace(rotate_above_at_rest=self.tuning.rotate_above))
 
@@ -210,7 +210,9 @@ class PurePursuit:
         """
         tuning = self._tuning(route, robot, margin, period, min(self.goal_distance, tolerance / 2))
         tuning = tuning._replace(spacing=spacing)
-        obstacles = self._index(world, tuning.lookahead_clearance) if indexed else unsorted(world.discs, world.bounds)
+        obstacles = (
+            self._index(world, tuning.lookahead_clearance) if indexed else unsorted_obstacles(world.discs, world.bounds)
+        )
         lookahead: Floats = np.empty(int(route.arc[-1] / spacing) + 2)
         _kernels_path.clear_lookaheads(
             route.xy, route.arc, obstacles, tuning.lookahead_clearance, spacing, self.lookahead_min,
@@ -298,7 +300,7 @@ class PurePursuit:
         return ObstacleIndex(discs, starts, bounds, side)
 
 
-def unsorted(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
+def unsorted_obstacles(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
     """Obstacles that all lie in one square."""
     return ObstacleIndex(discs, np.array([0, len(discs)]), np.asarray(bounds, dtype=np.float64), EVERYTHING)
 

@@ -39,7 +39,7 @@ def cannot_leave(
         halting = Leaving(tracked, controller, world, robot, halts=True)
         if _rehearsed(halting, world, robot, start, control_hz)[0].outcome is Outcome.SUCCEEDED:
             return ""
-    leaving = Leaving(tracked.for_any_turn, controller, world, robot)
+    leaving = Leaving(tracked.ignoring_turn_clearance, controller, world, robot)
     ending, plant = _rehearsed(leaving, world, robot, start, control_hz)
     if ending.outcome is not Outcome.COLLIDED:
         return ""
