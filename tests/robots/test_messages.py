@@ -7,7 +7,7 @@ from antdrive.robots import Avoidance, Footprint, Noise, Odometry, list_robots, 
 from antdrive.robots.importing.urdf_import import import_urdf
 from tests.messages import check_messages, numbered
 from tests.robots import test_lidar, test_polygons, test_robot_file
-from tests.robots.importing import test_urdf_import
+from tests.robots.importing import test_urdf_import as test_urdf
 
 NOISE = ({"slip": 0.6}, {"pose_xy": -0.1}, {"delay": math.nan}, {"pose_rate": 0.5})
 AVOIDANCE = ({"horizon": 0.0}, {"step": 61.0}, {"min_clearance": math.nan}, {"reversal_margin": -0.1})
@@ -45,8 +45,7 @@ def test_wrong_robots_are_refused_in_one_line(tmp_path, jackal, data_regression)
         },
         "lidars": {str(wrong): lambda w=wrong: test_lidar.changed(tmp_path, **w) for wrong in test_lidar.WRONG},
         "urdf": numbered(
-            lambda c=changes: import_urdf(test_urdf_import.changed(tmp_path, "burger.urdf", *c))
-            for changes in test_urdf_import.WRONG
+            lambda c=changes: import_urdf(test_urdf.changed(tmp_path, "burger.urdf", *c)) for changes in test_urdf.WRONG
         ),
         "noise in files": {wrong: lambda w=wrong: noisy(w) for wrong in ("slip: 2", "slop: 0.1", "slip: often")},
         "noise": {str(words): lambda w=words: Noise(**w) for words in NOISE},

@@ -15,7 +15,7 @@ from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_
 from antdrive.base.document import Document, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.records import STRICT
-from antdrive.robots.outline import MOST_CORNERS
+from antdrive.robots.outline import MAX_CORNERS
 from antdrive.robots.spec import Footprint, RobotSpec, require_feasible
 
 _CATALOG = Path(__file__).with_name("catalog")
@@ -47,7 +47,7 @@ class FootprintEntry(BaseModel):
     polygon: list[_Place] | None = Field(
         None,
         description="corners of a convex outline, in order: x ahead, y to the left of the axle's centre [m]; at most "
-        f"{MOST_CORNERS}",
+        f"{MAX_CORNERS}",
     )
 
     @model_validator(mode="after")

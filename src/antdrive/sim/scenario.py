@@ -320,7 +320,7 @@ class Scenario(Settings):
 def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:
     """The driven world as SVG, with start, goal, the ways of movers, and lines: points, colour, whether dashed."""
     world, task = s.driven_world, s.task
-    goal, movers = (*task.goal, task.goal_tolerance), world.ways(task.start[:2], s.seed)
+    goal, movers = (*task.goal, task.goal_tolerance), world.mover_paths(task.start[:2], s.seed)
     return world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
 
 

@@ -178,13 +178,13 @@ def import_world(
     wider than on the map. The key `source` of the world file says how far cylinders protrude from blocked cells.
     """
     from antdrive.worlds import import_file, save_task
-    from antdrive.worlds.formats.cellmap import watch_conversion
+    from antdrive.worlds.formats.cellmap import conversion_progress
     from antdrive.worlds.formats.importing import IMPORTS, import_format
     from antdrive.worlds.formats.map_server import kept_tasks
 
     try:
         file_format = import_format(path, barn=barn)
-        with bar("converting") as progress, watch_conversion(progress):
+        with bar("converting") as progress, conversion_progress(progress):
             tasks = import_file(
                 path,
                 start=numbers("--start", start, 3, "X,Y,YAW"),

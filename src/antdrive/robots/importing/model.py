@@ -23,7 +23,7 @@ from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.formats.xml import parse_xml
 
-MOST_PACKAGES = 100  # that one file may refer to
+MAX_PACKAGES = 100  # that one file may refer to
 
 
 def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Path | None:
@@ -40,7 +40,7 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
         raise input_error(str(path), "no such file")
     xacrodoc = optional("xacrodoc", "urdf", "xacro files are expanded with it")
     known = dict(packages)
-    for _ in range(MOST_PACKAGES):
+    for _ in range(MAX_PACKAGES):
         xacrodoc.packages.reset()
         xacrodoc.packages.update_package_cache(known)
         try:
@@ -52,7 +52,7 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
             if missing is None or folder is None:
                 raise input_error(str(path), f"xacro cannot expand it: {_in_one_line(error)}{_help(error)}") from None
             known[missing] = folder
-    raise input_error(str(path), f"refers to more than {MOST_PACKAGES} packages")
+    raise input_error(str(path), f"refers to more than {MAX_PACKAGES} packages")
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
@@ -96,7 +96,7 @@ def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
 
 # Around a circle of radius 1, with sides ahead, behind, to the left and to the right: it is as long and as wide as the circle.
 CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
-MOST_LINKS = 10_000
+MAX_LINKS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,8 +176,8 @@ def read_model(
     if root.tag != "robot":
         raise input_error(str(path), f"its root element is <{root.tag}>; a URDF file begins with <robot>")
     links = {_named(path, link): link for link in root.findall("link")}
-    if not 0 < len(links) <= MOST_LINKS:
-        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MOST_LINKS}")
+    if not 0 < len(links) <= MAX_LINKS:
+        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MAX_LINKS}")
     found = [_joint(path, element) for element in root.findall("joint")]
     commanded = _commanded(path, root, {joint.name for joint in found})
     places, joints = _placed(path, set(links), [replace(joint, commanded=commanded.get(joint.name)) for joint in found])

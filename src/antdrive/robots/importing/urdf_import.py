@@ -19,7 +19,7 @@ from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.model import UrdfModel, read_model
-from antdrive.robots.importing.sensors import found_lidar, lidar_entry
+from antdrive.robots.importing.sensors import import_lidar, lidar_entry
 from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
@@ -28,12 +28,12 @@ from antdrive.robots.spec import GRAVITY, RobotSpec, yaw_inertia_of
 
 ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # that are assumed where the motors allow them [m/s^2], [rad/s^2]
 SPEED, YAW_RATE = 0.5, 2.0  # that are assumed where the file has no limits [m/s], [rad/s]
-MOST_YAW_RATE = 3.14  # that is taken where only the wheels limit it: half a turn a second [rad/s]
+DEFAULT_YAW_RATE = 3.14  # that is taken where only the wheels limit it: half a turn a second [rad/s]
 SPARE = 0.9  # the share of what the motors could do that is used
 FRICTION = 1.5  # of wheels
 RANGES = ranges_of(RobotSpec)
 NO_LIMIT = "assumed: the file has no limit"
-LEAST_DRIVE = 0.05  # the least acceleration that makes an effort limit a motor's [m/s^2]
+MIN_MOTOR_ACCELERATION = 0.05  # the least acceleration that makes an effort limit a motor's [m/s^2]
 
 Found = dict[str, tuple[float, str]]  # values of a robot's file, and where they come from
 
@@ -89,8 +89,8 @@ def _of_joints(key: str, limit: _Limit, reach: float, most: float, assumed: floa
         return assumed, NO_LIMIT
     if reach > RANGES["max_speed"][1]:
         return assumed, f"assumed: {limit.where} would be {reach:.4g} m/s, {_beyond('max_speed', 'm/s')}"
-    if key == "max_yaw_rate" and most > MOST_YAW_RATE:
-        return MOST_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
+    if key == "max_yaw_rate" and most > DEFAULT_YAW_RATE:
+        return DEFAULT_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
     how = f"computed: {limit.where}, times the wheels' radius"
     return _five(most), how + (" over half the track" if key == "max_yaw_rate" else "")
 
@@ -132,7 +132,7 @@ def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: flo
     tag, told = model.drive_number("max_wheel_torque", "wheelTorque", "torque")
     if told:
         limits.append(_Limit(told, f"<{tag}> of the drive plugin, {told:.7g} N m"))
-    weakest, strongest = mass * LEAST_DRIVE * radius, RANGES["wheel_torque"][1]
+    weakest, strongest = mass * MIN_MOTOR_ACCELERATION * radius, RANGES["wheel_torque"][1]
     limits = sorted(limit for limit in limits if limit.value < math.inf)
     used = next((limit for limit in limits if weakest < limit.value <= strongest), None)
     beside = ""
@@ -241,7 +241,7 @@ def import_urdf(
     what = f"{kind} around the collision geometry of {_few(names)}, and around the wheels"
     what += "" if math.isinf(below) else f", below {below:g} m"
     values = _values(model, wheels, outline, floor, given)
-    text = _text(model, path, outline, what, values, found_lidar(model.lidars, frame, floor, outline))
+    text = _text(model, path, outline, what, values, import_lidar(model.lidars, frame, floor, outline))
     return ImportedRobot(
         _robot_in(text, path, values),
         text,

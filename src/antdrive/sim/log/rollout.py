@@ -371,7 +371,7 @@ class Rollout:
         task, world = self.record.task, self.record.world
         lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
         goal = (*task.goal, task.goal_tolerance)
-        movers = world.ways(task.start[:2], self.record.seed)
+        movers = world.mover_paths(task.start[:2], self.record.seed)
         picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
         facts = {
             "planner": self.record.planner.name,
