@@ -42,7 +42,7 @@ def importable() -> list[str]:
 
 def imported(name: str) -> RobotSpec:
     """The robot in one of the URDF files."""
-    return import_urdf(URDF / name, **TOLD.get(name, {})).robot
+    return import_urdf(URDF / name, **TOLD.get(name, {})).spec
 
 
 def values_of(robot: RobotSpec) -> dict[str, float]:

@@ -38,10 +38,10 @@ def kernel_shape(footprint: Footprint) -> tuple[Floats, Floats]:
     return shape, np.array(footprint.corners, dtype=np.float64).reshape(-1, 2)
 
 
-def footprint_distances(world: World, robot: RobotSpec, poses: npt.ArrayLike) -> Floats:
+def footprint_distances(world: World, spec: RobotSpec, poses: npt.ArrayLike) -> Floats:
     """The distance from the robot's footprint to each obstacle and then each of `WALLS`, negative in it, (P, N + 4) [m]."""
     x, y, yaw = np.asarray(poses, dtype=np.float64).reshape(-1, 3, 1).swapaxes(0, 1)
-    foot, discs = robot.footprint, world.discs
+    foot, discs = spec.footprint, world.discs
     cos, sin = np.cos(yaw), np.sin(yaw)
     dx, dy = discs[:, 0] - x, discs[:, 1] - y
     if foot.corners:
@@ -83,17 +83,17 @@ def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
     return f"{key} at ({disc.x:g}, {disc.y:g}) with radius {disc.radius:g}"
 
 
-def overlap_at(world: World, robot: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
+def overlap_at(world: World, spec: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
     """What the robot's footprint overlaps or touches most at a pose, and by how much; empty where it fits.
 
     Args:
         world: the obstacles and walls; movers do not count
-        robot: the robot
+        spec: the robot
         pose: x, y and yaw of its centre [m, rad]
         unseen: further obstacles
     """
     full = World(world.name, world.bounds, world.obstacles + unseen)
-    gap = footprint_distances(full, robot, [pose])[0]
+    gap = footprint_distances(full, spec, [pose])[0]
     worst = int(gap.argmin())
     if gap[worst] > 0:
         return ""

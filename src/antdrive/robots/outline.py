@@ -31,7 +31,7 @@ class Footprint:
     half_width: float = 0.0
     rounding: float = 0.0
     # Records leave it out where there are none, so that the logs of centred robots are as they were.
-    corners: tuple[Point, ...] = field(default=(), metadata={"left_out_if_default": True})
+    corners: tuple[Point, ...] = field(default=(), metadata={"omit_if_default": True})
 
     @classmethod
     def disc(cls, radius: float, centre: Point = (0.0, 0.0)) -> Footprint:

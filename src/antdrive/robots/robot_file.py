@@ -140,22 +140,22 @@ def robot_schema() -> dict[str, Any]:
 def _to_spec(entry: Any, document: Document) -> RobotSpec:
     values = {field.name: getattr(entry, field.name) for field in dataclasses.fields(RobotSpec)}
     try:
-        robot = RobotSpec(**{**values, "footprint": entry.footprint.footprint()})
-        require_feasible(robot)
+        spec = RobotSpec(**{**values, "footprint": entry.footprint.footprint()})
+        require_feasible(spec)
     except FieldError as error:
         raise document.field_error(error) from None
-    return robot
+    return spec
 
 
-def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:
+def robot_to_dict(spec: RobotSpec) -> dict[str, Any]:
     """A robot as plain data, as it stands in a rollout's record."""
     left_out = {
         field.name
-        for field in dataclasses.fields(robot)
-        if field.metadata.get("left_out_if_default") and getattr(robot, field.name) == field.default
+        for field in dataclasses.fields(spec)
+        if field.metadata.get("omit_if_default") and getattr(spec, field.name) == field.default
     }
-    data = {key: value for key, value in dataclasses.asdict(robot).items() if key not in left_out}
-    if not robot.footprint.corners:
+    data = {key: value for key, value in dataclasses.asdict(spec).items() if key not in left_out}
+    if not spec.footprint.corners:
         del data["footprint"]["corners"]
     return data
 

@@ -127,8 +127,8 @@ def import_robot(
     if figure is not None:
         from antdrive.views.figures.robot_figure import robot_figure
 
-        robot_figure(found.robot, figure, pieces=found.pieces, above=found.above)
+        robot_figure(found.spec, figure, pieces=found.pieces, above=found.above)
         files["figure"] = str(figure)
     write_text(target, found.text)
-    facts = {**robot_to_dict(found.robot), "files": files, "left_out": list(found.left_out)}
+    facts = {**robot_to_dict(found.spec), "files": files, "left_out": list(found.missing_meshes)}
     show(json, facts, [found.text.rstrip(), *file_lines(files)])

@@ -189,7 +189,7 @@ class PurePursuit:
         self,
         route: Route,
         world: World,
-        robot: RobotSpec,
+        spec: RobotSpec,
         margin: float,
         period: float,
         tolerance: float = math.inf,
@@ -201,14 +201,14 @@ class PurePursuit:
         Args:
             route: the route
             world: the world as the controller knows it
-            robot: the robot
+            spec: the robot
             margin: the safety margin that the route keeps beyond the robot's radius [m]
             period: control period [s]
             tolerance: goal tolerance [m]; where it is small, the robot stops closer to the route's end
             spacing: distance between the samples at which lookaheads and speed limits are worked out [m]
             indexed: whether the obstacles are sorted by place; that pays where the robot drives among them for long
         """
-        tuning = self._tuning(route, robot, margin, period, min(self.goal_distance, tolerance / 2))
+        tuning = self._tuning(route, spec, margin, period, min(self.goal_distance, tolerance / 2))
         tuning = tuning._replace(spacing=spacing)
         obstacles = (
             self._index(world, tuning.lookahead_clearance) if indexed else unsorted_obstacles(world.discs, world.bounds)
@@ -221,7 +221,7 @@ class PurePursuit:
         at = spacing * np.arange(len(lookahead))
         profile = speed_profile(
             route,
-            robot,
+            spec,
             blend=self.blend if route.curvature is not None else self.corner_blend,
             rotate_in_place_above=self.rotate_in_place_above,
             braking=self.braking,
@@ -231,16 +231,16 @@ class PurePursuit:
         if route.curvature is None:
             curvature[:] = np.nan
         near_obstacles = self.min_speed_near_obstacles, self.clearance_time
-        braking = self.braking * robot.max_acceleration
-        speed = limits_along(route, world, robot.radius, profile, lookahead, tuning, near_obstacles, braking)
+        braking = self.braking * spec.max_acceleration
+        speed = limits_along(route, world, spec.radius, profile, lookahead, tuning, near_obstacles, braking)
         limits = MotionLimits(
-            speed=robot.max_speed,
-            yaw_rate=robot.max_yaw_rate,
-            acceleration=robot.max_acceleration,
-            yaw_acceleration=robot.max_yaw_acceleration,
-            lateral_acceleration=robot.max_lateral_acceleration,
-            half_track=robot.track / 2,
-            rim_speed=robot.max_wheel_speed * robot.wheel_radius,
+            speed=spec.max_speed,
+            yaw_rate=spec.max_yaw_rate,
+            acceleration=spec.max_acceleration,
+            yaw_acceleration=spec.max_yaw_acceleration,
+            lateral_acceleration=spec.max_lateral_acceleration,
+            half_track=spec.track / 2,
+            rim_speed=spec.max_wheel_speed * spec.wheel_radius,
         )
         samples = PathSamples(route.xy, route.arc, lookahead, speed, curvature, heading)
         return TrackedPath(route, tuning.goal_distance, samples, obstacles, limits, tuning)
@@ -265,18 +265,18 @@ class PurePursuit:
         return Twist(speed, yaw_rate), PursuitState(arc, turning, limiter)
 
     def _tuning(
-        self, route: Route, robot: RobotSpec, margin: float, period: float, goal_distance: float
+        self, route: Route, spec: RobotSpec, margin: float, period: float, goal_distance: float
     ) -> PursuitTuning:
         return PursuitTuning(
             period=period,
             spacing=SPACING,
-            lookahead_clearance=robot.radius + self.lookahead_margin * margin,
-            stopping_clearance=robot.radius + self.stopping_margin * margin,
-            robot_radius=robot.radius,
-            half_length=robot.footprint.half_length,
-            half_width=robot.footprint.half_width,
-            rounding=robot.footprint.rounding,
-            corners=np.array(robot.footprint.corners, dtype=np.float64).reshape(-1, 2),
+            lookahead_clearance=spec.radius + self.lookahead_margin * margin,
+            stopping_clearance=spec.radius + self.stopping_margin * margin,
+            robot_radius=spec.radius,
+            half_length=spec.footprint.half_length,
+            half_width=spec.footprint.half_width,
+            rounding=spec.footprint.rounding,
+            corners=np.array(spec.footprint.corners, dtype=np.float64).reshape(-1, 2),
             lookahead_time=self.corner_lookahead_time if route.curvature is None else self.lookahead_time,
             lookahead_min=self.lookahead_min,
             lookahead_max=self.lookahead_max,

@@ -141,7 +141,7 @@ class UrdfModel:
     masses: dict[str, float]  # the mass of each link that has one [kg]
     # what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
     drive: dict[str, str]
-    left_out: tuple[str, ...]  # meshes that were not found
+    missing_meshes: tuple[str, ...]  # meshes that were not found
     lidars: tuple[UrdfSensor, ...] = ()  # the lidars that Gazebo would simulate
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
@@ -193,9 +193,9 @@ def read_model(
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
-    lidars, left_out = lidar_sensors(root, places), tuple(reader.left_out)
+    lidars, missing_meshes = lidar_sensors(root, places), tuple(reader.missing_meshes)
     return UrdfModel(
-        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), left_out, lidars
+        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), missing_meshes, lidars
     )
 
 
@@ -352,7 +352,7 @@ class _Shapes:
 
     def __init__(self, path: Path, meshes: Path | None, without_meshes: bool, packages: Mapping[str, Path]) -> None:
         self._path, self._meshes, self._without, self._packages = path, meshes, without_meshes, packages
-        self.left_out: list[str] = []
+        self.missing_meshes: list[str] = []
 
     def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
         """The piece of a <collision>; none for a mesh that is left out."""
@@ -402,7 +402,7 @@ class _Shapes:
                     f"link {link}",
                     f"mesh {name} is not found; say where with --meshes FOLDER or --package NAME=FOLDER, or --without-meshes",
                 )
-            self.left_out.append(f"{link}: {name}")
+            self.missing_meshes.append(f"{link}: {name}")
             return None
         trimesh = optional("trimesh", "urdf", f"mesh {file.name} is read with it")
         try:

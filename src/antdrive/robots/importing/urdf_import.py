@@ -197,13 +197,13 @@ class _Value(NamedTuple):
 class ImportedRobot:
     """A robot out of a URDF file."""
 
-    robot: RobotSpec  # the robot
+    spec: RobotSpec
     text: str  # its file, with a comment for each value
     # the collision geometry below the height of the import, from above: points of each piece in the robot's
     # frame (N, 2) [m]
     pieces: tuple[Floats, ...]
     above: tuple[Floats, ...]  # the same of the pieces that lie above that height
-    left_out: tuple[str, ...]  # meshes that were not found
+    missing_meshes: tuple[str, ...]  # meshes that were not found
 
 
 def import_urdf(
@@ -247,7 +247,7 @@ def import_urdf(
         text,
         tuple(points),
         tuple(_from_above(piece.points, frame) for piece in high),
-        model.left_out,
+        model.missing_meshes,
     )
 
 
@@ -304,7 +304,7 @@ def _values(
     top = max((float(piece.points[:, 2].max()) for piece in model.pieces), default=0.0) - floor
     xmin, ymin, xmax, ymax = outline.bounds
     apart = f"computed: between the middles of {left.joint.child} and {right.joint.child}"
-    size = f"read: {left.read_from}" + ("" if left.told else _contradiction(model, radius, *RADII))
+    size = f"read: {left.read_from}" + ("" if left.given else _contradiction(model, radius, *RADII))
     found: Found = {
         "height": (max(top, 2 * radius), "computed: top of the collision geometry above the floor"),
         "wheel_radius": (radius, size),
@@ -374,8 +374,8 @@ def _text(
             lines.append(f"{text:30}  # {comment}")
     if lidar is None and seen:
         lines.append(f"# no lidar: {''.join(c if c.isprintable() else '?' for c in seen)}")
-    if model.left_out:
-        left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.left_out)
+    if model.missing_meshes:
+        left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.missing_meshes)
         lines.append(f"# left out, because they were not found: {left}")
     return "\n".join(lines) + "\n"
 
