@@ -120,7 +120,7 @@ def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, Dri
 
 def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWheel]) -> str:
     """Why fewer than two wheels were found: they turn too little, or something reaches lower; and what helps."""
-    advice = "name the joints of its two driven wheels with --left and --right"
+    fix = "name the joints of its two driven wheels with --left and --right"
     limited = [
         joint
         for joint in model.joints.values()
@@ -139,8 +139,8 @@ def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWhee
         names = ", ".join(f"{name} by {height:.4g} m" for name, height in above.items() if math.isfinite(height))
         if names and lowest.link not in {joint.child for joint in turning}:
             lower = f"the collision geometry of link {lowest.link} lies lower than its wheels ({names})"
-            return f"{lower}, which then would not stand on the floor; if they drive it, {advice}"
-    return f"has {len(wheels)} wheels that turn freely and stand on the floor; a differential drive has two; if there are, {advice}"
+            return f"{lower}, which then would not stand on the floor; if they drive it, {fix}"
+    return f"has {len(wheels)} wheels that turn freely and stand on the floor; a differential drive has two; if there are, {fix}"
 
 
 def _bottom(model: UrdfModel, joint: UrdfJoint) -> float:
