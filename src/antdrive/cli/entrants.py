@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from antdrive.base.errors import FieldError, InputError
-from antdrive.cli.scenario import GROUPS, grouped
+from antdrive.cli.scenario_options import GROUPS, grouped
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario

@@ -15,7 +15,7 @@ from antdrive.cli.console import file_lines, planning, print_error, show, table
 from antdrive.cli.entrants import Entrant, check_worlds, entrants_of, repeating
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, results_folder
-from antdrive.cli.scenario import Ends, Setup
+from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.runs.comparing import COMPARED, Compared, difference_cells, differences, mark_of, same_drives
 from antdrive.views.folder import check_film, check_folder, write_result, write_run
 

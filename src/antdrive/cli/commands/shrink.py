@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, show, this_command, working
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
-from antdrive.cli.scenario import with_chosen_margin
-from antdrive.cli.warm import compile_once
+from antdrive.cli.scenario_options import with_chosen_margin
 from antdrive.views.folder import fingerprint, write_result, write_run
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from antdrive.cli.testing.checking import CheckResult, Update
+    from antdrive.cli.testing.evaluation import CheckResult, Update
     from antdrive.cli.testing.fixture import DriveFixture
     from antdrive.runs.suites.suite import SuiteCase
     from antdrive.views.artefacts import Results
@@ -95,7 +95,7 @@ class DriveItem(pytest.Item):
 
     def runtest(self) -> None:
         """Drive and judge."""
-        from antdrive.cli.testing.checking import check_case
+        from antdrive.cli.testing.evaluation import check_case
         from antdrive.cli.testing.fixture import DriveFailure
 
         compile_first(self.config)
@@ -146,7 +146,7 @@ def compile_first(config: pytest.Config) -> None:
     if _COMPILED in config.stash:
         return
     config.stash[_COMPILED] = True
-    from antdrive.cli.warm import compile_once
+    from antdrive.cli.compiling import compile_once
 
     def say(text: str) -> None:
         capture = config.pluginmanager.getplugin("capturemanager")
@@ -158,7 +158,7 @@ def compile_first(config: pytest.Config) -> None:
 
 def note(item: pytest.Item, result: CheckResult) -> None:
     """Remember what came out of a drive, for reports."""
-    from antdrive.cli.testing.summary import properties
+    from antdrive.cli.testing.session_summary import properties
 
     item.stash.setdefault(_DROVE, []).append(result)
     item.user_properties.extend(properties(result))
@@ -307,7 +307,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     unused = sorted(found)
     if not (told or unused):
         return
-    from antdrive.cli.testing.summary import add_to_page, drives_in, lines
+    from antdrive.cli.testing.session_summary import add_to_page, drives_in, lines
 
     drives = [drive for properties in told for drive in drives_in(properties)]
     terminalreporter.section("drives")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.atomic import written_whole
-from antdrive.cli.testing.checking import CheckResult
+from antdrive.cli.testing.evaluation import CheckResult
 
 #: The metrics that a test report gets.
 SHOWN = ("min_clearance_m", "duration_s", "driven_length_m")

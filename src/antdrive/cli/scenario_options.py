@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, print_error
 from antdrive.cli.options import Planner, Robot, option
 from antdrive.cli.parse import numbers, pair
-from antdrive.cli.warm import compile_once
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
