@@ -64,7 +64,7 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
     return [Entrant(label, name, tuple(own[label])) for label, name in labels.items()]
 
 
-def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
+def repeat_command(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
     """The `antdrive run` that repeats one of the compared runs."""
     from antdrive.sim.forms import setting_words, written
 

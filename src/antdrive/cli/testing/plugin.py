@@ -177,10 +177,10 @@ def results_of(config: pytest.Config) -> Results:
 
     given = config.getoption("drive_results")
     folder = config.invocation_params.dir / given if given else default_folder(config.rootpath)
-    return Results(folder, config.getoption("drive_film"), Path(places_of(config)), config.rootpath)
+    return Results(folder, config.getoption("drive_film"), Path(counting_folder(config)), config.rootpath)
 
 
-def places_of(config: pytest.Config) -> str:
+def counting_folder(config: pytest.Config) -> str:
     """The folder in which all processes of this run of pytest count the films of failed drives."""
     if _PLACES not in config.stash:
         import tempfile
@@ -193,7 +193,7 @@ def places_of(config: pytest.Config) -> str:
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     """Tell a process of xdist where films are counted."""
-    node.workerinput[FILMS_KEY] = places_of(node.config)
+    node.workerinput[FILMS_KEY] = counting_folder(node.config)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
