@@ -22,7 +22,7 @@ import numpy as np
 from antdrive.planners import Query
 from antdrive.runs.papers.experiments import Experiment, ibraheem2016
 from antdrive.runs.papers.maps import blocks, scattered
-from antdrive.runs.papers.trials import Trial, solve
+from antdrive.runs.papers.paper_runs import PaperRun, solve
 from antdrive.runs.statistics.intervals import medians_by_world
 from antdrive.runs.statistics.significance import wilcoxon
 from benchmarks.markdown import chosen, command_line
@@ -122,7 +122,7 @@ SEARCHES = {
 }
 
 
-def gaps(planner: str, options: Options, search: Search, seeds: int) -> tuple[list[float], list[Trial]]:
+def gaps(planner: str, options: Options, search: Search, seeds: int) -> tuple[list[float], list[PaperRun]]:
     """The gap of every map and seed, and the plans."""
     trials = [
         solve(planner, options, draw(seed), seed, search.work) for draw in search.maps.values() for seed in range(seeds)

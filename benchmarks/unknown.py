@@ -23,7 +23,7 @@ from typing import Any
 
 import yaml
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.robots import list_robots
 from antdrive.runs.barn import campaign_data, lines, reference_times, unpacked
 from antdrive.runs.campaigns import sweep
@@ -76,7 +76,7 @@ def robot_of(variant: Variant, folder: Path) -> str:
     data["lidar"] |= variant.lidar
     data["name"] = f"jackal {variant.name}"
     path = (folder / f"{variant.name}.yaml").resolve()
-    with written_whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text(yaml.safe_dump(data), encoding="utf-8")
     return str(path)
 

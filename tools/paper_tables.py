@@ -13,7 +13,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.runs.papers.claims import CLAIMS, Claim
 
 PAGES = Path(__file__).parent.parent / "docs" / "papers"
@@ -72,7 +72,7 @@ def _write(folder: Path) -> None:
 
 def _replace(page: Path, name: str, lines: Sequence[str]) -> None:
     changed = replaced(page.read_text(encoding="utf-8"), name, lines)
-    with written_whole(page) as temporary:
+    with atomic_write(page) as temporary:
         temporary.write_text(changed, encoding="utf-8")
 
 

@@ -8,12 +8,12 @@ import sys
 import pytest
 
 from antdrive.base import InputError
-from antdrive.base.atomic import claimed, written_whole
+from antdrive.base.atomic import atomic_write, folder_lock
 
 WRITES = """
 import sys, time
-from antdrive.base.atomic import claimed, written_whole
-with claimed(sys.argv[1]), written_whole(sys.argv[1] + "/film.mp4") as part:
+from antdrive.base.atomic import folder_lock, atomic_write
+with folder_lock(sys.argv[1]), atomic_write(sys.argv[1] + "/film.mp4") as part:
     part.write_text("half")
     print("there", flush=True)
     time.sleep(60)
@@ -35,15 +35,15 @@ def kill(process):
 
 def test_what_a_killed_process_left_is_removed_by_the_next_attempt(writer, tmp_path):
     (tmp_path / ".film-mine.mp4").touch()
-    with written_whole(tmp_path / "film.mp4") as part:
+    with atomic_write(tmp_path / "film.mp4") as part:
         part.write_text("whole")
         assert len(list(tmp_path.glob(".film-*-*-*.mp4"))) == 2, "a living process keeps its file"
     kill(writer)
     assert len(list(tmp_path.glob(".film-*-*-*.mp4"))) == 1
-    with written_whole(tmp_path / "plan.mp4") as part:
+    with atomic_write(tmp_path / "plan.mp4") as part:
         part.touch()
     assert len(list(tmp_path.glob(".film-*-*-*.mp4"))) == 1, "another file's"
-    with written_whole(tmp_path / "film.mp4") as part:
+    with atomic_write(tmp_path / "film.mp4") as part:
         part.write_text("again")
     assert sorted(path.name for path in tmp_path.glob("*film*")) == [".film-mine.mp4", "film.mp4"]
     assert (tmp_path / "film.mp4").read_text() == "again"
@@ -51,19 +51,19 @@ def test_what_a_killed_process_left_is_removed_by_the_next_attempt(writer, tmp_p
 
 def test_a_folder_is_claimed_once_and_a_claim_dies_with_its_process(writer, tmp_path):
     says = rf"another run \(process {writer.pid}\) is writing into this folder"
-    with pytest.raises(InputError, match=says), claimed(tmp_path):
+    with pytest.raises(InputError, match=says), folder_lock(tmp_path):
         pytest.fail("claimed twice")
     kill(writer)
-    with claimed(tmp_path):
+    with folder_lock(tmp_path):
         assert (tmp_path / ".antdrive.lock").read_text() == f"{os.getpid()}\n"
     assert not (tmp_path / ".antdrive.lock").exists()
-    with pytest.raises(KeyError), claimed(tmp_path):
+    with pytest.raises(KeyError), folder_lock(tmp_path):
         raise KeyError
-    with claimed(tmp_path / "new" / "folder"):
+    with folder_lock(tmp_path / "new" / "folder"):
         pass
 
 
 def test_a_long_name_is_written(tmp_path):
-    with written_whole(tmp_path / f"{'n' * 240}.yaml") as part:
+    with atomic_write(tmp_path / f"{'n' * 240}.yaml") as part:
         part.touch()
     assert [len(path.stem) for path in tmp_path.iterdir()] == [240]

@@ -9,7 +9,7 @@ import pytest
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.runs.margins import choice
 from antdrive.runs.margins.choice import Calibration
-from antdrive.runs.margins.trial import Loss, key_of
+from antdrive.runs.margins.loss import Loss, calibration_key
 from antdrive.sim import Rollout
 from antdrive.sim.scenario import Conditions
 
@@ -17,7 +17,7 @@ from antdrive.sim.scenario import Conditions
 def keep(margin, **changes):
     """Put a calibration of the turtlebot into the cache."""
     usual = {"robot": load_robot("turtlebot"), "controller": PurePursuit(), "noise": 0.0, "smoothing": "clearance"}
-    key = key_of(Conditions(**{**usual, **changes}))
+    key = calibration_key(Conditions(**{**usual, **changes}))
     choice._keep(
         Calibration(
             margin=margin, loss=margin - 0.011, largest=0.01, reserve=0.01, probability=1e-3, drives=80, key=key

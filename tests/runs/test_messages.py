@@ -11,7 +11,7 @@ from antdrive.runs.campaigns import expand, make_campaign, read_results, sweep
 from antdrive.runs.failures.failure import parse_bound
 from antdrive.runs.failures.hunt import find_failures
 from antdrive.runs.margins.choice import least_margin, predicted_loss
-from antdrive.runs.margins.trial import Loss
+from antdrive.runs.margins.loss import Loss
 from antdrive.runs.statistics.comparison import compare_metric, not_worse, pairs_of
 from antdrive.runs.statistics.intervals import wilson
 from antdrive.runs.statistics.pairing import PairedRuns

@@ -1,4 +1,4 @@
-"""Claims and their verdicts, on trials made up so that the answer is known."""
+"""Claims and their verdicts, on runs made up so that the answer is known."""
 
 import dataclasses
 import itertools
@@ -20,8 +20,8 @@ from antdrive.runs.papers.claims import (
     Arm,
     Claim,
     Decision,
-    judge,
-    trials_needed,
+    evaluate,
+    runs_needed,
     verdict_facts,
 )
 from antdrive.runs.papers.experiments import PAPERS
@@ -34,29 +34,29 @@ from antdrive.runs.papers.maps import (
     optimum,
     winding_candidate,
 )
-from antdrive.runs.papers.reproduce import keep_trials, kept_trials, too_few_seeds, trials_key
-from antdrive.runs.papers.trials import (
+from antdrive.runs.papers.paper_runs import (
     FirstTouchDStar,
+    PaperRun,
     Strollers,
-    Trial,
     concentration,
     drive,
     drive_among,
     solve,
     total_cost,
 )
+from antdrive.runs.papers.reproduce import load_runs, runs_key, save_runs, too_few_seeds
 from antdrive.worlds import Grid
 
 ONE, TWO = Arm("m", "one"), Arm("m", "two")
 
 
-def trials(values, worlds=0):
-    """Trials whose gap is the value; nan: no path."""
+def runs(values, worlds=0):
+    """Runs whose gap is the value; nan: no path."""
     made = []
     for seed, value in enumerate(values):
         solved = not math.isnan(value)
         result = SimpleNamespace(solved=solved, line_length=100.0 + value if solved else math.inf)
-        made.append(Trial(seed, seed % worlds if worlds else seed, result, 100.0, 0.1, 0.0))
+        made.append(PaperRun(seed, seed % worlds if worlds else seed, result, 100.0, 0.1, 0.0))
     return made
 
 
@@ -73,7 +73,7 @@ OFTENER, NO_WORSE, WIDER = claim("balance", "<"), claim("balance", "<=", SMALL_E
 
 
 def verdict(test, first, second=(), worlds=0):
-    return judge(test, {ONE: trials(first, worlds), TWO: trials(second, worlds)})
+    return evaluate(test, {ONE: runs(first, worlds), TWO: runs(second, worlds)})
 
 
 def test_every_claim_names_experiments_of_its_paper():
@@ -86,7 +86,7 @@ def test_every_claim_names_experiments_of_its_paper():
             assert one.printed
             assert one.statistic in STATISTICS
             assert one.relation in RELATIONS
-            quantities = {*dir(Trial), *Trial.__dataclass_fields__, ""}
+            quantities = {*dir(PaperRun), *PaperRun.__dataclass_fields__, ""}
             assert quantities >= {*one.quantity}
         for experiment in experiments():
             assert len(experiment.seeds(7)) == 7 * experiment.rounds
@@ -165,15 +165,15 @@ def test_no_worse_lets_a_small_effect_pass_and_no_larger_one():
 def test_the_gain_of_one_step_is_less_than_that_of_another():
     rng = np.random.default_rng(2)
     low, middle, high = (value + rng.normal(0, 1, 50) for value in (36.0, 39.0, 46.0))
-    arms = {Arm("m", name): trials(values) for name, values in zip("abc", (high, middle, low), strict=True)}
+    arms = {Arm("m", name): runs(values) for name, values in zip("abc", (high, middle, low), strict=True)}
     a, b, c = arms
     gained = claim("gain", "<", quantity=("length",), cases=((b, c, a, b),))
-    found = judge(gained, arms)
+    found = evaluate(gained, arms)
     assert found.decision is Decision.HOLDS
     assert found.value == pytest.approx(-4.0, abs=0.8)  # gains of 3 and 7
     assert gained.arms == set(arms)
     turned = dataclasses.replace(gained, cases=((a, b, b, c),))
-    assert judge(turned, arms).decision is Decision.REFUTED
+    assert evaluate(turned, arms).decision is Decision.REFUTED
 
 
 def test_two_quantities_of_the_same_runs_are_compared():
@@ -182,11 +182,11 @@ def test_two_quantities_of_the_same_runs_are_compared():
     for seed in range(20):
         best = 100 + np.r_[rng.normal(0, 5, 10), rng.normal(0, 1, 30)]
         result = SimpleNamespace(solved=True, line_length=100.0, history=SimpleNamespace(iteration_best=best))
-        made.append(Trial(seed, 0, result, 100.0, 0.1, 0.0))
+        made.append(PaperRun(seed, 0, result, 100.0, 0.1, 0.0))
     settles = claim("difference", "<", quantity=("unrest", "early_unrest"), cases=((ONE, ONE),))
-    assert judge(settles, {ONE: made}).decision is Decision.HOLDS
+    assert evaluate(settles, {ONE: made}).decision is Decision.HOLDS
     back = dataclasses.replace(settles, quantity=("early_unrest", "unrest"))
-    assert judge(back, {ONE: made}).decision is Decision.REFUTED
+    assert evaluate(back, {ONE: made}).decision is Decision.REFUTED
 
 
 def test_what_may_happen_is_borne_out_by_one_run_and_refuted_by_none():
@@ -207,7 +207,7 @@ def test_where_neither_gets_anywhere_nothing_can_be_told():
 def test_an_open_verdict_says_why():
     few = verdict(LESS, np.zeros(5), np.ones(5))
     assert few.decision is Decision.OPEN
-    assert few.why.startswith("5 trials, and with fewer than 6")
+    assert few.why.startswith("5 runs, and with fewer than 6")
     # 0.2 below the margin, with an interval of about a half to each side: some six times as many.
     wide = verdict(LESS, np.linspace(-1.2, 0.8, 21), np.zeros(21))
     assert wide.decision is Decision.OPEN
@@ -220,13 +220,13 @@ def test_an_open_verdict_says_why():
 
 def test_the_trials_that_a_test_needs_are_the_fewest_with_which_it_can_hold():
     test = claim("arrived", ">=", 0.9)
-    needed = trials_needed(test)
+    needed = runs_needed(test)
     assert needed == 35  # n / (n + 1.96^2) reaches 0.9
     assert verdict(test, np.ones(needed)).decision is Decision.HOLDS
     assert verdict(test, np.ones(needed - 1)).decision is Decision.OPEN
-    assert trials_needed(LESS) == FEWEST
+    assert runs_needed(LESS) == FEWEST
     assert verdict(LESS, np.zeros(FEWEST), np.ones(FEWEST)).decision is Decision.HOLDS
-    assert trials_needed(claim("wins", ">=", 1)) == 1
+    assert runs_needed(claim("wins", ">=", 1)) == 1
 
 
 def test_seeds_that_are_too_few_are_told_of_in_one_line():
@@ -364,7 +364,7 @@ def test_a_winding_candidate_has_the_moves_asked_for_and_turns_back_in_rows_and_
 def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
     kinds = (("14 obstacles", "10 ants"), ("one obstacle of radius 5", "3 via points"))
     one, other = (e for e in PAPERS["han2007"]() if (e.map, e.name) in kinds)
-    shut = Query(Grid.from_free(np.eye(3)), (0, 0), (2, 0))  # a trial without a path, and one without iterations
+    shut = Query(Grid.from_free(np.eye(3)), (0, 0), (2, 0))  # a run without a path, and one without iterations
     cases = [
         (one.planner, {**one.options, "iterations": 3}, one.query(0)),
         (other.planner, {**other.options, "iterations": 3}, other.query(0)),
@@ -372,9 +372,9 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
         ("astar", {}, shut),
     ]
     made = [solve(planner, options, query, 3) for planner, options, query in cases]
-    path, key = tmp_path / "t.npz", trials_key(one, 4)
-    keep_trials(made, path, key)
-    read = kept_trials(path, key)
+    path, key = tmp_path / "t.npz", runs_key(one, 4)
+    save_runs(made, path, key)
+    read = load_runs(path, key)
     quantities = (
         "length", "gap", "steps", "last", "settled", "near", "effort", "unrest", "early_unrest", "work", "cpu_s",
         "total",
@@ -384,11 +384,11 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
             np.testing.assert_equal(getattr(after, name), getattr(before, name), err_msg=name)
         np.testing.assert_array_equal(after.result.line, before.result.line)
         assert after.result.status is before.result.status
-    assert kept_trials(path, trials_key(one, 5)) is None
-    assert kept_trials(path, trials_key(dataclasses.replace(one, options={"ants": 11}), 4)) is None
+    assert load_runs(path, runs_key(one, 5)) is None
+    assert load_runs(path, runs_key(dataclasses.replace(one, options={"ants": 11}), 4)) is None
     path.write_bytes(path.read_bytes()[:-200])
-    assert kept_trials(path, key) is None
-    assert kept_trials(tmp_path / "none.npz", key) is None
+    assert load_runs(path, key) is None
+    assert load_runs(tmp_path / "none.npz", key) is None
 
 
 def test_a_length_that_no_map_has_is_refused(monkeypatch):
@@ -412,14 +412,14 @@ def test_the_quantities_of_a_trial_are_those_worked_out_by_hand():
     best = np.array([math.inf, 150.0, 124.0, 110.0, 110.0])
     history = History(best, np.array([9.0, 9.0, 9.0, 4.0, 6.0]), best, np.ones(5, dtype=np.int64))
     result = SimpleNamespace(solved=True, history=history, work=50, line_length=110.0)
-    trial = Trial(0, 0, result, 100.0, 0.1, 0.0)
-    assert (trial.effort, trial.settled, trial.gap) == (30.0, 4.0, pytest.approx(10.0))
-    assert trial.near == math.inf
-    assert dataclasses.replace(trial, optimum=105.0).near == 4.0  # 110 is within 5 % of 105
-    assert trial.last == 6.0
-    assert trial.unrest == trial.early_unrest == pytest.approx(np.std([9, 9, 9, 4, 6]))
-    assert trial.cpu_ms == 100.0
-    none = dataclasses.replace(trial, result=SimpleNamespace(solved=False, history=history, work=50))
+    run = PaperRun(0, 0, result, 100.0, 0.1, 0.0)
+    assert (run.effort, run.settled, run.gap) == (30.0, 4.0, pytest.approx(10.0))
+    assert run.near == math.inf
+    assert dataclasses.replace(run, optimum=105.0).near == 4.0  # 110 is within 5 % of 105
+    assert run.last == 6.0
+    assert run.unrest == run.early_unrest == pytest.approx(np.std([9, 9, 9, 4, 6]))
+    assert run.cpu_ms == 100.0
+    none = dataclasses.replace(run, result=SimpleNamespace(solved=False, history=history, work=50))
     assert (none.length, none.gap, none.steps, none.settled) == (math.inf,) * 4
 
 

@@ -91,7 +91,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
     with (tmp_path / "table.csv").open(newline="") as file:
         assert [float(line["mean"]) for line in csv.DictReader(file)] == [row.mean for row in rows]
 
-    # The same command again takes the trials from their files, all but the one that is lost, and finds the same.
+    # The same command again takes the runs from their files, all but the one that is lost, and finds the same.
     assert found.kept == 0
     lost = sorted((tmp_path / "trials").glob("*.npz"))[1]
     lost.unlink()

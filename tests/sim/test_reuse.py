@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.base import reuse
-from antdrive.base.reuse import bits, forget, reused
+from antdrive.base.caches import bits, cached, clear_caches
 from antdrive.planners import PLANNERS, Query
 from antdrive.sim import Engine, Scenario, run
 from antdrive.sim.physics import engine as engine_module
@@ -40,7 +40,7 @@ def fresh():
     """Each drive with nothing kept of another."""
     found = {}
     for name in scenarios():
-        forget()
+        clear_caches()
         found[name] = outcome_of(name)
     return found
 
@@ -88,7 +88,7 @@ def test_body_numbers_count_ground_robot_and_obstacles_in_order(turtlebot):
 def test_only_so_much_is_kept():
     calls = []
 
-    @reused(3)
+    @cached(3)
     def square(x):
         calls.append(x)
         return x * x
@@ -101,7 +101,7 @@ def test_only_so_much_is_kept():
     assert calls == [1, 2, 3, 4, 2]
     assert isinstance(square(2.0), float)  # an equal number of another type is another argument
     assert calls[-1] == 2.0
-    forget()
+    clear_caches()
     square(2)
     assert calls[-1] == 2
     assert len(calls) == 7

@@ -20,7 +20,7 @@ LONGEST_STEM = 100  # characters of a file's name that its temporary file repeat
 
 
 @contextmanager
-def written_whole(path: str | Path) -> Iterator[Path]:
+def atomic_write(path: str | Path) -> Iterator[Path]:
     """A context with a temporary path, which replaces `path` when the block succeeds and is removed when it fails.
 
     What processes that were killed left of earlier attempts at this file is removed.
@@ -50,13 +50,13 @@ def written_whole(path: str | Path) -> Iterator[Path]:
 
 def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
     """Write a text in UTF-8, whole or not at all; its path."""
-    with written_whole(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline=newline)
     return Path(path)
 
 
 @contextmanager
-def folder_written_whole(path: str | Path) -> Iterator[Path]:
+def atomic_folder(path: str | Path) -> Iterator[Path]:
     """A context with a temporary folder, which becomes `path` when the block succeeds and is removed when it fails."""
     target = Path(path)
     try:
@@ -84,7 +84,7 @@ def _umask() -> int:
 
 
 @contextmanager
-def claimed(folder: str | Path) -> Iterator[None]:
+def folder_lock(folder: str | Path) -> Iterator[None]:
     """A context in which no other process may claim the folder. A claim ends with its process, however that ends."""
     try:
         import fcntl

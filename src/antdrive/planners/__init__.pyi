@@ -35,7 +35,6 @@ from .iterative import Progress as Progress
 from .iterative import as_iterative as as_iterative
 from .iterative import keep_best as keep_best
 from .iterative import watch as watch
-from .own_code import record_name as record_name
 from .plan import Capabilities as Capabilities
 from .plan import Cell as Cell
 from .plan import Cells as Cells
@@ -64,3 +63,4 @@ from .smoothing.smooth import SMOOTHINGS as SMOOTHINGS
 from .smoothing.smooth import pull_taut as pull_taut
 from .smoothing.smooth import route_along as route_along
 from .smoothing.smooth import smooth as smooth
+from .user_code import record_name as record_name

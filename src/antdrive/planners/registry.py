@@ -23,8 +23,8 @@ from antdrive.planners.graph.apf import PotentialField
 from antdrive.planners.graph.incremental import DStar, DStarLite
 from antdrive.planners.graph.search import AStar, Dijkstra
 from antdrive.planners.graph.sipp import SafeIntervals
-from antdrive.planners.own_code import is_own, module_hash, own_object, own_version
 from antdrive.planners.plan import Planner
+from antdrive.planners.user_code import is_user_code, module_hash, user_code_version, user_object
 
 #: The planners of this package.
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
@@ -57,8 +57,8 @@ def load_planner(name: str, /, **options: Any) -> Planner:
         InputError: there is no such planner or option, or the option does not take the value; lists what is
             valid.
     """
-    if is_own(name):
-        return make_planner(own_object(name), name, **options)
+    if is_user_code(name):
+        return make_planner(user_object(name), name, **options)
     planner = PLANNERS.get(name)
     if planner is None:
         entry = _plugins().get(name)
@@ -82,9 +82,9 @@ def planner_version(name: str) -> str:
     Raises:
         InputError: there is no such planner.
     """
-    if is_own(name):
-        own_object(name)
-        return own_version(name)
+    if is_user_code(name):
+        user_object(name)
+        return user_code_version(name)
     if name in PLANNERS:
         return f"antdrive {importlib.metadata.version('antdrive')}"
     load_planner(name)

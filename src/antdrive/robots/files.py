@@ -10,11 +10,11 @@ from typing import Annotated, Any, TypeAlias, get_type_hints
 
 from pydantic import BaseModel, Field, create_model, model_validator
 
+from antdrive.base.caches import cached
 from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of
 from antdrive.base.document import Document, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.records import STRICT
-from antdrive.base.reuse import reused
 from antdrive.robots.outline import MOST_CORNERS
 from antdrive.robots.spec import Footprint, RobotSpec, require_feasible
 
@@ -119,7 +119,7 @@ def robot_from_text(text: str, source: str, stem: str) -> RobotSpec:
     return _robot_in(text, source, stem)
 
 
-@reused(16)
+@cached(16)
 def _robot_in(text: str, source: str, stem: str) -> RobotSpec:
     """The robot in the text of a robot file."""
     document = parse_document(text, source)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.atomic import claimed
+from antdrive.base.atomic import folder_lock
 from antdrive.base.errors import input_error
 from antdrive.base.files import write_json
 
@@ -42,7 +42,7 @@ def opened(folder: Path, manifest: str, facts: Mapping[str, Any] | None = None, 
         and any(p.name[0] != "." for p in folder.iterdir())
     ):
         raise input_error(str(folder), f"holds other files and no {manifest}; name a new folder, or that of {kind}")
-    with claimed(folder):
+    with folder_lock(folder):
         if facts is not None:
             write_json(folder / manifest, facts)
         yield folder

@@ -7,7 +7,7 @@ import platform
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
-from antdrive.base.reuse import Keyed, reused
+from antdrive.base.caches import Keyed, cached
 from antdrive.planners import AStar, PlanResult, Query, Tangent
 from antdrive.sim.driving.plants import Drive
 from antdrive.sim.driving.routes import by_contents, grid_of
@@ -88,7 +88,7 @@ def _plan_record(s: Scenario, grid: Grid, answer: PlanResult, mapped: bool) -> P
     )
 
 
-@reused(64)
+@cached(64)
 def _optima(asked: Keyed[tuple[Grid, Task]]) -> tuple[float | None, float | None]:
     """The lengths of the shortest path on the grid and of that among the inflated discs [m]; both searches draw nothing."""
     query, rng = Query.between(*asked.value), random_stream(0, "optimum")

@@ -19,7 +19,7 @@ import numpy as np
 from antdrive.base.atomic import write_text
 from antdrive.base.files import write_json
 from antdrive.runs.suites.baseline import Baseline
-from antdrive.runs.suites.judging import divergence
+from antdrive.runs.suites.evaluation import divergence
 from antdrive.runs.suites.suite import SUFFIX
 from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.sim.log.rollout import Rollout

@@ -22,11 +22,11 @@ RUN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES f
 
 def check_folder(folder: Path) -> None:
     """Make a folder and try to write into it, before any work is done for it."""
-    from antdrive.base.atomic import written_whole
+    from antdrive.base.atomic import atomic_write
 
     probe = folder / ".antdrive"
     try:
-        with written_whole(probe) as temporary:
+        with atomic_write(probe) as temporary:
             temporary.touch()
     except InputError as error:
         raise InputError(str(error).replace(str(probe), str(folder), 1)) from None

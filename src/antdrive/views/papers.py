@@ -17,7 +17,7 @@ from antdrive.runs.papers import maps
 from antdrive.runs.papers.claims import Arm
 from antdrive.runs.papers.experiments import PAPERS, Experiment
 from antdrive.runs.papers.maps import HAN_ANTS
-from antdrive.runs.papers.trials import Trial, solve
+from antdrive.runs.papers.paper_runs import PaperRun, solve
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.figures.canvas import endings
@@ -43,7 +43,7 @@ HAN_UNIT = 0.7  # a unit of han2007 [m]
 SIZE, FPS = (480, 360), 20.0
 PRELUDE, DRIVE = 3.0, 9.0  # how long the planning and the drive are shown [s]
 
-Measured: TypeAlias = Sequence[tuple[Experiment, list[Trial]]]
+Measured: TypeAlias = Sequence[tuple[Experiment, list[PaperRun]]]
 
 
 def draw_figures(paper: str, found: Measured, folder: Path, seeds: int, suffixes: Sequence[str]) -> dict[str, str]:

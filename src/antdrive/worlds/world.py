@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antdrive.base.caches import Keyed, bits
 from antdrive.base.errors import FieldError, require_finite, require_positive
-from antdrive.base.reuse import Keyed, bits
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.limits import MAX_CELLS, MAX_WALK, Coordinate, Size

@@ -104,7 +104,9 @@ def test_the_default_folder_is_never_that_of_another_comparison(antdrive, small)
 
 
 def test_a_second_comparison_in_the_same_folder_is_told(refused, small):
-    script = "from antdrive.base.atomic import claimed\nwith claimed('c'):\n print('claimed', flush=True)\n input()"
+    script = (
+        "from antdrive.base.atomic import folder_lock\nwith folder_lock('c'):\n print('claimed', flush=True)\n input()"
+    )
     with subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == b"claimed\n"

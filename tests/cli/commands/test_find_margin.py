@@ -7,7 +7,7 @@ import re
 import pytest
 
 from antdrive.cli.commands.find_margin import _lines
-from antdrive.runs.margins.choice import MarginTrial
+from antdrive.runs.margins.choice import MarginResult
 from antdrive.sim import Scenario
 
 
@@ -24,8 +24,8 @@ def test_the_smallest_safe_margin_is_found(antdrive, small):
 
 def test_the_answer_says_how_many_worlds_it_rests_on():
     """A margin that closes nine worlds of ten is safe in one."""
-    closing = MarginTrial(margin=0.2, drives=0, impassable=10, failed=None, left=math.inf)
-    trials = [closing, MarginTrial(margin=0.1, drives=1, impassable=9, failed=None, left=0.02)]
+    closing = MarginResult(margin=0.2, drives=0, impassable=10, failed=None, left=math.inf)
+    trials = [closing, MarginResult(margin=0.1, drives=1, impassable=9, failed=None, left=0.02)]
     *_, said = _lines(Scenario.of("empty", "astar"), trials, 0.1)
     assert said.endswith(": 0.100 m, from 1 drive; the margin closes 9 more worlds, which are left out")
     *_, said = _lines(Scenario.of("empty", "astar"), trials[:1], None)

@@ -5,7 +5,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from antdrive.base.atomic import claimed
+from antdrive.base.atomic import folder_lock
 from antdrive.robots import list_robots
 from antdrive.worlds import Disc, Task, World, save_task
 
@@ -143,7 +143,7 @@ def test_runs_that_differ_have_folders_of_their_own(antdrive, small_run, tmp_pat
 
 
 def test_two_runs_do_not_write_into_one_folder_at_once(refused, small):
-    with claimed("r"):
+    with folder_lock("r"):
         line = refused("run", small, "-p", "astar", "--out", "r")
     assert line.startswith("antdrive: r: another run (process ")
 

@@ -27,7 +27,7 @@ from antdrive.planners import (
 from antdrive.planners.colonies.merging_ants import even_out
 from antdrive.planners.colonies.mmas_dstar import PATIENCE
 from antdrive.runs.papers.maps import environments
-from antdrive.runs.papers.trials import Strollers, drive
+from antdrive.runs.papers.paper_runs import Strollers, drive
 from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.replanning.agreement import World
 from tests.planners.worlds_to_solve import catalogue, optimum, quick, random_discs, random_query, sealed

@@ -31,7 +31,7 @@ from antdrive.runs.failures.hunt import (
 from antdrive.runs.failures.report import report
 from antdrive.runs.failures.shrink import shrink
 from antdrive.runs.suites.demands import Demands
-from antdrive.runs.suites.judging import unfulfilled
+from antdrive.runs.suites.evaluation import unmet_demands
 from antdrive.runs.suites.scenarios import task_of as scenario_task
 from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Outcome, Scenario, run
@@ -112,12 +112,14 @@ def test_a_test_of_a_finding_demands_what_was_touched_and_why(found):
     done, failure = run(finding.scenario), finding.failure
     expected = expectation(done)
     assert expected == {"outcome": "collided", "touched": "cylinder", "cause": failure.cause}
-    assert list(unfulfilled(done, Demands.of(expected))) == []
+    assert list(unmet_demands(done, Demands.of(expected))) == []
     other = next(cause for cause in CAUSES if cause != failure.cause)
-    assert list(unfulfilled(done, Demands.of({**expected, "cause": other}))) == [
+    assert list(unmet_demands(done, Demands.of({**expected, "cause": other}))) == [
         f"cause: {failure.cause} took most of the margin, expected {other}"
     ]
-    assert list(unfulfilled(done, Demands.of({**expected, "touched": "wall"}))) == ["touched: cylinder, expected wall"]
+    assert list(unmet_demands(done, Demands.of({**expected, "touched": "wall"}))) == [
+        "touched: cylinder, expected wall"
+    ]
 
 
 def test_the_same_seed_finds_the_same(found, careless):

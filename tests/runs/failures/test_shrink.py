@@ -12,10 +12,10 @@ from antdrive.base import InputError
 from antdrive.planners import PLANNERS, Planner
 from antdrive.planners.anyangle.passage import feasible
 from antdrive.runs.failures import passes
+from antdrive.runs.failures.candidates import CandidateRunner, changeable, identity_of, room_in
 from antdrive.runs.failures.ddmin import one_minimal
 from antdrive.runs.failures.failure import Failure, failure_of, parse_bound
 from antdrive.runs.failures.shrink import shrink
-from antdrive.runs.failures.trials import Trials, changeable, identity_of, room_in
 from antdrive.sim import run
 from antdrive.worlds import Cruising, Disc, Task, World
 
@@ -99,7 +99,7 @@ def steps(struck):
 
 @pytest.fixture(scope="module")
 def struck_small(struck, steps):
-    first = Trials.first
+    first = CandidateRunner.first
 
     def watched(self, candidates):
         found = first(self, candidates)
@@ -108,7 +108,7 @@ def struck_small(struck, steps):
         return found
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Trials, "first", watched)
+        patch.setattr(CandidateRunner, "first", watched)
         return shrink(struck)
 
 
@@ -200,7 +200,7 @@ class Counting:
 
 def test_a_session_that_ran_out_of_time_is_taken_up_where_it_stopped(fenced, tmp_path, monkeypatch):
     clock = iter(range(10**6))
-    monkeypatch.setattr("antdrive.runs.failures.trials.time.monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr("antdrive.runs.failures.candidates.time.monotonic", lambda: float(next(clock)))
     counting = Counting()
     assert isinstance(counting, Planner)
     scenario, journal = replace(fenced, planner=counting), tmp_path / "journal.json"
@@ -209,11 +209,11 @@ def test_a_session_that_ran_out_of_time_is_taken_up_where_it_stopped(fenced, tmp
     assert failure_of(run(cut.scenario)) == cut.failure
     counting.count = 0
     rest = shrink(scenario, seconds=1e6, journal=journal)
-    assert (rest.complete, rest.recalled) == (True, cut.trials)
-    assert counting.count < rest.trials + 10
+    assert (rest.complete, rest.recalled) == (True, cut.runs)
+    assert counting.count < rest.runs + 10
     whole = shrink(scenario, seconds=1e6)
     assert changeable(rest.scenario) == changeable(whole.scenario)
-    assert whole.trials == cut.trials + rest.trials
+    assert whole.runs == cut.runs + rest.runs
 
 
 def test_a_journal_of_another_failure_or_an_unreadable_one_is_not_used(fenced, tmp_path):
@@ -223,7 +223,7 @@ def test_a_journal_of_another_failure_or_an_unreadable_one_is_not_used(fenced, t
     for text in ("{", "[]", '{"header": "x"}', '{"header": 1, "answers": [1]}'):
         journal.write_text(text)
         again = shrink(fenced, journal=journal)
-        assert (again.recalled, again.trials) == (0, first.trials)
+        assert (again.recalled, again.runs) == (0, first.runs)
 
 
 def test_answers_that_no_longer_hold_are_forgotten(fenced, tmp_path):
@@ -281,8 +281,8 @@ def test_a_world_that_has_a_path_keeps_one(struck, fenced):
     near = passes.with_obstacles(struck, [Disc(x, y + 0.5 + struck.inflate - 0.01, 0.5)])
     assert failure_of(run(near)) == failure
     assert not feasible(near.task, struck.inflate)
-    assert Trials(failure).first([near]) is near
-    assert Trials(failure, room=room).first([near]) is None
+    assert CandidateRunner(failure).first([near]) is near
+    assert CandidateRunner(failure, room=room).first([near]) is None
     no_path = Failure("no_path", "nothing", "")
     assert room_in(fenced, no_path) is None
     assert room_in(struck, no_path) == struck.inflate + struck.task.cell

@@ -23,7 +23,7 @@ from antdrive.runs.margins.choice import (
     least_margin,
     predicted_loss,
 )
-from antdrive.runs.margins.trial import Loss, course, key_of, least_bound, loss_on_course
+from antdrive.runs.margins.loss import Loss, calibration_key, course, least_bound, loss_on_course
 from antdrive.sim import Scenario, run
 from antdrive.sim.driving.rules import Pursuit
 from antdrive.sim.scenario import Conditions
@@ -114,8 +114,10 @@ def test_every_condition_has_a_part_in_the_key_and_labels_have_none(turtlebot):
         conditions(turtlebot, physics_hz=480),
         conditions(turtlebot, control_hz=30),
     ]
-    assert len({key_of(usual), *(key_of(other) for other in others)}) == 1 + len(others)
-    assert key_of(conditions(dataclasses.replace(turtlebot, name="mine", source=None))) == key_of(usual)
+    assert len({calibration_key(usual), *(calibration_key(other) for other in others)}) == 1 + len(others)
+    assert calibration_key(conditions(dataclasses.replace(turtlebot, name="mine", source=None))) == calibration_key(
+        usual
+    )
 
 
 def test_an_unknown_smoothing_is_refused(turtlebot):
@@ -265,7 +267,7 @@ def test_a_damaged_entry_does_not_count(cache, driven, robot, damage):
 def test_an_entry_under_the_name_of_another_does_not_count(cache, driven, robot):
     choose_margin(robot, jobs=1)
     (entry,) = cache.iterdir()
-    entry.write_text(entry.read_text().replace(key_of(robot), "0" * 64))
+    entry.write_text(entry.read_text().replace(calibration_key(robot), "0" * 64))
     assert known_margin(robot) is None
 
 

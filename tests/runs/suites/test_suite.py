@@ -13,9 +13,9 @@ from antdrive import Disc, Outcome, Scenario
 from antdrive.base.errors import InputError
 from antdrive.cli.commands.run import run as command
 from antdrive.cli.testing import check_case
-from antdrive.planners.own_code import is_importable_elsewhere
+from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.margins.choice import Calibration
-from antdrive.runs.margins.trial import key_of
+from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.suites import Baseline, load_suite, scenario_of, select
 from antdrive.runs.suites.names import check_names
 from antdrive.runs.suites.scenarios import run_command
@@ -104,7 +104,7 @@ def test_a_margin_is_chosen_once_and_named_by_the_baseline(tmp_path, monkeypatch
             reserve=0.01,
             probability=0.001,
             drives=80,
-            key=key_of(conditions),
+            key=calibration_key(conditions),
         )
 
     chosen = []

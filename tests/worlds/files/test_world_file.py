@@ -14,8 +14,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from antdrive.base import InputError
+from antdrive.base.caches import clear_caches
 from antdrive.base.document import parse_document
-from antdrive.base.reuse import forget
 from antdrive.worlds import (
     Disc,
     Task,
@@ -255,7 +255,7 @@ def test_the_largest_world_that_is_written_reads_back(tmp_path, monkeypatch):
             with pytest.raises(InputError, match="not written"):
                 save_task(TASK, tmp_path / "one.yaml")
     monkeypatch.setattr(document, "MAX_VALUES", values - 1)
-    forget()
+    clear_caches()
     with pytest.raises(InputError):
         load_task(tmp_path / "one.yaml")
 

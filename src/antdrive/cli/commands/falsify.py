@@ -47,10 +47,10 @@ def falsify(
     A path exists in each of them. Failures are run again in another process, shrunk, and written as a suite with a film
     each. Ctrl-C keeps what was found. Exit code 0: nothing was found. Exit code 1: the set-up fails in some world.
     """
-    from antdrive.planners.own_code import is_own
+    from antdrive.planners.user_code import is_user_code
     from antdrive.runs.failures.hunt import find_failures
 
-    if is_own(setup.planner):
+    if is_user_code(setup.planner):
         problem = "failures are run again in other processes, which know registered planners only"
         raise InputError(
             f"--planner {setup.planner}: {problem}; register the class under the entry point antdrive.planners"

@@ -12,7 +12,7 @@ from antdrive.cli.options import argument, option
 from antdrive.cli.scenario_options import Ends, Setup, random_world
 
 if TYPE_CHECKING:
-    from antdrive.runs.margins.choice import MarginTrial
+    from antdrive.runs.margins.choice import MarginResult
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Task
@@ -94,10 +94,10 @@ def _chosen(world: str | None, kind: str | None, ends: Ends) -> "str | Task":
     return "empty"
 
 
-def _lines(base: "Scenario", trials: "Sequence[MarginTrial]", smallest: float | None) -> Iterator[str]:
-    from antdrive.runs.margins.choice import TRIAL_HEADS
+def _lines(base: "Scenario", trials: "Sequence[MarginResult]", smallest: float | None) -> Iterator[str]:
+    from antdrive.runs.margins.choice import MARGIN_HEADS
 
-    yield from table(TRIAL_HEADS, (trial.cells for trial in sorted(trials, key=lambda trial: trial.margin)))
+    yield from table(MARGIN_HEADS, (trial.cells for trial in sorted(trials, key=lambda trial: trial.margin)))
     found = "none up to 0.2 m" if smallest is None else f"{smallest:.3f} m"
     if trial := next((trial for trial in trials if trial.margin == smallest), None):
         closed = f"; the margin closes {trial.impassable} more worlds, which are left out" if trial.impassable else ""

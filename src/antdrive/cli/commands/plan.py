@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from antdrive.base.atomic import claimed
+from antdrive.base.atomic import folder_lock
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, planning, show
@@ -46,7 +46,7 @@ def plan(
         from antdrive.views.figures.plan_figures import plan_figures
 
         named: dict[str, Any] = {"name": setup.planner, "suffixes": suffixes(vector)}
-        with claimed(out):
+        with folder_lock(out):
             made = plan_figures(scenario.task, grid, answer, scenario.robot, out, **named)
         files = {name: str(path) for name, path in made.items()}
     facts = {

@@ -34,7 +34,7 @@ def reproduce(
     """
     from antdrive.runs.papers.claims import VERDICT_HEADS, verdict_cells, verdict_facts
     from antdrive.runs.papers.experiments import PAPERS
-    from antdrive.runs.papers.reproduce import HEADS, TRIALS, row_cells, too_few_seeds
+    from antdrive.runs.papers.reproduce import HEADS, RUNS_FOLDER, row_cells, too_few_seeds
     from antdrive.runs.papers.reproduce import reproduce as repeat
     from antdrive.views.papers import draw_figures
 
@@ -66,5 +66,5 @@ def reproduce(
     lines += file_lines(files)
     if found.kept:
         count = f"{found.kept} of {len(found.rows)}"
-        lines.append(f"{count} experiments were done before and were taken from {folder / TRIALS}")
+        lines.append(f"{count} experiments were done before and were taken from {folder / RUNS_FOLDER}")
     show(json, result, lines)

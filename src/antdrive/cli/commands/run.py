@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from antdrive.base.atomic import claimed
+from antdrive.base.atomic import folder_lock
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
@@ -48,7 +48,7 @@ def run(
     _check_views(scenario, film, prelude, gui)
     check_folder(folder)
     compile_once()
-    with claimed(folder):
+    with folder_lock(folder):
         with planning(f"planning with {scenario.planner_name}"), keep_best():  # Ctrl-C keeps the best path so far
             planned = plan(scenario)
         with bar("driving") as progress:

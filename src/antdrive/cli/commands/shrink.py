@@ -83,7 +83,7 @@ def shrink(
         "summary": shrunk.summary,
         "complete": shrunk.complete,
         "repeats": repeats,
-        "trials": shrunk.trials,
+        "trials": shrunk.runs,
         "recalled": shrunk.recalled,
     }
     show(json, report, _lines(shrunk, files, repeats))
@@ -132,7 +132,7 @@ def _of_a_log(words: str, planner: str | None) -> "Scenario":
 def _lines(shrunk: "Shrunk", files: dict[str, str], repeats: bool) -> Iterator[str]:
     yield f"{shrunk.original.task.world.name}: {shrunk.failure.sentence}"
     smaller = "smaller" if shrunk.smaller else "no smaller"
-    yield f"{smaller} after {shrunk.trials} runs: {shrunk.summary}"
+    yield f"{smaller} after {shrunk.runs} runs: {shrunk.summary}"
     if not shrunk.complete:
         yield "the time was over: the same command goes on from here, --seconds gives it longer"
     if not repeats:

@@ -1,4 +1,4 @@
-"""Drive a test's scenario, judge it, and say what came out: the core of the pytest plugin and of `antdrive check`."""
+"""Drive a test's scenario, evaluate it, and say what came out: the core of the pytest plugin and of `antdrive check`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from antdrive.planners import PlannerError
 from antdrive.runs.pool import Pool, WorkerDied
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import Demands
-from antdrive.runs.suites.judging import RAISED, Judgement, explain, judge, unfulfilled
+from antdrive.runs.suites.evaluation import RAISED, Evaluation, evaluate, explain, unmet_demands
 from antdrive.runs.suites.scenarios import run_command, scenario_of
 from antdrive.runs.suites.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
 from antdrive.sim.pipeline import Run
@@ -99,32 +99,32 @@ class Check:
     folder: Path | None = None  # where logs, pictures and films of the test are written; None: nowhere
     results: Results | None = None  # which of them are written; None: none
 
-    def judge(self, run: Run) -> CheckResult:
+    def evaluate(self, run: Run) -> CheckResult:
         """Judge a run."""
         started, path, accepted = time.perf_counter(), self.baseline, ""
         baseline = None if path is None or self.update == "all" else Baseline.own(path, self.name)
         if path is not None and baseline is None:
-            judgement, accepted = self._without_baseline(run, path)
+            evaluation, accepted = self._without_baseline(run, path)
         else:
-            judgement = judge(run, self.demands, baseline)
-        details = [] if judgement.passed else [*explain(run, baseline)]
+            evaluation = evaluate(run, self.demands, baseline)
+        details = [] if evaluation.passed else [*explain(run, baseline)]
         files, unfilmed = dict[str, str](), False
         try:
-            files, unfilmed = self._written(run, judgement, baseline)
+            files, unfilmed = self._written(run, evaluation, baseline)
         except Exception as error:  # a picture of a planner's odd answer may fail in many ways
-            if judgement.passed:
+            if evaluation.passed:
                 raise
             said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
             details.append(f"results: {said}")  # which must not hide the faults
         rollout, wall = run.rollout, run.plan.wall_s
         return CheckResult(
             address=self.address,
-            passed=judgement.passed,
+            passed=evaluation.passed,
             outcome=run.outcome.key,
             certified=run.certificate is not None and run.certificate.certified,
             case="" if path is None else self.name,
-            faults=judgement.faults,
-            gains=judgement.gains,
+            faults=evaluation.faults,
+            gains=evaluation.gains,
             details=tuple(details),
             accepted=accepted,
             commands=self.commands,
@@ -158,9 +158,9 @@ class Check:
             files=files,
         )
 
-    def _without_baseline(self, run: Run, path: Path) -> tuple[Judgement, str]:
+    def _without_baseline(self, run: Run, path: Path) -> tuple[Evaluation, str]:
         """Judge a run by its demands alone, and write its baseline if asked to and if it fulfils them; what was written."""
-        faults, accepted = list(unfulfilled(run, self.demands)), ""
+        faults, accepted = list(unmet_demands(run, self.demands)), ""
         if not self.update:
             remedy = "" if faults else f"; accept this drive with {self.accept}"
             faults.append(f"baseline: {shown_path(path)} is missing{remedy}")
@@ -168,19 +168,19 @@ class Check:
             faults.append("baseline: not accepted, because the drive is not what the test expects")
         else:
             accepted = Baseline.of(run, self.name).renew(path)
-        return Judgement(tuple(faults)), accepted
+        return Evaluation(tuple(faults)), accepted
 
-    def _written(self, run: Run, judgement: Judgement, baseline: Baseline | None) -> tuple[dict[str, str], bool]:
+    def _written(self, run: Run, evaluation: Evaluation, baseline: Baseline | None) -> tuple[dict[str, str], bool]:
         """What was written about a test, by name, and whether it failed and only its film is missing."""
         if self.folder is None or self.results is None:
             return {}, False
         remove_artefacts(self.folder)
-        failed, drove, films = not judgement.passed, run.rollout is not None, self.results.films
+        failed, drove, films = not evaluation.passed, run.rollout is not None, self.results.films
         filmed = drove and self.results.takes_film(failed=failed)
         if not (failed or films == "always"):
             return {}, False
         files = write_artefacts(
-            run, self.folder, baseline, film=filmed, faults=judgement.faults, commands=self.commands
+            run, self.folder, baseline, film=filmed, faults=evaluation.faults, commands=self.commands
         )
         return files, drove and films == "failed" and not filmed
 
@@ -204,7 +204,7 @@ def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check
 
 
 def check_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
-    """Drive a suite's test and judge it.
+    """Drive a suite's test and evaluate it.
 
     Args:
         case: the test
@@ -218,7 +218,7 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     run_alone = run_command(case, anywhere=check.commands != (shlex.join(["antdrive", "check", case.address]),))
     check = dataclasses.replace(check, commands=tuple(filter(None, (*check.commands, run_alone))))
     try:
-        return check.judge(drive(scenario))
+        return check.evaluate(drive(scenario))
     except PlannerError as error:
         return check.failed_early(RAISED, str(error), error)
 
@@ -242,7 +242,7 @@ def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> 
 def check_cases(
     cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "", results: Results | None = None
 ) -> Iterator[CheckResult]:
-    """Drive and judge many tests; the results come as they are made, in the order of the tests, and do not depend on `jobs`.
+    """Drive and evaluate many tests; the results come as they are made, in the order of the tests, and do not depend on `jobs`.
 
     A test that cannot be judged, because its suite, a file or its baseline is wrong, fails with that as its fault.
 

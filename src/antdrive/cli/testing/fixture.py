@@ -12,7 +12,7 @@ from antdrive.cli.testing.evaluation import Check, CheckResult, Update
 from antdrive.planners import Planner
 from antdrive.robots import RobotSpec, list_robots
 from antdrive.runs.suites.demands import Demands
-from antdrive.runs.suites.nearest import nearest_of, touched_in
+from antdrive.runs.suites.nearest import first_contact, nearest_of
 from antdrive.runs.suites.suite import BASELINES
 from antdrive.sim.log.certificate import certify, in_metres
 from antdrive.sim.log.outcome import Outcome
@@ -127,7 +127,7 @@ class DriveFixture:
             update=self._update,
             folder=self._results.of(self._file, whole) if self._results else None,
             results=self._results,
-        ).judge(run)
+        ).evaluate(run)
         self._report(result)
         if not result.passed:
             raise DriveFailure(result)
@@ -195,7 +195,7 @@ def assert_collision_free(run: Run | Rollout, clearance: float = 0.0) -> None:
         assert isinstance(run, Run)
         raise AssertionError(f"the robot did not drive: {run.outcome.key}{f' ({run.reason})' if run.reason else ''}")
     certificate = certify(rollout)
-    touched = touched_in(rollout) if rollout.outcome.with_contact else None
+    touched = first_contact(rollout) if rollout.outcome.with_contact else None
     if touched is not None:
         raise AssertionError(f"{rollout.outcome.key}: touched {touched.thing}; {touched.place}")
     if not certificate.certified:

@@ -94,7 +94,7 @@ class DriveItem(pytest.Item):
         self.case = case
 
     def runtest(self) -> None:
-        """Drive and judge."""
+        """Drive and evaluate."""
         from antdrive.cli.testing.evaluation import check_case
         from antdrive.cli.testing.fixture import DriveFailure
 

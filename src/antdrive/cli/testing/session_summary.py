@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.cli.testing.evaluation import CheckResult
 
 #: The metrics that a test report gets.
@@ -122,7 +122,7 @@ def save_junit(results: Sequence[CheckResult], path: Path) -> None:
         if not result.passed:
             failure = ET.SubElement(test, "failure", {"message": _plain(result.faults[0])})
             failure.text = "\n".join(map(_plain, result.message.splitlines()))
-    with written_whole(path) as part:
+    with atomic_write(path) as part:
         ET.ElementTree(tree).write(part, encoding="utf-8", xml_declaration=True)
 
 

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats, Pose
+from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError
-from antdrive.base.reuse import Keyed, reused
 from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
@@ -303,7 +303,7 @@ def unsorted(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
     return ObstacleIndex(discs, np.array([0, len(discs)]), np.asarray(bounds, dtype=np.float64), EVERYTHING)
 
 
-@reused(16)
+@cached(16)
 def _discs_by_square(world: Keyed[World], side: float, distance: float) -> tuple[Floats, npt.NDArray[np.int64]]:
     bounds = np.asarray(world.value.bounds, dtype=np.float64)
     return _kernels_obstacles.index_discs(world.value.discs, bounds, side, distance)

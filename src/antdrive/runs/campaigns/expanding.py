@@ -16,7 +16,7 @@ from antdrive.base.files import file_name
 from antdrive.robots import list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
 from antdrive.runs.campaigns.grid import campaign_tasks, campaign_worlds, planner_variants
-from antdrive.runs.campaigns.job import Job, NamedRobot, NamedSettings, NamedTask, PlannerVariant, SweepCase, key_of
+from antdrive.runs.campaigns.job import Job, NamedRobot, NamedSettings, NamedTask, PlannerVariant, SweepCase, run_key
 from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting_words
 from antdrive.sim.log.record import canonical_hash
 from antdrive.worlds import Task
@@ -53,7 +53,7 @@ def expand(campaign: Campaign) -> Expansion:
     for case in _cases(tasks, robots, settings, planners, files):
         identity = case.identity
         for seed in campaign.entry.seeds:
-            key = key_of(identity, seed)
+            key = run_key(identity, seed)
             jobs.setdefault(key, Job(key, case, seed))
     counts = {
         **_count_tasks(tasks),

@@ -148,6 +148,6 @@ class Job(NamedTuple):
     seed: int
 
 
-def key_of(identity: str, seed: int) -> str:
+def run_key(identity: str, seed: int) -> str:
     """The key of a run: a SHA-256, cut to 32 hexadecimal digits."""
     return hashlib.sha256(f"{identity}\n{seed}".encode()).hexdigest()[:KEY_DIGITS]

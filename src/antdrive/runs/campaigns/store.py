@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from antdrive.base.atomic import write_text, written_whole
+from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.optional import parquet_library
 from antdrive.runs import folder as folders
@@ -62,7 +62,7 @@ class Store:
         """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds, if `tick` is called that often."""
         if log is not None:
             try:
-                with written_whole(self.folder / row["rollout"]) as part:
+                with atomic_write(self.folder / row["rollout"]) as part:
                     part.write_bytes(log)
             except OSError as error:
                 raise InputError(f"{row['rollout']}: cannot be written ({error.strerror or error})") from None

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
@@ -24,7 +24,7 @@ from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, TOO_SLOW, grid_
 from antdrive.runs.campaigns.running import Driving, Finished, Keep, Work, finished_of
 from antdrive.runs.campaigns.store import Store, former_grid, opened, outcomes_in
 from antdrive.runs.margins.choice import Calibration, choose_margin
-from antdrive.runs.margins.trial import key_of
+from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.pool import Done, Pool, cores
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import versions
@@ -171,7 +171,7 @@ def calibrated(jobs: Iterable[Job]) -> list[Job]:
     for job in jobs:
         if job.case.settings.fields["margin"] == "auto" and id(job.case) not in cases:
             conditions = job.case.scenario(job.seed, margin=0.0).loss_conditions
-            key = key_of(conditions)
+            key = calibration_key(conditions)
             if key not in chosen:
                 chosen[key] = choose_margin(conditions)
             cases[id(job.case)] = dataclasses.replace(job.case, calibration=chosen[key])
@@ -202,6 +202,6 @@ def _begin(store: Store, campaign: Campaign, expansion: Expansion, jobs: Sequenc
         if not (store.folder / path).exists():
             save_task(task, store.folder / path)
     for path, source in {**expansion.robots, **expansion.planners}.items():
-        with written_whole(store.folder / path) as part:
+        with atomic_write(store.folder / path) as part:
             shutil.copyfile(source, part)
     store.begin(manifest, grid_table(jobs))

@@ -12,8 +12,8 @@ from antdrive.base.errors import FieldError, input_error
 from antdrive.planners import PlannerError
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import CYLINDER, UNSEEN, WALL, Bound
-from antdrive.runs.suites.judging import RAISED, judge, limits, unfulfilled
-from antdrive.runs.suites.nearest import NOTHING, cause_of_contact, touched_first
+from antdrive.runs.suites.evaluation import RAISED, evaluate, limits, unmet_demands
+from antdrive.runs.suites.nearest import NOTHING, cause_of_contact, first_contact_kind
 from antdrive.runs.suites.suite import SuiteCase
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
@@ -77,7 +77,7 @@ def failure_of(done: Run, bound: Bound | None = None) -> Failure | None:
         bound: what counts as failure; None: everything but a certified success
     """
     rollout = done.rollout
-    touched = NOTHING if rollout is None else touched_first(rollout)
+    touched = NOTHING if rollout is None else first_contact_kind(rollout)
     if bound is not None:
         if rollout is None or not bound.holds(METRICS[bound.metric](rollout)):
             return None
@@ -102,10 +102,10 @@ def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
         return None
     if (found := _first_broken(demands.bounds, rollout)) is not None:
         return found
-    if not case.entry.baseline or any(unfulfilled(done, demands)):
+    if not case.entry.baseline or any(unmet_demands(done, demands)):
         return None
     baseline = Baseline.own(case.baseline_path, case.id)
-    faults = () if baseline is None else judge(done, demands, baseline).faults
+    faults = () if baseline is None else evaluate(done, demands, baseline).faults
     if baseline is None or not faults:
         return None
     same = baseline.outcome is done.outcome and baseline.line

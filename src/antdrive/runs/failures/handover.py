@@ -23,7 +23,7 @@ from antdrive.runs.failures.failure import Attempt
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.runs.suites.names import is_own_entry
-from antdrive.runs.suites.nearest import cause_of_contact, touched_first
+from antdrive.runs.suites.nearest import cause_of_contact, first_contact_kind
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import SuiteCase, load_suite
 from antdrive.sim.forms import written
@@ -134,7 +134,7 @@ def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
     if failed.outcome is Outcome.SUCCEEDED:
         expected["certified"] = failed.succeeded
     if failed.rollout is not None and failed.outcome.with_contact:
-        expected["touched"] = touched_first(failed.rollout)
+        expected["touched"] = first_contact_kind(failed.rollout)
         if bound is None and (cause := cause_of_contact(failed.rollout)):
             expected["cause"] = cause
     if bound is not None:

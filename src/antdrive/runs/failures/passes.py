@@ -13,8 +13,8 @@ import numpy as np
 from antdrive.base import Bounds, Floats
 from antdrive.base.errors import FieldError
 from antdrive.planners import capabilities_of
+from antdrive.runs.failures.candidates import CandidateRunner
 from antdrive.runs.failures.ddmin import one_minimal
-from antdrive.runs.failures.trials import Trials
 from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.scenario import Scenario
@@ -31,93 +31,93 @@ FEW, MANY = 2, 8  # of MANY obstacles or fewer, each single one and each pair is
 DIGITS = (0, 1, 2, 3)  # behind the decimal point; radii and angles keep at least one
 
 
-def nearest(scenario: Scenario, trials: Trials) -> Scenario:
+def nearest(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with the 1, 2, 4, ... obstacles that are nearest to the drive, as many as suffice."""
-    discs, order = scenario.task.world.obstacles, _by_distance(scenario, trials)
+    discs, order = scenario.task.world.obstacles, _by_distance(scenario, runner)
     counts = itertools.takewhile(lambda count: count < len(discs), (2**k for k in itertools.count()))
     fewer = (with_obstacles(scenario, _at(discs, order[:count])) for count in counts)
-    return trials.first(_with_seeds(fewer)) or scenario
+    return runner.first(_with_seeds(fewer)) or scenario
 
 
-def obstacles(scenario: Scenario, trials: Trials) -> Scenario:
+def obstacles(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with the obstacles that the failure needs."""
-    discs, order = scenario.task.world.obstacles, _by_distance(scenario, trials)
-    scenario = _needed(scenario, order, lambda s, kept: with_obstacles(s, _at(discs, kept)), trials)
+    discs, order = scenario.task.world.obstacles, _by_distance(scenario, runner)
+    scenario = _needed(scenario, order, lambda s, kept: with_obstacles(s, _at(discs, kept)), runner)
     discs = scenario.task.world.obstacles
     if not FEW < len(discs) <= MANY:
         return scenario
     fewer = (some for count in range(1, FEW + 1) for some in itertools.combinations(discs, count))
-    return trials.first(with_obstacles(scenario, some) for some in fewer) or scenario
+    return runner.first(with_obstacles(scenario, some) for some in fewer) or scenario
 
 
-def movers(scenario: Scenario, trials: Trials) -> Scenario:
+def movers(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with the movers that the failure needs."""
-    return _needed(scenario, scenario.task.world.movers, with_movers, trials)
+    return _needed(scenario, scenario.task.world.movers, with_movers, runner)
 
 
-def unseen(scenario: Scenario, trials: Trials) -> Scenario:
+def unseen(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with the unseen obstacles that the failure needs."""
-    return _needed(scenario, scenario.unseen, with_unseen, trials)
+    return _needed(scenario, scenario.unseen, with_unseen, runner)
 
 
-def start(scenario: Scenario, trials: Trials) -> Scenario:
+def start(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with the start moved along the drive, towards the failure."""
-    return trials.first(_with_seeds(_nearer_starts(scenario, trials.rollout(scenario)))) or scenario
+    return runner.first(_with_seeds(_nearer_starts(scenario, runner.rollout(scenario)))) or scenario
 
 
-def goal(scenario: Scenario, trials: Trials) -> Scenario:
+def goal(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with the goal moved along the route, towards the failure."""
-    return trials.first(_nearer_goals(scenario, trials.rollout(scenario))) or scenario
+    return runner.first(_nearer_goals(scenario, runner.rollout(scenario))) or scenario
 
 
-def bounds(scenario: Scenario, trials: Trials) -> Scenario:
+def bounds(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with walls moved inwards, by whole cells, so that the grid stays where it is.
 
     Cylinders that a moved wall would cut or leave outside go.
     """
     for side in range(4):
-        scenario = trials.first(_walled(scenario, side, b) for b in _tighter(scenario, side)) or scenario
+        scenario = runner.first(_walled(scenario, side, b) for b in _tighter(scenario, side)) or scenario
     return scenario
 
 
-def noise(scenario: Scenario, trials: Trials) -> Scenario:
+def noise(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with the least noise: none, or a tenth to nine tenths of its own."""
     levels = [float(f"{scenario.noise * share:.2g}") for share in NOISES]
-    return trials.first(_varied(scenario, noise=level) for level in levels if level < scenario.noise) or scenario
+    return runner.first(_varied(scenario, noise=level) for level in levels if level < scenario.noise) or scenario
 
 
-def seed(scenario: Scenario, trials: Trials) -> Scenario:
+def seed(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with the simplest seed."""
     most = SEEDS if _is_random(scenario) else 1
-    return trials.first(_varied(scenario, seed=n) for n in range(min(most, scenario.seed))) or scenario
+    return runner.first(_varied(scenario, seed=n) for n in range(min(most, scenario.seed))) or scenario
 
 
-def time_limit(scenario: Scenario, trials: Trials) -> Scenario:
+def time_limit(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario without a time limit of its own."""
     task = dataclasses.replace(scenario.task, time_limit=None)
     free = _varied(scenario, time_limit=None, task=task)
-    return scenario if free == scenario else trials.first([free]) or scenario
+    return scenario if free == scenario else runner.first([free]) or scenario
 
 
-def digits(scenario: Scenario, trials: Trials) -> Scenario:
+def digits(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """The scenario with its positions and radii rounded to fewer digits: all at once, then one by one."""
     for count in DIGITS:
         whole = _all_rounded(scenario, count)
-        if whole == scenario or trials.first([whole]) is not None:
+        if whole == scenario or runner.first([whole]) is not None:
             return whole or scenario
     for rounded in _roundings(scenario):
         for count in DIGITS:
             candidate = rounded(scenario, count)
             if candidate == scenario:
                 break
-            if trials.first([candidate]) is not None:
+            if runner.first([candidate]) is not None:
                 scenario = candidate or scenario
                 break
     return scenario
 
 
 #: The passes with their names, in their order. Nearer ends come first, because they shorten every later trial.
-PASSES: tuple[tuple[str, Callable[[Scenario, Trials], Scenario]], ...] = (
+PASSES: tuple[tuple[str, Callable[[Scenario, CandidateRunner], Scenario]], ...] = (
     ("start", start),
     ("goal", goal),
     ("obstacles", nearest),
@@ -154,7 +154,7 @@ def _needed(
     scenario: Scenario,
     items: Sequence[Item],
     make: Callable[[Scenario, Sequence[Item]], Scenario | None],
-    trials: Trials,
+    runner: CandidateRunner,
 ) -> Scenario:
     """The scenario with those of some items that the failure needs, by delta debugging."""
 
@@ -166,7 +166,7 @@ def _needed(
                 tried.append((make(scenario, some), some))
                 yield tried[-1][0]
 
-        found = trials.first(candidates())
+        found = runner.first(candidates())
         return None if found is None else next(some for candidate, some in tried if candidate is found)
 
     kept = one_minimal(items, first)
@@ -195,9 +195,9 @@ def _at(discs: Sequence[Disc], indices: Iterable[int]) -> list[Disc]:
     return [discs[i] for i in sorted(indices)]
 
 
-def _by_distance(scenario: Scenario, trials: Trials) -> list[int]:
+def _by_distance(scenario: Scenario, runner: CandidateRunner) -> list[int]:
     """The indices of the obstacles, those nearest to the drive and to the rest of its route first."""
-    discs, rollout = scenario.task.world.obstacles, trials.rollout(scenario)
+    discs, rollout = scenario.task.world.obstacles, runner.rollout(scenario)
     if rollout is None or not discs:
         return list(range(len(discs)))
     line = np.vstack([rollout.pose[::12, :2], _rest_of_route(rollout, len(rollout.t) - 1)])

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import Planner, list_planners, load_planner
-from antdrive.planners.own_code import is_own, own_object, record_name
+from antdrive.planners.user_code import is_user_code, record_name, user_object
 from antdrive.robots import Avoidance, PurePursuit
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.policy import Perception, ReplanPolicy
@@ -84,11 +84,11 @@ def _own_planner(words: str, name: str, settings: Mapping[str, Any]) -> Planner:
     """The planner of people's own file or module that a record names by its class."""
     if record_name(words) not in (words, name):
         raise InputError(f"planner: the log's planner is {name!r:.60}, not {record_name(words)!r:.60}")
-    if not is_own(words):
+    if not is_user_code(words):
         raise InputError(
             f"planner: write FILE.py:CLASS or MODULE:CLASS, got {words!r:.60}; registered ones need no words"
         )
-    return load_planner(words, **_options(own_object(words), settings))
+    return load_planner(words, **_options(user_object(words), settings))
 
 
 def _options(kind: Any, settings: Mapping[str, Any]) -> dict[str, Any]:

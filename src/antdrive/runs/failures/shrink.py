@@ -7,9 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from antdrive.base.errors import InputError
+from antdrive.runs.failures.candidates import (
+    CandidateRunner,
+    OutOfTimeError,
+    changeable,
+    failure_in,
+    identity_of,
+    room_in,
+)
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.runs.failures.passes import PASSES
-from antdrive.runs.failures.trials import OutOfTimeError, Trials, changeable, failure_in, identity_of, room_in
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim.scenario import Scenario
 
@@ -25,7 +32,7 @@ class Shrunk:
         scenario: the smallest one that was found to fail in the same way
         failure: how both fail
         complete: whether every pass came to its end; else the time was over, and going on may make it smaller
-        trials: how many candidates were run, in this session
+        runs: number of candidates run in this session
         recalled: how many answers came from the journal of an earlier session
     """
 
@@ -33,7 +40,7 @@ class Shrunk:
     scenario: Scenario
     failure: Failure
     complete: bool
-    trials: int
+    runs: int
     recalled: int
 
     @property
@@ -93,29 +100,29 @@ def shrink(
     if failure is None:
         counts = "a failure is anything but a certified success" if bound is None else f"the bound is {bound}"
         raise InputError(f"{scenario.task.world.name}: this run does not fail, so there is nothing to shrink; {counts}")
-    trials = Trials(
+    runner = CandidateRunner(
         failure, bound, room=room_in(scenario, failure), seconds=seconds, journal=journal,
         identity=identity_of(scenario), jobs=jobs, progress=progress,
     )  # fmt: skip
     try:
-        small, complete = _smallest(scenario, trials)
-        if trials.recalled and failure_in(small, bound) != failure:  # the journal is older than the planner's code
-            trials.forget()
-            small, complete = _smallest(scenario, trials)
+        small, complete = _smallest(scenario, runner)
+        if runner.recalled and failure_in(small, bound) != failure:  # the journal is older than the planner's code
+            runner.forget()
+            small, complete = _smallest(scenario, runner)
     finally:
-        trials.close()
-    return Shrunk(scenario, small, failure, complete, trials.made, len(trials.recalled))
+        runner.close()
+    return Shrunk(scenario, small, failure, complete, runner.made, len(runner.recalled))
 
 
-def _smallest(scenario: Scenario, trials: Trials) -> tuple[Scenario, bool]:
+def _smallest(scenario: Scenario, runner: CandidateRunner) -> tuple[Scenario, bool]:
     """What all passes make of a scenario, again and again until none changes anything; whether they came that far."""
     small = scenario
     try:
         for _ in range(ROUNDS):
             before = changeable(small)
             for name, shrinking in PASSES:
-                trials.stage = name
-                small = shrinking(small, trials)
+                runner.stage = name
+                small = shrinking(small, runner)
             if changeable(small) == before:
                 return small, True
     except OutOfTimeError:

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 from pydantic import TypeAdapter
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.kernel_cache import cache_folder
 from antdrive.base.records import STRICT
-from antdrive.runs.margins.trial import Loss, key_of, loss_on_course
+from antdrive.runs.margins.loss import Loss, calibration_key, loss_on_course
 from antdrive.runs.pool import Pool, processes_for
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.outcome import Outcome
@@ -51,7 +51,7 @@ class Calibration:
     reserve: float  # part of the margin that is left beyond the predicted loss, at least [m]
     probability: float  # of a drive along a course of the calibration that loses more than `loss`
     drives: int  # how many drives the prediction rests on
-    key: str  # the conditions that it holds for, see `key_of`
+    key: str  # the conditions that it holds for, see `calibration_key`
 
     __pydantic_config__ = STRICT
 
@@ -91,7 +91,7 @@ def least_margin(
     next one where the room that was left by the last ones, as a line, is the reserve.
     """
     most = max(MOST[0], MOST[1] * radius)
-    margin, found = FIRST_GUESS, None
+    margin, calibration = FIRST_GUESS, None
     unsafe, safe = (-1.0, -math.inf), (math.inf, math.inf)  # the margins next to the least one, and what they spare
     for _ in range(ROUNDS):
         losses = losses_with(margin)
@@ -103,21 +103,21 @@ def least_margin(
             unsafe = (margin, spare)
         else:
             safe, largest = (margin, spare), max(each.footprint for each in losses)
-            found = Calibration(
+            calibration = Calibration(
                 margin=margin, loss=loss, largest=largest, reserve=reserve, probability=PROBABILITY,
                 drives=len(losses), key=key,
             )  # fmt: skip
         if unsafe[0] >= most or safe[0] == 0 or safe[1] <= CLOSE or safe[0] - unsafe[0] <= CLOSE:
             break
         margin = _next_margin(unsafe, safe, most)
-    if found is None:
+    if calibration is None:
         tried = (
             f"none of the {ROUNDS} margins tried, up to {unsafe[0]:g} m,"
             if unsafe[0] < most
             else f"no margin up to {most:g} m"
         )
         raise FieldError("margin", f"auto: {tried} leaves {reserve:g} m; lower the noise, or give a number")
-    return found
+    return calibration
 
 
 def _next_margin(unsafe: tuple[float, float], safe: tuple[float, float], most: float) -> float:
@@ -144,12 +144,14 @@ def choose_margin(
 
     Movers are no part of the prediction.
     """
-    found = known_margin(conditions)
-    if found is None:
+    calibration = known_margin(conditions)
+    if calibration is None:
         with Pool(processes_for(jobs)) as pool:
-            found = least_margin(_driving(conditions, pool, progress), key_of(conditions), conditions.robot.radius)
-        _keep(found)
-    return found
+            calibration = least_margin(
+                _driving(conditions, pool, progress), calibration_key(conditions), conditions.robot.radius
+            )
+        _keep(calibration)
+    return calibration
 
 
 def with_chosen_margin(scenario: Scenario, progress: Callable[[int, float], None] | None = None) -> Scenario:
@@ -164,25 +166,28 @@ def with_chosen_margin(scenario: Scenario, progress: Callable[[int, float], None
     return with_margin_of(scenario, choose_margin(scenario.loss_conditions, progress=progress))
 
 
-def with_margin_of(scenario: Scenario, found: Calibration) -> Scenario:
+def with_margin_of(scenario: Scenario, calibration: Calibration) -> Scenario:
     """The scenario with the margin of a calibration for its conditions."""
     record = MarginRecord(
-        loss_m=found.loss, reserve_m=found.reserve, probability=found.probability, drives=found.drives
+        loss_m=calibration.loss,
+        reserve_m=calibration.reserve,
+        probability=calibration.probability,
+        drives=calibration.drives,
     )
-    choice = MarginChoice(margin=found.margin, record=record, conditions=scenario.loss_conditions)
-    return dataclasses.replace(scenario, margin=found.margin, margin_choice=choice)
+    choice = MarginChoice(margin=calibration.margin, record=record, conditions=scenario.loss_conditions)
+    return dataclasses.replace(scenario, margin=calibration.margin, margin_choice=choice)
 
 
 def known_margin(conditions: Conditions) -> Calibration | None:
     """The calibration in the cache; None where there is none, or only a damaged one."""
-    path = _path(key_of(conditions))
+    path = _path(calibration_key(conditions))
     if path is None:
         return None
     try:
-        found = _adapter().validate_json(path.read_bytes())
+        calibration = _adapter().validate_json(path.read_bytes())
     except (OSError, ValueError):
         return None
-    return found if found.key == key_of(conditions) else None
+    return calibration if calibration.key == calibration_key(conditions) else None
 
 
 def _driving(
@@ -204,13 +209,13 @@ def _driving(
     return losses_with
 
 
-def _keep(found: Calibration) -> None:
-    path = _path(found.key)
+def _keep(calibration: Calibration) -> None:
+    path = _path(calibration.key)
     if path is None:
         return
     try:
-        with written_whole(path) as temporary:
-            temporary.write_bytes(_adapter().dump_json(found, indent=1))
+        with atomic_write(path) as temporary:
+            temporary.write_bytes(_adapter().dump_json(calibration, indent=1))
     except (InputError, OSError):
         return  # a full disk costs the next run a calibration, nothing else
 
@@ -225,11 +230,11 @@ def _adapter() -> TypeAdapter[Calibration]:
     return TypeAdapter(Calibration)
 
 
-TRIAL_HEADS = ("margin m", "driven", "no path", "least room left m", "failed")
+MARGIN_HEADS = ("margin m", "driven", "no path", "least room left m", "failed")
 
 
 @dataclass(frozen=True)
-class MarginTrial:
+class MarginResult:
     """All drives with one margin, up to the first that failed."""
 
     margin: float  # the margin that was tried [m]
@@ -246,7 +251,7 @@ class MarginTrial:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """A row of a table, under `TRIAL_HEADS`."""
+        """A row of a table, under `MARGIN_HEADS`."""
         left = f"{self.left:.4f}" if self.drives else "-"
         failed = "" if self.failed is None else f"seed {self.failed}"
         return f"{self.margin:.3f}", str(self.drives), str(self.impassable), left, failed
@@ -259,10 +264,10 @@ def find_margin(
     reserve: float = 0.005,
     most: float = 0.2,
     resolution: float = 0.005,
-) -> Iterator[MarginTrial]:
+) -> Iterator[MarginResult]:
     """Search by bisection for the smallest margin with which the drives of all seeds succeed.
 
-    Trials come as they are made; the smallest margin of those that are safe is the answer.
+    Results come as they are made; the smallest safe margin is the answer.
     """
     if not 0 < resolution < most:
         raise FieldError("resolution", f"must be greater than 0 and less than {most:g}, got {resolution:g}")
@@ -271,15 +276,15 @@ def find_margin(
         0,
         math.ceil(most / resolution),
     )  # in steps: the answer is at least low; high is safe or closes all worlds
-    trial = _try_margin(high * resolution, drive, hardest_first, reserve)
-    yield trial
-    if trial.failed is not None:
+    result = _try_margin(high * resolution, drive, hardest_first, reserve)
+    yield result
+    if result.failed is not None:
         return
     while low < high:
         middle = (low + high) // 2
-        trial = _try_margin(middle * resolution, drive, hardest_first, reserve)
-        yield trial
-        if trial.failed is None:
+        result = _try_margin(middle * resolution, drive, hardest_first, reserve)
+        yield result
+        if result.failed is None:
             high = middle
         else:
             low = middle + 1
@@ -287,7 +292,7 @@ def find_margin(
 
 def _try_margin(
     margin: float, drive: Callable[[float, int], Run], hardest_first: list[int], reserve: float
-) -> MarginTrial:
+) -> MarginResult:
     """Drive with one margin until a drive fails; a seed that fails moves to the front of `hardest_first`."""
     left, drives, impassable = math.inf, 0, 0
     for seed in hardest_first:
@@ -301,5 +306,5 @@ def _try_margin(
         if not run.succeeded or left < reserve:
             hardest_first.remove(seed)
             hardest_first.insert(0, seed)
-            return MarginTrial(margin, drives, impassable, seed, left)
-    return MarginTrial(margin, drives, impassable, None, left)
+            return MarginResult(margin, drives, impassable, seed, left)
+    return MarginResult(margin, drives, impassable, None, left)

@@ -1,4 +1,4 @@
-"""The papers' claims, each a row of `claims.csv`, and whether they hold: a claim's test on the trials of its experiments.
+"""The papers' claims, each a row of `claims.csv`, and whether they hold: a claim's test on the runs of its experiments.
 
 A claim is one sentence that an experiment can refute, and the test that decides it.
 """
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.runs.papers.trials import Trial
+from antdrive.runs.papers.paper_runs import PaperRun
 from antdrive.runs.statistics.intervals import Interval, means_by_world, medians_by_world, resampled, wilson
 from antdrive.runs.statistics.significance import wilcoxon
 
@@ -46,7 +46,7 @@ class Claim:
     reading: str = "ours"  # how the planner is read where that is not our default
     printed: str  # the paper's figures
     statistic: str  # a key of `STATISTICS`
-    quantity: tuple[str, ...] = ("gap",)  # properties of `Trial`; a second one is that of the second planner
+    quantity: tuple[str, ...] = ("gap",)  # properties of `PaperRun`; a second one is that of the second planner
     relation: str  # a key of `RELATIONS`
     bound: float
     cases: tuple[tuple[Arm, ...], ...]  # on each map the planners that are measured together
@@ -80,9 +80,9 @@ CLAIMS = _claims()
 
 Floats = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]
-Found = Mapping[Arm, Sequence[Trial]]
+RunsByArm = Mapping[Arm, Sequence[PaperRun]]
 NO_PATH = 1e9  # replaces infinity in differences, so that "no path" minus "no path" is 0
-FEWEST = 6  # with fewer trials no interval says anything
+FEWEST = 6  # with fewer runs no interval says anything
 MANY = 1000  # times as many maps and seeds: a factor above this is not written
 EQUAL = 1e-6  # a value is at most a bound that it exceeds by less
 ABOUT = 0.05  # the share of a printed mean by which ours may differ
@@ -114,16 +114,16 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a statistic gives on a claim's trials."""
+    """What a statistic gives on a claim's runs."""
 
     value: float
     interval: Interval
-    trials: int  # trials, or pairs of them, that count
+    runs: int  # runs, or pairs of them, that count
     ours: str  # the value with its interval, in words
     why: str = ""  # further figures, in words
     unknown: str = ""  # why no decision is possible whatever the interval
-    few: str = ""  # what is said of fewer trials than the test needs, where it is not that no interval says anything
-    exact: bool = False  # the interval is right for any number of trials, so that even few can refute
+    few: str = ""  # what is said of fewer runs than the test needs, where it is not that no interval says anything
+    exact: bool = False  # the interval is right for any number of runs, so that even few can refute
 
 
 #: By relation, whether an interval bears it out, and whether it refutes it.
@@ -141,15 +141,15 @@ RELATIONS: Mapping[str, Callable[[Interval, float], tuple[bool, bool]]] = Mappin
 )
 
 
-def judge(claim: Claim, found: Found) -> Verdict:
+def evaluate(claim: Claim, runs: RunsByArm) -> Verdict:
     """Test a claim."""
-    measured = STATISTICS[claim.statistic](claim, found)
+    measured = STATISTICS[claim.statistic](claim, runs)
     holds, fails = RELATIONS[claim.relation](measured.interval, claim.bound)
     decision, reason = Decision.OPEN, ""
     if measured.unknown:
         reason = measured.unknown
-    elif measured.trials < trials_needed(claim) and not (measured.exact and fails):
-        reason = measured.few or f"{measured.trials} trials, and with fewer than {FEWEST} no interval says anything"
+    elif measured.runs < runs_needed(claim) and not (measured.exact and fails):
+        reason = measured.few or f"{measured.runs} runs, and with fewer than {FEWEST} no interval says anything"
     elif holds or fails:
         decision = Decision.HOLDS if holds else Decision.REFUTED
     else:
@@ -158,8 +158,8 @@ def judge(claim: Claim, found: Found) -> Verdict:
     return Verdict(claim, decision, measured.ours, why, measured.value, *measured.interval)
 
 
-def trials_needed(claim: Claim) -> int:
-    """How many trials a claim's test needs at least to bear it out."""
+def runs_needed(claim: Claim) -> int:
+    """How many runs a claim's test needs at least to bear it out."""
     if claim.statistic in ("arrived", "failed"):
         above = claim.relation in (">", ">=")
         return next(
@@ -168,43 +168,43 @@ def trials_needed(claim: Claim) -> int:
     return 1 if "wins" in claim.statistic and TIMED not in claim.quantity else FEWEST
 
 
-def trials_at_hand(claim: Claim, sizes: Mapping[Arm, int]) -> int:
-    """How many trials, or pairs of them, a claim's test counts."""
+def runs_available(claim: Claim, sizes: Mapping[Arm, int]) -> int:
+    """How many runs, or pairs of them, a claim's test counts."""
     counts = [min(sizes[arm] for arm in case) for case in claim.cases]
     return min(counts) if "wins" in claim.statistic else sum(counts)
 
 
-def _difference(claim: Claim, found: Found) -> Measured:
+def _difference(claim: Claim, runs: RunsByArm) -> Measured:
     """The median of the differences, pair by pair."""
-    first, second, world = _paired(claim, found)
+    first, second, world = _paired(claim, runs)
     difference = np.round(first - second, 9)  # rounding errors become 0
     value, interval = _median(difference, world)
     why = f"{_counts(difference)}; Wilcoxon's p {wilcoxon(difference):.2g}"
     if claim.quantity == ("work",):
-        why += f"; processor time {_slower(claim, found):+.0f} %"
+        why += f"; processor time {_slower(claim, runs):+.0f} %"
     ours = f"median difference {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
     return Measured(value, interval, len(difference), ours, why, _never(first, second))
 
 
-def _gain(claim: Claim, found: Found) -> Measured:
+def _gain(claim: Claim, runs: RunsByArm) -> Measured:
     """The median of the differences of two gains: from the first planner to the second, and from the third to the fourth."""
     (case,) = claim.cases
-    before, after, world = _paired(claim, found, [case[:2]])
-    earlier, later, _ = _paired(claim, found, [case[2:]])
+    before, after, world = _paired(claim, runs, [case[:2]])
+    earlier, later, _ = _paired(claim, runs, [case[2:]])
     value, interval = _median(np.round((before - after) - (earlier - later), 9), world)
     gains = f"median gains {np.median(before - after):.2f} and {np.median(earlier - later):.2f}"
     ours = f"median difference of the gains {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
     return Measured(value, interval, len(before), ours, gains)
 
 
-def _balance(claim: Claim, found: Found) -> Measured:
+def _balance(claim: Claim, runs: RunsByArm) -> Measured:
     """The share of the pairs in which the first value is above the second, less the share in which it is below [points].
 
     For values of which many are equal, as lengths on small maps: their median difference is 0 whatever the others are. Two
     planners that are alike have a balance of 0, of which an interval never says that it is 0 or less; so "no worse" lets a
     small effect pass.
     """
-    first, second, world = _paired(claim, found)
+    first, second, world = _paired(claim, runs)
     difference = np.round(first - second, 9)
     signs = np.sign(difference)
     value, interval = 100 * float(signs.mean()), means_by_world(100 * signs[:, None], _alone(world))[0]
@@ -215,12 +215,12 @@ def _balance(claim: Claim, found: Found) -> Measured:
     return Measured(value, interval, len(signs), ours, median, _never(first, second))
 
 
-def _scatter(claim: Claim, found: Found) -> Measured:
+def _scatter(claim: Claim, runs: RunsByArm) -> Measured:
     """The difference of the two ranges between quartiles; maps, and runs within each, are resampled for its interval.
 
     A quartile that no path reaches is infinite, and so is the range.
     """
-    first, second, world = _paired(claim, found)
+    first, second, world = _paired(claim, runs)
 
     def wider(counts: Numbers) -> float:
         return _quartile_range(first, counts) - _quartile_range(second, counts)
@@ -234,23 +234,23 @@ def _scatter(claim: Claim, found: Found) -> Measured:
     return Measured(value, interval, len(first), ours, "ranges between quartiles, bootstrapped")
 
 
-def _median_of_one(claim: Claim, found: Found) -> Measured:
+def _median_of_one(claim: Claim, runs: RunsByArm) -> Measured:
     """The median of all values."""
-    values, world = _together(claim, found)
+    values, world = _together(claim, runs)
     value, interval = _median(values, world)
     arrived, within = int((values < NO_PATH).sum()), int((values <= claim.bound + EQUAL).sum())
     why = f"{arrived} of {len(values)} found a path, {within} are within the bound"
     return Measured(value, interval, len(values), f"median {_with_interval(value, interval, claim)}", why)
 
 
-def _mean_of_one(claim: Claim, found: Found) -> Measured:
+def _mean_of_one(claim: Claim, runs: RunsByArm) -> Measured:
     """The mean of all finite values, beside the printed one."""
-    values, _ = _together(claim, found)
+    values, _ = _together(claim, runs)
     known = values[values < NO_PATH]
     if not len(known):
         return Measured(math.nan, Interval(math.nan, math.nan), 0, "–", unknown="no path was found")
     value = float(known.mean())
-    # Trials are of one map, so each counts on its own.
+    # Runs are of one map, so each counts on its own.
     interval = means_by_world(known[:, None], np.arange(len(known)))[0]
     why = f"{100 * (value / claim.bound - 1):+.1f} % from the printed mean"
     if len(known) < len(values):
@@ -258,53 +258,51 @@ def _mean_of_one(claim: Claim, found: Found) -> Measured:
     return Measured(value, interval, len(known), f"mean {_with_interval(value, interval, claim)}", why)
 
 
-def _arrived(claim: Claim, found: Found) -> Measured:
+def _arrived(claim: Claim, runs: RunsByArm) -> Measured:
     """The share of the runs in which a planner finds a path."""
-    runs, arrived, needed = *_solved(claim, found), trials_needed(claim)
-    interval = wilson(arrived, runs)
+    count, arrived, needed = *_solved(claim, runs), runs_needed(claim)
+    interval = wilson(arrived, count)
     return Measured(
-        value=arrived / runs,
+        value=arrived / count,
         interval=interval,
-        trials=runs,
-        ours=f"{arrived}/{runs} arrived [{interval.low:.0%}, {interval.high:.0%}]",
+        runs=count,
+        ours=f"{arrived}/{count} arrived [{interval.low:.0%}, {interval.high:.0%}]",
         why=f"{'at least' if claim.relation == '>=' else 'at most'} {claim.bound:.0%} asked; Wilson's interval",
-        few=f"{runs} runs, and the interval of fewer than {needed} is too wide whatever they give",
+        few=f"{count} runs, and the interval of fewer than {needed} is too wide whatever they give",
         exact=True,
     )
 
 
-def _failed(claim: Claim, found: Found) -> Measured:
+def _failed(claim: Claim, runs: RunsByArm) -> Measured:
     """The share of the runs in which a planner finds no path. One such run shows that there are any; none refutes it."""
-    runs, arrived = _solved(claim, found)
-    failed, interval = runs - arrived, wilson(runs - arrived, runs)
+    count, arrived = _solved(claim, runs)
+    failed, interval = count - arrived, wilson(count - arrived, count)
     return Measured(
-        value=failed / runs,
+        value=failed / count,
         interval=interval,
-        trials=runs,
-        ours=f"{failed}/{runs} found no path [{interval.low:.0%}, {interval.high:.0%}]",
+        runs=count,
+        ours=f"{failed}/{count} found no path [{interval.low:.0%}, {interval.high:.0%}]",
         why="one run that fails bears it out" if failed else "",
         unknown="" if failed else "no run failed, which does not say that none may",
     )
 
 
-def _wins(claim: Claim, found: Found) -> Measured:
+def _wins(claim: Claim, runs: RunsByArm) -> Measured:
     """In how many cases the first planner's median, or its best run as for times of equal work, is below the second's."""
     stands = np.min if claim.statistic == "wins of best runs" else np.median
-    pairs = [
-        [float(stands([_value(t, claim.quantity[0]) for t in found[arm]])) for arm in case] for case in claim.cases
-    ]
+    pairs = [[float(stands([_value(t, claim.quantity[0]) for t in runs[arm]])) for arm in case] for case in claim.cases]
     less = sum(a < b - 1e-9 for a, b in pairs)
     digits = 2 if TIMED in claim.quantity else 0
     why = ", ".join(f"{a:.{digits}f} : {b:.{digits}f}" for a, b in pairs)
-    runs = min(len(found[one]) for one, _ in claim.cases)
-    few = f"{runs} runs tell no time, {FEWEST} do"
-    return Measured(float(less), Interval(less, less), runs, f"less in {less} of {len(pairs)}", why, few=few)
+    count = min(len(runs[one]) for one, _ in claim.cases)
+    few = f"{count} runs tell no time, {FEWEST} do"
+    return Measured(float(less), Interval(less, less), count, f"less in {less} of {len(pairs)}", why, few=few)
 
 
-#: By its name in the table of claims, what a statistic measures of a claim's trials.
-STATISTICS: Mapping[str, Callable[[Claim, Found], Measured]] = MappingProxyType(
+#: By its name in the table of claims, what a statistic measures of a claim's runs.
+STATISTICS: Mapping[str, Callable[[Claim, RunsByArm], Measured]] = MappingProxyType(
     {
-        # A single planner's trials, all together.
+        # A single planner's runs, all together.
         "median": _median_of_one,
         "mean": _mean_of_one,
         "arrived": _arrived,
@@ -344,39 +342,42 @@ def _never(first: Floats, second: Floats) -> str:
     return NEVER if min(first.min(), second.min()) >= NO_PATH else ""
 
 
-def _slower(claim: Claim, found: Found) -> float:
+def _slower(claim: Claim, runs: RunsByArm) -> float:
     """By how much the first planner's median processor time is above the second's [%]; below 0 if it is faster."""
-    first, second, _ = _paired(claim, found, quantity=(TIMED,))
+    first, second, _ = _paired(claim, runs, quantity=(TIMED,))
     return 100 * (float(np.median(first)) / max(float(np.median(second)), 1e-9) - 1)
 
 
-def _value(trial: Trial, quantity: str) -> float:
-    value = float(getattr(trial, quantity))
+def _value(run: PaperRun, quantity: str) -> float:
+    value = float(getattr(run, quantity))
     return NO_PATH if math.isnan(value) else min(value, NO_PATH)
 
 
-def _solved(claim: Claim, found: Found) -> tuple[int, int]:
+def _solved(claim: Claim, runs: RunsByArm) -> tuple[int, int]:
     """The number of all runs, and of those that found a path."""
-    solved = [trial.result.solved for (arm,) in claim.cases for trial in found[arm]]
+    solved = [run.result.solved for (arm,) in claim.cases for run in runs[arm]]
     return len(solved), sum(solved)
 
 
-def _together(claim: Claim, found: Found) -> tuple[Floats, Numbers]:
-    """The values of all trials, (N,), and the number of each one's map, (N,)."""
+def _together(claim: Claim, runs: RunsByArm) -> tuple[Floats, Numbers]:
+    """The values of all runs, (N,), and the number of each one's map, (N,)."""
     (quantity,) = claim.quantity
-    rows = [(_value(trial, quantity), (arm.map, trial.world)) for (arm,) in claim.cases for trial in found[arm]]
+    rows = [(_value(run, quantity), (arm.map, run.world)) for (arm,) in claim.cases for run in runs[arm]]
     return np.array([value for value, _ in rows]), _numbered([place for _, place in rows])
 
 
 def _paired(
-    claim: Claim, found: Found, cases: Sequence[tuple[Arm, ...]] | None = None, quantity: tuple[str, ...] | None = None
+    claim: Claim,
+    runs: RunsByArm,
+    cases: Sequence[tuple[Arm, ...]] | None = None,
+    quantity: tuple[str, ...] | None = None,
 ) -> tuple[Floats, Floats, Numbers]:
     """The values of first and second planners with the same map and seed, (N,) each, and the number of their map, (N,)."""
     quantity = quantity or claim.quantity
     rows = []
     for one, other in claim.cases if cases is None else cases:
-        second = {trial.seed: trial for trial in found[other]}
-        rows += [(trial, second[trial.seed], (one.map, trial.world)) for trial in found[one] if trial.seed in second]
+        second = {run.seed: run for run in runs[other]}
+        rows += [(run, second[run.seed], (one.map, run.world)) for run in runs[one] if run.seed in second]
     values = np.array([[_value(a, quantity[0]), _value(b, quantity[-1])] for a, b, _ in rows]).reshape(-1, 2)
     return values[:, 0], values[:, 1], _numbered([place for *_, place in rows])
 
@@ -387,12 +388,12 @@ def _numbered(places: Sequence[tuple[str, int]]) -> Numbers:
 
 
 def _median(values: Floats, world: Numbers) -> tuple[float, Interval]:
-    """The median and its interval; where all trials are of one map, each counts on its own."""
+    """The median and its interval; where all runs are of one map, each counts on its own."""
     return float(np.median(values)), medians_by_world(values[:, None], _alone(world))[0]
 
 
 def _alone(world: Numbers) -> Numbers:
-    """What is resampled: maps or, where there is only one, single trials."""
+    """What is resampled: maps or, where there is only one, single runs."""
     return np.arange(len(world)) if len(set(world.tolist())) == 1 else world
 
 

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from antdrive.planners import Planner, Query
 from antdrive.runs.papers import maps
 from antdrive.runs.papers.maps import MoveCount, candidate, winding_candidate
-from antdrive.runs.papers.trials import FirstTouchDStar
+from antdrive.runs.papers.paper_runs import FirstTouchDStar
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class Experiment:
     comparable: bool = (
         False  # the shortest path of the recreated maps is as long as the paper says, so that lengths compare
     )
-    quantity: str = "length"  # the value that is printed and measured: a property of `Trial`
+    quantity: str = "length"  # the value that is printed and measured: a property of `PaperRun`
     label: str = ""  # the planner with its setting, unique among the experiments of a map
     worlds: int = 1  # how many different maps there are; 0: one for each seed
     work: float = math.inf  # where it is finite, planning ends after so many ant steps

@@ -1,6 +1,6 @@
 """The papers' experiments repeated: printed and measured values, and the claims with their verdicts.
 
-Trials are kept in files, so that an interrupted reproduction goes on where it stopped.
+Runs are kept in files, so that an interrupted reproduction goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import numpy.typing as npt
 import antdrive.planners
 import antdrive.runs.papers
 import antdrive.worlds
-from antdrive.base.atomic import write_text, written_whole
+from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError
 from antdrive.planners import History, PlanResult, PlanStatus
 from antdrive.runs.papers.claims import (
@@ -36,24 +36,24 @@ from antdrive.runs.papers.claims import (
     Arm,
     Claim,
     Verdict,
-    judge,
-    trials_at_hand,
-    trials_needed,
+    evaluate,
+    runs_available,
+    runs_needed,
     verdict_cells,
     verdict_facts,
 )
 from antdrive.runs.papers.experiments import PAPERS, Experiment
-from antdrive.runs.papers.trials import Trial, drive_among, solve
+from antdrive.runs.papers.paper_runs import PaperRun, drive_among, solve
 from antdrive.runs.pool import Pool, processes_for
 from antdrive.runs.statistics.intervals import medians_by_world
 
 HISTORY = ("best", "iteration_best", "iteration_mean", "arrived")
-NUMBERS = ("optimum", "cpu_s", "total", "concentration")  # in the order of `Trial`
+NUMBERS = ("optimum", "cpu_s", "total", "concentration")  # in the order of `PaperRun`
 NONE = -1  # the size of waypoints that a plan does not have
 
 
-def trials_key(experiment: Experiment, seeds: int) -> str:
-    """What the trials of an experiment depend on, the source code included: a file with another key is not used."""
+def runs_key(experiment: Experiment, seeds: int) -> str:
+    """What the runs of an experiment depend on, the source code included: a file with another key is not used."""
     facts = {
         "map": experiment.map,
         "name": experiment.name,
@@ -70,26 +70,26 @@ def trials_key(experiment: Experiment, seeds: int) -> str:
 
 @functools.cache
 def code_hash() -> str:
-    """The hash of the source files of worlds, planners and papers' experiments, but for those that only judge and draw."""
-    found = hashlib.sha256()
+    """The hash of the source files of worlds, planners and papers' experiments, but for those that only evaluate and draw."""
+    digest = hashlib.sha256()
     for package in (antdrive.worlds, antdrive.planners, antdrive.runs.papers):
         for folder in package.__path__:
             for path in sorted(Path(folder).rglob("*.py")):
-                if package is antdrive.runs.papers and path.stem == "claims":  # no trial depends on it
+                if package is antdrive.runs.papers and path.stem == "claims":  # no run depends on it
                     continue
-                found.update(path.read_bytes())
-    return found.hexdigest()
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
-def keep_trials(trials: Sequence[Trial], path: Path, key: str) -> None:
-    """Write trials to a file; plans lose their fields, options and planning times."""
-    plans = [trial.result for trial in trials]
+def save_runs(runs: Sequence[PaperRun], path: Path, key: str) -> None:
+    """Write runs to a file; plans lose their fields, options and planning times."""
+    plans = [run.result for run in runs]
     lines = [plan.waypoints for plan in plans]
     arrays: dict[str, Any] = {
         "key": np.array(key),
-        "seed": np.array([trial.seed for trial in trials]),
-        "world": np.array([trial.world for trial in trials]),
-        "numbers": np.array([[getattr(trial, name) for name in NUMBERS] for trial in trials]).reshape(-1, len(NUMBERS)),
+        "seed": np.array([run.seed for run in runs]),
+        "world": np.array([run.world for run in runs]),
+        "numbers": np.array([[getattr(run, name) for name in NUMBERS] for run in runs]).reshape(-1, len(NUMBERS)),
         "status": np.array([plan.status.name for plan in plans], dtype=np.str_),
         "work": np.array([plan.work for plan in plans]),
         "lengths": np.array([[plan.cost, _or_nan(plan.length)] for plan in plans]).reshape(-1, 2),
@@ -101,12 +101,12 @@ def keep_trials(trials: Sequence[Trial], path: Path, key: str) -> None:
     }
     for name in HISTORY:
         arrays[name] = np.concatenate([getattr(History(), name), *(getattr(plan.history, name) for plan in plans)])
-    with written_whole(path) as temporary, temporary.open("wb") as file:
+    with atomic_write(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
 
 
-def kept_trials(path: Path, key: str) -> list[Trial] | None:
-    """The trials of a file; None if there is no such file, or it has another key or cannot be read."""
+def load_runs(path: Path, key: str) -> list[PaperRun] | None:
+    """The runs of a file; None if there is no such file, or it has another key or cannot be read."""
     try:
         with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             if str(file["key"]) != key:
@@ -117,7 +117,7 @@ def kept_trials(path: Path, key: str) -> list[Trial] | None:
     cells = _parts(arrays["cells"], arrays["sizes"])
     waypoints = _parts(arrays["waypoints"], np.maximum(arrays["waypoint_sizes"], 0))
     histories = [_parts(arrays[name], arrays["history_sizes"]) for name in HISTORY]
-    trials = []
+    runs = []
     for k, (seed, world) in enumerate(zip(arrays["seed"], arrays["world"], strict=True)):
         cost, length = (float(value) for value in arrays["lengths"][k])
         plan = PlanResult(
@@ -129,8 +129,8 @@ def kept_trials(path: Path, key: str) -> list[Trial] | None:
             work=int(arrays["work"][k]),
             history=History(*(parts[k] for parts in histories)),
         )
-        trials.append(Trial(int(seed), int(world), plan, *map(float, arrays["numbers"][k])))
-    return trials
+        runs.append(PaperRun(int(seed), int(world), plan, *map(float, arrays["numbers"][k])))
+    return runs
 
 
 def _or_nan(value: float | None) -> float:
@@ -143,10 +143,10 @@ def _parts(joined: npt.NDArray[Any], sizes: npt.NDArray[np.int64]) -> list[npt.N
 
 T = TypeVar("T")
 MOST_SEEDS = 1000  # every claim can be decided with fewer
-TRIALS = "trials"  # the folder of the trials within that of the results
+RUNS_FOLDER = "trials"  # the folder of the runs within that of the results
 
 
-Measurements = list[tuple[Experiment, list[Trial]]]
+Measurements = list[tuple[Experiment, list[PaperRun]]]
 
 
 @dataclass(frozen=True)
@@ -182,8 +182,8 @@ class Reproduction:
     kept: int  # how many experiments were taken from the files of an earlier, interrupted command
 
     def of(self, paper: str) -> Measurements:
-        """The experiments of one paper with their trials."""
-        return [(experiment, trials) for experiment, trials in self.measured if experiment.paper == paper]
+        """The experiments of one paper with their runs."""
+        return [(experiment, runs) for experiment, runs in self.measured if experiment.paper == paper]
 
 
 def reproduce(
@@ -195,16 +195,16 @@ def reproduce(
     quick: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Reproduction:
-    """Run the experiments of papers again, judge the papers' claims, and write tables and CSV files.
+    """Run the experiments of papers again, evaluate the papers' claims, and write tables and CSV files.
 
-    The trials of an experiment are written as soon as it is done. A second call with the same folder and seeds takes them
+    The runs of an experiment are written as soon as it is done. A second call with the same folder and seeds takes them
     from there, unless the source code has changed in between.
     """
     experiments = _experiments(papers, quick)
-    measured, kept = _all_trials(experiments, folder / TRIALS, seeds, jobs, progress)
-    rows = [_row(experiment, trials) for experiment, trials in measured]
-    arms = {(e.paper, e.map, e.name): trials for e, trials in measured if e.name != "steps"}
-    verdicts = [judge(claim, found) for claim, found in _judgeable(arms)]
+    measured, kept = _all_runs(experiments, folder / RUNS_FOLDER, seeds, jobs, progress)
+    rows = [_row(experiment, runs) for experiment, runs in measured]
+    arms = {(e.paper, e.map, e.name): runs for e, runs in measured if e.name != "steps"}
+    verdicts = [evaluate(claim, runs) for claim, runs in _measured_claims(arms)]
     files = {
         "table": _write_table(HEADS, map(row_cells, rows), folder / "table.md", NOTE),
         "csv": _write_csv([vars(row) for row in rows], folder / "table.csv"),
@@ -227,38 +227,38 @@ def _hurried(experiment: Experiment) -> Experiment:
     return dataclasses.replace(experiment, work=experiment.work / 10, worlds=min(experiment.worlds, 2), rounds=1)
 
 
-def _all_trials(
+def _all_runs(
     experiments: Sequence[Experiment],
     folder: Path,
     seeds: int,
     jobs: int | None,
     progress: Callable[[float], None] | None,
 ) -> tuple[Measurements, int]:
-    """The experiments with their trials, and for how many these were in the folder already."""
+    """The experiments with their runs, and for how many these were in the folder already."""
     total, done, kept = sum(len(experiment.seeds(seeds)) for experiment in experiments), 0, 0
-    found: Measurements = []
+    measured: Measurements = []
     with Pool(processes_for(jobs)) as pool:
         for experiment in experiments:
             words = f"{experiment.paper} {experiment.map} {experiment.name}"
-            path, key = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz", trials_key(experiment, seeds)
-            trials = kept_trials(path, key)
-            if trials is None:
-                trials = []
-                for trial in pool.results(operator.call, _planned(experiment, seeds)):
-                    trials.append(dataclasses.replace(trial, world=experiment.world(trial.seed)))
+            path, key = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz", runs_key(experiment, seeds)
+            runs = load_runs(path, key)
+            if runs is None:
+                runs = []
+                for run in pool.results(operator.call, _planned(experiment, seeds)):
+                    runs.append(dataclasses.replace(run, world=experiment.world(run.seed)))
                     if progress is not None:
-                        progress((done + len(trials)) / total)
-                keep_trials(trials, path, key)
+                        progress((done + len(runs)) / total)
+                save_runs(runs, path, key)
             else:
                 kept += 1
-            done += len(trials)
-            found.append((experiment, trials))
+            done += len(runs)
+            measured.append((experiment, runs))
     if progress is not None:
         progress(1.0)
-    return found, kept
+    return measured, kept
 
 
-def _planned(experiment: Experiment, seeds: int) -> Iterator[Callable[[], Trial]]:
+def _planned(experiment: Experiment, seeds: int) -> Iterator[Callable[[], PaperRun]]:
     """The calls that plan an experiment."""
     planner = experiment.made or experiment.planner
     for seed in experiment.seeds(seeds):
@@ -269,7 +269,7 @@ def _planned(experiment: Experiment, seeds: int) -> Iterator[Callable[[], Trial]
             yield partial(solve, planner, experiment.options, query, seed, experiment.work)
 
 
-def _judgeable(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[Claim, dict[Arm, T]]]:
+def _measured_claims(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[Claim, dict[Arm, T]]]:
     """The claims all of whose experiments are among these (paper, map, name), with what is known of them."""
     for claim in CLAIMS:
         places = {arm: (claim.paper, *arm) for arm in claim.arms}
@@ -282,8 +282,8 @@ def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> 
     experiments = _experiments(papers, quick)
 
     def undecided(count: int) -> tuple[int, int]:
-        claims = list(_judgeable({(e.paper, e.map, e.name): len(e.seeds(count)) for e in experiments}))
-        return sum(trials_at_hand(claim, sizes) < trials_needed(claim) for claim, sizes in claims), len(claims)
+        claims = list(_measured_claims({(e.paper, e.map, e.name): len(e.seeds(count)) for e in experiments}))
+        return sum(runs_available(claim, sizes) < runs_needed(claim) for claim, sizes in claims), len(claims)
 
     few, total = undecided(seeds)
     if not few:
@@ -292,12 +292,12 @@ def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> 
     return f"seeds: {seeds} are too few to decide {few} of {total} claims, whatever they give; {enough} suffice"
 
 
-def _row(experiment: Experiment, trials: Sequence[Trial]) -> ResultRow:
-    values = [float(getattr(trial, experiment.quantity)) for trial in trials]
+def _row(experiment: Experiment, runs: Sequence[PaperRun]) -> ResultRow:
+    values = [float(getattr(run, experiment.quantity)) for run in runs]
     known = [value for value in values if math.isfinite(value)]
-    solved = [trial for trial in trials if trial.result.solved]
-    gaps = np.array([trial.gap / 100.0 for trial in solved])
-    worlds = np.array([trial.world for trial in solved], dtype=np.int64)
+    solved = [run for run in runs if run.result.solved]
+    gaps = np.array([run.gap / 100.0 for run in solved])
+    worlds = np.array([run.world for run in solved], dtype=np.int64)
     alone = np.arange(len(worlds)) if len(set(worlds.tolist())) == 1 else worlds
     low, high = medians_by_world(gaps[:, None], alone)[0] if solved else (math.nan, math.nan)
     return ResultRow(
@@ -311,12 +311,12 @@ def _row(experiment: Experiment, trials: Sequence[Trial]) -> ResultRow:
         mean=statistics.mean(known) if known else math.nan,
         best=min(known, default=math.nan),
         arrived=len(known),
-        seeds=len(trials),
-        optimum=statistics.mean(trial.optimum for trial in trials),
+        seeds=len(runs),
+        optimum=statistics.mean(run.optimum for run in runs),
         gap=float(np.median(gaps)) if solved else math.nan,
         gap_low=low,
         gap_high=high,
-        plan_s=statistics.median(trial.cpu_s for trial in trials),
+        plan_s=statistics.median(run.cpu_s for run in runs),
     )
 
 
@@ -362,7 +362,7 @@ def _write_table(heads: Sequence[str], rows: Iterable[Sequence[str]], path: Path
 
 
 def _write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> str:
-    with written_whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+    with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         if rows:
             writer.writerow(list(rows[0]))

@@ -1,8 +1,8 @@
 from .baseline import Baseline as Baseline
 from .demands import Bound as Bound
 from .demands import Demands as Demands
-from .judging import Judgement as Judgement
-from .judging import judge as judge
+from .evaluation import Evaluation as Evaluation
+from .evaluation import evaluate as evaluate
 from .names import select as select
 from .scenarios import scenario_of as scenario_of
 from .strategies import tasks as tasks

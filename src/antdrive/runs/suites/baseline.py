@@ -118,7 +118,7 @@ class Baseline:
             bound_m=_rounded(certificate.bound) if certificate else None,
             metrics=_metrics(rollout) if rollout else {},
             nearest=nearest_of(rollout) if rollout else None,
-            hashes=conditions(run),
+            hashes=configuration_hashes(run),
             versions=dict(rollout.record.versions) if rollout else versions(),
             drive_digest=rollout.drive_digest if rollout else "",
             limiters=rollout.record.limiters if rollout else (),
@@ -234,7 +234,7 @@ class Baseline:
 _ADAPTER = TypeAdapter(Baseline)
 
 
-def conditions(run: Run) -> dict[str, str]:
+def configuration_hashes(run: Run) -> dict[str, str]:
     """The hashes of all that a run depends on, by name: world, robot, settings, unseen obstacles; none without a rollout.
 
     The record's time limit counts only where it was given: by default it follows from the robot and the route.

@@ -26,7 +26,7 @@ CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"
 KINDS = (CYLINDER, UNSEEN, MOVER, WALL)
 
 #: The keys of `expect` that are no metrics.
-VERDICT = ("outcome", "certified", "touched", "cause")
+NON_METRICS = ("outcome", "certified", "touched", "cause")
 
 _SIGNS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
     {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt, "==": operator.eq}
@@ -133,7 +133,7 @@ class Demands:
         """
         bounds: list[Bound] = []
         for key, value in expect.items():
-            if key not in VERDICT:
+            if key not in NON_METRICS:
                 bounds += _bounds(key, value)
         outcome = _outcome(expect.get("outcome", Outcome.SUCCEEDED.key))
         return cls(
@@ -185,7 +185,7 @@ def _of_a_contact(
 
 def _bounds(key: str, value: Any) -> list[Bound]:
     if key not in METRICS:
-        known = [*VERDICT, *METRICS]
+        known = [*NON_METRICS, *METRICS]
         raise FieldError(f"expect.{key}", f"no such metric; {suggest(key, known)}")
     if key in WALL_CLOCK:
         raise FieldError(f"expect.{key}", "depends on the machine and its load, so no test can bound it; leave it out")

@@ -9,9 +9,9 @@ from typing import Any
 
 from antdrive.base.checks import resolve, show, suggest
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.planners.own_code import OwnCodeError, is_own, object_in, record_name
 from antdrive.planners.plan import Planner
 from antdrive.planners.registry import load_planner, make_planner
+from antdrive.planners.user_code import UserCodeError, is_user_code, load_object, record_name
 from antdrive.robots.files import list_robots
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
 from antdrive.worlds.files.world_file import list_worlds
@@ -50,7 +50,7 @@ def planner_of(case: SuiteCase) -> tuple[Planner, str]:
     if len(sources) > 1:
         raise case.error("planner.file", "a planner comes from a module or from a file; keep one")
     try:
-        if not sources and not is_own(name):
+        if not sources and not is_user_code(name):
             return load_planner(name, **options), name
         made = _own(case, name, sources)
         return make_planner(made, record_name(name), **options), record_name(name)
@@ -68,7 +68,7 @@ def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
     """Whether the words of a suite name a planner in a file or module."""
     name = planner if isinstance(planner, str) else planner.get("name")
     sources = () if isinstance(planner, str) else (key for key in SOURCES if key in planner)
-    return any(sources) or (isinstance(name, str) and is_own(name))
+    return any(sources) or (isinstance(name, str) and is_user_code(name))
 
 
 def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:
@@ -89,13 +89,13 @@ def _own(case: SuiteCase, name: str, sources: Mapping[str, Any]) -> Any:
         key, word, is_file, of_word = f"planner.{key}", name, key == "file", "planner.name"
         if not isinstance(source, str):
             raise case.error(key, f"must be text, got {show(source)}")
-        if is_own(name):
+        if is_user_code(name):
             raise case.error(of_word, f"must be the class alone, because {key} says where it is, got {show(name)}")
     if is_file and not (case.suite.parent / source).is_file():
         raise case.error(key, f"{source}: no such file beside the suite")
     try:
-        return object_in(source, word, case.suite.parent, is_file=is_file)
-    except OwnCodeError as error:
+        return load_object(source, word, case.suite.parent, is_file=is_file)
+    except UserCodeError as error:
         raise case.error(of_word if error.of_class else key, error.problem) from error
 
 

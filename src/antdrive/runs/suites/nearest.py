@@ -50,7 +50,7 @@ def nearest_of(rollout: Rollout) -> ClosestApproach:
     return _encounter(rollout, row, thing)
 
 
-def touched_in(rollout: Rollout) -> ClosestApproach | None:
+def first_contact(rollout: Rollout) -> ClosestApproach | None:
     """What the robot touched first; None if it touched nothing."""
     touches = touches_of(rollout)
     if not touches:
@@ -87,7 +87,7 @@ def _encounter(rollout: Rollout, row: int, thing: str) -> ClosestApproach:
 NOTHING = "nothing"  # is what a drive without a contact touched
 
 
-def touched_first(rollout: Rollout) -> str:
+def first_contact_kind(rollout: Rollout) -> str:
     """The kind of thing that a drive touched first, or `NOTHING`."""
     found = touches_of(rollout)
     if not found:
@@ -106,7 +106,7 @@ def cause_of_contact(rollout: Rollout) -> str:
 
     It is empty for what no margin could prevent: contacts with movers, with cylinders that the planner did not know of, and none.
     """
-    if touched_first(rollout) not in (CYLINDER, WALL):
+    if first_contact_kind(rollout) not in (CYLINDER, WALL):
         return ""
     rows = int(rollout.contacts[0, 0]) + 1
     arrays = ("t", "pose", "twist", "command", "clearance", "limiter", "movers")

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Bounds
-from antdrive.base.reuse import Keyed, bits, reused
+from antdrive.base.caches import Keyed, bits, cached
 from antdrive.planners import (
     Planner,
     PlanResult,
@@ -204,7 +204,7 @@ class OneRoute(RouteGuide):
         )
 
 
-@reused(16)
+@cached(16)
 def grid_of(world: Keyed[World], cell: float, inflate: float) -> Grid:
     """The grid of a world."""
     return rasterise(world.value, cell, inflate)
@@ -225,7 +225,7 @@ def bounds_of(grid: Grid) -> Bounds:
     return x - half, y - half, x + (cols - 0.5) * grid.cell, y + (rows - 0.5) * grid.cell
 
 
-@reused(64)
+@cached(64)
 def _tracked(asked: Keyed[tuple[RoutePlanner, Grid, PlanResult]], kind: str) -> tuple[Route, TrackedPath]:
     routes, grid, plan = asked.value
     route = smooth(plan, grid, routes.task, kind=kind)

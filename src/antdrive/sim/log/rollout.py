@@ -25,7 +25,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
@@ -273,7 +273,7 @@ class Rollout:
         target = Path(path)
         text = dataclasses.replace(self.record, digest=self.digest).to_json()
         DriveRecord.from_json(text)  # a log that could not be read again is not written
-        with written_whole(target) as temporary, temporary.open("wb") as file:
+        with atomic_write(target) as temporary, temporary.open("wb") as file:
             np.savez_compressed(file, record=np.array(text), **{name: getattr(self, name) for name in self._written})
         return target
 

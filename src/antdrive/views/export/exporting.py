@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.base.atomic import folder_written_whole, written_whole
+from antdrive.base.atomic import atomic_folder, atomic_write
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.files import require_new
 from antdrive.base.plane import in_map
@@ -69,13 +69,13 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
 
 def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
     layout = target.with_suffix(LAYOUT)
-    with written_whole(layout) as beside, written_whole(target) as part:  # both or none
+    with atomic_write(layout) as beside, atomic_write(target) as part:  # both or none
         _write_bag(rollout, log, part, beside, again)
     return [target, layout]
 
 
 def _to_rosbag2(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
-    with folder_written_whole(target) as folder:
+    with atomic_folder(target) as folder:
         bag, beside = f"{target.name}.mcap", folder / f"{target.name}{LAYOUT}"
         topics, notes = _write_bag(rollout, log, folder / bag, beside, again)
         (folder / "metadata.yaml").write_text(metadata(bag, topics, notes), encoding="utf-8")
@@ -92,7 +92,7 @@ def _write_bag(rollout: Rollout, log: Path, bag: Path, layout: Path, again: bool
 
 
 def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
-    with folder_written_whole(target) as folder:
+    with atomic_folder(target) as folder:
         write_tables(rollout, folder)
     return [target]
 

@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.base.files import known_suffix
 from antdrive.base.types import Bounds
 from antdrive.sim.log.outcome import Outcome
@@ -135,7 +135,7 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
         "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
         "svg": {"Date": None, "Creator": None},
     }[kind]
-    with written_whole(target) as temporary:
+    with atomic_write(target) as temporary:
         figure.savefig(temporary, format=kind, dpi=dpi, metadata=empty)
     return target
 

@@ -22,7 +22,7 @@ from typing import IO, Any
 import numpy as np
 from PIL import Image
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import atomic_write
 from antdrive.base.files import file_name, known_suffix
 from antdrive.base.types import Floats
 from antdrive.runs.pool import Pool, cores
@@ -133,7 +133,7 @@ def still(
     kind = known_suffix(target, STILLS)
     shot = Shot(rollout, **asdict(FilmOptions(camera, size, note=note).checked()))
     picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.replay.duration))
-    with written_whole(target) as temporary:
+    with atomic_write(target) as temporary:
         Image.fromarray(picture).save(temporary, format=kind[1:], **STILLS[kind])
     return target
 
@@ -156,7 +156,7 @@ def encoded(
 ) -> FilmInfo:
     """Render and encode the frames of a film, whole or not at all; facts about it."""
     started = time.perf_counter()
-    with written_whole(target) as temporary, encoding(temporary, options.size, options.fps) as send:
+    with atomic_write(target) as temporary, encoding(temporary, options.size, options.fps) as send:
         for k, picture in enumerate(frames):
             send(picture)
             if progress is not None:

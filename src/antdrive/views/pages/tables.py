@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.atomic import write_text, written_whole
+from antdrive.base.atomic import atomic_write, write_text
 from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.runs.statistics.success import PlannerSuccess
 from antdrive.views.pages.rendering import NONE, TextTable, percent, percents, probability, short, with_interval
@@ -152,7 +152,7 @@ def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
 
 def _write_lines(path: Path, lines: Sequence[Sequence[Any]]) -> None:
     """Write comma-separated values, an empty cell for what is not a number."""
-    with written_whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+    with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         csv.writer(stream).writerows(["" if value != value else value for value in line] for line in lines)
 
 

@@ -14,11 +14,11 @@ import yaml
 from pydantic import BaseModel, Field
 
 from antdrive.base.atomic import write_text
+from antdrive.base.caches import cached
 from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of, suggest, yaml_number
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.records import STRICT
-from antdrive.base.reuse import reused
 from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD, Coordinate, Size
 from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
 from antdrive.worlds.world import Disc, Task, World
@@ -151,7 +151,7 @@ def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
     return _tasks_in(read_yaml(path), os.fspath(path), path.stem)
 
 
-@reused(16)
+@cached(16)
 def _tasks_in(text: str, source: str, stem: str) -> Mapping[str | None, Task]:
     """The tasks in the text of a world file."""
     document = parse_document(text, source)

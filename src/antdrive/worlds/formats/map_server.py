@@ -21,7 +21,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from antdrive.base.atomic import write_text, written_whole
+from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.checks import OneLine, check, yaml_number
 from antdrive.base.document import read_document
 from antdrive.base.errors import FieldError, input_error
@@ -270,7 +270,7 @@ def export_map_server(
         text += "".join(
             f"    - {{name: {json.dumps(name)}, {', '.join(_ends(other))}}}\n" for name, other in tasks.items()
         )
-    with written_whole(image) as part:
+    with atomic_write(image) as part:
         part.write_bytes(b"P5\n%d %d\n255\n" % (cols, rows) + picture.tobytes())
     write_text(target, text, newline="\n")
     return image

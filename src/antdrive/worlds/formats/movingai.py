@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.atomic import write_text, written_whole
+from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import input_error
 from antdrive.base.files import read_bytes
 from antdrive.base.types import Point, Pose
@@ -234,7 +234,7 @@ def export_movingai_map(task: Task, path: str | Path, *, resolution: float | Non
     rows, cols = cells.free.shape
     lines = [bytes(row).decode("ascii") for row in np.where(cells.free[::-1], ord("."), ord("@")).astype(np.uint8)]
     text = "\n".join([f"type octile\nheight {rows}\nwidth {cols}\nmap", *lines]) + "\n"
-    with written_whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text(text, encoding="ascii", newline="\n")
     return cells
 

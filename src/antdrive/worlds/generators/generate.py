@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.base.caches import cached
 from antdrive.base.errors import FieldError, input_error, require_positive
-from antdrive.base.reuse import reused
 from antdrive.base.types import Point
 from antdrive.worlds.formats.barn import BARN_BOUNDS, BARN_CELL, BARN_GOAL, BARN_START, BARN_TOLERANCE
 from antdrive.worlds.geometry import point_clearance
@@ -238,7 +238,7 @@ def generate(
     return replace(task, world=replace(task.world, name=name or kind, source=source))
 
 
-@reused(64)
+@cached(64)
 def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
     """The random world that {generate: KIND, seed: SEED} with options stands for in a file."""
     return generate(kind, np.random.default_rng(seed), dict(options), name=f"{kind}-{seed}", note=f"seed {seed}")

@@ -1,4 +1,4 @@
-"""Trials of the papers' experiments: a planner's path on one map with one seed, planned at once or decided cell by cell.
+"""Runs of the papers' experiments: a planner's path on one map with one seed, planned at once or decided cell by cell.
 
 As in hasan, obstacles of one cell may move to a random free neighbouring cell at every decision. His baseline must have been
 a D* that is not optimal: its printed costs are far above those of shortest paths.
@@ -92,7 +92,7 @@ LAST = 10  # iterations over which `unrest` is measured
 
 
 @dataclass(frozen=True)
-class Trial:
+class PaperRun:
     """What one plan of an experiment gave. Lengths are in cells."""
 
     seed: int  # of map and planner
@@ -171,7 +171,9 @@ class Trial:
         return float(self.result.work)
 
 
-def solve(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, work: float = math.inf) -> Trial:
+def solve(
+    planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, work: float = math.inf
+) -> PaperRun:
     """Plan once."""
     chosen = load_planner(planner, **options) if isinstance(planner, str) else planner
     rng = np.random.default_rng(seed)
@@ -185,7 +187,7 @@ def solve(planner: str | Planner, options: Mapping[str, Any], query: Query, seed
     else:
         result = chosen.plan(query, rng)
     spent = time.process_time() - started
-    return Trial(seed, seed, result, maps.optimum(query), spent, total_cost(query, result), concentration(result))
+    return PaperRun(seed, seed, result, maps.optimum(query), spent, total_cost(query, result), concentration(result))
 
 
 def concentration(result: PlanResult) -> float:
@@ -267,8 +269,8 @@ def drive(
     return cells
 
 
-def drive_among(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, count: int) -> Trial:
-    """Drive once, cell by cell, among movers; the trial's path is the one that was driven."""
+def drive_among(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, count: int) -> PaperRun:
+    """Drive once, cell by cell, among movers; the run's path is the one that was driven."""
     chosen = load_planner(planner, **options) if isinstance(planner, str) else planner
     movers = Strollers(query.grid, count, np.random.default_rng([seed, count]), (query.start, query.goal))
     started = time.process_time()
@@ -286,4 +288,4 @@ def drive_among(planner: str | Planner, options: Mapping[str, Any], query: Query
     )
     if not result.solved:
         result = dataclasses.replace(result, cells=path[:0], cost=float("inf"))
-    return Trial(seed, seed, result, maps.optimum(query), sum(times), total_cost(query, result))
+    return PaperRun(seed, seed, result, maps.optimum(query), sum(times), total_cost(query, result))

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive import METRICS, Outcome, run
-from antdrive.runs.suites import Baseline, Demands, judge, judging
+from antdrive.runs.suites import Baseline, Demands, evaluate, evaluation
 from antdrive.runs.suites.baseline import MAX_BYTES
-from antdrive.runs.suites.judging import distances, divergence, explain, farthest
-from antdrive.runs.suites.nearest import nearest_of, touched_in
+from antdrive.runs.suites.evaluation import distances, divergence, explain, farthest
+from antdrive.runs.suites.nearest import first_contact, nearest_of
 from antdrive.sim.log.metrics import Tolerance
 from antdrive.views.artefacts import MOST_FILMS, Results, drive_of, file_name, remove_artefacts
 
@@ -39,8 +39,8 @@ def test_a_drive_is_as_good_as_its_own_baseline(small_run, baseline):
     exact = dataclasses.replace(PLAIN, trajectory="exact")
     near = dataclasses.replace(PLAIN, trajectory=0.002)
     for demands in (PLAIN, exact, near):
-        judgement = judge(small_run, demands, baseline)
-        assert (judgement.faults, judgement.gains) == ((), ())
+        evaluation = evaluate(small_run, demands, baseline)
+        assert (evaluation.faults, evaluation.gains) == ((), ())
     assert divergence(baseline, small_run.rollout) is None
     assert "bit for bit" in " ".join(explain(small_run, baseline))
 
@@ -82,8 +82,8 @@ def test_a_long_drive_has_a_coarser_line(small_run):
 
 def test_a_metric_that_is_no_number_any_more_is_a_fault(small_run, baseline, monkeypatch):
     broken = dataclasses.replace(METRICS["spl"], function=lambda rollout: math.nan)
-    monkeypatch.setattr(judging, "METRICS", {**METRICS, "spl": broken})
-    assert [text.split(",")[0] for text in judge(small_run, PLAIN, baseline).faults] == ["spl: nan"]
+    monkeypatch.setattr(evaluation, "METRICS", {**METRICS, "spl": broken})
+    assert [text.split(",")[0] for text in evaluate(small_run, PLAIN, baseline).faults] == ["spl: nan"]
 
 
 @pytest.mark.parametrize("hz", [125, 77])
@@ -91,7 +91,7 @@ def test_a_drive_is_on_its_own_line_at_any_rate_of_physics(small_scenario, hz):
     """The rows of these rates are not at the moments of the line."""
     odd = run(dataclasses.replace(small_scenario, physics_hz=hz, control_hz=hz))
     baseline = Baseline.of(odd, "odd[0]")
-    assert judge(odd, dataclasses.replace(PLAIN, trajectory=0.002), baseline).passed
+    assert evaluate(odd, dataclasses.replace(PLAIN, trajectory=0.002), baseline).passed
     assert distances(baseline, odd.rollout).max() < 1e-3, "whole millimetres"
 
 
@@ -101,47 +101,47 @@ def test_each_metric_fails_beyond_its_tolerance_in_its_worse_direction_only(smal
     step = metric.tolerance.allowed(now) / (1 - metric.tolerance.relative) + 1e-4
     better_before = now - step if metric.better == "lower" else now + step
     worse_before = now + step / (1 - metric.tolerance.relative) if metric.better == "lower" else now - step
-    fault = judge(small_run, PLAIN, changed(baseline, **{name: better_before}))
+    fault = evaluate(small_run, PLAIN, changed(baseline, **{name: better_before}))
     assert [text.split(":")[0] for text in fault.faults] == [name]
-    gain = judge(small_run, PLAIN, changed(baseline, **{name: worse_before}))
+    gain = evaluate(small_run, PLAIN, changed(baseline, **{name: worse_before}))
     assert (gain.faults, [text.split(":")[0] for text in gain.gains]) == ((), [name])
-    within = judge(small_run, PLAIN, changed(baseline, **{name: now + metric.tolerance.absolute / 2}))
+    within = evaluate(small_run, PLAIN, changed(baseline, **{name: now + metric.tolerance.absolute / 2}))
     assert (within.faults, within.gains) == ((), ())
     lenient = dataclasses.replace(PLAIN, tolerances={name: None})
-    assert judge(small_run, lenient, changed(baseline, **{name: better_before})).passed
+    assert evaluate(small_run, lenient, changed(baseline, **{name: better_before})).passed
     strict = dataclasses.replace(PLAIN, tolerances={name: Tolerance(step / 10)})
-    assert not judge(small_run, strict, changed(baseline, **{name: better_before})).passed
+    assert not evaluate(small_run, strict, changed(baseline, **{name: better_before})).passed
 
 
 def test_wall_clock_times_and_counts_without_a_direction_are_not_compared(small_run, baseline):
     assert not {"plan_s", "drive_wall_s"} & baseline.metrics.keys()
-    assert judge(small_run, PLAIN, changed(baseline, replans=9.0, avoiding_s=9.0)).passed
+    assert evaluate(small_run, PLAIN, changed(baseline, replans=9.0, avoiding_s=9.0)).passed
 
 
 def test_the_verdict_counts_whatever_the_metrics_say(small_run, collided_run, baseline, small_scenario):
-    faults = judge(collided_run, PLAIN, baseline).faults
+    faults = evaluate(collided_run, PLAIN, baseline).faults
     assert faults == ("outcome: collided, expected succeeded",), "once, as the baseline says nothing else"
     expected = Demands.of({"outcome": "collided"})
     before = Baseline.of(collided_run, "small[0]")
-    assert judge(collided_run, expected, before).passed
-    assert judge(small_run, expected, before).faults == ("outcome: succeeded, expected collided",)
-    assert judge(small_run, PLAIN, before).gains == ("outcome: succeeded, in the baseline collided",)
+    assert evaluate(collided_run, expected, before).passed
+    assert evaluate(small_run, expected, before).faults == ("outcome: succeeded, expected collided",)
+    assert evaluate(small_run, PLAIN, before).gains == ("outcome: succeeded, in the baseline collided",)
     doubtful = dataclasses.replace(small_run, certificate=dataclasses.replace(small_run.certificate, certified=False))
-    assert judge(doubtful, PLAIN, baseline).faults == ("certificate: not certified collision-free ()",)
+    assert evaluate(doubtful, PLAIN, baseline).faults == ("certificate: not certified collision-free ()",)
     lenient = Demands.of({"certified": False})
-    assert judge(doubtful, lenient, baseline).faults == (
+    assert evaluate(doubtful, lenient, baseline).faults == (
         "certificate: not certified collision-free, in the baseline it was",
     )
     elsewhere = dataclasses.replace(baseline, outcome=Outcome.TIMED_OUT)
-    assert judge(collided_run, PLAIN, elsewhere).faults == (
+    assert evaluate(collided_run, PLAIN, elsewhere).faults == (
         "outcome: collided, expected succeeded",
         "outcome: collided, in the baseline timed_out",
     )
     nowhere = run(dataclasses.replace(small_scenario, margin=1.4))
     closed = Baseline.of(nowhere, "small[0]")
-    assert judge(nowhere, Demands.of({"outcome": "no_path"}), closed).passed
+    assert evaluate(nowhere, Demands.of({"outcome": "no_path"}), closed).passed
     assert (closed.line, closed.metrics, closed.nearest) == ((), {}, None)
-    assert judge(nowhere, Demands.of({"outcome": "no_path", "duration_s": "< 9"}), closed).faults == (
+    assert evaluate(nowhere, Demands.of({"outcome": "no_path", "duration_s": "< 9"}), closed).faults == (
         "duration_s: the robot did not drive, expected < 9",
     )
 
@@ -149,19 +149,19 @@ def test_the_verdict_counts_whatever_the_metrics_say(small_run, collided_run, ba
 def test_the_line_is_judged_where_it_is_asked_for_and_the_end_always(small_run, baseline):
     middle = len(baseline.line) // 2
     aside = moved(moved(baseline, 0.03, since=middle), -0.03, since=len(baseline.line) - 1)
-    assert judge(small_run, PLAIN, aside).passed
-    assert judge(small_run, dataclasses.replace(PLAIN, trajectory=0.04), aside).passed
-    (fault,) = judge(small_run, dataclasses.replace(PLAIN, trajectory=0.02), aside).faults
+    assert evaluate(small_run, PLAIN, aside).passed
+    assert evaluate(small_run, dataclasses.replace(PLAIN, trajectory=0.04), aside).passed
+    (fault,) = evaluate(small_run, dataclasses.replace(PLAIN, trajectory=0.02), aside).faults
     assert fault.startswith("trajectory: up to 0.03")
     found = divergence(aside, small_run.rollout)
     assert found.t == pytest.approx(aside.times[middle])
     assert math.dist(found.now, found.then) == pytest.approx(0.03, abs=1e-3)
     other = dataclasses.replace(baseline, drive_digest="0" * 64)
-    assert judge(small_run, dataclasses.replace(PLAIN, trajectory="exact"), other).faults
+    assert evaluate(small_run, dataclasses.replace(PLAIN, trajectory="exact"), other).faults
     elsewhere = moved(baseline, 0.06, since=len(baseline.line) - 1)
-    (fault,) = judge(small_run, PLAIN, elsewhere).faults
+    (fault,) = evaluate(small_run, PLAIN, elsewhere).faults
     assert fault.startswith("end_m: the drive ends at (")
-    assert judge(small_run, Demands.of({}, {"end_m": 0.1}), elsewhere).passed
+    assert evaluate(small_run, Demands.of({}, {"end_m": 0.1}), elsewhere).passed
 
 
 def test_messages_name_what_changed_since_the_baseline(small_run, baseline):
@@ -181,8 +181,8 @@ def test_what_was_touched_or_passed_is_named(small_run, collided_run):
     near = nearest_of(small_run.rollout)
     assert near.thing == "obstacles[0] at (2, 1.5) with radius 0.3"
     assert near.clearance == pytest.approx(small_run.rollout.clearance.min(), abs=1e-6)
-    assert touched_in(small_run.rollout) is None
-    touched = touched_in(collided_run.rollout)
+    assert first_contact(small_run.rollout) is None
+    touched = first_contact(collided_run.rollout)
     assert touched.thing.startswith("unseen[0] at (")
     assert touched.t == pytest.approx(collided_run.rollout.t[int(collided_run.rollout.contacts[0, 0])], abs=1e-3)
 
@@ -197,14 +197,14 @@ def test_each_wall_has_its_name(small_run, start, wall):
     touching = dataclasses.replace(
         log, pose=np.tile(start, (len(log.t), 1)), contacts=np.array([[5.0, 1.0 + wall, 0.0, 1.0]])
     )
-    touched = touched_in(touching)
+    touched = first_contact(touching)
     name = ("the left wall", "the right wall", "the lower wall", "the upper wall")[wall]
     assert (touched.thing, nearest_of(dataclasses.replace(touching, clearance=-log.t)).thing) == (name, name)
 
 
 def test_a_plain_number_bounds_a_count(small_run):
-    assert judge(small_run, Demands.of({"contacts_driving": 0}), None).passed
-    assert not judge(small_run, Demands.of({"contacts_driving": 1}), None).passed
+    assert evaluate(small_run, Demands.of({"contacts_driving": 0}), None).passed
+    assert not evaluate(small_run, Demands.of({"contacts_driving": 1}), None).passed
 
 
 def test_an_accepted_drive_of_movers_has_movers_in_its_picture(baseline, small_run):

@@ -124,7 +124,7 @@ class Loss(NamedTuple):
     disc: float  # by the smallest disc around it, for which plans are made; never less than by the footprint [m]
 
 
-def key_of(conditions: Conditions) -> str:
+def calibration_key(conditions: Conditions) -> str:
     """The SHA-256 of conditions, and of the versions of the code that the loss depends on."""
     facts = dataclasses.asdict(conditions)
     for label in ("name", "source"):

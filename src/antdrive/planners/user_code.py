@@ -19,7 +19,7 @@ from typing import Any
 from antdrive.base.errors import InputError, Terminated, input_error
 
 DIGITS = 8  # hexadecimal digits of a file's hash
-FROM_FILE = "_antdrive_own_"  # what the names of modules begin with that were loaded from a file
+FROM_FILE = "_antdrive_user_"  # what the names of modules begin with that were loaded from a file
 
 #: The folder that each module was imported for and lies in, by the module's name.
 _OWNERS: dict[str, Path] = {}
@@ -27,7 +27,7 @@ _OWNERS: dict[str, Path] = {}
 _ASIDE: dict[Path, dict[str, ModuleType]] = {}
 
 
-def is_own(name: str) -> bool:
+def is_user_code(name: str) -> bool:
     """Whether a planner's name is that of a file or module, and not a registered one."""
     return ":" in name
 
@@ -41,7 +41,7 @@ def record_name(name: str) -> str:
     return name.rpartition(":")[2]
 
 
-class OwnCodeError(InputError):
+class UserCodeError(InputError):
     """A file or module of people's own is not there, cannot be imported, or lacks the class.
 
     Attributes:
@@ -57,13 +57,13 @@ class OwnCodeError(InputError):
         return f"planner: {self.problem}"
 
 
-def own_object(name: str) -> Any:
+def user_object(name: str) -> Any:
     """What a file or module of people's own calls by the name behind the last colon."""
     source, _, word = name.rpartition(":")
-    return object_in(source, word, is_file=source.endswith(".py"))
+    return load_object(source, word, is_file=source.endswith(".py"))
 
 
-def object_in(source: str, word: str, folder: Path | None = None, *, is_file: bool) -> Any:
+def load_object(source: str, word: str, folder: Path | None = None, *, is_file: bool) -> Any:
     """What a file or module of people's own calls by a name.
 
     A file is read again when its content has changed. Folders may have modules of the same name.
@@ -74,11 +74,11 @@ def object_in(source: str, word: str, folder: Path | None = None, *, is_file: bo
         raise
     except SystemExit as error:
         problem = f"{source}: ends the program while it is imported (exit code {error.code}); guard what it runs"
-        raise OwnCodeError(f'{problem} with if __name__ == "__main__"') from error
+        raise UserCodeError(f'{problem} with if __name__ == "__main__"') from error
     except Exception as error:  # people's own code may raise anything while it is imported
-        raise OwnCodeError(f"{source}: cannot be imported ({type(error).__name__}: {error})") from error
+        raise UserCodeError(f"{source}: cannot be imported ({type(error).__name__}: {error})") from error
     if not word or not hasattr(module, word):
-        raise OwnCodeError(f"{source} has no {word!r}; {_choices(module, word)}", of_class=True)
+        raise UserCodeError(f"{source} has no {word!r}; {_choices(module, word)}", of_class=True)
     return getattr(module, word)
 
 
@@ -88,7 +88,7 @@ def is_importable_elsewhere(planner: object) -> bool:
     return not home.startswith(FROM_FILE) and home not in _OWNERS
 
 
-def own_version(name: str) -> str:
+def user_code_version(name: str) -> str:
     """What the code of a file or module is: its name and the beginning of its hash."""
     source = name.rpartition(":")[0]
     if source.endswith(".py"):
@@ -110,9 +110,9 @@ def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise OwnCodeError(f"{path}: no such file") from None
+        raise UserCodeError(f"{path}: no such file") from None
     except OSError as error:
-        raise OwnCodeError(f"{path}: cannot be read ({error.strerror})") from None
+        raise UserCodeError(f"{path}: cannot be read ({error.strerror})") from None
 
 
 def _choices(module: ModuleType, word: str) -> str:
@@ -134,7 +134,7 @@ def _from_module(name: str, folder: Path | None) -> ModuleType:
     if own is not None and taken is not None and Path(taken).resolve() != own:
         where = "beside the suite" if folder is not None else "in the working directory"
         problem = f"{top} is imported from {taken}, and there is one {where}"
-        raise OwnCodeError(f"{problem}; give it another name, or name its file")
+        raise UserCodeError(f"{problem}; give it another name, or name its file")
     return module
 
 
@@ -189,7 +189,7 @@ def _importing_for(folder: Path, *, owned: bool) -> Iterator[None]:
         sys.modules[name], _OWNERS[name] = module, folder
     before = set(sys.modules)
     try:
-        with _looking_in(Path.cwd(), folder):
+        with _extended_path(Path.cwd(), folder):
             yield
     finally:
         for name in set(sys.modules) - before if owned else ():
@@ -205,7 +205,7 @@ def _module_in(folder: Path, name: str) -> Path | None:
 
 
 @contextlib.contextmanager
-def _looking_in(*folders: Path) -> Iterator[None]:
+def _extended_path(*folders: Path) -> Iterator[None]:
     """A context in which modules are also looked for in some folders, after all others."""
     added = [text for text in dict.fromkeys(map(str, folders)) if text not in sys.path]
     sys.path.extend(added)

@@ -1,4 +1,4 @@
-"""Trials of candidate scenarios: each is run at most once, within a time budget, and remembered in a journal."""
+"""Candidate scenarios of a shrinking: each runs at most once, within a time budget, and a journal records the answers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import Planner, PlannerError
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible
-from antdrive.planners.own_code import is_importable_elsewhere
+from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_planner
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
@@ -31,7 +31,7 @@ JOURNAL_EVERY = 2.0  # the journal is written at most this often, apart from its
 
 
 class OutOfTimeError(Exception):
-    """The time for trials is over."""
+    """The time budget is spent."""
 
 
 def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = True) -> Failure | None:
@@ -60,7 +60,7 @@ def room_in(scenario: Scenario, failure: Failure) -> float | None:
     return next((clearance for clearance in (*more, claimed) if feasible(task, clearance)), None)
 
 
-class Trials:
+class CandidateRunner:
     """Runs candidates and says which of them fail in one given way, in worlds that leave as much room.
 
     The answers depend on the candidates alone, not on time, processes, or what a journal already knew.

@@ -1,6 +1,6 @@
 """Judge a run by what its test demands, and against its baseline.
 
-The verdict always counts: the outcome, whether the drive is certified, and the bounds of the suite. A metric that is worse
+These always count: the outcome, whether the drive is certified, and the bounds of the suite. A metric that is worse
 than in the baseline by more than its tolerance is a fault, one that is better by more than that a gain. The driven line is
 judged only where the test demands it.
 """
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.base.types import Floats, Point
-from antdrive.runs.suites.baseline import Baseline, conditions
+from antdrive.runs.suites.baseline import Baseline, configuration_hashes
 from antdrive.runs.suites.demands import END, Bound, Demands
-from antdrive.runs.suites.nearest import cause_of_contact, nearest_of, touched_first, touched_in
+from antdrive.runs.suites.nearest import cause_of_contact, first_contact, first_contact_kind, nearest_of
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
@@ -96,7 +96,7 @@ def divergence(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Di
 def explain(run: Run, baseline: Baseline | None) -> Iterator[str]:
     """Yield what explains the faults of a test, a sentence each."""
     if run.rollout is not None:
-        touched = touched_in(run.rollout)
+        touched = first_contact(run.rollout)
         if touched is not None:
             yield f"touched {touched.thing}; {touched.place}"
             if baseline is not None and baseline.nearest is not None:
@@ -121,14 +121,14 @@ def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
 
 
 def changes(run: Run, baseline: Baseline) -> Iterator[str]:
-    """What differs between the conditions of a run and those of its baseline, a line each."""
+    """What differs between a run and its baseline, a line each."""
     present: Mapping[str, str] = run.rollout.record.versions if run.rollout else versions()
     others = [
         f"{name} {baseline.versions.get(name, 'none')} -> {version}"
         for name, version in present.items()
         if baseline.versions.get(name) != version
     ]
-    hashes = conditions(run)
+    hashes = configuration_hashes(run)
     if hashes and baseline.hashes:
         changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
         if changed:
@@ -163,7 +163,7 @@ ROUNDED = 1e-6  # the last decimal of a baseline's metrics
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Evaluation:
     """What is wrong with a run, and what is better than before.
 
     Attributes:
@@ -180,7 +180,7 @@ class Judgement:
         return not self.faults
 
 
-def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
+def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluation:
     """Judge a run.
 
     Args:
@@ -188,29 +188,29 @@ def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
         demands: what its test demands
         baseline: the earlier drive; None: only the demands count
     """
-    faults = list(unfulfilled(run, demands))
+    faults = list(unmet_demands(run, demands))
     gains: list[str] = []
     if baseline is not None:
-        verdict = _verdict(run, baseline)
+        outcome_changes = _outcome_changes(run, baseline)
         if run.succeeded:
-            gains.extend(verdict)
+            gains.extend(outcome_changes)
         elif not _demanded(baseline.outcome, baseline.certified, demands) or _demanded(
             run.outcome, _certified(run), demands
         ):
             # else it is among the faults
-            faults.extend(verdict)
+            faults.extend(outcome_changes)
         if run.rollout is not None and baseline.line and run.outcome is baseline.outcome:
             for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
                 _compare(name, run.rollout, baseline, demands, faults, gains)
             faults += _line_faults(run.rollout, baseline, demands)
-    return Judgement(tuple(faults), tuple(gains))
+    return Evaluation(tuple(faults), tuple(gains))
 
 
 def _certified(run: Run) -> bool:
     return run.certificate is not None and run.certificate.certified
 
 
-def unfulfilled(run: Run, demands: Demands) -> Iterator[str]:
+def unmet_demands(run: Run, demands: Demands) -> Iterator[str]:
     """What a run does not fulfil, whatever the baseline, a sentence each."""
     certified = _certified(run)
     if run.outcome is not demands.outcome:
@@ -232,13 +232,13 @@ def unfulfilled(run: Run, demands: Demands) -> Iterator[str]:
 
 def _other_contact(rollout: Rollout, demands: Demands) -> Iterator[str]:
     """How the first contact differs from the one that is demanded."""
-    if demands.touched is not None and (touched := touched_first(rollout)) != demands.touched:
+    if demands.touched is not None and (touched := first_contact_kind(rollout)) != demands.touched:
         yield f"touched: {touched}, expected {demands.touched}"
     elif demands.cause is not None and (cause := cause_of_contact(rollout)) != demands.cause:
         yield f"cause: {cause or 'none'} took most of the margin, expected {demands.cause}"
 
 
-def _verdict(run: Run, baseline: Baseline) -> list[str]:
+def _outcome_changes(run: Run, baseline: Baseline) -> list[str]:
     """How outcome and certificate differ from the baseline's, a sentence each."""
     if run.outcome is not baseline.outcome:
         return [f"outcome: {run.outcome.key}, in the baseline {baseline.outcome.key}"]
