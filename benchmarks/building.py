@@ -1,6 +1,6 @@
 """A building of 40 x 30 m as a map of 0.05 m a pixel: what each stage of its use costs, and the loop among 10,000 cylinders.
 
-python -m benchmarks.building               # tables for docs/benchmarks.md
+python -m benchmarks.building               # tables for docs/notebook/building.md
 python -m benchmarks.building tasks         # 30 random tasks in it, with the campaign's statistics
 python -m benchmarks.building --map DIR     # only write the map, to look at it
 """

@@ -1,6 +1,6 @@
 """Robots out of URDF and of the catalogue: what was imported beside public specifications, and who drives through BARN's world 0.
 
-python -m benchmarks.robots            # tables for docs/benchmarks.md; the drives need the archive of BARN (`--barn`)
+python -m benchmarks.robots            # tables for docs/notebook/urdf-robots.md; the drives need the archive of BARN (`--barn`)
 python -m benchmarks.robots --values   # only what was imported
 """
 
