@@ -11,7 +11,7 @@ from antdrive.cli.console import file_lines, planning, show
 from antdrive.cli.options import option
 from antdrive.cli.output import chosen_margin, in_brackets, plain
 from antdrive.cli.scenario_options import Ends, Setup
-from antdrive.views.folder import suffixes
+from antdrive.views.run_folder import suffixes
 
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult

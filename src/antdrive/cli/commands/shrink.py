@@ -12,7 +12,7 @@ from antdrive.cli.console import file_lines, show, this_command, working
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario_options import with_chosen_margin
-from antdrive.views.folder import fingerprint, write_result, write_run
+from antdrive.views.run_folder import fingerprint, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.shrink import Shrunk

@@ -16,7 +16,7 @@ from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import SKIN
 
 
-class Recollection:
+class MapReconstruction:
     """The scans of a log, entered one after the other. Moments are asked for in increasing order.
 
     The map is made anew at the poses that the robot believed in, so it is the robot's own. A robot that found no way forgets
@@ -125,13 +125,13 @@ class Recollection:
         return np.array([math.cos(turn), math.sin(turn), x, y])
 
 
-def laid_in_world(points: Floats, drift: Floats) -> Floats:
+def world_points(points: Floats, drift: Floats) -> Floats:
     """Where places on the robot's map lie in the world (N, 2) [m]."""
     cos, sin, x, y = drift.tolist()
     return np.asarray((points - (x, y)) @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
 
 
-def containers(cylinders: Floats) -> npt.NDArray[np.intp]:
+def enclosing_cylinders(cylinders: Floats) -> npt.NDArray[np.intp]:
     """For each of the cylinders (N, 4) one that it stands in, or itself: nobody sees what stands in another one."""
     found = np.arange(len(cylinders))
     for j, (x, y, radius, _) in enumerate(cylinders):
