@@ -37,7 +37,7 @@ def report(
     other = next(folder for folder in folders if folder not in campaigns)
     if campaigns:
         raise InputError(f"{other}: is no campaign's folder, as {campaigns[0]} is; report about them apart")
-    refuse_questions([*(["planner"] if planner else []), *asked.given], other)
+    refuse_campaign_options([*(["planner"] if planner else []), *asked.given], other)
     from antdrive.views.pages.run_report import write_report
 
     count = write_report(folders, out, title=title, embed_films=embed_films)
