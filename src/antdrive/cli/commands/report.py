@@ -5,7 +5,7 @@ from typing import Annotated
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.campaign_tables import CampaignQuery, is_campaign, report_campaigns
+from antdrive.cli.campaign_tables import CampaignQuery, is_campaign, refuse_campaign_options, report_campaigns
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import argument, flag, option
 
