@@ -33,7 +33,7 @@ PLANS: dict[str, Plan] = {
     "sim/driving/plants.py": Plan(_DRIVE, 8),
     "sim/driving/leaving.py": Plan((f"{_DRIVING}test_leaving.py",), 8),
     "sim/driving/blockage.py": Plan((f"{_DRIVING}test_driver.py",), 0),
-    "views/film/replay.py": Plan(("tests/views/film/test_replay.py",), 0),
+    "views/film/playback.py": Plan(("tests/views/film/test_playback.py",), 0),
     "robots/_kernels_footprint.py": Plan((_PARTS, "tests/robots/test_footprint.py"), 4, plain=True),
     "robots/outline.py": Plan(("tests/robots/test_polygons.py",), 6, plain=True),
     "robots/importing/wheels.py": Plan(("tests/robots/importing/test_urdf.py",), 6, plain=True),

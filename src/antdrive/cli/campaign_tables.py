@@ -13,7 +13,7 @@ from antdrive.cli.console import file_lines, show, table
 from antdrive.cli.options import option
 
 if TYPE_CHECKING:
-    from antdrive.views.pages.summary import CampaignSummary
+    from antdrive.views.pages.campaign_summary import CampaignSummary
 
 #: Files of a campaign's folder, as `runs/campaigns/store` names them; that module would load much more.
 MARKS = ("manifest.json", "grid.parquet")
@@ -113,7 +113,7 @@ def campaigns_of_words(words: Sequence[str], context: typer.Context, asked: Ques
 
 def compare_campaigns(folders: Sequence[Path], planners: Sequence[str], asked: Questions, json: bool) -> None:
     """Print success of each planner and the comparison of each pair."""
-    from antdrive.views.pages.campaign import summarise_campaign
+    from antdrive.views.pages.campaign_report import summarise_campaign
 
     summary = summarise_campaign(folders, planners=planners, strict=True, **asked.words)
     show(json, summary.as_dict(), _tables(summary))
@@ -134,7 +134,7 @@ def report_campaigns(
     folders: Sequence[Path], out: Path, json: bool, title: str | None, planners: Sequence[str], asked: Questions
 ) -> None:
     """Write the report of a campaign, or of several."""
-    from antdrive.views.pages.campaign import report_campaign
+    from antdrive.views.pages.campaign_report import report_campaign
 
     files = report_campaign(folders, out, title=title, planners=planners, **asked.words)
     size = sum(path.stat().st_size for path in files)

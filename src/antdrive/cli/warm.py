@@ -166,8 +166,8 @@ def _sense() -> None:
             (0.75, 0.75, 0.0), np.array([[2.2 - 0.1 * k, 0.8]]) + (90 if k == 0 else 0), np.array([0.2])
         )
         seen.insert((0.75, 0.75, 0.0), ranges, tracker.update(ground, (0.75, 0.75, 0.0), ranges, 0.2 * k))
-    seen.take_as_free((0.75, 0.75), 0.2)
-    seen.forget((2.0, 0.8), 0.3)
+    seen.mark_free((0.75, 0.75), 0.2)
+    seen.clear_hits((2.0, 0.8), 0.3)
     seen.discs()
     clear_distance(seen, (0.75, 0.75, 0.0), 0.5, 0.1, robot.footprint, 1.0)
 

@@ -9,7 +9,7 @@ from typing import Any
 from antdrive.base.errors import FieldError
 from antdrive.planners import PlanResult, PlanStatus
 from antdrive.sim.compose import compose, load_replanning
-from antdrive.sim.driving.drive import Driver, Progress, drive, unheard
+from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS, measure
@@ -142,7 +142,7 @@ def run(
     s: Scenario,
     *,
     planned: tuple[Grid, PlanResult] | None = None,
-    progress: Progress = unheard,
+    progress: Progress = ignore_progress,
 ) -> Run:
     """Plan and drive one scenario.
 

@@ -88,7 +88,7 @@ def drive_suites(
     from antdrive.runs.pool import cores
     from antdrive.runs.suites import scenario_of, select
     from antdrive.views.artefacts import Films, Results, default_folder
-    from antdrive.views.folder import check_folder
+    from antdrive.views.run_folder import check_folder
 
     if film not in get_args(Films):
         raise InputError(f"--film {film}: unknown; choose from {', '.join(get_args(Films))}")

@@ -17,7 +17,7 @@ from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario import Ends, Setup
 from antdrive.runs.comparing import COMPARED, Compared, difference_cells, differences, mark_of, same_drives
-from antdrive.views.folder import check_film, check_folder, write_result, write_run
+from antdrive.views.run_folder import check_film, check_folder, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout

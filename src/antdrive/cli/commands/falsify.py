@@ -13,7 +13,7 @@ from antdrive.cli.console import bar, show, table
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario import Setup
-from antdrive.views.folder import RUN_FILES, fingerprint, write_result, write_run
+from antdrive.views.run_folder import RUN_FILES, fingerprint, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.hunt import Hunt

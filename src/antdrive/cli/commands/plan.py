@@ -11,7 +11,7 @@ from antdrive.cli.options import option
 from antdrive.cli.output import chosen_margin, in_brackets, plain
 from antdrive.cli.scenario import Ends, Setup
 from antdrive.cli.warm import compile_once
-from antdrive.views.folder import suffixes
+from antdrive.views.run_folder import suffixes
 
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult

@@ -11,7 +11,7 @@ from antdrive.cli.output import film_drives
 from antdrive.cli.parse import log_at
 from antdrive.cli.parse import size as parse_size
 from antdrive.cli.warm import compile_once
-from antdrive.views.folder import caption
+from antdrive.views.run_folder import caption
 
 
 def render(

@@ -38,7 +38,7 @@ def report(
     if campaigns:
         raise InputError(f"{other}: is no campaign's folder, as {campaigns[0]} is; report about them apart")
     refuse_questions([*(["planner"] if planner else []), *asked.given], other)
-    from antdrive.views.pages.report import write_report
+    from antdrive.views.pages.run_report import write_report
 
     count = write_report(folders, out, title=title, embed_films=embed_films)
     size = out.stat().st_size

@@ -8,7 +8,7 @@ from antdrive.cli import options
 from antdrive.cli.console import bar, file_lines, print_error, show, table
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import results_folder
-from antdrive.views.folder import suffixes
+from antdrive.views.run_folder import suffixes
 
 MARKER = "reproduce.json"
 QUICK_SEEDS = 6

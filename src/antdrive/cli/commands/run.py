@@ -12,7 +12,7 @@ from antdrive.cli.output import film_drives, run_lines
 from antdrive.cli.scenario import Ends, Setup
 from antdrive.cli.warm import compile_once
 from antdrive.sim.settings import SETTINGS
-from antdrive.views.folder import check_film, check_folder, default_folder, write_result, write_run
+from antdrive.views.run_folder import check_film, check_folder, default_folder, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario

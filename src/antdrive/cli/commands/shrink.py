@@ -12,7 +12,7 @@ from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario import with_chosen_margin
 from antdrive.cli.warm import compile_once
-from antdrive.views.folder import fingerprint, write_result, write_run
+from antdrive.views.run_folder import fingerprint, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.shrink import Shrunk

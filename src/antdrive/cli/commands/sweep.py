@@ -112,7 +112,7 @@ def sweep(
         print_error(note)
     files: list[str] = []
     if report is not None:
-        from antdrive.views.pages.campaign import report_campaign
+        from antdrive.views.pages.campaign_report import report_campaign
 
         files = [str(path) for path in report_campaign(out, report)]
     facts = {
@@ -130,7 +130,7 @@ def sweep(
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Refuse options that mean nothing."""
     if report is not None:
-        from antdrive.views.pages.campaign import check_suffix
+        from antdrive.views.pages.campaign_report import check_suffix
 
         check_suffix(report)
         if dry_run:

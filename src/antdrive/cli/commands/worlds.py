@@ -246,7 +246,7 @@ def export_world(
     A world that was made from a map is written where it lies in that map, but for a .map, which has no coordinates.
     """
     from antdrive.base.files import require_new
-    from antdrive.views.export.worlds import SDF, SUFFIXES, file_beside, write_world
+    from antdrive.views.export.world_export import SDF, SUFFIXES, file_beside, write_world
     from antdrive.worlds import load_task, load_tasks
 
     suffix = out.suffix.lower()

@@ -176,7 +176,7 @@ class Check:
             return {}, False
         remove_artefacts(self.folder)
         failed, drove, films = not evaluation.passed, run.rollout is not None, self.results.films
-        filmed = drove and self.results.takes_film(failed=failed)
+        filmed = drove and self.results.should_film(failed=failed)
         if not (failed or films == "always"):
             return {}, False
         files = write_artefacts(

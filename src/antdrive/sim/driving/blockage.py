@@ -21,7 +21,7 @@ from antdrive.base.plane import place_name
 from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.robots import TrackedPath
-from antdrive.sim.driving.others import Others
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Task, rasterise
 from antdrive.worlds.world import PointWorld
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 STEP = 0.25  # movers are predicted at least this often [s]
 MIN_RADIUS = 0.01  # smaller discs are left out [m]
 STILL = 0.05  # a mover that stays this close to where it was stands still [m]
-LOOK_AHEAD = 3.0  # the route is looked at for this far [m]
+GAP_RANGE = 3.0  # the route is looked at for this far [m]
 GAP_STEP = 0.05  # between two points of it [m]
 GAP_SLACK = 0.05  # avoidance may still refuse a route that passes a mover with this much more than it keeps [m]
-LOOK = 1.0  # predictions are checked this often for a mover that sets out again [s]
+STANDING_STEP = 1.0  # predictions are checked this often for a mover that sets out again [s]
 
 
 def covered_discs(
-    predictor: Others,
+    predictor: PerceivedMovers,
     tick: int,
     ends: Floats,
     duration: float,
@@ -130,7 +130,9 @@ class Blockage:
         reason: which mover stands where, once the robot has no patience left; empty before
     """
 
-    def __init__(self, task: Task, grid: Grid, predictor: Others, hz: int, policy: ReplanPolicy, keeps: float) -> None:
+    def __init__(
+        self, task: Task, grid: Grid, predictor: PerceivedMovers, hz: int, policy: ReplanPolicy, keeps: float
+    ) -> None:
         self.failures, self.reason = 0, ""
         self._keeps = keeps
         self._gaps: dict[int, tuple[float, float]] = {}  # where the noted movers stand
@@ -194,7 +196,7 @@ class Blockage:
         standing = self.standing(tick, robot)
         if self._keeps <= self._grid.inflate or not len(standing):
             return
-        ahead = np.arange(arc, min(arc + LOOK_AHEAD, tracked.length), GAP_STEP)
+        ahead = np.arange(arc, min(arc + GAP_RANGE, tracked.length), GAP_STEP)
         points, positions = points_at(tracked, ahead), self._predictor.perceived(tick, robot)[1]
         noted = self._noted(tick, robot)
         for m in standing.tolist():
@@ -237,7 +239,7 @@ class Blockage:
     def standing(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
         """The movers (S,) that the robot perceives and predicts to stand still for as long as its patience lasts."""
         perceived = self._predictor.within_range(tick, robot)
-        ahead = np.linspace(0.0, self._patience, 1 + math.ceil(self._patience / LOOK))
+        ahead = np.linspace(0.0, self._patience, 1 + math.ceil(self._patience / STANDING_STEP))
         positions, _ = self._predictor.predict(tick, robot, ahead)
         return np.asarray(perceived[np.hypot(*np.moveaxis(positions - positions[0], -1, 0)).max(axis=0) <= STILL])
 

@@ -11,7 +11,7 @@ from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Decider, Ending, Guide, Localiser, Moment, Plant, Rule, Scanning, Step
 from antdrive.sim.driving.plants import Bullet, Drive
-from antdrive.sim.driving.rules import OUT_OF_SIGHT, WAITING_SPEED, Pursuit, standing
+from antdrive.sim.driving.rules import SIGHT_LIMIT, WAITING_SPEED, Pursuit, standing
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import Task
@@ -21,11 +21,11 @@ PROGRESS_HZ = 10  # calls of `progress` per simulated second
 Progress = Callable[[float], None]
 
 
-def unheard(fraction: float) -> None:
+def ignore_progress(fraction: float) -> None:
     """Ignore the progress of a drive."""
 
 
-def unscanned(tick: int, pose: Pose, estimate: Pose) -> Pose:
+def no_scan(tick: int, pose: Pose, estimate: Pose) -> Pose:
     """The estimate of a robot that does not scan."""
     return estimate
 
@@ -34,11 +34,11 @@ def drive(
     plant: Plant,
     decider: Decider,
     localiser: Localiser,
-    scan: Scanning = unscanned,
+    scan: Scanning = no_scan,
     *,
     hz: int,  # control periods per second
     limit: float,  # the longest time [s]
-    progress: Progress = unheard,
+    progress: Progress = ignore_progress,
 ) -> Ending:
     """Drive until the decider ends it, the robot touches something, or the time is over."""
     ending = Ending(Outcome.COLLIDED) if plant.touched else None
@@ -82,7 +82,7 @@ class StuckClock(NamedTuple):
             return StuckClock(pursuit.arc)
         if waiting:
             return self
-        held = self.held + (pursuit.limiter == OUT_OF_SIGHT)
+        held = self.held + (pursuit.limiter == SIGHT_LIMIT)
         if pursuit.turning:
             return StuckClock(self.farthest, self.driving, self.turning + 1, held)
         return StuckClock(self.farthest, self.driving + 1, self.turning, held)
@@ -216,7 +216,7 @@ def follow(
     control_hz: int = 60,
     localiser: Localiser | None = None,
     rules: Sequence[Rule] = (),
-    progress: Progress = unheard,
+    progress: Progress = ignore_progress,
 ) -> Drive:
     """Drive along a path from the start of a task, for at most a time [s]; `rules` apply after pursuit."""
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))

@@ -17,7 +17,7 @@ from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.planners import PlanResult
 from antdrive.robots import RobotSpec, TrackedPath
 from antdrive.sim.driving.blockage import MIN_RADIUS, Blockage, close_route, covered_discs, points_at
-from antdrive.sim.driving.others import Others, Tracked
+from antdrive.sim.driving.perceived_movers import PerceivedMovers, Tracked
 from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED, ReplanPolicy
 from antdrive.worlds import Disc, Grid, World, rasterise
 
@@ -41,13 +41,13 @@ class Traffic:
         samples: how many independent places of movers that makes, about
     """
 
-    def __init__(self, predictor: Others, radius: float, bounds: Bounds, hz: int) -> None:
+    def __init__(self, predictor: PerceivedMovers, radius: float, bounds: Bounds, hz: int) -> None:
         self.box, self.samples = _nowhere(), 0.0
         self._predictor, self._radius, self._hz = predictor, radius, hz
         self._area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
         self._noted = _nowhere()
 
-    def look(self, tick: int, robot: tuple[float, float]) -> None:
+    def observe(self, tick: int, robot: tuple[float, float]) -> None:
         """Take note of the movers that the robot perceives in a tick from a position [m]."""
         perceived, places = self._predictor.perceived(tick, robot)
         self._note(places[perceived], 1 / self._hz)
@@ -101,18 +101,18 @@ class TrackedTraffic(Traffic):
         self._tracks, self._fast = predictor, FAST * robot.max_speed
         self._last, self._lately, self._most = -1, 0.0, 0.0
 
-    def look(self, tick: int, robot: tuple[float, float]) -> None:
+    def observe(self, tick: int, robot: tuple[float, float]) -> None:
         """Take note of the movers that the last scan met, if it is a new one, from a position [m]."""
-        watch = self._tracks.watch
-        if watch.tick == self._last:
+        tracking = self._tracks.tracking
+        if tracking.tick == self._last:
             return
-        period = (watch.tick - self._last) / self._hz
-        self._last = watch.tick
+        period = (tracking.tick - self._last) / self._hz
+        self._last = tracking.tick
         self._note(self._tracks.sighted(tick), period)
         kept = math.exp(-period / MEMORY)
         self._lately *= kept
-        if watch.sight:
-            self._lately += (1 - kept) * self._sweep(tick, robot, watch.reach) / watch.sight
+        if tracking.sight:
+            self._lately += (1 - kept) * self._sweep(tick, robot, tracking.reach) / tracking.sight
         self._most = max(self._lately, self._most * math.exp(-period / FADING))
 
     def rate(self, tick: int, robot: tuple[float, float]) -> float:
@@ -218,7 +218,7 @@ class MoversAhead:
 
     def __init__(
         self,
-        others: Others,
+        movers: PerceivedMovers,
         policy: ReplanPolicy,
         goal: Point,
         grid: Grid,
@@ -226,14 +226,14 @@ class MoversAhead:
         traffic: Traffic | None,
         blockage: Blockage | None = None,
     ) -> None:
-        self._predictor, self._policy, self._goal, self._grid, self._hz = others, policy, goal, grid, hz
+        self._predictor, self._policy, self._goal, self._grid, self._hz = movers, policy, goal, grid, hz
         self._traffic, self._blockage = traffic, blockage
         self._waiting_since = math.nan
 
-    def look(self, tick: int, pose: Pose, waiting: bool) -> None:
+    def observe(self, tick: int, pose: Pose, waiting: bool) -> None:
         """Take note of what the robot sees in a control period."""
         if self._traffic is not None:
-            self._traffic.look(tick, pose[:2])
+            self._traffic.observe(tick, pose[:2])
         if not waiting:
             self.wait_anew()
         elif math.isnan(self._waiting_since):

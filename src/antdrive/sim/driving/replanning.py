@@ -27,15 +27,15 @@ from antdrive.planners import (
     Query,
     TimedPlan,
     agent_for,
-    blaming,
     capabilities_of,
     check_step,
+    planner_errors,
     smooth,
 )
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs, with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
-from antdrive.sim.driving.others import Others
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
 from antdrive.sim.driving.rules import Schedule
 from antdrive.sim.log.record import DECISION
@@ -52,11 +52,13 @@ class Replanning(OneRoute):
         policy: when to replan
     """
 
-    def __init__(self, planner: RoutePlanner, policy: ReplanPolicy, others: Others, keeps: float = 0.0) -> None:
+    def __init__(
+        self, planner: RoutePlanner, policy: ReplanPolicy, movers: PerceivedMovers, keeps: float = 0.0
+    ) -> None:
         super().__init__(planner)
         self.policy = policy
         self._hz = planner.hz
-        self._predictor, self._keeps = others, keeps
+        self._predictor, self._keeps = movers, keeps
         self._task = dataclasses.replace(planner.task, world=dataclasses.replace(planner.task.world, movers=()))
         self._timed = capabilities_of(planner.planner).needs_motions
         self._replanned_at = -math.inf
@@ -64,11 +66,11 @@ class Replanning(OneRoute):
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         """Set out on a plan: its route, and the same prepared for the controller."""
         self._grid, policy = grid, self.policy
-        others, robot, task = self._predictor, self._routes.robot, self._task
-        self.blockage = Blockage(task, grid, others, self._hz, policy, self._keeps)
-        learns = policy.around_movers and others.guesses and not self._timed
-        traffic = Traffic(others, robot.radius, task.world.bounds, self._hz) if learns else None
-        self._ahead = MoversAhead(others, policy, task.goal, grid, self._hz, traffic, self.blockage)
+        movers, robot, task = self._predictor, self._routes.robot, self._task
+        self.blockage = Blockage(task, grid, movers, self._hz, policy, self._keeps)
+        learns = policy.around_movers and movers.guesses and not self._timed
+        traffic = Traffic(movers, robot.radius, task.world.bounds, self._hz) if learns else None
+        self._ahead = MoversAhead(movers, policy, task.goal, grid, self._hz, traffic, self.blockage)
         route, path = super().route(grid, plan)
         self._track(plan, route)
         return route, path
@@ -93,7 +95,7 @@ class Replanning(OneRoute):
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Why a new route is due now; empty if none is."""
         now, policy = tick / self._hz, self.policy
-        self._ahead.look(tick, pose, waiting)
+        self._ahead.observe(tick, pose, waiting)
         if self.blockage.pause(tick, pose[:2]) or now - self._replanned_at < policy.min_interval:
             return ""
         deviation = math.dist(_point_at(tracked.route, arc), pose[:2])
@@ -197,7 +199,7 @@ class CellByCell(Replanning):
         now, started = tick / self._hz, time.perf_counter()
         self._replanned_at = now
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
-        with blaming(self._routes.planner):
+        with planner_errors(self._routes.planner):
             here, propagated = self._online.cell, self._online.stats.propagated
             to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
         self._routes.wrong = self._routes.wrong or check_step(self._query, here, to)

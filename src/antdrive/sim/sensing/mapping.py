@@ -191,7 +191,7 @@ class OccupancyMap:
         found: Floats = kernels.discs_within(*(within or EVERYWHERE), self._plain)
         return found
 
-    def forget(self, place: Point, radius: float) -> Cells:
+    def clear_hits(self, place: Point, radius: float) -> Cells:
         """Take what was hit around a place for free ground, and return the cells (K, 2): a mover has gone on.
 
         Args:
@@ -201,9 +201,7 @@ class OccupancyMap:
         count = kernels.forget(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
-    def take_as_free(
-        self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None
-    ) -> Cells:
+    def mark_free(self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None) -> Cells:
         """Take unknown ground for free, such as that under the robot, and return the cells (K, 2).
 
         Args:
@@ -218,7 +216,7 @@ class OccupancyMap:
         count = kernels.take_as_free(*place, radius, discs, np.array(walls), self._plain, self._changed)
         return self._changed[:count].copy()
 
-    def renewed(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:
+    def reset_around(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:
         """An empty map with the same cells, but for what this one has seen free around a place; hits there are unknown ground.
 
         Args:
@@ -352,7 +350,7 @@ def clear_distance(
     footprint: Footprint,
     limit: float,
     *,
-    daring: bool = False,
+    freespace: bool = False,
 ) -> float:
     """How far the footprint, swept along the arc of a twist, stays on ground that was seen free, at most `limit` [m].
 
@@ -370,11 +368,11 @@ def clear_distance(
     """
     if speed == 0.0:
         return 0.0 if yaw_rate else limit
-    return _clear(seen, pose, speed, yaw_rate, footprint, limit, daring)
+    return _clear(seen, pose, speed, yaw_rate, footprint, limit, freespace)
 
 
 def clear_turn(
-    seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float, *, daring: bool = False
+    seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float, *, freespace: bool = False
 ) -> float:
     """How far the robot can turn on the spot over ground that was seen free, at most `limit` [rad]; as `clear_distance`.
 
@@ -386,14 +384,14 @@ def clear_turn(
         limit: how far is far enough [rad]
         daring: whether ground that was not seen counts as free
     """
-    return _clear(seen, pose, 0.0, yaw_rate, footprint, limit, daring)
+    return _clear(seen, pose, 0.0, yaw_rate, footprint, limit, freespace)
 
 
 def _clear(
-    seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float, daring: bool
+    seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float, freespace: bool
 ) -> float:
     shape = footprint.half_length, footprint.half_width, footprint.rounding
-    arrays = tuple(seen.arrays._replace(free=~seen.occupied)) if daring else seen.plain
+    arrays = tuple(seen.arrays._replace(free=~seen.occupied)) if freespace else seen.plain
     return float(_kernels_sight.clear_way(*pose, speed, yaw_rate, *shape, _corners(footprint), limit, arrays))
 
 

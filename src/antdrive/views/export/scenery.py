@@ -291,9 +291,9 @@ def planned_ground(rollout: Rollout) -> GroundGrid:
 
 def known_ground(rollout: Rollout) -> Iterator[GroundGrid]:
     """What a robot without a map had seen, in the frame of its estimated poses: at first, every second, and at last."""
-    from antdrive.views.recollection import Recollection
+    from antdrive.views.map_reconstruction import MapReconstruction
 
-    seen = Recollection(rollout, forgetting=True, meeting=False)
+    seen = MapReconstruction(rollout, forgetting=True, meeting=False)
     end = float(rollout.t[-1])
     times = [*np.arange(float(rollout.t[0]), end, PERIOD).tolist(), end]
     for at in times:

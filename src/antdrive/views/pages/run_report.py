@@ -21,7 +21,7 @@ from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
 from antdrive.sim.pipeline import Run
 from antdrive.views.pages.rendering import json_column, link_to, page_data, rendered, shown
-from antdrive.views.pages.runs import (
+from antdrive.views.pages.reported_runs import (
     COLUMN_NOTES,
     MEASURED,
     SETTINGS,
@@ -29,8 +29,8 @@ from antdrive.views.pages.runs import (
     Attachment,
     ReportedRun,
     find_runs,
-    made_run,
     note_differences,
+    reported_run,
     run_columns,
     run_table,
 )
@@ -88,7 +88,7 @@ def write_report(
     reported: list[ReportedRun] = []
     for source in given:
         if isinstance(source, Run):
-            made = made_run(source)
+            made = reported_run(source)
             if page:
                 made.figures += _drawn(source) if figures else []
                 made.films += _filmed(source) if films else []
@@ -155,7 +155,7 @@ def _text(runs: list[ReportedRun], title: str) -> str:
             tables=[run_table(ordered[:rows])] if rows else [],
             words=WORDS,
             most=rows,
-            uncounted=counted(ordered[rows:]),
+            uncounted=outcome_counts(ordered[rows:]),
             detailed=ordered[:details],
             undetailed=len(runs) - details,
             settings=SETTINGS,
@@ -166,7 +166,7 @@ def _text(runs: list[ReportedRun], title: str) -> str:
         rows, details = (rows, details // 2) if details > ENOUGH_DETAILS else (rows // 2, details // 2)
 
 
-def counted(runs: Sequence[ReportedRun]) -> str:
+def outcome_counts(runs: Sequence[ReportedRun]) -> str:
     """How many runs ended in which way, such as "12 succeeded; 3 collided"; empty without runs."""
     numbers = Counter(run.outcome for run in runs)
     most, rest = numbers.most_common(MOST_OUTCOMES), sum(numbers.values())
@@ -176,11 +176,11 @@ def counted(runs: Sequence[ReportedRun]) -> str:
 
 def _drawn(run: Run) -> list[Attachment]:
     """The overview of a run made in Python, or its plan where it did not drive."""
-    from antdrive.views.figures.run_figures import picture_of
+    from antdrive.views.figures.run_figures import draw_run
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "overview.png"
-        picture_of(run, path)
+        draw_run(run, path)
         return [_embedded(path, FIGURE_CAPTIONS["overview.png"])]
 
 

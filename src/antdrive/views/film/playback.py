@@ -34,7 +34,7 @@ class ReplanEvent(NamedTuple):
         return f"{'new route' if self.solved else 'no new route'}: {self.trigger}"
 
 
-class Replay:
+class Playback:
     """A run as functions of time [s], interpolated between the rows of its log."""
 
     def __init__(self, rollout: Rollout) -> None:

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.views.film import sight
+from antdrive.views.film import lidar_view
 from antdrive.views.film.camera import CAMERAS
 from antdrive.views.film.overlay import legend_entries
 from antdrive.views.film.shot import Shot
-from antdrive.views.recollection import Recollection, containers, laid_in_world
+from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders, world_points
 from antdrive.views.scene import Scene
 from tests.made_up_drive import scanned
 from tests.records import changed
@@ -18,10 +18,10 @@ from tests.records import changed
 SIZE = (480, 320)
 
 
-def known_ground(recollection, points):
+def known_ground(reconstruction, points):
     """Whether places lie on ground that was seen free or hit; all of them lie on the map."""
-    cols, rows = np.floor((points - recollection.map.origin) / recollection.map.cell).astype(int).T
-    return recollection.seen[rows, cols]
+    cols, rows = np.floor((points - reconstruction.map.origin) / reconstruction.map.cell).astype(int).T
+    return reconstruction.seen[rows, cols]
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def spots(log):
 
 
 def test_obstacles_are_pale_until_a_beam_meets_them(log, spots):
-    seen = Recollection(log)
+    seen = MapReconstruction(log)
     seen.advance(log.t[-1])
     first, last = (picture(log, "top", at) for at in (0.0, log.t[-1]))
     later = np.flatnonzero((seen.met > 0) & np.isfinite(seen.met))
@@ -62,14 +62,14 @@ def test_obstacles_are_pale_until_a_beam_meets_them(log, spots):
 
 def test_ground_is_hatched_until_it_is_seen(log, spots, monkeypatch):
     with_fan = picture(log, "top", 0.0)
-    monkeypatch.setattr(sight.SightPainter, "lay_fan", lambda *_: None)
+    monkeypatch.setattr(lidar_view.OwnMapPainter, "draw_beams", lambda *_: None)
     first, last = (picture(log, "top", at) for at in (0.0, log.t[-1]))
     x, y, yaw = log.pose[0].tolist()
     ahead = spots([(x + 0.45 * math.cos(yaw), y + 0.45 * math.sin(yaw))])
     red, _, blue = (with_fan - first)[ahead][0]
     assert red < blue - 12  # the fan
 
-    before, after = Recollection(log), Recollection(log)
+    before, after = MapReconstruction(log), MapReconstruction(log)
     before.advance(0.0)
     after.advance(log.t[-1])
     places = np.random.default_rng(1).uniform((0.3, 0.3), (5.7, 3.7), (4000, 2))
@@ -91,9 +91,9 @@ def test_a_picture_depends_on_the_moment_alone(log, camera):
 
 def test_hits_are_where_the_map_has_them(log, monkeypatch):
     with_hits = picture(log, "top", 0.3)
-    monkeypatch.setattr(sight.SightPainter, "put_hits", lambda *_: None)
+    monkeypatch.setattr(lidar_view.OwnMapPainter, "draw_hits", lambda *_: None)
     painted = np.abs(with_hits - picture(log, "top", 0.3)).max(axis=-1) > 40
-    seen = Recollection(log)
+    seen = MapReconstruction(log)
     seen.advance(0.3)
     shot = Shot(log, camera="top", size=SIZE, bare=True)
     height = seen.lidar.height
@@ -106,13 +106,13 @@ def test_hits_are_where_the_map_has_them(log, monkeypatch):
 
 
 def test_what_stands_inside_a_cylinder_looks_like_it(log):
-    around = containers(np.array([[0, 0, 0.5, 1], [0.1, 0, 0.2, 1], [2, 0, 0.2, 1], [0.6, 0, 0.3, 1.0]]))
+    around = enclosing_cylinders(np.array([[0, 0, 0.5, 1], [0.1, 0, 0.2, 1], [2, 0, 0.2, 1], [0.6, 0, 0.3, 1.0]]))
     assert around.tolist() == [0, 0, 2, 3]
 
 
 def test_the_legend_names_what_is_painted(log):
     scene = Scene.of(log)
-    assert not scene.has_zones
+    assert not scene.has_no_go_area
     plain = {entry.text for entry in legend_entries(scene, 0.5, 0.01)}
     named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, beams=True, sight=True)}
     assert named - plain == {"beams of the lidar", "hit, on the robot's map", "not known to be free"}
@@ -125,7 +125,7 @@ def test_the_legend_names_what_is_painted(log):
 
 def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log):
     shot = Shot(log, camera="top", size=SIZE, bare=True)
-    pose, movers = shot.replay.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
+    pose, movers = shot.playback.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
     plain = shot._compositor.frame(pose).astype(int)
     ringed = shot._compositor.frame(pose, followed=movers).astype(int)
     x, y = (np.array(shot._compositor.pixel(*at)) for at in ((3.0, 2.0), (3.55, 2.0)))
@@ -146,7 +146,7 @@ def test_of_a_robot_with_a_map_only_the_beams_are_painted(log, spots, monkeypatc
     fan = picture(mapped, "top", 0.0, at)
     bare = picture(replace(mapped, scans=log.scans[:0], scan_rows=log.scan_rows[:0]), "top", at)
     assert np.array_equal(picture(mapped, "top", at), fan)
-    monkeypatch.setattr(sight.FanPainter, "lay_fan", lambda *_: None)
+    monkeypatch.setattr(lidar_view.BeamPainter, "draw_beams", lambda *_: None)
     painted = np.abs(fan - picture(mapped, "top", at)).max(axis=-1) > 4
     rows, cols = np.nonzero(painted)
     assert len(rows) > 1000
@@ -185,14 +185,14 @@ def test_obstacles_are_met_when_a_beam_first_ends_on_them(far):
     expected = np.full(len(far.record.world.obstacles), math.inf)
     for k in reversed(range(len(far.scans))):
         expected[list(bodies_met(far, k))] = far.t[far.scan_rows[k]]
-    seen = Recollection(far)
+    seen = MapReconstruction(far)
     seen.advance(far.t[-1])
     assert len(set(expected.tolist())) > 4  # some at once, some later
     assert seen.met.tolist() == expected.tolist()
 
 
 def test_what_was_seen_grows_whatever_the_steps(far):
-    once, stepwise = Recollection(far), Recollection(far)
+    once, stepwise = MapReconstruction(far), MapReconstruction(far)
     grown = []
     for at in np.arange(0.0, far.t[-1] + 0.03, 0.03):
         stepwise.advance(at)
@@ -209,13 +209,13 @@ def test_the_map_is_laid_where_the_robot_believes_to_be(far):
     cos, sin = math.cos(turn), math.sin(turn)
     wrong = np.column_stack([far.pose[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + shift, far.pose[:, 2] + turn])
     drifted = replace(far, estimate=wrong)
-    straight, seen = Recollection(far), Recollection(drifted)
-    for recollection in (straight, seen):
-        recollection.advance(0.5)
+    straight, seen = MapReconstruction(far), MapReconstruction(drifted)
+    for reconstruction in (straight, seen):
+        reconstruction.advance(0.5)
     assert straight.drift(0.5) == pytest.approx([1, 0, 0, 0])
     there = seen.drift(0.5)
     assert there == pytest.approx([cos, sin, *shift])
-    laid, true = laid_in_world(seen.map.discs()[:, :2], there), straight.map.discs()[:, :2]
+    laid, true = world_points(seen.map.discs()[:, :2], there), straight.map.discs()[:, :2]
     apart = np.hypot(*(laid[:, None] - true[None]).transpose(2, 0, 1)).min(axis=1)
     assert apart.max() < 0.04  # grains of 2.5 cm are cut otherwise
     assert np.hypot(*(seen.map.discs()[:, :2][:, None] - true[None]).transpose(2, 0, 1)).min(axis=1).max() > 0.1
@@ -223,4 +223,4 @@ def test_the_map_is_laid_where_the_robot_believes_to_be(far):
 
 def test_a_log_without_scans_is_refused(made_up_drive):
     with pytest.raises(ValueError, match="no scans"):
-        Recollection(made_up_drive())
+        MapReconstruction(made_up_drive())

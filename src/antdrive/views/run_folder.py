@@ -35,7 +35,7 @@ def check_folder(folder: Path) -> None:
 
 def check_film(path: Path) -> None:
     """Check that a film can be written to `--film PATH`, before any work is done for it."""
-    from antdrive.views.film.options import ENCODERS
+    from antdrive.views.film.film_options import ENCODERS
 
     if path.suffix.lower() not in ENCODERS:
         raise InputError(f"--film {path}: films are written as {', '.join(ENCODERS)}")
@@ -75,10 +75,10 @@ def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = T
         log = str(run.rollout.save(folder / "rollout.npz"))
         files |= _write_figures(run, folder, log, suffixes(vector)) if figures else {"rollout": log}
     elif figures:
-        from antdrive.views.figures.run_figures import picture_of
+        from antdrive.views.figures.run_figures import draw_run
 
         files["figure"] = str(folder / "overview.png")
-        picture_of(run, files["figure"])
+        draw_run(run, files["figure"])
     return files
 
 
@@ -113,7 +113,7 @@ def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, 
 
 def write_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
     """Film a drive, or several side by side; facts about the film."""
-    from antdrive.views.film.compare import compare_film
+    from antdrive.views.film.comparison_film import compare_film
     from antdrive.views.film.video import film
 
     several = len(logs) > 1

@@ -16,9 +16,9 @@ from antdrive.planners import load_planner
 from antdrive.sim import run
 from antdrive.views.figures.run_figures import overview
 from antdrive.views.film.video import film
-from antdrive.views.pages import report as reporting
-from antdrive.views.pages.report import EMBEDDED_BYTES, write_report
-from antdrive.views.pages.runs import MEASURED, ReportedRun
+from antdrive.views.pages import run_report as reporting
+from antdrive.views.pages.reported_runs import MEASURED, ReportedRun
+from antdrive.views.pages.run_report import EMBEDDED_BYTES, write_report
 from tests.records import changed
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 

@@ -10,9 +10,9 @@ from antdrive.base.errors import FieldError
 from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
 from antdrive.sim.compose import compose
-from antdrive.sim.driving.others import Tracked
+from antdrive.sim.driving.perceived_movers import Tracked
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.driving.survey import Watch
+from antdrive.sim.driving.survey import MoverTracking
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord
@@ -108,8 +108,8 @@ def test_a_robot_without_a_map_follows_movers_too(jackal):
 
 def test_the_map_reaches_farther_among_movers(jackal):
     told = scenario(jackal, map="none", perception=Perception(), unseen=())
-    watching = replace(told, perception=LIDAR)
-    assert [compose(s).guide.survey.map.horizon for s in (told, watching)] == [10.0, 16.0]
+    tracks_movers = replace(told, perception=LIDAR)
+    assert [compose(s).guide.survey.map.horizon for s in (told, tracks_movers)] == [10.0, 16.0]
 
 
 def test_an_empty_world_is_watched_as_well(turtlebot):
@@ -122,13 +122,13 @@ def test_an_empty_world_is_watched_as_well(turtlebot):
 
 
 def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal):
-    watch, hall = Watch(jackal.lidar, 60), World("hall", (-5.0, -5.0, 5.0, 5.0))
+    tracking, hall = MoverTracking(jackal.lidar, 60), World("hall", (-5.0, -5.0, 5.0, 5.0))
     scanner = Scanner(jackal.lidar, np.empty((0, 3)), bounds=hall.bounds)
     ground = KnownGround(jackal.lidar, hall)
     for tick in range(31):
         places = np.array([[3.0 - tick / 60, 1.0], [2.0, -2.0]])
-        watch.read(ground, (0.0, 0.0, 0.0), scanner.scan((0.0, 0.0, 0.0), places, np.array([0.3, 0.2])), tick)
-    predictor = Tracked(watch, LIDAR, 60)
+        tracking.read(ground, (0.0, 0.0, 0.0), scanner.scan((0.0, 0.0, 0.0), places, np.array([0.3, 0.2])), tick)
+    predictor = Tracked(tracking, LIDAR, 60)
     places, radii = predictor.predict(36, (0.0, 0.0), np.array([0.0, 1.0]))
     numbers, everywhere = predictor.perceived(36, (0.0, 0.0))
     first = int(np.argmin(places[0, :, 1] < 0))
@@ -137,7 +137,7 @@ def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal):
     assert radii[first] == pytest.approx(0.3, abs=0.03)
     assert np.array_equal(everywhere[numbers], places[0])
     assert predictor.radius_of(int(numbers[first])) == radii[first]
-    near = Tracked(watch, Perception(kind="lidar", range=2.3), 60)
+    near = Tracked(tracking, Perception(kind="lidar", range=2.3), 60)
     assert near.within_range(36, (0.0, 0.0)).tolist() == [numbers[first]]
     assert math.hypot(2.0, 2.0) - 0.2 > 2.3
 

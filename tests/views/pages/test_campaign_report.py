@@ -9,9 +9,9 @@ import pytest
 
 from antdrive.runs.statistics.runs import RunTable
 from antdrive.views.colours import _luminance, label_styles
-from antdrive.views.pages.campaign import campaign_data, write_campaign_report
+from antdrive.views.pages.campaign_report import campaign_data, write_campaign_report
+from antdrive.views.pages.campaign_summary import summarise
 from antdrive.views.pages.charts import campaign_charts
-from antdrive.views.pages.summary import summarise
 from tests.runs.made_up_campaign import Skill, made_up_columns
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 

@@ -9,14 +9,14 @@ import numpy.typing as npt
 
 from antdrive.base.plane import frame_at
 from antdrive.base.types import Flags, Floats, Pose
-from antdrive.sim.driving.survey import MAP_CELL, RECENT, forgetting_ticks, horizon_of, turning_room
+from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of, reset_ticks, turning_room
 from antdrive.sim.log.rollout import Rollout, ranges_of
 from antdrive.sim.log.sights import lidar_of, meet
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import SKIN
 
 
-class Recollection:
+class MapReconstruction:
     """The scans of a log, entered one after the other. Moments are asked for in increasing order.
 
     The map is made anew at the poses that the robot believed in, so it is the robot's own. A robot that found no way forgets
@@ -38,7 +38,7 @@ class Recollection:
         self._entered, self._meeting = 0, meeting
         self.met: Floats = np.full(len(rollout.record.world.obstacles), math.inf)
         self.map = self._empty_map(rollout.record.task.start)
-        ticks = forgetting_ticks(rollout.record) if forgetting else ()
+        ticks = reset_ticks(rollout.record) if forgetting else ()
         self._forgetting = [tick / rollout.record.control_hz for tick in ticks]
 
     @property
@@ -74,17 +74,17 @@ class Recollection:
         """Make the map anew of the latest scans, as the robot did: in the same control period, after the scan."""
         record = self._rollout.record
         here = self._estimate(self._row(at))[:2]
-        self.map = self.map.renewed(here, turning_room(record.robot.radius), record.task.goal)
+        self.map = self.map.reset_around(here, turning_room(record.robot.radius), record.task.goal)
         recent = math.ceil(RECENT * self.lidar.rate)
         for k in range(max(0, self._entered - recent), self._entered):
             self._insert(k)
 
     def _empty_map(self, pose: Pose) -> OccupancyMap:
         record = self._rollout.record
-        horizon = horizon_of(watching=record.perception is not None and record.perception.kind == "lidar")
+        horizon = horizon_of(tracks_movers=record.perception is not None and record.perception.kind == "lidar")
         seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon, goal=record.task.goal)
         movers = np.column_stack((self._rollout.movers[0], [mover.radius for mover in record.world.movers]))
-        seen.take_as_free(pose[:2], turning_room(record.robot.radius), record.world, movers)
+        seen.mark_free(pose[:2], turning_room(record.robot.radius), record.world, movers)
         return seen
 
     def _insert(self, k: int) -> None:
@@ -125,13 +125,13 @@ class Recollection:
         return np.array([math.cos(turn), math.sin(turn), x, y])
 
 
-def laid_in_world(points: Floats, drift: Floats) -> Floats:
+def world_points(points: Floats, drift: Floats) -> Floats:
     """Where places on the robot's map lie in the world (N, 2) [m]."""
     cos, sin, x, y = drift.tolist()
     return np.asarray((points - (x, y)) @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
 
 
-def containers(cylinders: Floats) -> npt.NDArray[np.intp]:
+def enclosing_cylinders(cylinders: Floats) -> npt.NDArray[np.intp]:
     """For each of the cylinders (N, 4) one that it stands in, or itself: nobody sees what stands in another one."""
     found = np.arange(len(cylinders))
     for j, (x, y, radius, _) in enumerate(cylinders):

@@ -34,7 +34,7 @@ RELATIVE = 1e-9  # how far a cost may be off, as a fraction
 NEAR = 1e-6  # m: how far a waypoint may be off, and how much a line may come too close
 
 
-def ask(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
+def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
     """A planner's answer to a query. It is not checked.
 
     Args:
@@ -47,13 +47,13 @@ def ask(planner: Planner, query: Query, rng: np.random.Generator, name: str = ""
         InputError: the planner says that the query is wrong.
         PlannerError: the planner raised anything else, or its answer is no `PlanResult`.
     """
-    with blaming(planner, name):
+    with planner_errors(planner, name):
         answer: Any = planner.plan(query, rng)
-    return answered(planner, answer, name)
+    return require_result(planner, answer, name)
 
 
 @contextlib.contextmanager
-def blaming(planner: Planner, name: str = "") -> Iterator[None]:
+def planner_errors(planner: Planner, name: str = "") -> Iterator[None]:
     """Whatever is raised within becomes a `PlannerError`, but for `InputError`, Ctrl-C and SIGTERM.
 
     Args:
@@ -72,7 +72,7 @@ def blaming(planner: Planner, name: str = "") -> Iterator[None]:
         raise PlannerError(name or type(planner).__name__, f"raised {says} ({_place(planner, error)})") from error
 
 
-def answered(planner: Planner, answer: Any, name: str = "") -> PlanResult:
+def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
     """The answer of a planner, or of what it made, if it is a `PlanResult`.
 
     Args:
@@ -130,7 +130,7 @@ def check_plan(query: Query, result: PlanResult) -> str:
         query: what the planner was asked
         result: what it answered
     """
-    problem = _types(result) or _pictures(query, result)
+    problem = _types(result) or _figure_data(query, result)
     if problem:
         return problem
     if not len(result.cells):
@@ -188,7 +188,7 @@ def _types(result: PlanResult) -> str:
     return ""
 
 
-def _pictures(query: Query, result: PlanResult) -> str:
+def _figure_data(query: Query, result: PlanResult) -> str:
     """What is wrong with what figures draw: the field, and the history of an iterative planner; or empty."""
     field, history = result.field, result.history
     made: Any = history  # by other people's code
@@ -330,9 +330,9 @@ def _too_close(query: Query, xy: Floats) -> Any:
     # A robot that stands closer than the clearance leaves to a free cell nearby, but must not come closer still.
     keep[0] = min(inflate, float(point_clearance(task.world, xy[:1])[0]))
     close = segment_clearance(task.world, xy[:-1], xy[1:]) < keep - NEAR
-    share = end_reach(inflate, query.grid.cell) / max(math.dist(xy[0], xy[1]), 1e-9)
-    if share < 1:
-        away = xy[:1] + share * (xy[1:2] - xy[:1])
+    fraction = end_reach(inflate, query.grid.cell) / max(math.dist(xy[0], xy[1]), 1e-9)
+    if fraction < 1:
+        away = xy[:1] + fraction * (xy[1:2] - xy[:1])
         close[0] |= segment_clearance(task.world, away, xy[1:2])[0] < inflate - NEAR
     return close
 

@@ -4,8 +4,8 @@ from PIL import Image
 
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ComponentRecord
-from antdrive.views.colours import VERDICTS, planner_style
-from antdrive.views.film.compare import FULL, LEAST_TILE, Mark, SplitScreen, compare_film, fitting_size
+from antdrive.views.colours import OUTCOME_LABELS, planner_style
+from antdrive.views.film.comparison_film import FULL, LEAST_TILE, Mark, SplitScreen, compare_film, fitting_size
 from tests.records import changed
 
 SIZE = (640, 360)
@@ -29,7 +29,7 @@ def shaped(log, high):
 def test_tiles_show_the_same_moment_and_a_finished_run_keeps_its_last_picture(drives):
     screen = SplitScreen(drives, "top", SIZE)
     at = [screen.frame(t) for t in (0.3, 0.7, 0.8)]
-    alone = screen._tiles[1].shot.replay.pose(0.8)
+    alone = screen._tiles[1].shot.playback.pose(0.8)
     assert all(picture.shape == (*SIZE[::-1], 3) for picture in at)
     left, right = np.s_[:, :318], np.s_[:, 320:]
     assert (at[1][left] == at[2][left]).all(), "over"
@@ -44,7 +44,7 @@ def test_each_run_has_its_planners_colour_and_its_outcome(drives):
     for k, log in enumerate(drives):
         colour = np.array(planner_style(log.record.planner.name)[0])
         assert np.abs(end[2, 320 * k + 2].astype(int) - colour).max() == 0
-    green = np.array(VERDICTS[Outcome.SUCCEEDED][1])
+    green = np.array(OUTCOME_LABELS[Outcome.SUCCEEDED][1])
     assert (np.abs(end.astype(int) - green).max(axis=-1) < 6).sum() > 500
 
 

@@ -15,9 +15,9 @@ from PIL import Image, ImageDraw
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import BAND, CALM, INK, MUTED, VERDICTS, planner_style
+from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, planner_style
 from antdrive.views.film.camera import Picture, turns
-from antdrive.views.film.options import ENCODERS, FilmInfo, FilmOptions
+from antdrive.views.film.film_options import ENCODERS, FilmInfo, FilmOptions
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.text import fitted, font, pill, put, text_width
 from antdrive.views.film.video import HOLD, encoded, frame_times
@@ -108,7 +108,7 @@ class Tile:
 
     def frame(self, at: float) -> Picture:
         """The tile (h, w, 3) at a moment [s]; after the run's end, the last one."""
-        end = self.shot.replay.duration
+        end = self.shot.playback.duration
         if at < end:
             return self._with_head(self._marked(self.shot.view(at), at), at, False)
         if self._last is None:
@@ -126,13 +126,13 @@ class Tile:
         image = Image.new("RGB", (wide, self._head), BAND)
         draw = ImageDraw.Draw(image)
         draw.rectangle((0, 0, round(0.5 * unit), self._head), fill=self._colour)
-        words, colour = VERDICTS[self._outcome] if over else (f"{at:.1f} s", CALM)
+        words, colour = OUTCOME_LABELS[self._outcome] if over else (f"{at:.1f} s", CALM)
         verdict = pill(words, round(0.85 * unit), colour)
         room = wide - verdict.shape[1] - round(2.2 * unit)
         large, small = round(1.15 * unit), round(0.8 * unit)
         name = fitted(self._name, room, large, True)
         draw.text((1.2 * unit, 0.3 * unit), name, font=font(large, True), fill=INK)
-        facts = [f"path {self._length:.2f} m", f"min clearance {self.shot.replay.min_clearance(at):.3f} m"]
+        facts = [f"path {self._length:.2f} m", f"min clearance {self.shot.playback.min_clearance(at):.3f} m"]
         facts = [*facts, f"took {at:.1f} s"] if over else facts
         while len(facts) > 1 and text_width("  ·  ".join(facts), small) > wide - 2 * unit:
             facts.pop(0)

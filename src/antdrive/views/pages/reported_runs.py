@@ -251,11 +251,11 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
         if missing:
             raise InputError(f"{path}: {missing[0]}: missing; `antdrive run` writes it")
         log = path.parent / "rollout.npz"
-        facts = facts_of(Rollout.load(log), result, str(log)) if log.exists() else None
+        facts = log_facts(Rollout.load(log), result, str(log)) if log.exists() else None
         yield ReportedRun(path.parent, result, facts, place)
 
 
-def facts_of(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts:
+def log_facts(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts:
     """What a log says, computed from the log alone, and what the result beside it says otherwise."""
     try:
         certificate, metrics, digest = certify(rollout), measure(rollout), rollout.digest
@@ -267,10 +267,10 @@ def facts_of(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts
     return LogFacts(rollout.record, certificate, metrics, sights, scans, digest, logged_settings(rollout), claims)
 
 
-def made_run(run: Run) -> ReportedRun:
+def reported_run(run: Run) -> ReportedRun:
     """A run made in Python, as reports show it. Its log is certified again."""
     result, name = run.as_dict(), run.scenario.task.world.name
-    return ReportedRun(None, result, None if run.rollout is None else facts_of(run.rollout, result, name), 0)
+    return ReportedRun(None, result, None if run.rollout is None else log_facts(run.rollout, result, name), 0)
 
 
 def note_differences(runs: Sequence[ReportedRun]) -> None:

@@ -14,8 +14,8 @@ from antdrive.runs.campaigns.results import common_folder, read_runs
 from antdrive.runs.statistics.runs import HASHES, RunTable
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
+from antdrive.views.pages.campaign_summary import CampaignSummary, headline, measure_title, summarise
 from antdrive.views.pages.rendering import json_column, json_texts, link_to, page_data, rendered
-from antdrive.views.pages.summary import CampaignSummary, headline, measure_title, summarise
 from antdrive.views.pages.tables import (
     WORDS,
     all_cells,

@@ -14,7 +14,7 @@ from antdrive.views.colours import BEAM, HATCH, HIT, PALE
 from antdrive.views.film import _kernels_paint as painting
 from antdrive.views.film.camera import Picture
 from antdrive.views.film.ground import capsules
-from antdrive.views.recollection import Recollection, containers, laid_in_world
+from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders, world_points
 from antdrive.views.scene import Scene
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ DRAWN_BEAMS = 90  # in a full circle, at most
 HATCHING = 9.0  # distance between the lines of the hatching [px]
 
 
-class FanPainter:
+class BeamPainter:
     """Paints the beams of the last scan into frames."""
 
     def __init__(self, rollout: Rollout) -> None:
@@ -40,7 +40,7 @@ class FanPainter:
         """Go on to a moment [s]."""
         self._last = max(0, int(np.searchsorted(self._times, at + 1e-9, side="right")) - 1)
 
-    def lay_fan(self, frame: Picture, backdrop: Backdrop) -> None:
+    def draw_beams(self, frame: Picture, backdrop: Backdrop) -> None:
         """Lay the beams of the last scan on the ground."""
         lidar, (eye, first, reaches) = self._lidar, beams_of(self._rollout, self._last)
         every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
@@ -49,45 +49,45 @@ class FanPainter:
         kernels.lay_fan(frame, backdrop.visible, backdrop.forward, backdrop.inverse, *fan, style, colour)
 
 
-class SightPainter(FanPainter):
+class OwnMapPainter(BeamPainter):
     """Paints what a robot without a map had seen into frames. Moments are asked for in increasing order."""
 
     def __init__(self, rollout: Rollout, scene: Scene) -> None:
         super().__init__(rollout)
-        self._recollection, self._scene = Recollection(rollout), scene
-        self._drift = self._recollection.drift(0.0)
+        self._reconstruction, self._scene = MapReconstruction(rollout), scene
+        self._drift = self._reconstruction.drift(0.0)
         self._discs = np.empty((0, 3))
-        self._around = containers(scene.obstacles)
+        self._around = enclosing_cylinders(scene.obstacles)
 
     def advance(self, at: float) -> None:
         """Go on to a moment [s]."""
         super().advance(at)
-        recollection = self._recollection
-        recollection.advance(at)
-        self._drift = recollection.drift(at)
-        discs = recollection.map.discs()
-        self._discs = np.column_stack([laid_in_world(discs[:, :2], self._drift), discs[:, 2]])
+        reconstruction = self._reconstruction
+        reconstruction.advance(at)
+        self._drift = reconstruction.drift(at)
+        discs = reconstruction.map.discs()
+        self._discs = np.column_stack([world_points(discs[:, :2], self._drift), discs[:, 2]])
 
-    def laid(self, points: Floats) -> Floats:
+    def to_world(self, points: Floats) -> Floats:
         """Where places (N, 2) on the robot's map lie in the world now [m]."""
-        return laid_in_world(points, self._drift)
+        return world_points(points, self._drift)
 
-    def cover(self, frame: Picture, backdrop: Backdrop, fine: int) -> None:
+    def hatch_unknown(self, frame: Picture, backdrop: Backdrop, fine: int) -> None:
         """Hatch the ground that is not known to be free, and pale the obstacles that no beam has met."""
-        seen, pixel = self._recollection.map, backdrop.camera.pixel
+        seen, pixel = self._reconstruction.map, backdrop.camera.pixel
         style = np.array([VEIL, LINES, HATCHING * pixel, pixel])
         tints = np.array([PALE, HATCH], dtype=np.float64)
         arrays, bounds, visible = seen.arrays, np.array(self._scene.bounds), backdrop.visible
         ground = (arrays.free, arrays.occupied, arrays.frame)
         kernels.veil(frame, visible, backdrop.inverse, bounds, self._drift, *ground, style, tints)
-        unmet = np.isinf(self._recollection.met)[self._around]
+        unmet = np.isinf(self._reconstruction.met)[self._around]
         if unmet.any():
             kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
 
-    def put_hits(self, frame: Picture, backdrop: Backdrop) -> None:
+    def draw_hits(self, frame: Picture, backdrop: Backdrop) -> None:
         """Put the hits on the robot's map over everything, at the height of the beams."""
         camera = backdrop.camera
-        plane = camera.plane(min(self._recollection.lidar.height, 0.3))
+        plane = camera.plane(min(self._reconstruction.lidar.height, 0.3))
         places, radii = self._discs[:, :2], np.maximum(self._discs[:, 2], 1.1 * camera.pixel)
         everywhere, colour = np.ones_like(backdrop.visible), np.array(HIT, dtype=np.float64)
         rows = capsules(places, places, radii)

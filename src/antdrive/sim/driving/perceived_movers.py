@@ -14,7 +14,7 @@ from antdrive.sim.policy import Perception
 from antdrive.worlds import Trajectories
 
 if TYPE_CHECKING:
-    from antdrive.sim.driving.survey import Watch
+    from antdrive.sim.driving.survey import MoverTracking
     from antdrive.sim.sensing.tracking import TrackedMovers
 
 CHUNK = 240  # control periods whose positions and velocities are computed at once
@@ -24,7 +24,7 @@ STANDS = 0.08  # a mover that is slower than this, as far as scans tell, stands 
 Numbers: TypeAlias = npt.NDArray[np.int64]
 
 
-class Others(abc.ABC):
+class PerceivedMovers(abc.ABC):
     """The movers as the robot perceives them, within range. Each goes on at the velocity that the robot knows.
 
     Attributes:
@@ -69,7 +69,7 @@ class Others(abc.ABC):
         return numbers[near], places[near], velocities[near], radii[near]
 
 
-class Told(Others):
+class GroundTruth(PerceivedMovers):
     """Movers by ground truth: positions, velocities or motions."""
 
     def __init__(self, trajectories: Trajectories, perception: Perception, hz: int) -> None:
@@ -108,21 +108,21 @@ class Told(Others):
         return self._everyone, self._positions[row], self._velocities[row], self._trajectories.radii
 
 
-class Tracked(Others):
+class Tracked(PerceivedMovers):
     """Movers by tracks of a lidar, counted as they are found.
 
     Attributes:
         watch: what the scans tell
     """
 
-    def __init__(self, watch: Watch, perception: Perception, hz: int) -> None:
+    def __init__(self, tracking: MoverTracking, perception: Perception, hz: int) -> None:
         super().__init__(perception, hz)
-        self.watch = watch
+        self.tracking = tracking
 
     def perceived(self, tick: int, robot: tuple[float, float]) -> tuple[Numbers, Floats]:
         """The numbers (P,) of the movers that are followed, and the places of all (M, 2) [m]; nan: not followed any more."""
         numbers, places, _, _ = self._now(tick)
-        everywhere = np.full((self.watch.tracker.found, 2), np.nan)
+        everywhere = np.full((self.tracking.tracker.found, 2), np.nan)
         everywhere[numbers] = places
         return self.within_range(tick, robot), everywhere
 
@@ -141,10 +141,10 @@ class Tracked(Others):
     @property
     def _followed(self) -> TrackedMovers:
         """The movers at the last scan."""
-        return self.watch.tracker.movers()
+        return self.tracking.tracker.movers()
 
     def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
         found = self._followed
         velocities = np.where(np.hypot(*found.velocities.T)[:, None] < STANDS, 0.0, found.velocities)
-        places = found.positions + (tick - self.watch.tick) / self._hz * velocities
+        places = found.positions + (tick - self.tracking.tick) / self._hz * velocities
         return found.numbers, places, velocities, found.radii

@@ -23,10 +23,10 @@ _within: ContextVar[bool] = ContextVar("_within", default=False)
 _loaded: set[str] = set()  # what has been rehearsed in this process
 
 
-class Rehearsed(Protocol):
+class WarmsUp(Protocol):
     """A planner that can be tried before its time is taken."""
 
-    def rehearsal(self) -> Rehearsed:
+    def for_warmup(self) -> WarmsUp:
         """The same planner with as little work as calls the same kernels."""
         ...
 
@@ -36,7 +36,7 @@ class Rehearsed(Protocol):
 
 
 @contextlib.contextmanager
-def kernels_loaded(planner: Rehearsed, query: Query) -> Iterator[None]:
+def kernels_loaded(planner: WarmsUp, query: Query) -> Iterator[None]:
     """A context for timed planning, with the planner's kernels loaded before it begins."""
     if _within.get():
         yield
@@ -49,9 +49,9 @@ def kernels_loaded(planner: Rehearsed, query: Query) -> Iterator[None]:
         _within.reset(token)
 
 
-def load_kernels(planner: Rehearsed, query: Query) -> None:
+def load_kernels(planner: WarmsUp, query: Query) -> None:
     """Plan on a tiny grid, unless this planner with these options has done so in this process."""
-    shorter = planner.rehearsal()
+    shorter = planner.for_warmup()
     writeable = query.grid.free.flags.writeable
     kind = (bool(query.motions), query.task is not None, writeable)
     key = f"{type(shorter).__module__}.{shorter!r} {kind}"
@@ -60,15 +60,15 @@ def load_kernels(planner: Rehearsed, query: Query) -> None:
     _loaded.add(key)
     # A new context has no watcher, who would see these iterations too; a planner that fails here fails where it is timed.
     with contextlib.suppress(Exception):
-        contextvars.Context().run(_rehearse, shorter, tiny_query(type(query), *kind))
+        contextvars.Context().run(_warm_up, shorter, tiny_query(type(query), *kind))
 
 
-def _rehearse(planner: Rehearsed, query: Query) -> None:
+def _warm_up(planner: WarmsUp, query: Query) -> None:
     _within.set(True)
     planner.plan(query, np.random.default_rng(0))
 
 
-def tiny_query(made_of: type[Query], motions: bool, task: bool, writeable: bool = False) -> Query:
+def tiny_query(query_type: type[Query], motions: bool, task: bool, writeable: bool = False) -> Query:
     """A query on 12 x 12 cells around a cylinder, of the same types as those of worlds."""
     from antdrive.worlds import Cruising, Disc, Task, Trajectories, World, rasterise
 
@@ -78,7 +78,7 @@ def tiny_query(made_of: type[Query], motions: bool, task: bool, writeable: bool 
     grid = rasterise(world, made.cell, 0.2)
     if writeable:
         grid = dataclasses.replace(grid, free=grid.free.copy(), moves=grid.moves.copy())
-    query = made_of.between(grid, made)
+    query = query_type.between(grid, made)
     return dataclasses.replace(
         query, task=made if task else None, motions=Trajectories.of(world, made.start[:2], 0).motions if motions else ()
     )
