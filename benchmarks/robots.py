@@ -20,7 +20,7 @@ from antdrive.robots.importing.urdf_import import import_urdf
 from antdrive.sim import Scenario, run
 from antdrive.worlds import Task
 from benchmarks.drives import barn_tasks
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 from tools.shared_data import BARN
 
 HERE = Path(__file__).parent

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import print_error, print_json, print_line
-from antdrive.cli.exits import WRONG_INPUT
+from antdrive.cli.exits import INVALID_INPUT
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import log_at
 
@@ -52,4 +52,4 @@ def verify(
     readable = all(found["readable"] for found in checked.values())
     if json and (readable or len(checked) > 1):
         print_json({"certified": all_certified, "rollouts": checked})
-    return all_certified if readable else WRONG_INPUT
+    return all_certified if readable else INVALID_INPUT

@@ -10,7 +10,7 @@ from antdrive.cli import options
 from antdrive.cli.console import bar, file_lines, show, table
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pair
-from antdrive.cli.scenario import Ends, random_world
+from antdrive.cli.scenario_options import Ends, random_world
 
 if TYPE_CHECKING:
     from antdrive.worlds import Task
