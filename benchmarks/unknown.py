@@ -31,7 +31,7 @@ from antdrive.runs.campaigns.results import SweepResults
 from antdrive.runs.statistics.price import Ratio, prices
 from antdrive.runs.statistics.run_table import RunTable
 from antdrive.views.film.video import film_failures
-from benchmarks.tables import command_line, missing, print_tables, table
+from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import BARN
 
 SMALLEST = ("ablations --worlds 1 --variants 2 --jobs 0 --results out", "contacts --worlds 2 --jobs 0 --results out")

@@ -14,7 +14,7 @@ from antdrive.runs.papers.claims import CLAIMS, Decision
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.reproduction import reproduce as measure_again
 from antdrive.views import papers as pictures
-from tools.papers import claims_table, counts_table, missing, replaced
+from tools.paper_tables import claims_table, counts_table, missing, replaced
 from tools.shared_data import data_folder
 
 

@@ -12,7 +12,7 @@ from antdrive.cli import options
 from antdrive.cli.console import bar, show, table
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, results_folder
-from antdrive.cli.scenario import Setup
+from antdrive.cli.scenario_options import Setup
 from antdrive.views.run_folder import RUN_FILES, fingerprint, write_result, write_run
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, show, this_command, working
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
-from antdrive.cli.scenario import with_chosen_margin
-from antdrive.cli.warm import compile_once
+from antdrive.cli.scenario_options import with_chosen_margin
 from antdrive.views.run_folder import fingerprint, write_result, write_run
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def shrink(
     if planner is not None and "::" in failure:
         raise InputError(f"--planner: is for logs; the suite says which planner {failure} has")
     scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure, planner), None)
-    crossed = parse_bound(bound) if bound is not None else _bound_not_kept(case, scenario)
+    crossed = parse_bound(bound) if bound is not None else _broken_bound(case, scenario)
     name = f"{scenario_name(scenario.task.world.name)}-small"
     mark = fingerprint(scenario, str(crossed))
     with results_folder(out, Path("out") / name, MARKER, mark) as (folder, _):
@@ -101,7 +101,7 @@ def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
     return scenario_of(cases[0], with_chosen_margin), cases[0]
 
 
-def _bound_not_kept(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | None":
+def _broken_bound(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | None":
     """What counts as failing where a test's drive ends as expected and breaks a bound of the test or of its baseline."""
     from antdrive.runs.failures.failure import Attempt, bound_broken_in
 
