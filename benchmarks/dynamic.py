@@ -39,7 +39,7 @@ from antdrive.worlds import (
     load_task,
     rasterise,
 )
-from benchmarks.tables import command_line, missing, print_tables, table
+from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import DYNABARN
 
 SMALLEST = ("--most 1 --jobs 1",)

@@ -18,7 +18,7 @@ from antdrive.runs.margins.choice import Calibration, choose_margin, with_chosen
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import generate
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 
 SMALLEST = ("--worlds 2 --robots turtlebot --smoothings taut --noises 0 --jobs 1",)
 FIRST_SEED = 50_000

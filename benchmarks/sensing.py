@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from antdrive.robots import Lidar, load_robot
 from antdrive.sim.sensing import MappedGround, MoverTracker, OccupancyMap, Scanner, clear_distance
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 
 SMALLEST = ("--blocks 1 --beams 36",)
 HALL = (-10.0, -10.0, 10.0, 10.0)

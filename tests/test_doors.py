@@ -10,7 +10,7 @@ from antdrive.cli.commands.worlds import import_world
 from antdrive.robots import LIMITERS
 from antdrive.robots.control import _kernels_pursuit as rules
 from antdrive.sim.log.metrics import METRICS
-from antdrive.views.colours import VERDICTS
+from antdrive.views.colours import OUTCOME_LABELS
 from antdrive.views.figures.run_figures import LIMITER_COLOURS
 from antdrive.worlds import IMPORTS
 
@@ -53,7 +53,7 @@ def test_a_limiter_has_a_colour_and_an_index_in_the_kernels():
 
 @pytest.mark.parametrize("outcome", Outcome)
 def test_an_outcome_has_a_verdict(outcome):
-    assert outcome in VERDICTS
+    assert outcome in OUTCOME_LABELS
     assert not outcome.value.endswith("."), "the sentence continues in messages"
 
 

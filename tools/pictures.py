@@ -22,11 +22,11 @@ from typing import Any
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
-from antdrive.views.film.compare import SplitScreen
+from antdrive.views.film.comparison_film import SplitScreen
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.video import STILLS, still
-from antdrive.views.folder import caption
-from antdrive.views.pages.report import write_report
+from antdrive.views.pages.run_report import write_report
+from antdrive.views.run_folder import caption
 from antdrive.worlds.world import Disc
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"

@@ -15,7 +15,7 @@ import pytest
 from antdrive.cli.commands import COMMANDS, ROBOTS, WORLDS
 from antdrive.cli.exits import BROKEN_PIPE
 from antdrive.cli.groups import application
-from antdrive.planners import PLANNERS, watch
+from antdrive.planners import PLANNERS, on_progress
 
 
 @pytest.mark.parametrize(("group", "table"), [([], COMMANDS), (["worlds"], WORLDS), (["robots"], ROBOTS)])
@@ -115,7 +115,7 @@ def test_ctrl_c_while_planning_ends_a_command_that_plans_many_times(antdrive, sm
     def stop(progress):
         raise KeyboardInterrupt
 
-    with watch(stop):
+    with on_progress(stop):
         code, out, err = antdrive(*(str(small) if word == "WORLD" else word for word in words))
     *notes, last = err.splitlines()
     assert (code, out, last) == (130, "", "antdrive: interrupted")

@@ -104,7 +104,7 @@ def test_a_calibration_that_is_due_is_announced(antdrive, small, monkeypatch):
 
 def test_where_no_margin_is_enough_the_option_is_named(refused, small, monkeypatch):
     monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [Loss(margin, margin)] * choice.DRIVES)
-    monkeypatch.setattr("antdrive.cli.scenario.print_error", lambda text: None)
+    monkeypatch.setattr("antdrive.cli.scenario_options.print_error", lambda text: None)
     assert "--margin: auto: none of the 12 margins tried, up to 0.25 m, leaves 0.01 m" in refused(
         "plan", small, "--margin", "auto"
     )

@@ -17,7 +17,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import require
-from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import (
     Capabilities,
     Cells,
@@ -31,7 +31,7 @@ from antdrive.planners.plan import (
     path_cost,
 )
 
-REHEARSED = 2  # iterations in which kernels are loaded: the second evaporates and reuses what the first left
+WARMUP_ITERATIONS = 2  # iterations in which kernels are loaded: the second evaporates and reuses what the first left
 
 
 class Iteration(NamedTuple):
@@ -72,21 +72,21 @@ class Progress(NamedTuple):
     best: float
 
 
-_watcher: ContextVar[Callable[[Progress], None] | None] = ContextVar("_watcher", default=None)
+_progress_callback: ContextVar[Callable[[Progress], None] | None] = ContextVar("_progress_callback", default=None)
 
 
 @contextmanager
-def watch(see: Callable[[Progress], None]) -> Iterator[None]:
-    """Within this block, planners call `see` after every iteration.
+def on_progress(callback: Callable[[Progress], None]) -> Iterator[None]:
+    """Within this block, planners call `callback` after every iteration.
 
     Args:
-        see: called with the progress; what it raises ends the planning
+        callback: called with the progress; what it raises ends the planning
     """
-    token = _watcher.set(see)
+    token = _progress_callback.set(callback)
     try:
         yield
     finally:
-        _watcher.reset(token)
+        _progress_callback.reset(token)
 
 
 _keeping: ContextVar[bool] = ContextVar("_keeping", default=False)
@@ -131,9 +131,9 @@ class IterativePlanner(GridPlanner):
         """What this planner can do and what it needs."""
         return Capabilities(iterative=True)
 
-    def rehearsal(self) -> IterativePlanner:
+    def for_warmup(self) -> IterativePlanner:
         """This planner with few iterations, which call the same kernels."""
-        return dataclasses.replace(self, iterations=min(self.iterations, REHEARSED), time_budget=None)
+        return dataclasses.replace(self, iterations=min(self.iterations, WARMUP_ITERATIONS), time_budget=None)
 
     @abc.abstractmethod
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
@@ -158,7 +158,7 @@ class IterativePlanner(GridPlanner):
             states: the iterations, as `iterate` yields them
         """
         if not reachable(query):
-            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit=self.work_unit)
+            return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work_unit=self.work_unit)
         if query.start == query.goal:
             here = np.array([query.start], dtype=np.int32)
             return PlanResult(status=PlanStatus.SOLVED, cells=here, cost=0.0, work_unit=self.work_unit)
@@ -175,11 +175,11 @@ class IterativePlanner(GridPlanner):
 
     def _improve(self, states: Iterator[Iteration], done: list[Iteration]) -> str:
         deadline = math.inf if self.time_budget is None else time.perf_counter() + self.time_budget
-        see = _watcher.get()
+        callback = _progress_callback.get()
         for state in itertools.islice(states, self.iterations):
             done.append(state)
-            if see is not None:
-                see(Progress(len(done), self.iterations, done[-1].best))
+            if callback is not None:
+                callback(Progress(len(done), self.iterations, done[-1].best))
             if time.perf_counter() >= deadline and len(done) < self.iterations:
                 spent = f"{len(done)} of {self.iterations} iterations"
                 return f"stopped by the time budget of {self.time_budget:g} s after {spent}"

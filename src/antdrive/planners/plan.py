@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from antdrive.base import Floats, Point
 from antdrive.base.errors import FieldError, input_error
-from antdrive.planners.loading import kernels_loaded
+from antdrive.planners.warmup import kernels_loaded
 from antdrive.worlds import MoverMotion, Task
 from antdrive.worlds.route import cells_beside
 
@@ -28,7 +28,7 @@ Cell: TypeAlias = tuple[int, int]
 #: Cells of a grid, (N, 2): row and column of each.
 Cells: TypeAlias = npt.NDArray[np.int32]
 
-ENDS_TOGETHER = 16  # lines from an end to free cells that are looked at together, the shortest first
+END_BATCH = 16  # lines from an end to free cells that are looked at together, the shortest first
 
 
 class PlanStatus(enum.Enum):
@@ -138,7 +138,7 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -
         if clear.any():
             at_row, at_col = near[some[clear.argmax()]].tolist()
             return (at_row, at_col), True
-        first, last = last, last + ENDS_TOGETHER
+        first, last = last, last + END_BATCH
     return (row, col), False
 
 
@@ -216,7 +216,7 @@ class PlanResult:
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import card, curve_svg, path_svg
+        from antdrive.worlds.svg import card, curve_svg, path_svg
 
         picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
         facts = {
@@ -274,8 +274,8 @@ class TimedPlan(PlanResult):
         """
         ticks = max(1, math.ceil(self.duration / step))
         t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
-        robot = self.at(t)
-        return min((float(np.hypot(*(robot - m.at(t)).T).min()) - m.radius for m in movers), default=math.inf)
+        xy = self.at(t)
+        return min((float(np.hypot(*(xy - m.at(t)).T).min()) - m.radius for m in movers), default=math.inf)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -363,7 +363,7 @@ class GridPlanner(abc.ABC):
         options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return dataclasses.replace(result, options=options, wall_s=spent)
 
-    def rehearsal(self) -> GridPlanner:
+    def for_warmup(self) -> GridPlanner:
         """This planner with as little work as calls the same kernels, which are loaded so before the clock starts."""
         return self
 

@@ -98,13 +98,13 @@ def list_planners() -> Mapping[str, Planner]:
 
     A planner that cannot be loaded is left out with a warning.
     """
-    found = dict(PLANNERS)
+    planners = dict(PLANNERS)
     for name, entry in _plugins().items():
         try:
-            found[name] = _load(entry)
+            planners[name] = _load(entry)
         except InputError as broken:
             warnings.warn(str(broken), stacklevel=2)
-    return MappingProxyType(found)
+    return MappingProxyType(planners)
 
 
 def describe(planner: Planner) -> str:
@@ -214,16 +214,16 @@ def _unknown(name: str, choices: Iterable[str], what: str = "planner") -> str:
 
 
 def _plugins() -> dict[str, importlib.metadata.EntryPoint]:
-    found: dict[str, importlib.metadata.EntryPoint] = {}
+    entries: dict[str, importlib.metadata.EntryPoint] = {}
     for entry in importlib.metadata.entry_points(group=GROUP):
-        if entry.name in PLANNERS or (entry.name in found and found[entry.name].value != entry.value):
-            taken = "antdrive" if entry.name in PLANNERS else _maker(found[entry.name])
+        if entry.name in PLANNERS or (entry.name in entries and entries[entry.name].value != entry.value):
+            taken = "antdrive" if entry.name in PLANNERS else _maker(entries[entry.name])
             warnings.warn(
                 f"planner {entry.name!r} of {_maker(entry)} is left out: {taken} has one of that name", stacklevel=3
             )
             continue
-        found.setdefault(entry.name, entry)
-    return found
+        entries.setdefault(entry.name, entry)
+    return entries
 
 
 def _load(entry: importlib.metadata.EntryPoint) -> Planner:

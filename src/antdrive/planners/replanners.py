@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
-from antdrive.planners.checking import ask, blaming
 from antdrive.planners.graph.incremental import CachedReplanner, Replanner, ReplanningPlanner
 from antdrive.planners.plan import Cell, Planner, PlanResult, Query, capabilities_of
+from antdrive.planners.validation import planner_errors, request_plan
 
 
 def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> Replanner:
@@ -34,7 +34,7 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
                 "planner", f"{type(planner).__name__} plans among {what}; it cannot replan by blocked cells"
             )
     if can.own_replanner:
-        with blaming(planner):
+        with planner_errors(planner):
             return cast(ReplanningPlanner, planner).replanner(query, rng)
     return ReplanFromScratch(planner, query, rng)
 
@@ -46,8 +46,8 @@ class ReplanFromScratch(CachedReplanner):
         super().__init__(query)
         self._planner, self._rng = planner, rng
 
-    def _plan_anew(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
-        return dataclasses.replace(ask(self._planner, query, self._rng), waypoints=None, length=None)
+    def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
+        return dataclasses.replace(request_plan(self._planner, query, self._rng), waypoints=None, length=None)
 
 
 @dataclass
@@ -129,7 +129,7 @@ def agent_for(planner: Planner, query: Query, rng: np.random.Generator) -> Onlin
         PlannerError: the planner raised something.
     """
     if capabilities_of(planner).cell_by_cell:
-        with blaming(planner):
+        with planner_errors(planner):
             return cast(CellByCellPlanner, planner).agent(query, rng)
     return ReplanningAgent(replanner_for(planner, query, rng))
 

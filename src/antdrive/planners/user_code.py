@@ -200,8 +200,8 @@ def _importing_for(folder: Path, *, owned: bool) -> Iterator[None]:
 
 def _module_in(folder: Path, name: str) -> Path | None:
     """The file of a module or package in a folder; None if there is none."""
-    found = importlib.machinery.PathFinder.find_spec(name, [str(folder)])
-    return Path(found.origin).resolve() if found is not None and found.origin is not None else None
+    spec = importlib.machinery.PathFinder.find_spec(name, [str(folder)])
+    return Path(spec.origin).resolve() if spec is not None and spec.origin is not None else None
 
 
 @contextlib.contextmanager

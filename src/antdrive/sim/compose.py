@@ -189,7 +189,7 @@ def warm_up_replanning(s: Scenario) -> None:
     """Replan twice in a tiny world, once per process and planner, so that the times of replans hold no loading of kernels."""
     if not s.driven_world.movers or s.replanning is None or not isinstance(s.planner, GridPlanner):
         return
-    planner = s.planner.rehearsal()
+    planner = s.planner.for_warmup()
     key = f"{type(planner).__module__}.{planner!r} {s.smoothing} {s.known_perception.kind} {s.replanning}"
     if key in _rehearsed:
         return

@@ -22,7 +22,7 @@ from antdrive.sim.recording import rollout_of
 from antdrive.sim.recording import versions as versions
 from antdrive.sim.scenario import Scenario, picture_of
 from antdrive.worlds import Grid
-from antdrive.worlds.drawing import LINE, card
+from antdrive.worlds.svg import LINE, card
 
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
 ENDED_BY = {

@@ -25,7 +25,7 @@ from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.physics.engine import State
 from antdrive.sim.policy import SCANNED
 from antdrive.sim.sensing import Scanner
-from antdrive.views.recollection import Recollection
+from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.worlds import Cruising, Disc, Task, World, generate, load_task
 from tests.records import changed
 
@@ -184,9 +184,9 @@ def test_a_drive_that_forgot_its_map_can_be_replayed(jackal, monkeypatch):
     assert len(list(reset_ticks(done.rollout.record))) > 1
     assert done.reason.startswith("no way through what was seen, last at t = ")
     assert replay(done.rollout).problems == ()
-    kept, forgot = Recollection(done.rollout), Recollection(done.rollout, forgetting=True)
-    for recollection in (kept, forgot):
-        recollection.advance(4.0)
+    kept, forgot = MapReconstruction(done.rollout), MapReconstruction(done.rollout, forgetting=True)
+    for reconstruction in (kept, forgot):
+        reconstruction.advance(4.0)
     own = cells_of(own_map(done.rollout))
     rounded = len(own) // 50  # a log has millimetres
     assert len(cells_of(forgot.map) ^ own) <= rounded < len(cells_of(kept.map) ^ own)

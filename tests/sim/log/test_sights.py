@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.base.plane import frame_at, laid
+from antdrive.base.plane import relative_frame, transform_points
 from antdrive.robots import load_robot
-from antdrive.robots.placing import footprint_clearance
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.sim import METRICS
 from antdrive.sim.log.rollout import millimetres, ranges_of
 from antdrive.sim.log.sights import PASSED, first_meetings, mover_sightings, passed, seen_ground, sightings
@@ -163,7 +163,7 @@ def flat(points):
 
 
 def test_a_frame_lies_so_that_both_poses_are_one():
-    frames = frame_at(OWN, TRUE)
+    frames = relative_frame(OWN, TRUE)
     turn = np.exp(1j * frames[:, 2])
     np.testing.assert_allclose(flat(frames) + turn * flat(OWN), flat(TRUE), atol=1e-12)
     np.testing.assert_allclose(turn * np.exp(1j * OWN[:, 2]), np.exp(1j * TRUE[:, 2]), atol=1e-12)
@@ -173,7 +173,7 @@ def test_what_the_robot_sees_lies_as_it_lies_from_the_robot():
     seen = RANDOM.uniform(-9, 9, (40, 2))
     ahead = (flat(seen) - flat(OWN)) * np.exp(-1j * OWN[:, 2])
     there = flat(TRUE) + ahead * np.exp(1j * TRUE[:, 2])
-    np.testing.assert_allclose(flat(laid(seen, frame_at(OWN, TRUE))), there, atol=1e-12)
+    np.testing.assert_allclose(flat(transform_points(seen, relative_frame(OWN, TRUE))), there, atol=1e-12)
 
 
 @given(st.lists(st.floats(0.002, 65.0), max_size=20))

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 
 from antdrive.runs.statistics.intervals import Interval
-from antdrive.runs.statistics.runs import RunTable
-from antdrive.views.pages.campaign import write_campaign_report
+from antdrive.runs.statistics.run_table import RunTable
+from antdrive.views.pages.campaign_report import write_campaign_report
+from antdrive.views.pages.campaign_summary import headline, measure_title, summarise
 from antdrive.views.pages.rendering import percent, percents, probability, short
-from antdrive.views.pages.summary import headline, measure_title, summarise
 from antdrive.views.pages.tables import all_cells, latex_text, outcome_cells, pair_cells, success_cells
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Point, Pose
-from antdrive.base.plane import place_name
+from antdrive.base.plane import format_position
 from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.robots import TrackedPath
@@ -268,7 +268,7 @@ class Blockage:
         order = self._standing[np.argsort(np.hypot(*(positions[self._standing] - pose[:2]).T), kind="stable")]
         alone = (m for m in order.tolist() if self._way(tick, pose, order[order != m]))
         mover = next(alone, int(order[0]))
-        at = place_name(self._task.frame, *positions[mover].tolist())
+        at = format_position(self._task.frame, *positions[mover].tolist())
         narrow = mover in self._noted(tick, pose[:2]) and self._way(tick, pose, order, narrow=True)
         closes = (
             f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self._keeps:.3g} m from it"

@@ -18,7 +18,7 @@ import numpy as np
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.planners import PlanResult, PlanStatus, smooth
 from antdrive.robots import TrackedPath, Twist
-from antdrive.robots.control.pursuit import unsorted
+from antdrive.robots.control.pursuit import unsorted_obstacles
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
@@ -231,7 +231,7 @@ class Exploration(RouteGuide):
         x, y, _ = pose
         near = self._routes.controller.lookahead_max + path.tuning.lookahead_clearance + SPARE
         discs = self.survey.map.discs((x - near, y - near, x + near, y + near))
-        return path.among(unsorted(discs, path.obstacles.bounds))
+        return path.with_obstacles(unsorted_obstacles(discs, path.obstacles.bounds))
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """A new path to a goal that the robot missed, unless it looks for a way already."""

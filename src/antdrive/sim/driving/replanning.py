@@ -27,9 +27,9 @@ from antdrive.planners import (
     Query,
     TimedPlan,
     agent_for,
-    blaming,
     capabilities_of,
     check_step,
+    planner_errors,
     smooth,
 )
 from antdrive.robots import TrackedPath
@@ -199,7 +199,7 @@ class CellByCell(Replanning):
         now, started = tick / self._hz, time.perf_counter()
         self._replanned_at = now
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
-        with blaming(self._routes.planner):
+        with planner_errors(self._routes.planner):
             here, propagated = self._online.cell, self._online.stats.propagated
             to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
         self._routes.plan_error = self._routes.plan_error or check_step(self._query, here, to)

@@ -17,12 +17,12 @@ from antdrive.planners import (
     PlanResult,
     PlanStatus,
     Query,
-    answered,
-    ask,
-    blaming,
     capabilities_of,
     checked,
+    planner_errors,
     replanner_for,
+    request_plan,
+    require_result,
     smooth,
 )
 from antdrive.planners.plan import Cell
@@ -87,7 +87,7 @@ class RoutePlanner:
 
     def plan(self, query: Query, rng: np.random.Generator, label: str = "") -> PlanResult:
         """The planner's answer, checked."""
-        return self.checked(query, ask(self.planner, query, rng, label))
+        return self.checked(query, request_plan(self.planner, query, rng, label))
 
     def checked(self, query: Query, answer: PlanResult) -> PlanResult:
         """The answer, if it is right; else note what is wrong with it."""
@@ -112,11 +112,11 @@ class RoutePlanner:
             return unreachable
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
             return self.plan(query, self.rng)
-        with blaming(self.planner):
+        with planner_errors(self.planner):
             closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
             # Without a map, movers change so many cells that a search is repaired no faster than made anew.
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
-        answer = answered(self.planner, answer)
+        answer = require_result(self.planner, answer)
         # A replanner knows cells only, not that the robot cannot get to the first of them.
         return unreachable if query.unreachable else self.checked(query, answer)
 

@@ -84,7 +84,7 @@ class Pursuit:
         last, before = now.before.command, now.before.pursuit
         if now.clock.turning <= self._full_turn:
             return Step(*self._controller.step(now.path, now.pose, last, before))
-        return Step(*self._controller.step(now.path.without_turning, now.pose, last, before._replace(turning=False)))
+        return Step(*self._controller.step(now.path.preferring_arcs, now.pose, last, before._replace(turning=False)))
 
 
 class TurnToScan:

@@ -94,7 +94,7 @@ class Certificate:
         return f"{self.statement}: least clearance {least}, between steps at least {bound}"
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import card
+        from antdrive.worlds.svg import card
 
         facts: dict[str, object] = {
             "least clearance": in_metres(self.min_clearance),

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import frame_at, laid
+from antdrive.base.plane import relative_frame, transform_points
 from antdrive.base.types import Floats
+from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.lidar import Lidar
-from antdrive.robots.placing import shape_of
 from antdrive.sim.log import _kernels_sights as kernels
 from antdrive.sim.log.record import finite_or_none
 from antdrive.sim.log.rollout import Rollout, ranges_of
@@ -137,7 +137,7 @@ def mover_sightings(rollout: Rollout) -> list[Sighting]:
 
 def _sighting(rollout: Rollout, j: int, first: float, poses: Floats, disc: Floats, **more: Any) -> Sighting:
     """What is first met at a time [s], if the robot's poses (T, 3) are seen from where a disc (3,) has its place."""
-    shape, row, away = shape_of(rollout.record.robot.footprint), np.zeros(1, dtype=np.int64), np.empty(1)
+    shape, row, away = kernel_shape(rollout.record.robot.footprint), np.zeros(1, dtype=np.int64), np.empty(1)
 
     def approach(some: Floats) -> tuple[int, float]:
         kernels.nearest_approaches(some, *shape, disc[None], row, away)
@@ -158,7 +158,7 @@ def tracked_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
     """
     rows = rollout.tracks[:, 0].astype(np.int64)
     believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
-    places = laid(rollout.tracks[:, 2:4].astype(np.float64), frame_at(believed, true))
+    places = transform_points(rollout.tracks[:, 2:4].astype(np.float64), relative_frame(believed, true))
     return [
         rows[np.hypot(*(places - rollout.movers[rows, j]).T) <= mover.radius]
         for j, mover in enumerate(rollout.record.world.movers)

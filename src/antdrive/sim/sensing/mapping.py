@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.base.errors import require_positive
+from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.lidar import Lidar
-from antdrive.robots.placing import shape_of
 from antdrive.robots.spec import Footprint
 from antdrive.sim.sensing import _kernels_mapping as kernels
 from antdrive.sim.sensing import _kernels_sight
@@ -397,4 +397,4 @@ def _clear(
 
 @functools.lru_cache(maxsize=16)
 def _corners(footprint: Footprint) -> Floats:
-    return shape_of(footprint)[1]
+    return kernel_shape(footprint)[1]

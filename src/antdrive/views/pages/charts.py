@@ -18,7 +18,7 @@ from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.success import StepCurve, distributions, performance_profiles
 from antdrive.views.colours import INK, MUTED, LabelStyle, hexed
 from antdrive.views.figures.canvas import new_figure, styled
-from antdrive.views.pages.summary import CampaignSummary, known_metrics, measure_title
+from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics, measure_title
 
 WORST = 10_000.0  # times the best value: the right end of a profile
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]

@@ -13,8 +13,8 @@ from typing import Any
 from antdrive.base.atomic import atomic_write, write_text
 from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.runs.statistics.success import PlannerSuccess
+from antdrive.views.pages.campaign_summary import CampaignSummary, measure_title
 from antdrive.views.pages.rendering import NONE, TextTable, percent, percents, probability, short, with_interval
-from antdrive.views.pages.summary import CampaignSummary, measure_title
 
 #: Headings of columns that hold words.
 WORDS = ("planner", "first", "second", "better", "lower", "against", "measure", "not worse")
