@@ -16,7 +16,7 @@ import pytest
 import antdrive.planners
 from antdrive import Scenario
 from antdrive.base import InputError
-from antdrive.cli.warm import TOGETHER
+from antdrive.cli.compiling import TOGETHER
 from antdrive.planners import (
     PLANNERS,
     AcoHan,
@@ -155,7 +155,7 @@ def test_a_planner_s_kernels_are_compiled_by_a_warm_up_group(name):
     groups = [names for names in TOGETHER if name in names]
     # The drive in the warm-up plans with `astar` and `as`, whose kernels other planners use, too.
     known = {kernel for names in (*TOGETHER, ("astar", "as")) for n in names for kernel in kernel_modules(PLANNERS[n])}
-    assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in cli/warm.py"
+    assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in cli/compiling.py"
 
 
 @pytest.mark.parametrize("name", PLANNERS)

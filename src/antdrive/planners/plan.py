@@ -213,7 +213,7 @@ class PlanResult:
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import card, curve_svg, path_svg
+        from antdrive.worlds.svg import card, curve_svg, path_svg
 
         picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
         facts = {

@@ -11,7 +11,7 @@ from antdrive.base import FieldError
 from antdrive.runs.statistics.comparison import _needed, compare_metric, compare_success, not_worse, pairs_of
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.price import prices
-from antdrive.runs.statistics.runs import PLACE, SETTINGS, RunTable, described, matching, merged
+from antdrive.runs.statistics.run_table import PLACE, SETTINGS, RunTable, described, matching, merged
 from antdrive.runs.statistics.success import common_medians, success_table
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
 

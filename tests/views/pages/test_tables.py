@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 
 from antdrive.runs.statistics.intervals import Interval
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.run_table import RunTable
 from antdrive.views.pages.campaign_report import write_campaign_report
 from antdrive.views.pages.campaign_summary import headline, measure_title, summarise
 from antdrive.views.pages.rendering import percent, percents, probability, short

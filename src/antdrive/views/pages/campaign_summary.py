@@ -24,7 +24,7 @@ from antdrive.runs.statistics.comparison import (
 from antdrive.runs.statistics.intervals import Interval
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.price import prices
-from antdrive.runs.statistics.runs import HASHES, RunTable
+from antdrive.runs.statistics.run_table import HASHES, RunTable
 from antdrive.runs.statistics.significance import FLIPS
 from antdrive.runs.statistics.success import PlannerSuccess, common_medians, success_table
 from antdrive.sim.log.metrics import METRICS
