@@ -170,7 +170,7 @@ def calibrated(jobs: Iterable[Job]) -> list[Job]:
     cases: dict[int, SweepCase] = {}
     for job in jobs:
         if job.case.settings.fields["margin"] == "auto" and id(job.case) not in cases:
-            conditions = job.case.scenario(job.seed, margin=0.0).loss_conditions
+            conditions = job.case.scenario(job.seed, margin=0.0).loss_factors
             key = calibration_key(conditions)
             if key not in chosen:
                 chosen[key] = choose_margin(conditions)
