@@ -1,6 +1,6 @@
 """A building of 40 x 30 m as a map of 0.05 m a pixel: what each stage of its use costs, and the loop among 10,000 cylinders.
 
-python -m benchmarks.building               # tables for docs/benchmarks.md
+python -m benchmarks.building               # tables for docs/notebook/building.md
 python -m benchmarks.building tasks         # 30 random tasks in it, with the campaign's statistics
 python -m benchmarks.building --map DIR     # only write the map, to look at it
 """
@@ -30,7 +30,7 @@ from antdrive.sim import Engine, Rollout, Scenario, certify, run
 from antdrive.sim.driving.drive import follow
 from antdrive.worlds import import_map_server, load_task, rasterise, save_task
 from benchmarks.loop import task_among, winding
-from benchmarks.tables import chosen, command_line
+from benchmarks.markdown import chosen, command_line
 
 RESOLUTION = 0.05  # [m]
 SIZE = (40.0, 30.0)  # [m]

@@ -29,12 +29,12 @@ import numpy as np
 from antdrive.sim import Scenario, run
 from antdrive.sim.driving import drive
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.stopping_constraint import StayInSight
-from antdrive.sim.driving.survey import Senses
+from antdrive.sim.driving.stopping_constraint import StoppingConstraint
+from antdrive.sim.driving.survey import SimulatedLidar
 from antdrive.sim.sensing import OccupancyMap
 from antdrive.sim.sensing.matching import ScanMatcher
 from benchmarks.drives import barn_tasks
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 from tools.shared_data import BARN
 
 SMALLEST = ("--drives 1 --worlds 1",)
@@ -102,12 +102,12 @@ def rows(source: Path, drives: int, worlds: int) -> Iterator[list[str]]:
     meter = Meter()
     meter.watch(drive, "_control_period", PERIOD)
     for owner, method, name in (
-        (Senses, "ranges", "scan"),
+        (SimulatedLidar, "ranges", "scan"),
         (ScanMatcher, "corrected", "match"),
         (OccupancyMap, "insert", "map"),
         (Exploration, "trigger", "watch"),
         (Exploration, "refreshed", "watch"),
-        (StayInSight, "limit", "sight"),
+        (StoppingConstraint, "limit", "sight"),
         (Exploration, "replan", "replans"),
     ):
         meter.watch(owner, method, name)

@@ -18,12 +18,12 @@ import numpy as np
 from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
 from antdrive.sim import Perception
 from antdrive.sim.driving.drive import OnePath, follow
-from antdrive.sim.driving.others import Told
+from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.driving.rules import Avoid
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
-from benchmarks.tables import command_line
+from benchmarks.markdown import command_line
 
 SMALLEST = ("--rounds 1",)
 MOVERS = 24
@@ -73,7 +73,7 @@ def table_of_movers(route: Route, rounds: int) -> None:
                 (f"{MOVERS} movers, not seen", full, moving),
                 (f"{MOVERS} movers, avoided", full, moving),
             ):
-                told = Told(motions, Perception(), 60)
+                told = GroundTruth(motions, Perception(), 60)
                 avoid = Avoid(Avoidance(), told, OnePath(), task, robot, 60)
                 started = time.perf_counter()
                 rules = [avoid] if name.endswith("avoided") else []

@@ -20,17 +20,18 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from antdrive.views.film.options import FilmOptions
+
 from antdrive.robots import list_robots
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
-from antdrive.views.film.compare import SplitScreen
-from antdrive.views.film.options import FilmOptions
+from antdrive.views.film.comparison_film import SplitScreen
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.video import STILLS, film, still
-from antdrive.views.folder import caption
-from antdrive.views.pages.report import write_report
+from antdrive.views.pages.run_report import write_report
+from antdrive.views.run_folder import caption
 from antdrive.worlds import list_worlds, load_task
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc

@@ -15,8 +15,8 @@ from .planners.registry import PLANNERS as PLANNERS
 from .planners.registry import list_planners as list_planners
 from .planners.registry import load_planner as load_planner
 from .robots.control.pursuit import PurePursuit as PurePursuit
-from .robots.files import list_robots as list_robots
-from .robots.files import load_robot as load_robot
+from .robots.robot_file import list_robots as list_robots
+from .robots.robot_file import load_robot as load_robot
 from .robots.spec import RobotSpec as RobotSpec
 from .runs.campaigns.sweeping import sweep as sweep
 from .sim.log.certificate import Certificate as Certificate
@@ -31,7 +31,7 @@ from .sim.pipeline import run as run
 from .sim.scenario import Scenario as Scenario
 from .views.figures.run_figures import overview as overview
 from .views.film.video import film as film
-from .views.pages.report import write_report as write_report
+from .views.pages.run_report import write_report as write_report
 from .worlds.files.world_file import list_worlds as list_worlds
 from .worlds.files.world_file import load_task as load_task
 from .worlds.files.world_file import save_task as save_task

@@ -14,7 +14,7 @@ import pytest
 import antdrive.runs.suites
 import antdrive.sim
 import antdrive.views
-from antdrive.views.pages.runs import REQUIRED
+from antdrive.views.pages.reported_runs import REQUIRED
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

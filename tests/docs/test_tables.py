@@ -155,24 +155,41 @@ COMMAND = re.compile(r"`(?:python -m (?P<module>[\w.]+)|make (?P<target>[\w-]+)|
 TABLE = re.compile(r"^\|[\s:|-]+\|$", re.MULTILINE)
 
 
-def sections(page):
-    """The text below each heading of a page, up to the next one."""
-    found = {}
-    for part in re.split(r"^(?=## )", page.read_text(), flags=re.MULTILINE)[1:]:
-        for section in re.split(r"^(?=### )", part, flags=re.MULTILINE):
-            found[section.partition("\n")[0]] = section
-    return found
-
-
-SECTIONS = {head: text for head, text in sections(ROOT / "docs" / "benchmarks.md").items() if TABLE.search(text)}
+BENCHMARKS = (DOCS / "benchmarks.md").read_text()
+NOTEBOOK = [page for page in sorted((DOCS / "notebook").glob("*.md")) if page.stem != "index"]
+SECTIONS = {
+    f"{page.stem}: {section.partition(chr(10))[0]}": section
+    for page in NOTEBOOK
+    for section in re.split(r"^## ", page.read_text(), flags=re.MULTILINE)
+    if TABLE.search(section)
+}
 
 
 @pytest.mark.parametrize("head", SECTIONS)
-def test_a_section_with_a_table_names_a_command_that_exists(head):
+def test_a_section_of_the_notebook_names_a_command_that_exists(head):
     commands = list(COMMAND.finditer(SECTIONS[head]))
     assert commands, "which command measures it again?"
-    for found in commands:
-        assert exists(found), found[0]
+    for command in commands:
+        assert exists(command), command[0]
+
+
+def test_benchmarks_are_one_page_of_ten_figures():
+    figures = re.findall(r"^\| \d+ \|.*", BENCHMARKS, re.MULTILINE)
+    commands = [COMMAND.search(row.rpartition(" | ")[2]) for row in figures]
+    assert len(BENCHMARKS.split()) <= 1200
+    assert len(figures) == 10
+    assert all(command and exists(command) for command in commands)
+
+
+def test_benchmarks_link_every_page_of_the_notebook():
+    assert [page.name for page in NOTEBOOK if f"| [{title(page)}](notebook/{page.name}) |" not in BENCHMARKS] == []
+    listed = (DOCS / "notebook" / "index.md").read_text().partition("```{toctree}")[2]
+    assert [page.name for page in NOTEBOOK if f"\n{page.stem}\n" not in listed] == []
+
+
+def title(page):
+    """The first heading of a page."""
+    return page.read_text().partition("# ")[2].partition("\n")[0]
 
 
 def exists(found):

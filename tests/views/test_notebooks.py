@@ -14,7 +14,7 @@ import pytest
 from antdrive.planners import PLANNERS, PlanResult, PlanStatus, Query, load_planner
 from antdrive.sim import Scenario, certify
 from antdrive.sim.log.outcome import Outcome
-from antdrive.views.colours import PLANNER_COLOURS, PLANNER_STYLES, VERDICTS, planner_style
+from antdrive.views.colours import OUTCOME_LABELS, PLANNER_COLOURS, PLANNER_STYLES, planner_style
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, Wandering, World, load_task, rasterise
 from tests.records import changed
 
@@ -143,4 +143,4 @@ def test_a_plugins_planner_has_a_style_of_its_name():
 
 
 def test_every_outcome_has_a_label():
-    assert set(VERDICTS) == set(Outcome)
+    assert set(OUTCOME_LABELS) == set(Outcome)

@@ -46,7 +46,7 @@ def polyline_length(xy: npt.ArrayLike) -> float:
     return float(segment_lengths(xy).sum())
 
 
-def in_map(frame: Pose, points: npt.ArrayLike) -> Floats:
+def world_to_map(frame: Pose, points: npt.ArrayLike) -> Floats:
     """Points (N, 2) or poses (N, 3) of the world in the frame of its map; the same numbers, bit for bit, where the two agree."""
     found = np.array(points, dtype=np.float64)
     x, y, yaw = frame
@@ -59,23 +59,23 @@ def in_map(frame: Pose, points: npt.ArrayLike) -> Floats:
     return found
 
 
-def out_of_map(frame: Pose, points: npt.ArrayLike) -> Floats:
-    """Points (N, 2) or poses (N, 3) of a map in the frame of a world that was made from it: the inverse of `in_map`."""
+def map_to_world(frame: Pose, points: npt.ArrayLike) -> Floats:
+    """Points (N, 2) or poses (N, 3) of a map in the frame of a world that was made from it: the inverse of `world_to_map`."""
     x, y, yaw = frame
     cosine, sine = math.cos(yaw), math.sin(yaw)
-    return in_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
+    return world_to_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
 
 
-def place_name(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
+def format_position(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
     """A place of a world in words; where the world lies in a map, in the frames of both."""
     here = f"({x:{digits}}, {y:{digits}})"
     if not any(frame):
         return here
-    there = in_map(frame, [(x, y)])[0].tolist()
+    there = world_to_map(frame, [(x, y)])[0].tolist()
     return f"{here} in the world, ({there[0]:{digits}}, {there[1]:{digits}}) in its map"
 
 
-def frame_at(inner: Floats, outer: Floats) -> Floats:
+def relative_frame(inner: Floats, outer: Floats) -> Floats:
     """Where a frame lies in another one, if something has a pose in each: x, y and yaw of its origin (N, 3) [m, rad]."""
     turn = outer[:, 2] - inner[:, 2]
     cos, sin = np.cos(turn), np.sin(turn)
@@ -83,7 +83,7 @@ def frame_at(inner: Floats, outer: Floats) -> Floats:
     return np.column_stack([outer[:, 0] - (cos * x - sin * y), outer[:, 1] - (sin * x + cos * y), turn])
 
 
-def laid(points: Floats, frames: Floats) -> Floats:
+def transform_points(points: Floats, frames: Floats) -> Floats:
     """Where points of frames lie in the frame around them (N, 2) [m]."""
     cos, sin = np.cos(frames[:, 2]), np.sin(frames[:, 2])
     x, y = points[:, 0], points[:, 1]

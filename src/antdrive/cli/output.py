@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, file_lines, this_command
-from antdrive.cli.warm import compile_once
-from antdrive.runs.folder import free_folder, opened
-from antdrive.views.folder import check_folder
+from antdrive.runs.results_folder import free_folder, opened
+from antdrive.views.run_folder import check_folder
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
@@ -36,7 +36,7 @@ def results_folder(
 
 def film_drives(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
     """Film a drive, or several side by side, with a progress bar; facts about the film."""
-    from antdrive.views.folder import write_film
+    from antdrive.views.run_folder import write_film
 
     with bar("filming") as progress:
         return write_film(logs, path, progress=progress, **options)

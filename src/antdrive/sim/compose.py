@@ -19,17 +19,17 @@ from typing import NamedTuple
 from antdrive.planners import GridPlanner, capabilities_of
 from antdrive.robots import LIMITERS, Avoidance
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.drive import full_turn, unscanned
+from antdrive.sim.driving.drive import full_turn, no_scan
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.localising import localiser_of
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.others import Others, Told, Tracked
 from antdrive.sim.driving.parts import Localiser, Logs, RouteGuide, Rule, Scanning
+from antdrive.sim.driving.perceived_movers import GroundTruth, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.rules import EXPLORING_LIMITERS, GOAL_SHARE, Avoid, KeepToSchedule, LookRound, Pursuit
-from antdrive.sim.driving.stopping_constraint import StayInSight
-from antdrive.sim.driving.survey import Lookout, Senses, Survey, Watch
+from antdrive.sim.driving.rules import EXPLORING_LIMITERS, GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, TurnToScan
+from antdrive.sim.driving.stopping_constraint import StoppingConstraint
+from antdrive.sim.driving.survey import MoverDetector, MoverTracking, SimulatedLidar, Survey
 from antdrive.sim.policy import OBSTRUCTED, Perception, ReplanPolicy
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
@@ -58,39 +58,41 @@ class Parts(NamedTuple):
 
 def compose(s: Scenario) -> Parts:
     """The parts of a scenario's drive."""
-    perception, avoidance, hz = perceived(s), avoidance_of(s), s.control_hz
-    watching, mapped = perception.kind == "lidar", s.map == "given"
-    moving = watching or bool(s.driven_world.movers)
+    perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
+    tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
+    moving = tracks_movers or bool(s.driven_world.movers)
     localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, s.task.start, s.seed)
-    survey = None if mapped else _survey(s, watching)
-    scans = _lookout(s) if mapped and watching else survey
-    watch = scans.watch if scans else None
-    others: Others = Tracked(watch, perception, hz) if watch else Told(s.trajectories, perception, hz)
+    survey = None if mapped else _survey(s, tracks_movers)
+    scans = _mover_detector(s) if mapped and tracks_movers else survey
+    tracking = scans.tracking if scans else None
+    movers: PerceivedMovers = (
+        Tracked(tracking, perception, hz) if tracking else GroundTruth(s.trajectories, perception, hz)
+    )
     rules: list[Rule] = [Pursuit(s.controller, full_turn(s.robot, hz))]
     guide: RouteGuide
     if survey:
         guide = exploration = _exploration(s, survey)
-        rules.append(LookRound(exploration, s.robot, hz))
+        rules.append(TurnToScan(exploration, s.robot, hz))
     else:
-        guide = _guide(s, others, moving)
+        guide = _guide(s, movers, moving)
     if capabilities_of(s.planner).needs_motions:
         rules.append(KeepToSchedule(guide, s.robot, hz))
     if moving and avoidance is not None:
-        drifts = survey is not None and watching
+        drifts = survey is not None and tracks_movers
         share = DRIFTING_SHARE if drifts else GOAL_SHARE
         blind = drifts and not _lidar(s).full_circle
         backwards = BLIND_SHARE * s.robot.max_speed if blind else math.inf
-        rules.append(Avoid(avoidance, others, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards))
+        rules.append(Avoid(avoidance, movers, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards))
     if survey:
         # One scan may be as old as their period, and commands are late.
         reaction = 1 / hz + 1 / survey.lidar.rate + s.robot.noise.scaled(s.noise).delay
-        rules.append(StayInSight(survey, s.robot, hz, reaction, exploration.note_sight))
+        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_held))
     return Parts(
         localiser,
-        scans.scan if scans else unscanned,
+        scans.scan if scans else no_scan,
         guide,
         tuple(rules),
-        tuple(part for part in (localiser, guide, scans, watch) if part is not None),
+        tuple(part for part in (localiser, guide, scans, tracking) if part is not None),
         perception=perception if moving else None,
         avoidance=avoidance if moving else None,
         replanning=s.replanning if moving or survey else None,
@@ -99,7 +101,7 @@ def compose(s: Scenario) -> Parts:
     )
 
 
-def perceived(s: Scenario) -> Perception:
+def perception_of(s: Scenario) -> Perception:
     """What the robot perceives of movers: their motions, if the planner is given them."""
     return Perception(kind="motions") if s.timed else s.known_perception
 
@@ -109,7 +111,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
     return RoutePlanner(
         planner=s.planner,
         planner_label=s.planner_label,
-        task=s.task if s.map == "given" else told(s.task),
+        task=s.task if s.map == "given" else mapless_task(s.task),
         robot=s.robot,
         controller=s.controller,
         margin=s.margin,
@@ -122,7 +124,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
     )
 
 
-def told(task: Task) -> Task:
+def mapless_task(task: Task) -> Task:
     """All that a robot without a map is given of a task: its first pose, where the goal is from there, and the tolerance."""
     (x0, y0), (x1, y1) = task.start[:2], task.goal
     empty = World("unknown", (min(x0, x1) - 1.0, min(y0, y1) - 1.0, max(x0, x1) + 1.0, max(y0, y1) + 1.0))
@@ -135,42 +137,42 @@ def avoidance_of(s: Scenario) -> Avoidance | None:
     Movers whose motions are known do not reverse unexpectedly, so reversals are not considered. A plan in
     space and time avoids the movers already, so the horizon is short.
     """
-    if s.avoidance is None or perceived(s).kind != "motions":
+    if s.avoidance is None or perception_of(s).kind != "motions":
         return s.avoidance
     horizon = min(s.avoidance.horizon, 1.0) if s.timed else s.avoidance.horizon
     return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=horizon)
 
 
-def _guide(s: Scenario, others: Others, moving: bool) -> RouteGuide:
+def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
     """What plans the routes of a robot with a map."""
     policy, avoidance = s.replanning, avoidance_of(s)
     if policy is None or not moving:
         return OneRoute(route_planner(s))
     kind = CellByCell if capabilities_of(s.planner).cell_by_cell and policy.around_movers else Replanning
-    return kind(route_planner(s), policy, others, s.robot.radius + avoidance.min_clearance if avoidance else 0.0)
+    return kind(route_planner(s), policy, movers, s.robot.radius + avoidance.min_clearance if avoidance else 0.0)
 
 
 def _exploration(s: Scenario, survey: Survey) -> Exploration:
     """What finds the routes of a robot without a map; around the movers that it tracks, if it is to."""
     policy, ahead = s.replanning or ReplanPolicy(), None
-    if survey.watch is not None and s.replanning is not None and policy.around_movers:
-        tracked = Tracked(survey.watch, perceived(s), s.control_hz)
+    if survey.tracking is not None and s.replanning is not None and policy.around_movers:
+        tracked = Tracked(survey.tracking, perception_of(s), s.control_hz)
         ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, s.control_hz)
     return Exploration(route_planner(s), survey, policy, ahead)
 
 
-def _survey(s: Scenario, watching: bool) -> Survey:
+def _survey(s: Scenario, tracks_movers: bool) -> Survey:
     """What a robot without a map knows of the world."""
-    watch = Watch(_lidar(s), s.control_hz) if watching else None
-    return Survey.of(s.robot, s.task, _senses(s), matching=s.localisation == "matching", watch=watch)
+    tracking = MoverTracking(_lidar(s), s.control_hz) if tracks_movers else None
+    return Survey.of(s.robot, s.task, _sensor(s), matching=s.localisation == "matching", tracking=tracking)
 
 
-def _lookout(s: Scenario) -> Lookout:
+def _mover_detector(s: Scenario) -> MoverDetector:
     """What looks for movers, and for obstacles that are not on the given map."""
     noise, lidar = s.robot.noise.scaled(s.noise), _lidar(s)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
     ground = KnownGround(lidar, s.task.world, math.inf, *errors)
-    return Lookout(_senses(s), ground, Watch(lidar, s.control_hz, *errors))
+    return MoverDetector(_sensor(s), ground, MoverTracking(lidar, s.control_hz, *errors))
 
 
 def _lidar(s: Scenario) -> Lidar:
@@ -178,16 +180,16 @@ def _lidar(s: Scenario) -> Lidar:
     return s.robot.lidar
 
 
-def _senses(s: Scenario) -> Senses:
+def _sensor(s: Scenario) -> SimulatedLidar:
     """The lidar in the world that the robot drives in."""
-    return Senses.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)
+    return SimulatedLidar.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)
 
 
-def load_replanning(s: Scenario) -> None:
+def warm_up_replanning(s: Scenario) -> None:
     """Replan twice in a tiny world, once per process and planner, so that the times of replans hold no loading of kernels."""
     if not s.driven_world.movers or s.replanning is None or not isinstance(s.planner, GridPlanner):
         return
-    planner = s.planner.rehearsal()
+    planner = s.planner.for_warmup()
     key = f"{type(planner).__module__}.{planner!r} {s.smoothing} {s.known_perception.kind} {s.replanning}"
     if key in _rehearsed:
         return

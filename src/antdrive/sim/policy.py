@@ -23,7 +23,7 @@ HELD = "held by sight"
 BACKED = "backed off"
 MADE_ROOM = "made room"
 LOST = "no way"
-LOOKED = "looked round"
+SCANNED = "looked round"
 
 PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions", "lidar"]
 

@@ -5,9 +5,9 @@ from .figures.run_figures import certificate_figure as certificate_figure
 from .figures.run_figures import comparison_figure as comparison_figure
 from .figures.run_figures import overview as overview
 from .figures.sight_figure import sight_figure as sight_figure
-from .film.options import FilmInfo as FilmInfo
+from .film.film_options import FilmInfo as FilmInfo
 from .film.video import film as film
 from .film.video import still as still
-from .pages.campaign import report_campaign as report_campaign
-from .pages.campaign import summarise_campaign as summarise_campaign
-from .pages.report import write_report as write_report
+from .pages.campaign_report import report_campaign as report_campaign
+from .pages.campaign_report import summarise_campaign as summarise_campaign
+from .pages.run_report import write_report as write_report

@@ -59,14 +59,14 @@ class Results:
         stem = file.name.removesuffix(SUFFIX) if file.name.endswith(SUFFIX) else file.stem
         return self.folder.joinpath(*map(file_name, (*parts, stem, name)))
 
-    def takes_film(self, *, failed: bool) -> bool:
+    def should_film(self, *, failed: bool) -> bool:
         """Whether a test gets a film. Of failed tests the first `MOST_FILMS` do, and each of them takes a place."""
         if self.films != "failed":
             return self.films == "always"
-        return failed and (self.places is None or any(_taken(self.places / str(k)) for k in range(MOST_FILMS)))
+        return failed and (self.places is None or any(_claim(self.places / str(k)) for k in range(MOST_FILMS)))
 
 
-def _taken(place: Path) -> bool:
+def _claim(place: Path) -> bool:
     """Whether this process is the first to take a place."""
     try:
         place.touch(exist_ok=False)
@@ -110,13 +110,13 @@ def write_artefacts(
     run: Run, folder: Path, baseline: Baseline | None, *, film: bool, faults: Sequence[str], commands: Sequence[str]
 ) -> dict[str, str]:
     """Write everything about a test into its folder; the files by what they are. Earlier files are removed first."""
-    from antdrive.views.figures.run_figures import picture_of
+    from antdrive.views.figures.run_figures import draw_run
 
     remove_artefacts(folder)
     rollout = run.rollout
     files = {} if rollout is None else {"rollout": str(rollout.save(folder / "rollout.npz"))}
     files["overview"] = str(folder / "overview.png")
-    picture_of(run, files["overview"])
+    draw_run(run, files["overview"])
     if rollout is not None:
         files |= _comparison(rollout, baseline, folder, film)
     write_text(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
@@ -154,12 +154,12 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
         return {"film": str(make_film(rollout, folder / "film.mp4", **options).path)}
     from antdrive.views.figures.run_figures import then_and_now
 
-    then, found = drive_of(baseline, rollout), divergence(baseline, rollout)
+    then, found = baseline_rollout(baseline, rollout), divergence(baseline, rollout)
     place = None if found is None else (found.t, *found.then)
     files = {"then and now": str(folder / "then-and-now.png")}
-    then_and_now(then, rollout, files["then and now"], parted=place)
+    then_and_now(then, rollout, files["then and now"], divergence=place)
     if film:
-        from antdrive.views.film.compare import Mark, compare_film
+        from antdrive.views.film.comparison_film import Mark, compare_film
 
         mark = None if found is None else Mark(found.t, *found.then, f"they part at {found.t:.1f} s")
         info = compare_film(
@@ -169,7 +169,7 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
     return files
 
 
-def drive_of(baseline: Baseline, now: Rollout) -> Rollout:
+def baseline_rollout(baseline: Baseline, now: Rollout) -> Rollout:
     """A drive along a baseline's line, in the world of the present drive, for pictures: it has no commands and no contacts."""
     times = baseline.times
     samples = np.array(baseline.line, dtype=np.float64)

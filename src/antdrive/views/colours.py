@@ -52,7 +52,7 @@ DOUBT: Colour = (176, 106, 0)
 CALM: Colour = (70, 82, 104)
 
 #: The label of each outcome on pictures, and its colour.
-VERDICTS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
+OUTCOME_LABELS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
     {
         Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
         Outcome.COLLIDED: ("✕ COLLIDED", BAD),

@@ -89,26 +89,26 @@ class Scene:
         return cls(name=world.name, bounds=world.bounds, obstacles=obstacles, robot=robot, **ends, **more)
 
     @property
-    def unseen_said(self) -> str:
+    def unseen_label(self) -> str:
         """What legends call the obstacles of `--unseen`: without a map the planner knew of no obstacle at first."""
         return "placed after planning" if self.mapped else "not in the world file"
 
     @property
-    def route_said(self) -> str:
+    def route_label(self) -> str:
         """What legends call the first route."""
         return "route" if self.mapped else "first route, before the world was seen"
 
     @property
-    def movers_said(self) -> str:
+    def movers_label(self) -> str:
         """What a legend says of movers: a picture shows them at one moment."""
         return f"moving obstacle, at {self.movers_at:.1f} s"
 
     @property
-    def has_zones(self) -> bool:
+    def has_no_go_area(self) -> bool:
         """Whether there is ground around the obstacles that plans keep off from the start."""
         return self.mapped and self.inflate > 0
 
-    def around(self, way: Floats) -> Bounds:
+    def map_bounds(self, way: Floats) -> Bounds:
         """The part of the plane that a map shows [m]: the world, and what a robot without a map planned first."""
         if self.mapped or not len(way):
             return self.bounds

@@ -15,7 +15,7 @@ from antdrive.views.colours import KERB, OBSTACLE, UNSEEN, Colour
 from antdrive.views.film.compositor import drawn_height, part_pose
 from antdrive.views.film.ground import kerb_width
 from antdrive.views.film.meshes import Mesh, cylinder, join, kerb, robot_parts
-from antdrive.views.film.replay import Replay
+from antdrive.views.film.playback import Playback
 from antdrive.views.scene import Scene
 
 AT_ONCE = 400  # meshes in one body: PyBullet takes at most 131072 vertices
@@ -51,7 +51,7 @@ def show(rollout: Rollout, *, hold: float = 3.0) -> None:
         raise InputError("--gui: PyBullet's viewer did not open")
     try:
         p.configureDebugVisualizer(p.COV_ENABLE_GUI, 0, physicsClientId=number)
-        scene, replay = Scene.of(rollout), Replay(rollout)
+        scene, playback = Scene.of(rollout), Playback(rollout)
         tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
         width = kerb_width(scene)
         add_mesh(number, join(*kerb(scene.bounds, width, 0.8 * width)), KERB)
@@ -67,10 +67,10 @@ def show(rollout: Rollout, *, hold: float = 3.0) -> None:
         middle = [(x0 + x1) / 2, (y0 + y1) / 2, 0.0]
         p.resetDebugVisualizerCamera(0.9 * max(x1 - x0, y1 - y0), 0, -52, middle, physicsClientId=number)
         started = time.monotonic()
-        while (at := time.monotonic() - started) < replay.duration + hold and p.isConnected(physicsClientId=number):
-            now = min(at, replay.duration)
+        while (at := time.monotonic() - started) < playback.duration + hold and p.isConnected(physicsClientId=number):
+            now = min(at, playback.duration)
             for part, body in robot:
-                place, turn = part_pose(part, *replay.pose(now), replay.wheels(now))
+                place, turn = part_pose(part, *playback.pose(now), playback.wheels(now))
                 p.resetBasePositionAndOrientation(body, place, turn, physicsClientId=number)
             time.sleep(1 / 60)
     finally:

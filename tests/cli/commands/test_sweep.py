@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.base.atomic import folder_lock
-from antdrive.cli.campaigns import _without_again
+from antdrive.cli.campaign_options import _without_again
 from antdrive.cli.console import duration
 from antdrive.runs.campaigns import canonical_bytes, read_results
 

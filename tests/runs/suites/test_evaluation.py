@@ -16,7 +16,7 @@ from antdrive.runs.suites.baseline import MAX_BYTES
 from antdrive.runs.suites.evaluation import distances, divergence, explain, farthest
 from antdrive.runs.suites.nearest import first_contact, nearest_of
 from antdrive.sim.log.metrics import Tolerance
-from antdrive.views.artefacts import MOST_FILMS, Results, drive_of, file_name, remove_artefacts
+from antdrive.views.artefacts import MOST_FILMS, Results, baseline_rollout, file_name, remove_artefacts
 
 PLAIN = Demands()
 
@@ -208,7 +208,7 @@ def test_a_plain_number_bounds_a_count(small_run):
 
 
 def test_an_accepted_drive_of_movers_has_movers_in_its_picture(baseline, small_run):
-    then = drive_of(baseline, small_run.rollout)
+    then = baseline_rollout(baseline, small_run.rollout)
     assert then.outcome is Outcome.SUCCEEDED
     assert np.abs(np.interp(then.t, small_run.rollout.t, small_run.rollout.clearance) - then.clearance).max() < 2e-3
 
@@ -239,10 +239,10 @@ def test_only_files_that_antdrive_writes_are_removed(tmp_path):
 def test_of_failed_tests_the_first_ten_are_filmed(tmp_path):
     """Each process has its own record of where results go; they share the folder in which films are counted."""
     processes = [Results(tmp_path / "results", "failed", tmp_path) for _ in range(3)]
-    assert not processes[0].takes_film(failed=False)
-    assert [processes[k % 3].takes_film(failed=True) for k in range(13)] == [True] * MOST_FILMS + [False] * 3
+    assert not processes[0].should_film(failed=False)
+    assert [processes[k % 3].should_film(failed=True) for k in range(13)] == [True] * MOST_FILMS + [False] * 3
     assert MOST_FILMS == 10
     for films in ("never", "always"):
         results = Results(tmp_path / "results", films, tmp_path)
-        assert {results.takes_film(failed=failed) for failed in (True, False)} == {films == "always"}
-    assert all(Results(tmp_path).takes_film(failed=True) for _ in range(12)), "without a run of many there is no limit"
+        assert {results.should_film(failed=failed) for failed in (True, False)} == {films == "always"}
+    assert all(Results(tmp_path).should_film(failed=True) for _ in range(12)), "without a run of many there is no limit"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from antdrive.robots import LIMITERS, Avoidance
 from antdrive.sim import Outcome, Perception, Scenario, run
-from antdrive.sim.driving.others import Told
+from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.log.record import PerceptionRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World
 from tests.records import changed
@@ -152,7 +152,7 @@ def test_movers_are_predicted_as_the_perception_allows(tick, told):
     movers = (CROSSING, Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.5, 0.3)))
     traffic = Trajectories.of(replace(HALL, movers=movers), (1.0, 3.0))
     ahead = Avoidance().prediction_times
-    places, radii = Told(traffic, Perception(kind=told), 60).predict(tick, (0.0, 0.0), ahead)
+    places, radii = GroundTruth(traffic, Perception(kind=told), 60).predict(tick, (0.0, 0.0), ahead)
     now, speed = traffic.positions(tick / 60)[0], traffic.velocities(tick / 60)[0]
     expected = {
         "positions": np.repeat(now[None], len(ahead), axis=0),

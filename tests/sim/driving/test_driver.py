@@ -19,11 +19,11 @@ from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
 from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, follow, full_turn
 from antdrive.sim.driving.localising import TruePose
-from antdrive.sim.driving.others import Told
 from antdrive.sim.driving.parts import Ending, Guide, Moment, Step
+from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.driving.rules import AVOIDING, OUT_OF_SIGHT, WAITING_SPEED, Avoid, Pursuit, braked, stopping_time
-from antdrive.sim.driving.stopping_constraint import StayInSight
+from antdrive.sim.driving.rules import AVOIDING, SIGHT_LIMIT, WAITING_SPEED, Avoid, Pursuit, braked, stopping_time
+from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, rasterise
 from tests.records import changed
@@ -67,7 +67,7 @@ def test_the_stuck_clock_counts_driving_and_turning_without_progress_and_no_wait
 
 def test_that_sight_held_the_robot_is_said_where_it_did_so_for_most_of_the_time():
     """Progress begins the count anew; a robot that waits counts as nothing."""
-    held, free = PursuitState(limiter=OUT_OF_SIGHT), PursuitState()
+    held, free = PursuitState(limiter=SIGHT_LIMIT), PursuitState()
     for states, said in (
         ([held] * 6 + [free] * 5, True),
         ([held] * 5 + [free] * 5, False),
@@ -110,7 +110,7 @@ def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it():
         for y in (3.5, 3.6):
             goal = (x, y - 0.6)
             mover = Keyframed(radius=0.5, keyframes=((0.0, x, y), (9.0, x, y)))
-            still = Told(Trajectories.of(World("w", HALL.bounds, movers=(mover,)), (1.0, 3.0)), Perception(), 60)
+            still = GroundTruth(Trajectories.of(World("w", HALL.bounds, movers=(mover,)), (1.0, 3.0)), Perception(), 60)
             grid = hall_grid()
             discs = covered_discs(still, 0, np.array([(1.0, 3.0), goal]), 0.0, grid)
             assert discs
@@ -146,8 +146,8 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     calm = SimpleNamespace(
         prediction_times=np.arange(3.0), step=1.0, avoid=lambda *_, **__: (Twist(0.5, 0.0), True, AvoidanceState())
     )
-    nobody = Told(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
-    sight = StayInSight(None, turtlebot, 60, 0.1, lambda *_: None)
+    nobody = GroundTruth(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
+    sight = StoppingConstraint(None, turtlebot, 60, 0.1, lambda *_: None)
     sight.limit = lambda *_: (Twist(0.005, 0.0), True)
     robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), sight)
     at_goal = (*TASK.goal, 0.0)
@@ -226,7 +226,7 @@ def test_movers_close_neither_the_robots_position_nor_the_goal():
     over_goal = Keyframed(radius=0.6, keyframes=((0.0, 8.0, 3.2), (9.0, 8.0, 3.2001)))
     crossing = Cruising(radius=0.3, position=(4.0, 1.0), velocity=(0.0, 0.5))
     world = World("hall", HALL.bounds, HALL.obstacles, movers=(over_goal, crossing))
-    predictor = Told(Trajectories.of(world, TASK.start[:2]), Perception(), 60)
+    predictor = GroundTruth(Trajectories.of(world, TASK.start[:2]), Perception(), 60)
     grid = hall_grid()
     ends = np.array([TASK.start[:2], TASK.goal])
     discs = covered_discs(predictor, 0, ends, 1.0, grid)
@@ -270,7 +270,7 @@ def test_a_robot_that_brakes_stops_at_the_goal_if_both_ends_of_its_way_are_there
     x, y = TASK.goal
     assert TASK.goal_tolerance == 0.25
     for yaw, pose in ((0.0, (x - before, y, 0.0)), (np.pi / 2, (x, y - before, np.pi / 2))):
-        nobody = Told(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
+        nobody = GroundTruth(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
         rule = Avoid(Avoidance(), nobody, OnePath(), TASK, turtlebot, 60)
         assert rule._stops_at_goal(pose, Twist(speed, 0.0)) is stops, yaw
 

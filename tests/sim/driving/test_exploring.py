@@ -13,19 +13,19 @@ from hypothesis import strategies as st
 from antdrive.robots import PursuitState, Twist
 from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Rollout, Scenario, run
-from antdrive.sim.compose import compose, told
+from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, hit_within, point_at
 from antdrive.sim.driving.drive import Driver
 from antdrive.sim.driving.parts import Step
-from antdrive.sim.driving.recovery import Look, Recovery
+from antdrive.sim.driving.recovery import Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of
-from antdrive.sim.driving.stopping_constraint import StayInSight
-from antdrive.sim.driving.survey import Senses, Survey, Watch, forgetting_ticks
+from antdrive.sim.driving.stopping_constraint import StoppingConstraint
+from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.physics.engine import State
-from antdrive.sim.policy import LOOKED
+from antdrive.sim.policy import SCANNED
 from antdrive.sim.sensing import Scanner
-from antdrive.views.recollection import Recollection
+from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.worlds import Cruising, Disc, Task, World, generate, load_task
 from tests.records import changed
 
@@ -151,19 +151,19 @@ def test_the_map_is_forgotten_where_plans_failed(log):
     found = replace(lost, solved=True, cost_m=1.0, route=((0.0, 0.0), (1.0, 0.0)))
     replans = [lost, lost, found, lost, lost, lost, lost, found]
     timed = tuple(replace(replan, t=(k + 1) / 60) for k, replan in enumerate(replans))
-    assert list(forgetting_ticks(replace(log.record, replans=timed))) == [7]
-    assert list(forgetting_ticks(replace(log.record, replans=timed[:6]))) == []
+    assert list(reset_ticks(replace(log.record, replans=timed))) == [7]
+    assert list(reset_ticks(replace(log.record, replans=timed[:6]))) == []
 
 
 def own_map(log):
     """The map that the robot of a log had at last."""
-    survey, forgets = scans_of(log)
+    survey, resets = scans_of(log)
     assert isinstance(survey, Survey)
     for row in range(0, len(log.t), log.record.physics_hz // log.record.control_hz):
         tick = row * log.record.control_hz // log.record.physics_hz
         estimate = tuple(log.estimate[row].tolist()) if len(log.estimate) else tuple(log.pose[row].tolist())
         survey.scan(tick, tuple(log.pose[row].tolist()), estimate)
-        forgets.get(tick, lambda pose: None)(estimate)
+        resets.get(tick, lambda pose: None)(estimate)
     return survey.map
 
 
@@ -181,12 +181,12 @@ def test_a_drive_that_forgot_its_map_can_be_replayed(jackal, monkeypatch):
     task = Task(World("corridor", (0.0, 0.0, 7.0, 1.6), row), (1.0, 0.8, 0.0), (6.4, 0.8), cell=0.1)
     done = run(scenario(replace(jackal, lidar=short), task, time_limit=4.0))
     assert done.outcome is Outcome.TIMED_OUT, (done.outcome, done.reason)
-    assert len(list(forgetting_ticks(done.rollout.record))) > 1
+    assert len(list(reset_ticks(done.rollout.record))) > 1
     assert done.reason.startswith("no way through what was seen, last at t = ")
     assert replay(done.rollout).problems == ()
-    kept, forgot = Recollection(done.rollout), Recollection(done.rollout, forgetting=True)
-    for recollection in (kept, forgot):
-        recollection.advance(4.0)
+    kept, forgot = MapReconstruction(done.rollout), MapReconstruction(done.rollout, forgetting=True)
+    for reconstruction in (kept, forgot):
+        reconstruction.advance(4.0)
     own = cells_of(own_map(done.rollout))
     rounded = len(own) // 50  # a log has millimetres
     assert len(cells_of(forgot.map) ^ own) <= rounded < len(cells_of(kept.map) ^ own)
@@ -255,10 +255,10 @@ def test_plans_that_failed_long_ago_are_no_reason(jackal):
     said = []
     for tick in (60, 90, 120):
         assert exploration.replan(tick, TASK.start, "no way") is None
-        said.append(exploration.no_way(tick))
+        said.append(exploration.failure_note(tick))
     assert said == ["", "", "no way through what was seen, last at t = 2.0 s"]
-    assert exploration.no_way(120 + 30 * 60)
-    assert not exploration.no_way(121 + 30 * 60)
+    assert exploration.failure_note(120 + 30 * 60)
+    assert not exploration.failure_note(121 + 30 * 60)
 
 
 @pytest.mark.parametrize(("rate", "share"), [(1000.0, 5), (60.0, 5), (50.0, 4), (10.0, 1)])
@@ -272,14 +272,14 @@ def test_a_map_counts_the_scans_that_are_taken(jackal, rate, share):
     assert len(survey.scans) == pytest.approx(min(rate, 60), abs=1)
     assert survey.whole == pytest.approx(min(rate, 60) / share, abs=1)
     assert survey._recent == min(rate, 60)
-    assert Watch(robot.lidar, 60)._settle == 2 * min(rate, 60)
+    assert MoverTracking(robot.lidar, 60)._settle == 2 * min(rate, 60)
 
 
 def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal):
-    senses = Senses(Scanner.of(jackal.lidar, ROOM), ROOM, None, None, 60)
-    survey = Survey(senses, jackal, TASK.start, TASK.goal)
+    sensor = SimulatedLidar(Scanner.of(jackal.lidar, ROOM), ROOM, None, None, 60)
+    survey = Survey(sensor, jackal, TASK.start, TASK.goal)
     survey.scan(0, TASK.start, TASK.start)
-    caution = StayInSight(survey, jackal, 60, 0.1, lambda tick, held: None)
+    caution = StoppingConstraint(survey, jackal, 60, 0.1, lambda tick, held: None)
     free = caution.limit(TASK.start, Twist(1.0, 0.0), Twist(1.0, 0.0))
     assert free == (Twist(1.0, 0.0), False)  # stops within 0.35 m, sees 2 m
     back, slowed = caution.limit(TASK.start, Twist(0.0, 0.0), Twist(-0.5, 0.0))
@@ -300,8 +300,8 @@ def test_routes_begin_where_the_robot_believes_it_is_however_far_it_drifted(jack
 
 def test_the_robot_is_told_no_obstacle_and_no_wall():
     moved = replace(TASK, world=World("other", (-9.0, -9.0, 9.0, 9.0)))
-    assert told(TASK) == told(moved)
-    assert told(TASK).world.obstacles == ()
+    assert mapless_task(TASK) == mapless_task(moved)
+    assert mapless_task(TASK).world.obstacles == ()
 
 
 def test_a_drive_with_a_map_is_recorded_as_before(jackal):
@@ -330,7 +330,7 @@ def test_a_robot_with_a_narrow_lidar_looks_round_first(spec):
     task = Task(World("hall", OPEN, (Disc(2.6, 4.2, 0.3),)), HERE, (1.2, 4.6), goal_tolerance=0.25, cell=0.1)
     done = searching(changed(spec, "lidar", field_of_view=1.0), task)
     assert done.succeeded, (done.outcome, done.reason, triggers(done))
-    assert triggers(done)[0] == LOOKED
+    assert triggers(done)[0] == SCANNED
     first = done.rollout.pose[done.rollout.t < done.rollout.record.replans[0].t - 0.1]
     assert np.ptp(np.unwrap(first[:, 2])) > 2 * math.pi - 1.0  # with what it sees at once this is all around
     assert np.hypot(*(first[:, :2] - HERE[:2]).T).max() < 0.02
@@ -344,7 +344,7 @@ def test_a_robot_that_cannot_turn_where_it_stands_makes_room_ahead(jackal):
     assert done.succeeded, (done.outcome, done.reason, triggers(done))
     assert done.rollout.pose[:, 0].max() > 4.2
     assert "stalled" in triggers(done)
-    assert LOOKED in triggers(done)  # after it has made room: it had not seen what is behind it
+    assert SCANNED in triggers(done)  # after it has made room: it had not seen what is behind it
 
 
 def test_a_robot_is_told_of_a_mover_in_the_circle_of_its_first_turn(jackal):
@@ -363,7 +363,7 @@ def test_a_robot_that_is_boxed_in_looks_round_before_it_gives_up(jackal):
     assert not len(done.rollout.contacts)
     assert done.outcome is Outcome.TIMED_OUT
     assert done.reason.startswith("no way through what was seen")
-    assert LOOKED in triggers(done)
+    assert SCANNED in triggers(done)
     assert replay(done.rollout).problems == ()
 
 
@@ -372,9 +372,9 @@ def test_what_a_look_has_shown_is_not_forgotten_at_once():
     hz = 60
     replans = [
         SimpleNamespace(t=(k + 1) / hz, trigger=trigger, solved=False)
-        for k, trigger in enumerate(["no way"] * 3 + [LOOKED, "no way"])
+        for k, trigger in enumerate(["no way"] * 3 + [SCANNED, "no way"])
     ]
-    assert list(forgetting_ticks(SimpleNamespace(replans=replans, control_hz=hz))) == [5]
+    assert list(reset_ticks(SimpleNamespace(replans=replans, control_hz=hz))) == [5]
 
 
 @pytest.mark.parametrize("lost", [True, False])
@@ -402,18 +402,18 @@ def test_a_robot_that_has_no_way_where_its_route_ends_looks_for_one_for_a_while(
     st.sampled_from([10, 60, 240]),
 )
 def test_a_look_turns_as_far_as_it_is_to_and_stands(turtlebot, turns, yaw, rate, hz):
-    look, last, turned, reached = Look(turns, yaw, rate, turtlebot, hz), Twist(0.0, 0.0), 0.0, []
+    scan_turn, last, turned, reached = ScanTurn(turns, yaw, rate, turtlebot, hz), Twist(0.0, 0.0), 0.0, []
     hardest = turtlebot.max_yaw_acceleration / hz
     for _ in range(60 * hz):
-        twist = look.command((1.0, 2.0, math.remainder(yaw + turned, 2 * math.pi)), last)
-        if look.done:
+        twist = scan_turn.command((1.0, 2.0, math.remainder(yaw + turned, 2 * math.pi)), last)
+        if scan_turn.done:
             break
         assert twist.speed == 0.0
         assert abs(twist.yaw_rate) <= rate + 1e-9
         assert abs(twist.yaw_rate - last.yaw_rate) <= hardest + 1e-9
         last, turned = twist, turned + twist.yaw_rate / hz
         reached.append(turned)
-    assert look.done
+    assert scan_turn.done
     assert last.yaw_rate == pytest.approx(0.0, abs=0.01)
     assert turned == pytest.approx(sum(turns), abs=0.05 * len(turns) + hardest / hz)
     farthest = max(reached, key=lambda angle: angle * math.copysign(1.0, turns[0]))
@@ -423,13 +423,13 @@ def test_a_look_turns_as_far_as_it_is_to_and_stands(turtlebot, turns, yaw, rate,
 
 
 def test_a_look_that_is_not_let_turn_ends(turtlebot):
-    look = Look([2.0, -3.0], 0.0, 1.0, turtlebot, 60)
+    scan_turn = ScanTurn([2.0, -3.0], 0.0, 1.0, turtlebot, 60)
     periods = 0
-    while not look.done:
-        look.command((0.0, 0.0, 0.0), Twist(0.0, 0.0))
+    while not scan_turn.done:
+        scan_turn.command((0.0, 0.0, 0.0), Twist(0.0, 0.0))
         periods += 1
         assert periods < 200
-    moving = Look([2.0], 0.0, 1.0, turtlebot, 60)
+    moving = ScanTurn([2.0], 0.0, 1.0, turtlebot, 60)
     hardest = turtlebot.max_yaw_acceleration / 60
     for _ in range(60 * 10):  # movers turn the robot to and fro
         assert abs(moving.command((0.0, 0.0, 0.0), Twist(0.0, 1.0)).yaw_rate - 1.0) <= hardest + 1e-12
@@ -444,7 +444,7 @@ def survey_of(robot, left, right, open_=1.0):
         map=SimpleNamespace(share=1, turns=1),
         clear_turn=lambda pose, side, farthest: min(turns[side], farthest),
         clear_distance=lambda pose, speed, rate, longest: 0.0,
-        clear_way=lambda pose, twist, farthest, daring: open_ if daring else 0.0,
+        clear_way=lambda pose, twist, farthest, freespace: open_ if freespace else 0.0,
     )
 
 
@@ -460,32 +460,32 @@ def survey_of(robot, left, right, open_=1.0):
 )
 def test_a_look_goes_both_ways_where_one_is_not_free(jackal, left, right, turns):
     recovery = Recovery(survey_of(jackal, left, right), jackal, HERE, 60)
-    assert recovery.begin_look(HERE) == bool(turns)
-    assert (recovery.look is not None) == bool(turns)
-    if recovery.look is not None:
-        assert [recovery.look._left, *recovery.look._turns] == pytest.approx(turns, abs=1e-4)
+    assert recovery.begin_scan_turn(HERE) == bool(turns)
+    assert (recovery.scan_turn is not None) == bool(turns)
+    if recovery.scan_turn is not None:
+        assert [recovery.scan_turn._left, *recovery.scan_turn._turns] == pytest.approx(turns, abs=1e-4)
 
 
 def test_a_robot_looks_round_once_at_a_place(jackal, turtlebot):
     recovery = Recovery(survey_of(jackal, 9.0, 9.0), jackal, HERE, 60)
     assert not recovery.held(0.0, HERE)  # it sees enough to begin with
-    recovery.note_sight(1.0, FORWARD)
-    recovery.note_sight(1.4, FORWARD)
+    recovery.note_held(1.0, FORWARD)
+    recovery.note_held(1.4, FORWARD)
     assert [recovery.held(now, HERE) for now in (1.4, 1.6)] == [False, True]
-    assert recovery.begin_look(HERE)
-    recovery.end_look(3.0, HERE)
-    recovery.note_sight(3.0, FORWARD)
+    assert recovery.begin_scan_turn(HERE)
+    recovery.end_scan_turn(3.0, HERE)
+    recovery.note_held(3.0, FORWARD)
     assert not recovery.held(9.0, HERE)
-    assert not recovery.begin_look((4.2, 4.0, 1.0))
+    assert not recovery.begin_scan_turn((4.2, 4.0, 1.0))
     assert recovery.held(9.0, (4.4, 4.0, 1.0))
-    recovery.note_sight(9.1, None)
+    recovery.note_held(9.1, None)
     assert not recovery.held(9.2, (4.4, 4.0, 1.0))
     around = Recovery(survey_of(turtlebot, 9.0, 9.0), turtlebot, HERE, 60)
-    around.note_sight(1.0, FORWARD)
+    around.note_held(1.0, FORWARD)
     assert not around.held(9.0, HERE)  # its lidar sees all around
-    assert not around.begin_look(HERE)
+    assert not around.begin_scan_turn(HERE)
     before_a_post = Recovery(survey_of(jackal, 9.0, 9.0, 0.05), jackal, HERE, 60)
-    before_a_post.note_sight(1.0, FORWARD)
+    before_a_post.note_held(1.0, FORWARD)
     assert not before_a_post.held(9.0, HERE)  # there is nothing to see
 
 
@@ -496,10 +496,10 @@ def test_ground_that_was_not_seen_is_told_from_what_was_hit(jackal):
     exploration = compose(s).guide
     survey, recovery = exploration.survey, exploration._recovery
     for twist, unseen in ((FORWARD, False), (Twist(-0.5, 0.0), True), (Twist(0.001, 1.0), False)):
-        recovery.note_sight(0.0, twist)
-        seen, open_ = survey.clear_way(HERE, twist, 1.0), survey.clear_way(HERE, twist, 1.0, daring=True)
+        recovery.note_held(0.0, twist)
+        seen, open_ = survey.clear_way(HERE, twist, 1.0), survey.clear_way(HERE, twist, 1.0, freespace=True)
         assert seen <= open_
-        assert recovery.misses_sight(HERE) == unseen, (twist, seen, open_)
+        assert recovery.held_by_unknown(HERE) == unseen, (twist, seen, open_)
 
 
 @settings(max_examples=60, deadline=None)

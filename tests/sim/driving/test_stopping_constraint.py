@@ -9,8 +9,8 @@ import pytest
 from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Lidar, Twist, footprint_clearance, load_robot
-from antdrive.sim.driving.stopping_constraint import StayInSight
-from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.driving.stopping_constraint import StoppingConstraint
+from antdrive.sim.driving.survey import SimulatedLidar, Survey
 from antdrive.sim.sensing import Scanner
 from antdrive.worlds import Disc, World
 from tests.records import changed
@@ -42,9 +42,9 @@ def driven(robot, world, start, wanted, hz, held, *, told=None):
 
     `told` is the world of which it is told what stands around its start, by default the true one.
     """
-    senses = Senses(Scanner.of(robot.lidar, world), told or world, None, None, hz)
-    survey = Survey(senses, robot, start, (start[0] + 2.0, start[1]))
-    caution = StayInSight(survey, robot, hz, 1 / hz + 1 / robot.lidar.rate, lambda tick, held: None)
+    sensor = SimulatedLidar(Scanner.of(robot.lidar, world), told or world, None, None, hz)
+    survey = Survey(sensor, robot, start, (start[0] + 2.0, start[1]))
+    caution = StoppingConstraint(survey, robot, hz, 1 / hz + 1 / robot.lidar.rate, lambda tick, held: None)
     most, sharpest = robot.max_acceleration / hz, robot.max_yaw_acceleration / hz
     pose, last, poses = start, Twist(0.0, 0.0), []
     for tick in range(len(wanted) * held):
@@ -138,12 +138,12 @@ def test_a_robot_that_forgets_its_map_turns_over_no_post_that_it_has_seen(beside
     robot = changed(jackal, "lidar", field_of_view=math.pi)
     posts = tuple(Disc(2.88, 2.0 + side * beside, 0.03) for side in (-1, 1)) if beside else ()
     world, start, here = World("gate", (0.0, 0.0, 8.0, 4.0), posts), (1.5, 2.0, 0.0), (3.0, 2.0, 0.0)
-    survey = Survey(Senses(Scanner.of(robot.lidar, world), world, None, None, 50), robot, start, (7.0, 2.0))
+    survey = Survey(SimulatedLidar(Scanner.of(robot.lidar, world), world, None, None, 50), robot, start, (7.0, 2.0))
     for tick in range(210):
         x = min(3.0, 1.5 + 0.01 * tick)
         survey.scan(tick, (x, 2.0, 0.0), (x, 2.0, 0.0))
     known = survey.clear_turn(here, 1.0, math.pi)
-    survey.forget(here)
+    survey.reset(here)
     turn = survey.clear_turn(here, 1.0, math.pi)
     if beside is None:
         assert turn == known == math.pi

@@ -22,7 +22,7 @@ from antdrive.sim.driving.movers_ahead import (
     Traffic,
     Zone,
 )
-from antdrive.sim.driving.others import Told, Tracked
+from antdrive.sim.driving.perceived_movers import GroundTruth, Tracked
 from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, import_dynabarn, rasterise
@@ -47,7 +47,7 @@ SLOW = tuple(shuttle(3.0 + 0.9 * k, speed=0.2, phase=4.7 * k) for k in range(3))
 
 def traffic_of(*movers, kind="velocities", reach=math.inf):
     motions = Trajectories.of(replace(HALL, movers=movers), (1.0, 6.0))
-    predictor = Told(motions, Perception(kind=kind, range=reach), 60)
+    predictor = GroundTruth(motions, Perception(kind=kind, range=reach), 60)
     return Traffic(predictor, 0.2, HALL.bounds, 60)
 
 
@@ -63,7 +63,7 @@ def test_the_box_holds_every_place_that_was_seen_and_no_more():
     motions = Trajectories.of(replace(HALL, movers=SHUTTLES), (1.0, 6.0))
     for tick in range(0, 300, 7):
         robot = (1.0 + 0.02 * tick, 6.0)
-        traffic.look(tick, robot)
+        traffic.observe(tick, robot)
         places = motions.positions(tick / 60)[0]
         seen += [p for p, r in zip(places, motions.radii, strict=True) if math.dist(p, robot) - r <= 5.0]
     expected = np.concatenate((np.min(seen, axis=0), np.max(seen, axis=0)))
@@ -73,11 +73,11 @@ def test_the_box_holds_every_place_that_was_seen_and_no_more():
 def test_a_box_has_grown_only_when_a_mover_was_seen_farther_out():
     traffic = traffic_of(shuttle(5.0), shuttle(8.0))
     assert not traffic.grown(0.1), "nothing was seen yet"
-    traffic.look(0, (1.0, 6.0))
+    traffic.observe(0, (1.0, 6.0))
     assert traffic.grown(0.1)
     traffic.zones(0, (1.0, 6.0), (15.0, 6.0), GRID)
     assert not traffic.grown(0.1)
-    traffic.look(30, (1.0, 6.0))
+    traffic.observe(30, (1.0, 6.0))
     assert traffic.grown(0.4)
     assert not traffic.grown(0.6)
 
@@ -108,7 +108,7 @@ def test_few_places_make_a_box_that_is_grown_and_many_one_as_seen():
     traffic = traffic_of(*SHUTTLES)
     boxes = []
     for tick in range(1200):
-        traffic.look(tick, (1.0, 6.0))
+        traffic.observe(tick, (1.0, 6.0))
         if tick in (0, 1199):
             boxes.append([zone._box for zone in traffic.zones(tick, (1.0, 6.0), (15.0, 6.0), GRID)])
     assert traffic.samples == pytest.approx(11 + 11 * 1199 / (60 * MIXING))
@@ -222,23 +222,23 @@ class Seen:
 
 
 def traffic_seen(robot):
-    watch = Seen()
-    return TrackedTraffic(Tracked(watch, LIDAR, 60), robot, 60), watch
+    tracking = Seen()
+    return TrackedTraffic(Tracked(tracking, LIDAR, 60), robot, 60), tracking
 
 
 def ahead(robot, hits=None, **policy):
-    watch = Seen()
+    tracking = Seen()
     found = np.empty((0, 3)) if hits is None else hits
     survey = SimpleNamespace(map=SimpleNamespace(trust=7.5, discs=lambda: found))
-    predictor, settings = Tracked(watch, LIDAR, 60), ReplanPolicy(**policy)
-    return MoversSeenAhead(predictor, survey, settings, robot, ACROSS.goal, robot.radius + 0.03, 60), watch
+    predictor, settings = Tracked(tracking, LIDAR, 60), ReplanPolicy(**policy)
+    return MoversSeenAhead(predictor, survey, settings, robot, ACROSS.goal, robot.radius + 0.03, 60), tracking
 
 
-def busy(movers, watch, speed):
+def busy(movers, tracking, speed):
     """Show it ten movers between the long walls, each on another place and going north."""
     for tick in range(1, 61):
-        watch.see([(3.0 + k, 3.0 + 6.0 * ((k + 0.1 * tick) % 1.0), 0.0, speed) for k in range(10)], tick=tick)
-        movers.look(tick, POSE, False)
+        tracking.see([(3.0 + k, 3.0 + 6.0 * ((k + 0.1 * tick) % 1.0), 0.0, speed) for k in range(10)], tick=tick)
+        movers.observe(tick, POSE, False)
 
 
 def straight(robot, y=6.0):
@@ -249,31 +249,31 @@ def straight(robot, y=6.0):
 
 
 def test_only_movers_that_the_last_scan_met_make_the_box(jackal):
-    traffic, watch = traffic_seen(jackal)
-    watch.see([(2.0, 3.0, 0.0, 1.0), (5.0, 4.0, 1.0, 0.0), (30.0, -9.0, 1.0, 0.0)], hidden=1)
-    traffic.look(watch.tick, POSE[:2])
+    traffic, tracking = traffic_seen(jackal)
+    tracking.see([(2.0, 3.0, 0.0, 1.0), (5.0, 4.0, 1.0, 0.0), (30.0, -9.0, 1.0, 0.0)], hidden=1)
+    traffic.observe(tracking.tick, POSE[:2])
     assert traffic.box.tolist() == [2.0, 3.0, 5.0, 4.0]
     assert traffic.samples == 2
-    watch.see([(7.0, 3.5, 1.0, 0.0)], tick=watch.tick)  # no new scan
-    traffic.look(watch.tick, POSE[:2])
+    tracking.see([(7.0, 3.5, 1.0, 0.0)], tick=tracking.tick)  # no new scan
+    traffic.observe(tracking.tick, POSE[:2])
     assert traffic.box.tolist() == [2.0, 3.0, 5.0, 4.0]
 
 
 def test_the_rate_counts_fast_movers_in_reach_on_the_ground_in_sight(jackal):
     """Two movers of 1.8 m/s: each would meet robots on 2 (0.4 + R) 1.8 square metres a second."""
-    traffic, watch = traffic_seen(jackal)
+    traffic, tracking = traffic_seen(jackal)
     slow = FAST * jackal.max_speed - 0.01
     rows = [(3.0, 5.0, 0.0, 1.8), (4.0, 7.0, -1.8, 0.0), (5.0, 5.0, slow, 0.0), (1.0 + 7.5 + 0.41, 6.0, 0.0, 1.9)]
     expected = 2 * 2 * (0.4 + jackal.radius) * 1.8 / 50.0
     for tick in range(1, 60 * 30):
-        watch.see(rows, tick=tick)
-        traffic.look(tick, POSE[:2])
+        tracking.see(rows, tick=tick)
+        traffic.observe(tick, POSE[:2])
         if tick == 6:  # a velocity that is wrong for a moment is no traffic
             assert 0 < traffic.rate(0, POSE[:2]) < 0.1 * expected
     assert traffic.rate(0, POSE[:2]) == pytest.approx(expected)
-    for tick in range(watch.tick + 1, watch.tick + 1 + round(60 * FADING)):
-        watch.see([], tick=tick)
-        traffic.look(tick, POSE[:2])
+    for tick in range(tracking.tick + 1, tracking.tick + 1 + round(60 * FADING)):
+        tracking.see([], tick=tick)
+        traffic.observe(tick, POSE[:2])
     assert traffic.rate(0, POSE[:2]) == pytest.approx(expected * math.exp(-1), rel=1e-3)
 
 
@@ -281,10 +281,10 @@ def test_the_rate_counts_fast_movers_in_reach_on_the_ground_in_sight(jackal):
 @given(hits=st.lists(st.tuples(anywhere, anywhere), max_size=9), x=anywhere, y=anywhere, yaw=st.floats(-3, 3))
 def test_without_tracks_nothing_changes(jackal, hits, x, y, yaw):
     discs = np.array([(*hit, 0.03) for hit in hits]).reshape(-1, 3)
-    movers, watch = ahead(jackal, discs)
+    movers, tracking = ahead(jackal, discs)
     for tick in range(1, 200, 40):
-        watch.see([], tick=tick)
-        movers.look(tick, (x, y, yaw), False)
+        tracking.see([], tick=tick)
+        movers.observe(tick, (x, y, yaw), False)
         assert movers.trigger(tick, (x, y, yaw), straight(jackal), 0.0) == ""
     assert not movers.heavy(200, (x, y, yaw))
     assert movers.discs(200, (x, y, yaw)) == []
@@ -292,17 +292,17 @@ def test_without_tracks_nothing_changes(jackal, hits, x, y, yaw):
 
 
 def test_a_mover_on_its_way_onto_the_route_makes_a_new_one_due(jackal):
-    movers, watch = ahead(jackal)
+    movers, tracking = ahead(jackal)
     for start, trigger in (((3.0, 7.5), OBSTRUCTED), ((3.0, 9.0), ""), ((8.0, 7.5), "")):  # here, too late, too far
-        watch.see([(*start, 0.0, -1.0)])
-        assert movers.trigger(watch.tick, POSE, straight(jackal), 0.0) == trigger, start
+        tracking.see([(*start, 0.0, -1.0)])
+        assert movers.trigger(tracking.tick, POSE, straight(jackal), 0.0) == trigger, start
 
 
 def test_a_robot_that_waits_for_long_looks_for_another_way(jackal):
     movers, _ = ahead(jackal, max_wait=2.0)
     due = []
     for tick in range(200):
-        movers.look(tick, POSE, tick >= 10)
+        movers.observe(tick, POSE, tick >= 10)
         due.append(movers.trigger(tick, POSE, straight(jackal), 0.0))
     assert due.index(WAITED) == pytest.approx(10 + 2 * 60, abs=1)
     assert due.count(WAITED) == 1
@@ -310,16 +310,16 @@ def test_a_robot_that_waits_for_long_looks_for_another_way(jackal):
 
 def test_a_route_through_busy_ground_is_due_for_a_new_one_and_one_along_the_wall_is_not(jackal):
     for speed, y, trigger in ((1.8, 6.0, TRAFFIC), (1.8, 0.6, ""), (1.2, 6.0, "")):
-        movers, watch = ahead(jackal, max_traffic=0.07)
-        busy(movers, watch, speed)
-        watch.see([])  # where they are is no matter, but where they have been
+        movers, tracking = ahead(jackal, max_traffic=0.07)
+        busy(movers, tracking, speed)
+        tracking.see([])  # where they are is no matter, but where they have been
         assert movers.trigger(61, POSE, straight(jackal, y), 0.0) == trigger, (speed, y)
 
 
 def test_the_largest_zone_leaves_a_lane_along_the_walls(jackal):
     corners = np.array([(0.0, 0.0, 0.02), (16.0, 0.0, 0.02), (0.0, 12.0, 0.02), (16.0, 12.0, 0.02)])
-    movers, watch = ahead(jackal, corners)
-    busy(movers, watch, 1.8)
+    movers, tracking = ahead(jackal, corners)
+    busy(movers, tracking, 1.8)
     assert movers.bounds((0.0, 0.0, 16.0, 12.0)) == (0.0, 0.0, 16.0, 12.0)
     grid = rasterise(HALL, 0.05, jackal.radius + 0.03)
     zones = movers.zones(60, POSE, grid)
@@ -333,9 +333,9 @@ def test_the_largest_zone_leaves_a_lane_along_the_walls(jackal):
 
 @given(st.lists(st.tuples(st.floats(0, 16), st.floats(0, 12)), min_size=1, max_size=30))
 def test_only_far_hits_where_movers_roam_are_left_out(jackal, hits):
-    movers, watch = ahead(jackal)
-    watch.see([(4.0, 3.0, 0.0, 1.0), (12.0, 9.0, 0.0, 1.0)])
-    movers.look(watch.tick, POSE, False)
+    movers, tracking = ahead(jackal)
+    tracking.see([(4.0, 3.0, 0.0, 1.0), (12.0, 9.0, 0.0, 1.0)])
+    movers.observe(tracking.tick, POSE, False)
     discs = np.array([(*hit, 0.02) for hit in hits])
     kept = [hit for hit in hits if not (4 < hit[0] < 12 and 3 < hit[1] < 9 and math.dist(hit, POSE[:2]) > 7.5)]
     assert movers.without_trails(discs, POSE)[:, :2].tolist() == [list(hit) for hit in kept]
@@ -351,15 +351,15 @@ def test_plans_lead_round_busy_ground_and_off_movers(jackal, planner):
     """The first scan sees the hall; tracks that are told it then stand for movers."""
     exploration = compose(unknown(jackal, planner)).guide
     movers = exploration._movers
-    watch = exploration.survey.watch = Seen()
-    movers._predictor.watch = watch
+    tracking = exploration.survey.tracking = Seen()
+    movers._predictor.tracking = tracking
     _, plan, avoided = exploration._plan_around(0, POSE)
     assert (avoided, plan.cost) == ([], pytest.approx(14.0, abs=0.1))
-    watch.see([(3.0, 6.0, 0.0, 0.0)])
-    _, plan, avoided = exploration._plan_around(watch.tick, POSE)
+    tracking.see([(3.0, 6.0, 0.0, 0.0)])
+    _, plan, avoided = exploration._plan_around(tracking.tick, POSE)
     assert len(avoided) > 0
     assert 14.1 < plan.cost < 16.0
-    busy(movers, watch, 1.8)
+    busy(movers, tracking, 1.8)
     _, plan, _ = exploration._plan_around(60, POSE)
     assert plan.cost > 18.0
     for pose in (POSE, (5.0, 9.0, 0.0)):  # beside it, and in it: straight out

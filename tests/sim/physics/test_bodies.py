@@ -149,5 +149,5 @@ def test_bodies_are_looked_for_before_the_robot_can_get_to_the_edge():
     """The reach holds what the fastest robot drives between two looks, after the last of which it may be HOLD away."""
     with Engine(street().world, ROBOT) as engine:
         bodies = engine._near_bodies()
-    least = HOLD + ROBOT.radius + 1.5 * ROBOT.max_speed * engines.LOOK_EVERY / 240
+    least = HOLD + ROBOT.radius + 1.5 * ROBOT.max_speed * engines.CHECK_EVERY / 240
     assert bodies._reach > least

@@ -7,7 +7,7 @@ import pytest
 
 from antdrive.robots import Odometry
 from antdrive.sim.sensing import DeadReckoning, OccupancyMap, Scanner
-from antdrive.sim.sensing.matching import ScanMatcher, sliding_left_out
+from antdrive.sim.sensing.matching import ScanMatcher, without_sliding
 from antdrive.worlds import Disc, World
 
 
@@ -116,13 +116,13 @@ def test_a_correction_that_is_too_large_is_not_believed(jackal):
 def test_a_shift_along_the_only_wall_in_sight_is_left_out():
     before, after = (0.0, 0.0, 0.0), (0.01, 0.02, 0.003)
     wall = np.column_stack([np.full(60, 2.0), np.linspace(-1, 1, 60)])
-    assert sliding_left_out(before, after, wall) == pytest.approx((0.01, 0.0, 0.003))
+    assert without_sliding(before, after, wall) == pytest.approx((0.01, 0.0, 0.003))
     turned = wall @ np.array([[0.6, 0.8], [-0.8, 0.6]])  # faces the direction (0.6, 0.8)
-    x, y, _ = sliding_left_out(before, after, turned)
+    x, y, _ = without_sliding(before, after, turned)
     assert (x, y) == pytest.approx((0.022 * 0.6, 0.022 * 0.8))
     corner = np.vstack([wall, np.column_stack([np.linspace(1.97, 0, 60), np.ones(60)])])
-    assert sliding_left_out(before, after, corner) == pytest.approx(after)
+    assert without_sliding(before, after, corner) == pytest.approx(after)
     posts = np.repeat(np.random.default_rng(0).uniform(-3, 3, (12, 2)), 5, axis=0)
     posts += 0.02 * np.arange(60)[:, None] % 0.1
-    assert sliding_left_out(before, after, posts) == pytest.approx(after)
-    assert sliding_left_out(before, after, np.full((60, 2), np.nan)) == after
+    assert without_sliding(before, after, posts) == pytest.approx(after)
+    assert without_sliding(before, after, np.full((60, 2), np.nan)) == after

@@ -188,18 +188,18 @@ def test_nothing_is_entered_beyond_fixed_bounds():
 
 def test_ground_under_the_robot_can_be_taken_as_free():
     grid = OccupancyMap(EYE)
-    found = grid.take_as_free((0.0, 0.0), 0.3)
+    found = grid.mark_free((0.0, 0.0), 0.3)
     assert len(found) == grid.seen_free.sum()
     assert 0.09 * math.pi < len(found) * 0.05**2 < 0.38**2 * math.pi
-    assert len(grid.take_as_free((0.0, 0.0), 0.3)) == 0
+    assert len(grid.mark_free((0.0, 0.0), 0.3)) == 0
 
 
 def test_ground_on_which_something_stands_is_not_taken_as_free():
     post, wall = (0.22, 0.1, 0.07), -0.17
     world = World("corner", (wall, -5.0, 5.0, 5.0), (Disc(*post),))
     taken, whole = OccupancyMap(EYE), OccupancyMap(EYE)
-    whole.take_as_free((0.0, 0.0), 0.3)
-    taken.take_as_free((0.0, 0.0), 0.3, world)
+    whole.mark_free((0.0, 0.0), 0.3)
+    taken.mark_free((0.0, 0.0), 0.3, world)
     rows, cols = np.nonzero(whole.seen_free)
     inside = np.linspace(0.0, 1.0, 21) * taken.cell  # points of a cell, from its corner
     x, y = np.meshgrid(inside, inside)
@@ -214,7 +214,7 @@ def test_a_renewed_map_knows_the_free_ground_around_a_place_and_nothing_else(pla
     old, radius = OccupancyMap(EYE), 0.6
     for x in (0.0, 8.0):
         old.insert((x, 0.0, 0.1), Scanner(EYE, POSTS).scan((x, 0.0, 0.1)))
-    new = old.renewed(place, radius, goal=(9.0, -2.0))
+    new = old.reset_around(place, radius, goal=(9.0, -2.0))
     free = np.argwhere(new.seen_free)
     centres = (free[:, ::-1] + 0.5) * new.cell + new.origin
     # The cells are the same ones, so a centre is one of the old map, too; those that meet the disc lie close to it.
@@ -237,11 +237,11 @@ def test_a_mover_can_be_forgotten_and_its_beams_left_out():
     scanner, grid = Scanner(EYE, np.empty((0, 3))), OccupancyMap(EYE)
     where, radii = np.array([[1.5, 0.0]]), np.array([0.3])
     ranges = scanner.scan((0, 0, 0), where, radii)
-    grid.insert((0, 0, 0), ranges, left_out=np.isfinite(ranges))
+    grid.insert((0, 0, 0), ranges, omitted=np.isfinite(ranges))
     assert not grid.occupied.any()
     grid.insert((0, 0, 0), ranges)
     assert len(grid.discs())
-    assert len(grid.forget((1.5, 0.0), 0.5))
+    assert len(grid.clear_hits((1.5, 0.0), 0.5))
     assert not grid.occupied.any()
     assert len(grid.discs()) == 0
 
@@ -298,7 +298,7 @@ def test_what_comes_nearer_within_a_cell_is_known_before_the_next_whole_scan(gra
     """A thing that moves towards the robot within a cell: within the grain that was hit first, or into the one before it."""
     eye = Lidar(beams=9, field_of_view=0.02, min_range=0.1, max_range=6.0, rate=50.0)
     grid, here = OccupancyMap(eye, bounds=(-1.0, -1.0, 3.0, 1.0)), (0.0, 0.02, 0.0)
-    grid.take_as_free(here[:2], 1.2)
+    grid.mark_free(here[:2], 1.2)
     far, near = 1.049, 1.027 - grain
     ways = []
     for ranges in (np.full(9, far), np.full(9, near)):
@@ -337,8 +337,8 @@ def test_free_squares_are_passed_without_a_difference(jackal):
         assert np.array_equal(quick.insert(pose, ranges), walked.insert(pose, ranges))
         if number == 20:
             for found in (quick, walked):
-                found.forget((1.5, 0.5), 1.0)
-                found.take_as_free((0.0, 8.0), 2.0)
+                found.clear_hits((1.5, 0.5), 1.0)
+                found.mark_free((0.0, 8.0), 2.0)
     assert np.array_equal(quick.seen_free, walked.seen_free)
     assert np.array_equal(quick.arrays.odds, walked.arrays.odds)
     (rows, cols), side = quick.seen_free.shape, SQUARE
@@ -410,8 +410,8 @@ def test_the_way_is_clear_up_to_the_first_contact(unknown, hits, foot, speed, ra
     if len(discs):  # what overlaps the robot at first has a rule of its own
         discs = discs[gaps(discs, foot, pose) > 3e-3]
         for x, y, _ in blockers(grid)[gaps(blockers(grid), foot, pose) <= 3e-3]:
-            grid.forget((x, y), 0.1)
-            grid.take_as_free((x, y), 0.01)
+            grid.clear_hits((x, y), 0.1)
+            grid.mark_free((x, y), 0.01)
         discs = blockers(grid)
         hypothesis.assume(not len(discs) or gaps(discs, foot, pose).min() > 3e-3)
     way = clear_distance(grid, pose, speed, rate, foot, 1.5)

@@ -32,7 +32,7 @@ from antdrive.views.figures.plan_figures import bars_figure, contours_figure, pl
 from antdrive.views.figures.robot_figure import robot_figure
 from antdrive.views.figures.run_figures import certificate_figure, comparison_figure, overview, then_and_now
 from antdrive.views.figures.sight_figure import LISTED, sight_figure
-from antdrive.views.recollection import Recollection
+from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.worlds import Disc, Keyframed, Task, Wandering, World, rasterise
 from tests.made_up_drive import scanned, undriven
 from tests.records import changed
@@ -345,7 +345,7 @@ def test_both_drives_and_their_parting_are_drawn(made_up_drive, tmp_path):
     then = made_up_drive()
     now = replace(then, pose=then.pose + [0, 0.2, 0])
     plain = then_and_now(then, now, tmp_path / "a.png", dpi=60)
-    marked = then_and_now(then, now, tmp_path / "b.png", parted=(0.3, 1.0, 1.0), dpi=60)
+    marked = then_and_now(then, now, tmp_path / "b.png", divergence=(0.3, 1.0, 1.0), dpi=60)
     assert near(pixels(plain), START) > 100
     assert near(pixels(plain), SHELL) > 100
     assert near(pixels(marked), CONTACT) > near(pixels(plain), CONTACT) + 20
@@ -367,7 +367,7 @@ def test_the_figure_shows_the_map_and_the_first_sights(log, tmp_path):
     figure = sight_figure(log, tmp_path / "sight.png", dpi=60)
     named = panels(figure)
     assert set(named) == {"map", "known ground", "first sights"}
-    seen = Recollection(log)
+    seen = MapReconstruction(log)
     seen.advance(log.t[-1])
     _, explored = named["known ground"].lines[0].get_data()
     assert float(np.asarray(explored)[-1]) == pytest.approx(seen.explored)

@@ -16,8 +16,8 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
-from antdrive.views.colours import VERDICTS
-from antdrive.views.film import options, overlay, prelude, replay, video
+from antdrive.views.colours import OUTCOME_LABELS
+from antdrive.views.film import film_options, overlay, playback, prelude, video
 from antdrive.views.film.overlay import Layout, _entry_width, banner, legend_entries, legend_rows
 from antdrive.views.film.prelude import field_levels, plan_again, planning_frames
 from antdrive.views.film.shot import Shot
@@ -178,16 +178,16 @@ def test_every_outcome_ends_with_words_in_its_colour(drive, outcome):
     ended = changed(drive, "record", outcome=outcome)
     shot = Shot(ended, camera="top", size=SIZE)
     before, after = shot.frame(1.0), shot.last_frame()
-    colour = np.array(VERDICTS[outcome][1])
+    colour = np.array(OUTCOME_LABELS[outcome][1])
     count = [(np.abs(frame.astype(int) - colour).max(axis=-1) < 6).sum() for frame in (before, after)]
     assert count[1] > count[0] + 300
 
 
 def test_a_contact_flashes_and_stays_marked(crash):
     shot = Shot(crash, camera="oblique", size=SIZE)
-    end = shot.replay.duration
+    end = shot.playback.duration
     before, at, final = shot.frame(end - 0.2), shot.frame(end), shot.last_frame()
-    px, py = (round(value) for value in shot._compositor.pixel(*shot.replay.contact(end)[:2], 0.1))
+    px, py = (round(value) for value in shot._compositor.pixel(*shot.playback.contact(end)[:2], 0.1))
 
     def redness(picture, where):
         red, green, _ = np.moveaxis(picture[where].astype(int), -1, 0)
@@ -225,7 +225,7 @@ def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):
 
 
 def test_an_encoder_that_dies_is_reported(drive, tmp_path, monkeypatch):
-    monkeypatch.setitem(options.ENCODERS, ".mp4", ("-c:v", "no-such-codec"))
+    monkeypatch.setitem(film_options.ENCODERS, ".mp4", ("-c:v", "no-such-codec"))
     with pytest.raises(OSError, match="no-such-codec"):
         film(drive, tmp_path / "drive.mp4", size=SIZE)
     assert not list(tmp_path.iterdir())
@@ -252,7 +252,7 @@ def test_a_still_may_be_webp(drive, tmp_path):
 @pytest.mark.parametrize("size", [(320, 240), (640, 480), (1280, 720)])
 def test_the_outcomes_sentence_does_not_cover_the_legend(drive, size):
     shot = Shot(drive, camera="follow", size=size)
-    before, after = shot.frame(shot.replay.duration), shot.last_frame()
+    before, after = shot.frame(shot.playback.duration), shot.last_frame()
     high, wide = (shot._layout.unit + side for side in shot._legend.shape[:2])
     assert np.array_equal(before[:high, :wide], after[:high, :wide])
     assert not np.array_equal(before, after)
@@ -260,12 +260,12 @@ def test_the_outcomes_sentence_does_not_cover_the_legend(drive, size):
 
 def test_a_film_goes_into_slow_motion_around_a_contact(crash):
     shot = Shot(crash, camera="oblique", size=SIZE)
-    end, (first, last) = shot.replay.duration, shot.slow_motion
+    end, (first, last) = shot.playback.duration, shot.slow_motion
     times = frame_times(end, 30, 1.0, shot.slow_motion)
     word = [shot.frame(at)[-100:, -120:] for at in (first - 0.1, first + 0.1)]
     steps = np.diff(times)
     slowly = (times[:-1] >= first) & (times[1:] <= last)
-    assert steps[slowly] == pytest.approx(1 / 30 / replay.SLOW_MOTION)
+    assert steps[slowly] == pytest.approx(1 / 30 / playback.SLOW_MOTION)
     assert steps[: slowly.argmax() - 1] == pytest.approx(1 / 30)
     assert times[0] == 0
     assert end - times[-1] < 1 / 30
@@ -287,7 +287,7 @@ def test_frames_rendered_in_several_processes_equal_those_of_one(drive):
 def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
     for size, found in (((30.0, 22.0), True), ((4.0, 3.0), False)):
         shot = Shot(made_up_drive(size=size, obstacles=0), camera="top", size=SIZE)
-        compositor, pose = shot._compositor, shot.replay.pose(0.5)
+        compositor, pose = shot._compositor, shot.playback.pose(0.5)
         px, py = (round(value) for value in compositor.pixel(*pose[:2]))
         tinted = compositor.frame(pose).astype(int) - compositor.backdrop.pixels
         ring = np.abs(tinted[py - 14 : py + 14, px - 14 : px + 14, 2]).max()
@@ -331,7 +331,7 @@ def test_replans_at_every_cell_have_no_caption(drive):
     entry = ReplanRecord(t=0.0, trigger="decision", solved=True, cost_m=0.5, work=1, route=((1.0, 1.0), (1.5, 1.0)))
     decided = changed(drive, "record", replans=(entry,))
     shot = Shot(decided, camera="top", size=SIZE)
-    assert [event.caption for event in shot.replay.replans] == [""]
+    assert [event.caption for event in shot.playback.replans] == [""]
     shot.frame(0.5)
 
 

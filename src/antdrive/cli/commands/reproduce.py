@@ -8,7 +8,7 @@ from antdrive.cli import options
 from antdrive.cli.console import bar, file_lines, print_error, show, table
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import results_folder
-from antdrive.views.folder import suffixes
+from antdrive.views.run_folder import suffixes
 
 MARKER = "reproduce.json"
 QUICK_SEEDS = 6
@@ -34,8 +34,8 @@ def reproduce(
     """
     from antdrive.runs.papers.claims import VERDICT_HEADS, verdict_cells, verdict_facts
     from antdrive.runs.papers.experiments import PAPERS
-    from antdrive.runs.papers.reproduce import HEADS, RUNS_FOLDER, row_cells, too_few_seeds
-    from antdrive.runs.papers.reproduce import reproduce as repeat
+    from antdrive.runs.papers.reproduction import HEADS, RUNS_FOLDER, row_cells, too_few_seeds
+    from antdrive.runs.papers.reproduction import reproduce as repeat
     from antdrive.views.papers import draw_figures
 
     papers = list(PAPERS) if paper == "all" else [paper]

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.campaigns import campaign_from, resumable
+from antdrive.cli.campaign_options import campaign_from, resumable
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import campaign_bar, print_error, show, table
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.warm import compile_once
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def sweep(
         print_error(note)
     files: list[str] = []
     if report is not None:
-        from antdrive.views.pages.campaign import report_campaign
+        from antdrive.views.pages.campaign_report import report_campaign
 
         files = [str(path) for path in report_campaign(out, report)]
     facts = {
@@ -130,7 +130,7 @@ def sweep(
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Refuse options that mean nothing."""
     if report is not None:
-        from antdrive.views.pages.campaign import check_suffix
+        from antdrive.views.pages.campaign_report import check_suffix
 
         check_suffix(report)
         if dry_run:

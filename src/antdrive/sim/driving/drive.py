@@ -11,7 +11,7 @@ from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Decider, Ending, Guide, Localiser, Moment, Plant, Rule, Scanning, Step
 from antdrive.sim.driving.plants import Bullet, Drive
-from antdrive.sim.driving.rules import OUT_OF_SIGHT, WAITING_SPEED, Pursuit, standing
+from antdrive.sim.driving.rules import SIGHT_LIMIT, WAITING_SPEED, Pursuit, standing
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import Task
@@ -21,11 +21,11 @@ PROGRESS_HZ = 10  # calls of `progress` per simulated second
 Progress = Callable[[float], None]
 
 
-def unheard(fraction: float) -> None:
+def ignore_progress(fraction: float) -> None:
     """Ignore the progress of a drive."""
 
 
-def unscanned(tick: int, pose: Pose, estimate: Pose) -> Pose:
+def no_scan(tick: int, pose: Pose, estimate: Pose) -> Pose:
     """The estimate of a robot that does not scan."""
     return estimate
 
@@ -34,11 +34,11 @@ def drive(
     plant: Plant,
     decider: Decider,
     localiser: Localiser,
-    scan: Scanning = unscanned,
+    scan: Scanning = no_scan,
     *,
     hz: int,  # control periods per second
     limit: float,  # the longest time [s]
-    progress: Progress = unheard,
+    progress: Progress = ignore_progress,
 ) -> Ending:
     """Drive until the decider ends it, the robot touches something, or the time is over."""
     ending = Ending(Outcome.COLLIDED) if plant.touched else None
@@ -49,7 +49,7 @@ def drive(
         ending = _control_period(tick, plant, decider, localiser, scan)
         if tick % (hz // PROGRESS_HZ or 1) == 0:
             progress(decider.fraction)
-    return decider.explained(ending or Ending(Outcome.TIMED_OUT), tick)
+    return decider.with_reason(ending or Ending(Outcome.TIMED_OUT), tick)
 
 
 def _control_period(tick: int, plant: Plant, decider: Decider, localiser: Localiser, scan: Scanning) -> Ending | None:
@@ -82,7 +82,7 @@ class StuckClock(NamedTuple):
             return StuckClock(pursuit.arc)
         if waiting:
             return self
-        held = self.held + (pursuit.limiter == OUT_OF_SIGHT)
+        held = self.held + (pursuit.limiter == SIGHT_LIMIT)
         if pursuit.turning:
             return StuckClock(self.farthest, self.driving, self.turning + 1, held)
         return StuckClock(self.farthest, self.driving + 1, self.turning, held)
@@ -125,8 +125,8 @@ class Driver(Decider):
         trigger = guide.trigger(tick, pose, waiting, self.path, before.pursuit.arc)
         if trigger:
             self._follow(guide.replan(tick, pose, trigger))
-        if guide.wrong:
-            return self._wrong_plan(tick)
+        if guide.plan_error:
+            return self._invalid_plan(tick)
         if guide.blocked:
             return Ending(Outcome.BLOCKED, guide.blocked)
         self.path = guide.refreshed(self.path, pose)
@@ -137,7 +137,7 @@ class Driver(Decider):
         if step.arrived:
             return self._arrival(pose, state)
         ending = self._end_of_route(tick, pose, state)
-        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scans)
+        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
         return ending
 
     def gives_up(self, state: State) -> Ending | None:
@@ -147,11 +147,11 @@ class Driver(Decider):
             return None
         return Ending(Outcome.STUCK, clock.reason)
 
-    def explained(self, ending: Ending, tick: int) -> Ending:
+    def with_reason(self, ending: Ending, tick: int) -> Ending:
         """How the drive ends; of a robot that did not get on, whether it had found no way."""
         if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
             return ending
-        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.no_way(tick)))))
+        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.failure_note(tick)))))
 
     def _follow(self, path: TrackedPath | None) -> bool:
         """Go on along a new path; whether there is one."""
@@ -173,11 +173,11 @@ class Driver(Decider):
             return ending
         if self._follow(guide.missed(tick, pose)) or guide.may_wait:
             return None
-        return self._wrong_plan(tick) if guide.wrong else ending
+        return self._invalid_plan(tick) if guide.plan_error else ending
 
-    def _wrong_plan(self, tick: int) -> Ending:
+    def _invalid_plan(self, tick: int) -> Ending:
         """The ending of a drive on which the planner has given a wrong plan."""
-        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.wrong}")
+        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}")
 
     def _arrival(self, pose: Pose, state: State) -> Ending:
         """How the drive ends if the robot stops here, where it believes that it is at a pose, without a contact."""
@@ -216,7 +216,7 @@ def follow(
     control_hz: int = 60,
     localiser: Localiser | None = None,
     rules: Sequence[Rule] = (),
-    progress: Progress = unheard,
+    progress: Progress = ignore_progress,
 ) -> Drive:
     """Drive along a path from the start of a task, for at most a time [s]; `rules` apply after pursuit."""
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))

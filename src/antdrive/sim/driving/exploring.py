@@ -18,22 +18,22 @@ import numpy as np
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.planners import PlanResult, PlanStatus, smooth
 from antdrive.robots import TrackedPath, Twist
-from antdrive.robots.control.pursuit import unsorted
+from antdrive.robots.control.pursuit import unsorted_obstacles
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.parts import RouteGuide, Rows
-from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
+from antdrive.sim.driving.recovery import TRAIL, Recovery, ScanTurn
 from antdrive.sim.driving.routes import RoutePlanner, bounds_of
 from antdrive.sim.driving.survey import PATIENCE, Survey, table_logged
 from antdrive.sim.policy import (
     BACKED,
     DISCOVERED,
     HELD,
-    LOOKED,
     LOST,
     MADE_ROOM,
     MISSED,
+    SCANNED,
     STALLED,
     STRAYED,
     ReplanPolicy,
@@ -50,7 +50,7 @@ SAMPLES = 0.06  # spacing of the places on a route at which speed limits and loo
 SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
 INTERVAL = 0.15  # the shortest time between two plans [s]
 COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
-LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
+ROUTE_CHECK_STEP = 0.1  # spacing of the points of a route that are looked at [m]
 FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
 CORNERED = 0.1  # and those of other shapes by this share more of what their corners stand out [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from what was hit than in a known world [m]
@@ -78,7 +78,7 @@ class Exploration(RouteGuide):
         self._task, self._hz, self._robot = planner.task, planner.hz, planner.robot
         self._ahead, self._needed = np.empty((0, 2)), np.empty(0)
         self._arcs = np.empty(0)
-        self._looked = self._indexed = 0
+        self._checked = self._indexed = 0
         self._planned_at = -math.inf
         self.lost, self._failures, self._gave_up_at = False, 0, -math.inf
         self._recovery = Recovery(survey, planner.robot, planner.task.start, planner.hz)
@@ -87,24 +87,24 @@ class Exploration(RouteGuide):
         self._known_as: tuple[tuple[Any, ...], Task] = (), planner.task
 
     @property
-    def wrong(self) -> str:
+    def plan_error(self) -> str:
         """What is wrong with a plan that the planner gave; empty if nothing is."""
-        return self._routes.wrong
+        return self._routes.plan_error
 
     @property
     def may_wait(self) -> bool:
         """Whether the robot stays where it is for a while: it has no way, and tries again, or it makes a scan turn."""
-        return self.lost or self.scans
+        return self.lost or self.scan_turning
 
     @property
-    def scans(self) -> bool:
+    def scan_turning(self) -> bool:
         """Whether the robot makes a scan turn."""
-        return self._recovery.look is not None
+        return self._recovery.scan_turn is not None
 
     @property
-    def look(self) -> Look | None:
+    def scan_turn(self) -> ScanTurn | None:
         """The scan turn that the robot makes now; None: it makes none."""
-        return self._recovery.look
+        return self._recovery.scan_turn
 
     def first(self) -> tuple[Grid, PlanResult]:
         """The grid and the plan from the start, through what the first scan shows. Later plans do not depend on it."""
@@ -151,7 +151,7 @@ class Exploration(RouteGuide):
             task = self._known(pose, movers.bounds(self._bounds(GROWTH[0], pose)))
             grid = self._grid(task, self._routes.margin)
             zones, soon = movers.zones(tick, pose, grid), movers.discs(tick, pose)
-            around = movers.way_round(pose, zones, soon, functools.partial(self._routes.around, task, grid))
+            around = movers.plan_around_zones(pose, zones, soon, functools.partial(self._routes.around, task, grid))
             if around is not None:
                 return (grid, *around)
         discs = movers.discs(tick, pose)
@@ -176,7 +176,7 @@ class Exploration(RouteGuide):
         near = dataclasses.replace(task, world=_world(bounds, discs))
         route = smooth(answer, grid, with_obstacles(near, avoided), kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
-        self._watch(route, near.world, grid.inflate)
+        self._note_route(route, near.world, grid.inflate)
         return route, tracked
 
     def _bounds(self, growth: float, pose: Pose) -> Bounds:
@@ -231,7 +231,7 @@ class Exploration(RouteGuide):
         x, y, _ = pose
         near = self._routes.controller.lookahead_max + path.tuning.lookahead_clearance + SPARE
         discs = self.survey.map.discs((x - near, y - near, x + near, y + near))
-        return path.among(unsorted(discs, path.obstacles.bounds))
+        return path.with_obstacles(unsorted_obstacles(discs, path.obstacles.bounds))
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """A new path to a goal that the robot missed, unless it looks for a way already."""
@@ -241,13 +241,13 @@ class Exploration(RouteGuide):
         """Why a new route is due now; empty if none is."""
         now = tick / self._hz
         if self._movers is not None:
-            self._movers.look(tick, pose, waiting)
+            self._movers.observe(tick, pose, waiting)
         recovery = self._recovery
-        if recovery.look is not None:
-            return LOOKED if recovery.look.done else ""
+        if recovery.scan_turn is not None:
+            return SCANNED if recovery.scan_turn.done else ""
         if self.lost:
             return LOST if now - self._planned_at >= INTERVAL else ""
-        recovery.note_way(now, pose, waiting=waiting, backwards=tracked.backwards)
+        recovery.note_progress(now, pose, waiting=waiting, backwards=tracked.backwards)
         if tracked.route is recovery.route:
             over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
             return (BACKED if tracked.backwards else MADE_ROOM) if over else ""
@@ -261,9 +261,9 @@ class Exploration(RouteGuide):
             due = self._movers.trigger(tick, pose, tracked, arc)
             if due:
                 return due
-        if self._looked == self.survey.whole:
+        if self._checked == self.survey.whole:
             return ""
-        self._looked = self.survey.whole
+        self._checked = self.survey.whole
         deviation = math.dist(_kernels_hits.point_at(tracked.samples.xy, tracked.samples.arc, arc), pose[:2])
         if deviation > self._policy.max_deviation:
             return STRAYED
@@ -273,17 +273,17 @@ class Exploration(RouteGuide):
         """A new path from a pose, prepared for the controller; None: there is none, or the robot looks round first."""
         now, started = tick / self._hz, time.perf_counter()
         self._planned_at, self._tick = now, tick
-        if trigger in (STALLED, HELD, BACKED, MADE_ROOM, LOOKED):
+        if trigger in (STALLED, HELD, BACKED, MADE_ROOM, SCANNED):
             recovers, way = self._recovered(now, pose, trigger)
             if way is not None:
                 self.note(now, trigger, time.perf_counter() - started, 0, way.length, way.route.xy)
             if recovers:
                 return way
-        if self._failures >= PATIENCE and trigger != LOOKED:
+        if self._failures >= PATIENCE and trigger != SCANNED:
             self._failures = 0
-            self.survey.forget(pose)
+            self.survey.reset(pose)
         grid, plan, avoided = self._plan_around(tick, pose)
-        self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.wrong)
+        self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0
             route, tracked = self._route(pose, grid, plan, avoided)
@@ -291,37 +291,37 @@ class Exploration(RouteGuide):
             return tracked
         self.note(now, trigger, time.perf_counter() - started, plan.work)
         self._failures += 1
-        self._recovery.rests(now, pose)
+        self._recovery.note_rest(now, pose)
         if self._failures >= PATIENCE:
             self._gave_up_at = now
-            self._recovery.begin_look(pose)
+            self._recovery.begin_scan_turn(pose)
         return None
 
     def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
         """Whether a robot that did not get on does something else than to plan anew, and the way that it then follows."""
         recovery = self._recovery
-        if trigger == LOOKED:
-            recovery.end_look(now, pose)
+        if trigger == SCANNED:
+            recovery.end_scan_turn(now, pose)
             return False, None
         if trigger in (BACKED, MADE_ROOM):
-            recovery.rests(now, pose)
+            recovery.note_rest(now, pose)
         if trigger == STALLED:
             recovery.note_stall(now, pose)
-        if (trigger != STALLED or recovery.misses_sight(pose)) and recovery.begin_look(pose):
+        if (trigger != STALLED or recovery.held_by_unknown(pose)) and recovery.begin_scan_turn(pose):
             return True, None
         if trigger == HELD:
             return True, None
-        found = recovery.way(pose) if trigger == STALLED else None
+        found = recovery.escape(pose) if trigger == STALLED else None
         if found is None:
             return False, None
         way = self._prepare(found, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
-    def note_sight(self, tick: int, held: Twist | None) -> None:
+    def note_held(self, tick: int, held: Twist | None) -> None:
         """Note whether the robot stands because its sight does not let it go on."""
-        self._recovery.note_sight(tick / self._hz, held)
+        self._recovery.note_held(tick / self._hz, held)
 
-    def no_way(self, tick: int) -> str:
+    def failure_note(self, tick: int) -> str:
         """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not."""
         if tick / self._hz - self._gave_up_at > LATELY:
             return ""
@@ -333,16 +333,16 @@ class Exploration(RouteGuide):
 
     # ---- the route ahead
 
-    def _watch(self, route: Route, world: World, inflate: float) -> None:
+    def _note_route(self, route: Route, world: World, inflate: float) -> None:
         """Note the points of a route and the clearance that they are to keep."""
-        arcs = np.arange(0.0, route.length + LOOK_AT_ROUTE, LOOK_AT_ROUTE)
+        arcs = np.arange(0.0, route.length + ROUTE_CHECK_STEP, ROUTE_CHECK_STEP)
         self._arcs = arcs
         self._ahead = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
         self._needed = np.minimum(point_clearance(world, self._ahead), inflate)
 
     def _discovered(self, pose: Pose, arc: float) -> bool:
         """Whether the last scan met something where the route ahead leads."""
-        first = int(arc / LOOK_AT_ROUTE)
+        first = int(arc / ROUTE_CHECK_STEP)
         ahead, needed = self._ahead[first:], self._needed[first:]
         return len(ahead) > 0 and self.survey.hit_within(ahead, needed, self._arcs[first:] - arc)
 

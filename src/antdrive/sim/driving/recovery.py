@@ -32,7 +32,7 @@ WORTH_SEEING = 0.1  # ground that was not seen holds the robot if it could other
 STOPPED = 0.01  # a robot that turns more slowly than this has stopped [rad/s]
 
 
-class Look:
+class ScanTurn:
     """A turn on the spot, one way and then the other if the first is not free all round.
 
     Attributes:
@@ -79,7 +79,7 @@ class Recovery:
     """
 
     def __init__(self, survey: Survey, robot: RobotSpec, start: Pose, hz: int) -> None:
-        self.look: Look | None = None
+        self.scan_turn: ScanTurn | None = None
         self.route: Route | None = None
         self.backwards = False
         self._survey, self._robot, self._hz = survey, robot, hz
@@ -88,16 +88,16 @@ class Recovery:
         self._held_since = math.inf
         self._wanted: Twist | None = None
         self._stalls, self._stalled_at = 0, start[:2]
-        self._looked_at = (math.inf, math.inf)
+        self._turned_at = (math.inf, math.inf)
 
-    def note_way(self, now: float, pose: Pose, *, waiting: bool, backwards: bool) -> None:
+    def note_progress(self, now: float, pose: Pose, *, waiting: bool, backwards: bool) -> None:
         """Note where the robot is: whether it moves, and its track unless it follows that back."""
         if waiting or math.dist(self._rest[1], pose[:2]) > STALL_DISTANCE:
-            self.rests(now, pose)
+            self.note_rest(now, pose)
         if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
             self._trail.append(pose[:2])
 
-    def note_sight(self, now: float, held: Twist | None) -> None:
+    def note_held(self, now: float, held: Twist | None) -> None:
         """Note whether the robot stands because its sight does not let it go on."""
         if held is None:
             self._held_since = math.inf
@@ -105,7 +105,7 @@ class Recovery:
             self._held_since = now
         self._wanted = held
 
-    def rests(self, now: float, pose: Pose) -> None:
+    def note_rest(self, now: float, pose: Pose) -> None:
         """Count from now on how long the robot has not moved."""
         self._rest = now, pose[:2]
 
@@ -115,44 +115,46 @@ class Recovery:
 
     def held(self, now: float, pose: Pose) -> bool:
         """Whether ground that was not seen held the robot for long where it has not looked round, or will from the start on."""
-        if not self._may_look(pose):
+        if not self._may_turn(pose):
             return False
-        if self._looked_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW:
+        if self._turned_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW:
             return True
-        return now - self._held_since > HELD_TIME and self.misses_sight(pose)
+        return now - self._held_since > HELD_TIME and self.held_by_unknown(pose)
 
-    def misses_sight(self, pose: Pose) -> bool:
+    def held_by_unknown(self, pose: Pose) -> bool:
         """Whether the robot stands because it has not seen the ground ahead, not because something was hit there."""
         if self._wanted is None:
             return False
-        seen, open_ = (self._survey.clear_way(pose, self._wanted, WAY, daring=daring) for daring in (False, True))
+        seen, open_ = (
+            self._survey.clear_way(pose, self._wanted, WAY, freespace=freespace) for freespace in (False, True)
+        )
         return open_ > seen + WORTH_SEEING
 
-    def begin_look(self, pose: Pose) -> bool:
+    def begin_scan_turn(self, pose: Pose) -> bool:
         """Begin to look round; whether there is anything to look at that the robot has not looked at from here."""
-        if not self._may_look(pose):
+        if not self._may_turn(pose):
             return False
-        self._looked_at = pose[:2]
+        self._turned_at = pose[:2]
         turns = list(self._turns(pose))
         if not turns:
             return False
         lidar, seen = self._survey.lidar, self._survey.map
         rate = lidar.field_of_view * lidar.rate / (VIEWS * seen.share * seen.turns)
-        self.look = Look(turns, pose[2], min(rate, self._robot.max_yaw_rate), self._robot, self._hz)
+        self.scan_turn = ScanTurn(turns, pose[2], min(rate, self._robot.max_yaw_rate), self._robot, self._hz)
         return True
 
-    def end_look(self, now: float, pose: Pose) -> None:
+    def end_scan_turn(self, now: float, pose: Pose) -> None:
         """Go on after a look."""
-        self.look, self._held_since = None, math.inf
-        self.rests(now, pose)
+        self.scan_turn, self._held_since = None, math.inf
+        self.note_rest(now, pose)
 
     def note_stall(self, now: float, pose: Pose) -> None:
         """Note a stall, and how many there were at this place."""
-        self.rests(now, pose)
+        self.note_rest(now, pose)
         self._stalls = self._stalls + 1 if math.dist(self._stalled_at, pose[:2]) < AGAIN else 1
         self._stalled_at = pose[:2]
 
-    def way(self, pose: Pose) -> Route | None:
+    def escape(self, pose: Pose) -> Route | None:
         """A way out for a robot that stalls again, or that its sight holds: back along the track, else ahead. None: no way."""
         tries = self._stalls - 2 if self._held_since == math.inf else self._stalls - 1
         if not 0 <= tries <= len(LENGTHS):
@@ -180,8 +182,8 @@ class Recovery:
                 length += step
         return points if length >= 2 * TRAIL else points[:1]
 
-    def _may_look(self, pose: Pose) -> bool:
-        return not self._survey.lidar.full_circle and math.dist(self._looked_at, pose[:2]) >= ELSEWHERE
+    def _may_turn(self, pose: Pose) -> bool:
+        return not self._survey.lidar.full_circle and math.dist(self._turned_at, pose[:2]) >= ELSEWHERE
 
     def _turns(self, pose: Pose) -> Iterator[float]:
         """The turns with which the lidar sees all around, as far as they are free."""

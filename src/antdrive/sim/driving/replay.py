@@ -22,11 +22,11 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import Twist
-from antdrive.sim.driving.drive import drive, unscanned
+from antdrive.sim.driving.drive import drive, no_scan
 from antdrive.sim.driving.localising import Exact, localiser_of
 from antdrive.sim.driving.parts import Decider, Ending, Step
 from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.driving.survey import Scans, Senses, Survey, Watch, forgetting_ticks
+from antdrive.sim.driving.survey import MoverTracking, Scans, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine, State
@@ -103,14 +103,14 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     # A period's first row is the last of the period before; a contact ends the control of the robot.
     touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
     rows = range(0, min(touched, len(rollout.t) - 1), per_tick)
-    scans, forgets = scans_of(rollout)
-    plant, reader = Logged(rollout), Reader(rollout, len(rows), forgets)
+    scans, resets = scans_of(rollout)
+    plant, reader = Logged(rollout), Reader(rollout, len(rows), resets)
     periods = len(rows) + _decided_at_the_end(rollout, per_tick)
     drive(
         plant,
         reader,
         localiser,
-        scans.scan if scans else unscanned,
+        scans.scan if scans else no_scan,
         hz=record.control_hz,
         limit=periods / record.control_hz,
     )
@@ -159,17 +159,17 @@ class Logged:
 class Reader(Decider):
     """Decides as a log has it, for so many control periods, and has the map forgotten when the robot did so."""
 
-    def __init__(self, rollout: Rollout, periods: int, forgets: Mapping[int, Callable[[Pose], None]]) -> None:
+    def __init__(self, rollout: Rollout, periods: int, resets: Mapping[int, Callable[[Pose], None]]) -> None:
         self.step = Step()
-        self._rollout, self._periods, self._forgets = rollout, periods, forgets
+        self._rollout, self._periods, self._resets = rollout, periods, resets
         self._per_tick = rollout.record.physics_hz // rollout.record.control_hz
 
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
         """The logged command of a control period, or the end."""
         if tick == self._periods:
             return Ending(self._rollout.outcome)
-        if tick in self._forgets:
-            self._forgets[tick](pose)
+        if tick in self._resets:
+            self._resets[tick](pose)
         self.step = Step(Twist(*self._rollout.command[tick * self._per_tick + 1].tolist()))
         return None
 
@@ -181,13 +181,13 @@ def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pos
         return None, {}
     assert lidar is not None
     hz, noisy = record.control_hz, record.noise > 0
-    senses = Senses.of(lidar, record.world, rollout.trajectories(), seed=record.seed, noisy=noisy, hz=hz)
+    sensor = SimulatedLidar.of(lidar, record.world, rollout.trajectories(), seed=record.seed, noisy=noisy, hz=hz)
     if not record.exploring:
-        return Scans(senses), {}
-    watching = record.perception is not None and record.perception.kind == "lidar"
-    watch, matching = Watch(lidar, hz) if watching else None, record.localisation == "matching"
-    survey = Survey.of(record.robot, record.task, senses, matching=matching, watch=watch)
-    return survey, dict.fromkeys(forgetting_ticks(record), survey.forget)
+        return Scans(sensor), {}
+    tracks_movers = record.perception is not None and record.perception.kind == "lidar"
+    tracking, matching = MoverTracking(lidar, hz) if tracks_movers else None, record.localisation == "matching"
+    survey = Survey.of(record.robot, record.task, sensor, matching=matching, tracking=tracking)
+    return survey, dict.fromkeys(reset_ticks(record), survey.reset)
 
 
 def _decided_at_the_end(rollout: Rollout, per_tick: int) -> bool:

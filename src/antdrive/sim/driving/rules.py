@@ -1,4 +1,4 @@
-"""The rules of control, in the order in which they apply: pursue, scan turn, schedule, avoidance. The last is `StayInSight`."""
+"""Control rules, in order: pursuit, scan turn, schedule, avoidance. `StoppingConstraint` applies last."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from antdrive.base import Floats, Pose
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import TimedPlan
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, Twist
-from antdrive.sim.driving.others import Others
 from antdrive.sim.driving.parts import Guide, Moment, Step
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Route, Task
 
@@ -66,7 +66,7 @@ WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
 AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
 EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
-OUT_OF_SIGHT = EXPLORING_LIMITERS.index("sight")
+SIGHT_LIMIT = EXPLORING_LIMITERS.index("sight")
 
 
 class Pursuit:
@@ -84,10 +84,10 @@ class Pursuit:
         last, before = now.before.command, now.before.pursuit
         if now.clock.turning <= self._full_turn:
             return Step(*self._controller.step(now.path, now.pose, last, before))
-        return Step(*self._controller.step(now.path.without_turning, now.pose, last, before._replace(turning=False)))
+        return Step(*self._controller.step(now.path.preferring_arcs, now.pose, last, before._replace(turning=False)))
 
 
-class LookRound:
+class TurnToScan:
     """Turn on the spot to scan, once the robot stands; stop where it has no way."""
 
     def __init__(self, guide: Exploration, robot: RobotSpec, hz: int) -> None:
@@ -95,11 +95,11 @@ class LookRound:
 
     def apply(self, now: Moment, step: Step) -> Step:
         """The scan turn's command, or one that brakes for it."""
-        look, last = self._guide.look, now.before.command
-        if look is not None and not last.speed:
+        scan_turn, last = self._guide.scan_turn, now.before.command
+        if scan_turn is not None and not last.speed:
             turning = step.pursuit._replace(limiter=ROTATING)
-            return step._replace(command=look.command(now.pose, last), pursuit=turning)
-        if look is not None or self._guide.lost:
+            return step._replace(command=scan_turn.command(now.pose, last), pursuit=turning)
+        if scan_turn is not None or self._guide.lost:
             return step._replace(command=braked(last, self._robot, self._hz))
         return step
 
@@ -126,7 +126,7 @@ class Avoid:
     def __init__(
         self,
         avoidance: Avoidance,
-        others: Others,
+        movers: PerceivedMovers,
         guide: Guide,
         task: Task,
         robot: RobotSpec,
@@ -135,7 +135,7 @@ class Avoid:
         goal_share: float = GOAL_SHARE,
         backwards: float = math.inf,
     ) -> None:
-        self._avoidance, self._others, self._guide = avoidance, others, guide
+        self._avoidance, self._movers, self._guide = avoidance, movers, guide
         self._task, self._robot, self._hz = task, robot, hz
         self._goal_share, self._backwards = goal_share, backwards
         self._state = AvoidanceState()
@@ -151,7 +151,7 @@ class Avoid:
             step = step._replace(command=braked(last, self._robot, self._hz))
             # A robot that stands at the goal has arrived, so only the time until it stands matters.
             ahead = ahead[: 2 + math.ceil(stopping_time(last, self._robot) / avoidance.step)]
-        movers, radii = self._others.predict(tick, pose[:2], ahead)
+        movers, radii = self._movers.predict(tick, pose[:2], ahead)
         command, avoids, self._state = avoidance.avoid(
             path,
             self._robot,
@@ -161,7 +161,7 @@ class Avoid:
             step.command,
             self._state,
             movers,
-            radii - self._guide.closer(tick, pose[:2]),
+            radii - self._guide.clearance_reduction(tick, pose[:2]),
             speed_limit=step.speed_limit,
             backwards=self._backwards,
         )

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from antdrive.base import Pose
 from antdrive.robots import RobotSpec, Twist
 from antdrive.sim.driving.parts import Moment, Step
-from antdrive.sim.driving.rules import OUT_OF_SIGHT, stopping_time
+from antdrive.sim.driving.rules import SIGHT_LIMIT, stopping_time
 from antdrive.sim.driving.survey import Survey
 
 SLOWEST = 0.02  # of slower commands the turn counts, too, where `SHORT` is taken off [m/s]
@@ -17,7 +17,7 @@ ON_THE_SPOT = 1e-6  # arcs of a smaller radius than this are turns on the spot [
 STILL = Twist(0.0, 0.0)
 
 
-class StayInSight:
+class StoppingConstraint:
     """Slow down where the robot could not stop on ground that it has seen.
 
     Every command is checked, however slow: a robot that creeps gets to an obstacle as well. A command is let through, or slowed
@@ -38,7 +38,7 @@ class StayInSight:
         self._note(now.tick, step.command if slowed and stands else None)
         if not slowed:
             return step
-        return step._replace(command=command, pursuit=step.pursuit._replace(limiter=OUT_OF_SIGHT))
+        return step._replace(command=command, pursuit=step.pursuit._replace(limiter=SIGHT_LIMIT))
 
     def limit(self, pose: Pose, last: Twist, command: Twist) -> tuple[Twist, bool]:
         """The command, slower where it leads out of sight; and whether it was."""

@@ -19,9 +19,9 @@ from antdrive.sim.driving.parts import Rows
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import scans_logged
 from antdrive.sim.log.streams import random_stream
-from antdrive.sim.policy import LOOKED
+from antdrive.sim.policy import SCANNED
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_distance, clear_turn
-from antdrive.sim.sensing.matching import FAR, ScanMatcher, sliding_left_out
+from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers
 from antdrive.worlds import Task, Trajectories, World
@@ -37,9 +37,9 @@ SHARPEST = 0.05  # arcs of a smaller radius than this are nearly turns on the sp
 FAR_AMONG_MOVERS = 15.0  # scans are matched up to this far where movers, which are no marks, hide what is near [m]
 
 
-def horizon_of(*, watching: bool) -> float:
+def horizon_of(*, tracks_movers: bool) -> float:
     """How far away a hit may be that is entered in a robot's map [m]."""
-    return HORIZON_AMONG_MOVERS if watching else HORIZON
+    return HORIZON_AMONG_MOVERS if tracks_movers else HORIZON
 
 
 def turning_room(radius: float) -> float:
@@ -50,11 +50,11 @@ def turning_room(radius: float) -> float:
     return radius + PAD + 0.5 * MAP_CELL
 
 
-def forgetting_ticks(record: DriveRecord) -> Iterator[int]:
+def reset_ticks(record: DriveRecord) -> Iterator[int]:
     """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path."""
     failures = 0
     for replan in record.replans:
-        if failures >= PATIENCE and replan.trigger != LOOKED:
+        if failures >= PATIENCE and replan.trigger != SCANNED:
             failures = 0
             yield round(replan.t * record.control_hz)
         failures = 0 if replan.solved else failures + 1
@@ -69,7 +69,7 @@ def table_logged(
     return np.concatenate(tables or [np.empty((0, columns))]).astype(np.float32)
 
 
-class Watch:
+class MoverTracking:
     """What a robot's scans tell of movers, and the log of it.
 
     Attributes:
@@ -96,7 +96,7 @@ class Watch:
         self._log.append((tick, self.tracker.movers()))
         return theirs
 
-    def read_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
+    def update_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
         """The same for a robot that makes its own map, before the scan is entered."""
         return self.read(MappedGround(seen, self._settle), pose, ranges, tick)
 
@@ -125,7 +125,7 @@ class Scan(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Senses:
+class SimulatedLidar:
     """What a robot is surveying with."""
 
     scanner: Scanner  # the lidar in the true world
@@ -135,7 +135,9 @@ class Senses:
     hz: int  # control periods per second
 
     @classmethod
-    def of(cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int) -> Senses:
+    def of(
+        cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int
+    ) -> SimulatedLidar:
         """A lidar in a world, whose noise is drawn from a drive's seed; it scans once in a control period at most."""
         rng = random_stream(seed, "lidar") if noisy else None
         return cls(Scanner.of(lidar.at(hz), world), world, trajectories or None, rng, hz)
@@ -165,15 +167,15 @@ class Scans:
         scans: all scans so far
     """
 
-    def __init__(self, senses: Senses) -> None:
+    def __init__(self, sensor: SimulatedLidar) -> None:
         self.scans: list[Scan] = []
-        self._senses = senses
+        self._sensor = sensor
 
     def scan(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
         """Take a scan from the true pose if one is due in a control period; the estimate, which the scan may correct."""
-        if not self._senses.due(tick, self.scans[-1].tick if self.scans else -1):
+        if not self._sensor.due(tick, self.scans[-1].tick if self.scans else -1):
             return estimate
-        return self.read(tick, estimate, self._senses.ranges(tick, pose))
+        return self.read(tick, estimate, self._sensor.ranges(tick, pose))
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
         """Keep a scan; the estimate, which it does not correct."""
@@ -185,20 +187,20 @@ class Scans:
         return scans_logged(((scan.tick, scan.ranges) for scan in self.scans), per_tick, len(log.t))
 
 
-class Lookout(Scans):
+class MoverDetector(Scans):
     """Lidar-based mover detection for a robot with a map.
 
     Attributes:
         watch: the tracks of the movers
     """
 
-    def __init__(self, senses: Senses, ground: Ground, watch: Watch) -> None:
-        super().__init__(senses)
-        self.watch, self._ground = watch, ground
+    def __init__(self, sensor: SimulatedLidar, ground: Ground, tracking: MoverTracking) -> None:
+        super().__init__(sensor)
+        self.tracking, self._ground = tracking, ground
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
         """Keep a scan, and look for movers in it; the estimate."""
-        self.watch.read(self._ground, estimate, ranges, tick)
+        self.tracking.read(self._ground, estimate, ranges, tick)
         return super().read(tick, estimate, ranges)
 
 
@@ -217,31 +219,35 @@ class Survey(Scans):
 
     def __init__(
         self,
-        senses: Senses,
+        sensor: SimulatedLidar,
         robot: RobotSpec,
         start: Pose,
         goal: Point,
         *,
         matching: bool = False,
-        watch: Watch | None = None,
+        tracking: MoverTracking | None = None,
     ) -> None:
-        super().__init__(senses)
-        self.lidar = senses.scanner.lidar
+        super().__init__(sensor)
+        self.lidar = sensor.scanner.lidar
         foot = robot.footprint
         self._footprint = dataclasses.replace(foot, rounding=foot.rounding + PAD)
         self._turning_room = turning_room(robot.radius)
         self._goal = goal
-        self.watch = watch
-        self.map = OccupancyMap(self.lidar, MAP_CELL, start[:2], horizon_of(watching=watch is not None), goal=goal)
-        self.map.take_as_free(start[:2], self._turning_room, senses.world, senses.movers_at_start)
+        self.tracking = tracking
+        self.map = OccupancyMap(
+            self.lidar, MAP_CELL, start[:2], horizon_of(tracks_movers=tracking is not None), goal=goal
+        )
+        self.map.mark_free(start[:2], self._turning_room, sensor.world, sensor.movers_at_start)
         self._recent = math.ceil(RECENT * self.lidar.rate)
-        self._matcher = ScanMatcher(self.lidar, FAR if watch is None else FAR_AMONG_MOVERS) if matching else None
+        self._matcher = ScanMatcher(self.lidar, FAR if tracking is None else FAR_AMONG_MOVERS) if matching else None
         self.whole = 0
 
     @classmethod
-    def of(cls, robot: RobotSpec, task: Task, senses: Senses, *, matching: bool, watch: Watch | None) -> Survey:
+    def of(
+        cls, robot: RobotSpec, task: Task, sensor: SimulatedLidar, *, matching: bool, tracking: MoverTracking | None
+    ) -> Survey:
         """The survey of a drive, after the first scan from the start."""
-        survey = cls(senses, robot, task.start, task.goal, matching=matching, watch=watch)
+        survey = cls(sensor, robot, task.start, task.goal, matching=matching, tracking=tracking)
         survey.scan(0, task.start, task.start)
         return survey
 
@@ -251,19 +257,19 @@ class Survey(Scans):
             self.whole += 1
             if self._matcher is not None:
                 estimate = self._matched(self._matcher, estimate, ranges, tick)
-        movers = self.watch.read_on_map(self.map, estimate, ranges, tick) if self.watch is not None else None
+        movers = self.tracking.update_on_map(self.map, estimate, ranges, tick) if self.tracking is not None else None
         self.map.insert(estimate, ranges, movers)
         self.scans.append(Scan(tick, estimate, ranges, movers))
         return estimate
 
     def _matched(self, matcher: ScanMatcher, estimate: Pose, ranges: Floats, tick: int) -> Pose:
         """The estimated pose, corrected by a scan; among movers by what stands, and by nothing that slides along a wall."""
-        if self.watch is None:
+        if self.tracking is None:
             return matcher.corrected(self.map, estimate, ranges)
-        standing = self.watch.standing(self.map, estimate, ranges, tick)
+        standing = self.tracking.standing(self.map, estimate, ranges, tick)
         corrected = matcher.corrected(self.map, estimate, standing)
         near = np.where(standing <= FAR_AMONG_MOVERS, standing, np.inf)
-        return sliding_left_out(estimate, corrected, self.map.endpoints(estimate, near))
+        return without_sliding(estimate, corrected, self.map.endpoints(estimate, near))
 
     def hit_within(self, points: Floats, needed: Floats, ahead: Floats) -> bool:
         """Whether a beam of the last scan ended clearly nearer to a point of a route than the clearance that it needs."""
@@ -272,13 +278,13 @@ class Survey(Scans):
         ranges = scan.ranges if scan.movers is None else np.where(scan.movers, np.inf, scan.ranges)
         return bool(_kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, ranges))
 
-    def forget(self, pose: Pose) -> None:
+    def reset(self, pose: Pose) -> None:
         """Make the map anew of the latest scans: what was seen before may be elsewhere in a frame that drifts.
 
         What the robot covers when it turns stays free as far as it was seen free. Hits there become ground that was not seen:
         open to plans, but the robot does not move over it before it has looked again.
         """
-        self.map = self.map.renewed(pose[:2], self._turning_room, self._goal)
+        self.map = self.map.reset_around(pose[:2], self._turning_room, self._goal)
         for scan in self.scans[-self._recent :]:
             self.map.insert(scan.estimate, scan.ranges, scan.movers)
 
@@ -290,8 +296,8 @@ class Survey(Scans):
         """How far the robot can turn on the spot over ground that it has seen free [rad]."""
         return clear_turn(self.map, pose, yaw_rate, self._footprint, farthest)
 
-    def clear_way(self, pose: Pose, twist: Twist, farthest: float, *, daring: bool = False) -> float:
+    def clear_way(self, pose: Pose, twist: Twist, farthest: float, *, freespace: bool = False) -> float:
         """How far the robot can go with a twist over ground that it has seen free [m]; for what is nearly a turn [rad]."""
         if abs(twist.speed) <= SHARPEST * abs(twist.yaw_rate):
-            return clear_turn(self.map, pose, twist.yaw_rate, self._footprint, farthest, daring=daring)
-        return clear_distance(self.map, pose, *twist, self._footprint, farthest, daring=daring)
+            return clear_turn(self.map, pose, twist.yaw_rate, self._footprint, farthest, freespace=freespace)
+        return clear_distance(self.map, pose, *twist, self._footprint, farthest, freespace=freespace)

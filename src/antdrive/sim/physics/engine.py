@@ -20,7 +20,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Floats, Pose
-from antdrive.robots.placing import footprint_clearance
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies
@@ -42,7 +42,7 @@ OVERSPEED = 1.5  # no robot drives faster by itself than its highest speed times
 CHASSIS_AND_ANY = (-1, -1, -2)
 BATCH = 5000  # bodies that are built in one call at most
 MANY_BODIES = 1000  # in worlds of more cylinders only those near the robot have bodies
-LOOK_EVERY = 8  # physics steps after which bodies are looked for again
+CHECK_EVERY = 8  # physics steps after which bodies are looked for again
 NEAR_MARGIN = 0.2  # how much farther than the robot can get in that time bodies are made [m]
 WALL_THICKNESS = 0.1  # half of it [m]
 
@@ -180,7 +180,7 @@ class Engine:
         """Advance one physics step and return the chassis's contacts after it."""
         if self._movers is not None:
             self._movers.steer(self._steps)
-        if self._near is not None and self._steps % LOOK_EVERY == 0:
+        if self._near is not None and self._steps % CHECK_EVERY == 0:
             (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
             self._near.follow(x, y)
         self._steps += 1
@@ -287,7 +287,7 @@ class Engine:
 
     def _near_bodies(self) -> NearBodies:
         """The bodies around the robot; it cannot pass beyond them before it is looked at again."""
-        way = OVERSPEED * self.robot.max_speed * LOOK_EVERY / self.physics_hz
+        way = OVERSPEED * self.robot.max_speed * CHECK_EVERY / self.physics_hz
         reach = self.robot.radius + way + NEAR_MARGIN
         return NearBodies(self.world.obstacles, reach, _size, self._build_cylinders, self._obstacles, self._client)
 

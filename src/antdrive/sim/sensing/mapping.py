@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.base.errors import require_positive
+from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.lidar import Lidar
-from antdrive.robots.placing import shape_of
 from antdrive.robots.spec import Footprint
 from antdrive.sim.sensing import _kernels_mapping as kernels
 from antdrive.sim.sensing import _kernels_sight
@@ -130,13 +130,13 @@ class OccupancyMap:
         """The same arrays, for kernels."""
         return self._plain
 
-    def insert(self, pose: Pose, ranges: Floats, left_out: Mask | None = None) -> Cells:
+    def insert(self, pose: Pose, ranges: Floats, omitted: Mask | None = None) -> Cells:
         """Enter a scan, and return the cells that became free, occupied, or free again (K, 2): row, col.
 
         Args:
             pose: the estimated pose of the robot, not of its lidar
             ranges: the scan (beams,) [m]
-            left_out: beams whose hits are not entered, such as those of movers (beams,)
+            omitted: beams whose hits are not entered, such as those of movers (beams,)
         """
         x, y, yaw = self._lidar.pose_on(pose)
         if self._grows:
@@ -147,7 +147,7 @@ class OccupancyMap:
         turn = -1 if rest else number % self.turns
         turns = self.turns if self.scans else 1
         self.scans += 1
-        mask = self._none if left_out is None else np.ascontiguousarray(left_out)
+        mask = self._none if omitted is None else np.ascontiguousarray(omitted)
         count = kernels.insert(
             x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, turn, turns, mask,
             self.horizon, self.trust, self.scans, self._plain, self._changed,
@@ -191,7 +191,7 @@ class OccupancyMap:
         found: Floats = kernels.discs_within(*(within or EVERYWHERE), self._plain)
         return found
 
-    def forget(self, place: Point, radius: float) -> Cells:
+    def clear_hits(self, place: Point, radius: float) -> Cells:
         """Take what was hit around a place for free ground, and return the cells (K, 2): a mover has gone on.
 
         Args:
@@ -201,9 +201,7 @@ class OccupancyMap:
         count = kernels.forget(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
-    def take_as_free(
-        self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None
-    ) -> Cells:
+    def mark_free(self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None) -> Cells:
         """Take unknown ground for free, such as that under the robot, and return the cells (K, 2).
 
         Args:
@@ -218,7 +216,7 @@ class OccupancyMap:
         count = kernels.take_as_free(*place, radius, discs, np.array(walls), self._plain, self._changed)
         return self._changed[:count].copy()
 
-    def renewed(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:
+    def reset_around(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:
         """An empty map with the same cells, but for what this one has seen free around a place; hits there are unknown ground.
 
         Args:
@@ -352,7 +350,7 @@ def clear_distance(
     footprint: Footprint,
     limit: float,
     *,
-    daring: bool = False,
+    freespace: bool = False,
 ) -> float:
     """How far the footprint, swept along the arc of a twist, stays on ground that was seen free, at most `limit` [m].
 
@@ -366,15 +364,15 @@ def clear_distance(
         yaw_rate: counter-clockwise [rad/s]
         footprint: the robot's footprint
         limit: how far is far enough [m]
-        daring: whether ground that was not seen counts as free, so that only hits end the way
+        freespace: whether ground that was not seen counts as free, so that only hits end the way
     """
     if speed == 0.0:
         return 0.0 if yaw_rate else limit
-    return _clear(seen, pose, speed, yaw_rate, footprint, limit, daring)
+    return _clear(seen, pose, speed, yaw_rate, footprint, limit, freespace)
 
 
 def clear_turn(
-    seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float, *, daring: bool = False
+    seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float, *, freespace: bool = False
 ) -> float:
     """How far the robot can turn on the spot over ground that was seen free, at most `limit` [rad]; as `clear_distance`.
 
@@ -384,19 +382,19 @@ def clear_turn(
         yaw_rate: counter-clockwise [rad/s]; only its sign counts
         footprint: the robot's footprint
         limit: how far is far enough [rad]
-        daring: whether ground that was not seen counts as free
+        freespace: whether ground that was not seen counts as free
     """
-    return _clear(seen, pose, 0.0, yaw_rate, footprint, limit, daring)
+    return _clear(seen, pose, 0.0, yaw_rate, footprint, limit, freespace)
 
 
 def _clear(
-    seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float, daring: bool
+    seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float, freespace: bool
 ) -> float:
     shape = footprint.half_length, footprint.half_width, footprint.rounding
-    arrays = tuple(seen.arrays._replace(free=~seen.occupied)) if daring else seen.plain
+    arrays = tuple(seen.arrays._replace(free=~seen.occupied)) if freespace else seen.plain
     return float(_kernels_sight.clear_way(*pose, speed, yaw_rate, *shape, _corners(footprint), limit, arrays))
 
 
 @functools.lru_cache(maxsize=16)
 def _corners(footprint: Footprint) -> Floats:
-    return shape_of(footprint)[1]
+    return kernel_shape(footprint)[1]

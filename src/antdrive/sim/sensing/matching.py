@@ -46,7 +46,7 @@ class ScanMatcher:
         return x - cos * lidar.x + sin * lidar.y, y - sin * lidar.x - cos * lidar.y, heading
 
 
-def sliding_left_out(before: Pose, after: Pose, points: Floats) -> Pose:
+def without_sliding(before: Pose, after: Pose, points: Floats) -> Pose:
     """A corrected pose without the part of its shift that the scan cannot tell: along a wall that is all there is in sight.
 
     The normals of the surfaces that were hit tell in which directions they hold the pose: along the eigenvectors of their mean

@@ -21,7 +21,7 @@ from antdrive.base.atomic import atomic_write
 from antdrive.base.files import known_suffix
 from antdrive.base.types import Bounds
 from antdrive.sim.log.outcome import Outcome
-from antdrive.views.colours import INK, MUTED, VERDICTS, hexed
+from antdrive.views.colours import INK, MUTED, OUTCOME_LABELS, hexed
 from antdrive.views.scene import Scene
 
 SUFFIXES = (".png", ".pdf", ".svg")
@@ -74,11 +74,11 @@ def sheet(path: str | Path | None, size: tuple[float, float], dpi: float = 160) 
             write_figure(figure, target, dpi)
 
 
-def head(figure: Figure, title: str, outcome: Outcome | None = None) -> None:
+def draw_title(figure: Figure, title: str, outcome: Outcome | None = None) -> None:
     """Write a figure's title and, to the right, how a drive ended."""
     figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
     if outcome is not None:
-        name, colour = VERDICTS[outcome]
+        name, colour = OUTCOME_LABELS[outcome]
         figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
 
 

@@ -37,7 +37,7 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
     inside = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, ec=hexed(colours.KERB), lw=3.0, zorder=4.5)
     axes.add_patch(inside)
     known = scene.obstacles[~scene.unseen]
-    if scene.has_zones:
+    if scene.has_no_go_area:
         # One opaque layer: where zones overlap, transparent ones would look darker.
         zones = _circles(known[:, :2], known[:, 2] + scene.inflate)
         i = scene.inflate
@@ -102,7 +102,7 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
         handles += axes.plot(*cells.T, ".", ms=2.6, color=hexed(colours.MUTED), label="planned cells", zorder=4.6)
     if len(rollout.route) > 1:
         style = {"ls": (0, (4, 2.5)), "lw": 1.0, "color": hexed(colours.ROUTE)}
-        handles += axes.plot(*rollout.route.T, **style, label=scene.route_said, zorder=4.8)
+        handles += axes.plot(*rollout.route.T, **style, label=scene.route_label, zorder=4.8)
         for k, (_, line) in enumerate(rollout.legs()[1:]):
             drawn = axes.plot(*line.T, **{**style, "lw": 0.7, "alpha": 0.45}, label="new routes", zorder=4.7)
             handles += drawn if k == 0 else []
@@ -140,10 +140,10 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
     """Draw the map's legend above its upper left corner: `handles`, then obstacles, movers and zones."""
     known = [Patch(fc=hexed(colours.OBSTACLE), label="obstacle" if scene.mapped else "obstacle, on no map")]
     if scene.unseen.any():
-        known.append(Patch(fc=hexed(colours.UNSEEN), label=scene.unseen_said))
+        known.append(Patch(fc=hexed(colours.UNSEEN), label=scene.unseen_label))
     if scene.mover_radii:
-        known.append(Patch(fc=hexed(colours.MOVER), label=scene.movers_said))
-    if scene.has_zones:
+        known.append(Patch(fc=hexed(colours.MOVER), label=scene.movers_label))
+    if scene.has_no_go_area:
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in colours.ZONE)
         known.append(Patch(fc=pale, ec=hexed(colours.ZONE), lw=0.5, label=f"inflated by {scene.inflate:.2f} m"))
     legend_above(axes, [*handles, *known], handlelength=1.6)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from antdrive.base.types import Floats
 from antdrive.views.colours import BAD, MUTED, ROUTE, SHELL, START, hexed
-from antdrive.views.figures.canvas import colour_bar, endings, frame_map, head, legend_above, map_size, sheet
+from antdrive.views.figures.canvas import colour_bar, draw_title, endings, frame_map, legend_above, map_size, sheet
 from antdrive.views.figures.map_chart import FIELD, draw_field, draw_legend, draw_map
 from antdrive.views.figures.paper_figures import history_figure
 from antdrive.views.scene import Scene
@@ -65,7 +65,7 @@ def plan_figure(
     """
     scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
     cells, line = (grid.xy(plan.cells), grid.xy(plan.line)) if len(plan.cells) else (np.empty((0, 2)),) * 2
-    shown = scene.around(line)
+    shown = scene.map_bounds(line)
     iterations = len(plan.history)
     wide, high = map_size(scene, shown)
     wide += 0.9 if plan.field is not None else 0.0
@@ -91,7 +91,7 @@ def plan_figure(
             _draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
         length = f"{plan.cost:.2f} m" if len(plan.cells) else plan.status.value
         length += ", stopped early" if len(plan.cells) and not plan.solved else ""
-        head(figure, f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}")
+        draw_title(figure, f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}")
     return figure
 
 
@@ -195,7 +195,7 @@ def contours_figure(
                 colour_bar(figure, drawn, axes, "planner's field", format="%.2g")
         draw_map(axes, scene, floor=False)
         line = grid.xy(plan.line) if plan.solved else np.empty((0, 2))
-        frame_map(axes, scene.around(line))
+        frame_map(axes, scene.map_bounds(line))
         handles: list[Any] = []
         if len(line):
             handles = axes.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)

@@ -15,8 +15,17 @@ from antdrive.base.types import Floats
 from antdrive.sim.log.certificate import Certificate, in_metres
 from antdrive.sim.log.metrics import tracking_error
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import BAD, CONTACT, GOOD, MUTED, ROUTE, SHELL, START, VERDICTS, hexed, planner_style
-from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, head, legend_above, map_size, sheet, thinned
+from antdrive.views.colours import BAD, CONTACT, GOOD, MUTED, OUTCOME_LABELS, ROUTE, SHELL, START, hexed, planner_style
+from antdrive.views.figures.canvas import (
+    BELOW,
+    colour_bar,
+    draw_title,
+    frame_map,
+    legend_above,
+    map_size,
+    sheet,
+    thinned,
+)
 from antdrive.views.figures.map_chart import draw_along, draw_contact, draw_driven, draw_legend, draw_map
 from antdrive.views.scene import Scene
 
@@ -54,7 +63,7 @@ def overview(
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
     scene = Scene.of(rollout)
-    shown = scene.around(rollout.route)
+    shown = scene.map_bounds(rollout.route)
     wide, high = map_size(scene, shown)
     with sheet(path, (wide + 5.6, high + 0.9), dpi) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=[wide, 5.2], height_ratios=[1.0, 1.0, 0.11])
@@ -67,7 +76,7 @@ def overview(
         _draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance, label="speed"), scene, rollout)
         _draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance, label="limiters"), rollout)
         planner = rollout.record.planner.name
-        head(figure, f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", rollout.outcome)
+        draw_title(figure, f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", rollout.outcome)
     return figure
 
 
@@ -125,7 +134,7 @@ def _draw_limiters(axes: Any, rollout: Rollout) -> None:
     legend_above(axes, handles, ncols=min(len(handles), MOST_LIMITERS), handlelength=0.9, **place, **title)
 
 
-def picture_of(run: Run, path: str | Path) -> None:
+def draw_run(run: Run, path: str | Path) -> None:
     """Write the overview of a run, or its plan where it did not drive."""
     from antdrive.views.figures.plan_figures import plan_figure
 
@@ -183,7 +192,7 @@ def _draw_readings(axes: Any, certificate: Certificate, rollout: Rollout) -> Non
         (certificate.bound > 0, bound),
     )
     lines = [*readings, *((False, problem) for problem in certificate.problems[:3])]
-    verdict = certificate.verdict
+    verdict = certificate.statement
     colour = hexed(GOOD if certificate.certified else BAD)
     axes.text(0, 0.97, verdict, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes)
     for k, (fine, words) in enumerate(lines):
@@ -228,7 +237,7 @@ def then_and_now(
     now: Rollout,
     path: str | Path | None = None,
     *,
-    parted: tuple[float, float, float] | None = None,
+    divergence: tuple[float, float, float] | None = None,
     dpi: float = 130,
 ) -> Figure:
     """Draw two drives of the same scenario on one map, with their clearances and their distance over time."""
@@ -240,7 +249,7 @@ def then_and_now(
         draw_map(chart, scene)
         handles: list[Any] = []
         for log, colour, name, width in ((then, THEN, "baseline", 3.6), (now, NOW, "now", 1.8)):
-            end = f"{name}: {VERDICTS[log.outcome][0].lstrip('✓✕ ').lower()} after {log.t[-1]:.1f} s"
+            end = f"{name}: {OUTCOME_LABELS[log.outcome][0].lstrip('✓✕ ').lower()} after {log.t[-1]:.1f} s"
             handles += chart.plot(
                 *log.pose[thinned(len(log.t)), :2].T,
                 color=colour,
@@ -250,19 +259,19 @@ def then_and_now(
                 solid_capstyle="round",
             )
             chart.plot(*log.pose[-1, :2], "o", color=colour, ms=5, mec="white", zorder=6)
-        if parted is not None:
+        if divergence is not None:
             style: dict[str, Any] = {"ms": 13, "mfc": "none", "mec": hexed(CONTACT), "mew": 2.0, "ls": "none"}
-            handles += chart.plot(*parted[1:], "o", label=f"they part at {parted[0]:.1f} s", zorder=8, **style)
+            handles += chart.plot(*divergence[1:], "o", label=f"they part at {divergence[0]:.1f} s", zorder=8, **style)
         draw_legend(chart, [*handles, *draw_contact(chart, scene, now)], scene)
         above: Any = figure.add_subplot(areas[0, 1], label="clearance")
         below: Any = figure.add_subplot(areas[1, 1], sharex=above, label="distance")
-        _draw_over_time(above, below, then, now, None if parted is None else parted[0])
-        head(figure, f"{scene.name}   ·   {now.record.planner.name}   ·   {scene.robot.name}: baseline and now")
+        _draw_over_time(above, below, then, now, None if divergence is None else divergence[0])
+        draw_title(figure, f"{scene.name}   ·   {now.record.planner.name}   ·   {scene.robot.name}: baseline and now")
     return figure
 
 
-def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, parted: float | None) -> None:
-    """Draw both clearances, and the distance between the two robots; `parted` is when the drives part [s]."""
+def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, divergence: float | None) -> None:
+    """Draw both clearances, and the distance between the two robots; `divergence` is when the drives part [s]."""
     above.set(title="clearance [m]")
     above.axhline(0, color=hexed(BAD), lw=1.0)
     for log, colour in ((then, THEN), (now, NOW)):
@@ -273,8 +282,8 @@ def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, parted:
     below.plot(moments, apart, color=hexed(MUTED), lw=1.4)
     below.set_ylim(0, None)
     for axes in (above, below):
-        if parted is not None:
-            axes.axvline(parted, color=hexed(CONTACT), lw=1.0, ls=":")
+        if divergence is not None:
+            axes.axvline(divergence, color=hexed(CONTACT), lw=1.0, ls=":")
         axes.set_xlim(0, moments[-1])
 
 

@@ -14,9 +14,9 @@ from matplotlib.patches import Circle, Patch
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, sightings
 from antdrive.views.colours import BAD, BEAM, GOOD, HATCH, HIT, INK, MOVER, MUTED, OBSTACLE, PALE, ROUTE, SHELL, hexed
-from antdrive.views.figures.canvas import frame_map, head, legend_above, map_size, sheet
+from antdrive.views.figures.canvas import draw_title, frame_map, legend_above, map_size, sheet
 from antdrive.views.figures.map_chart import draw_map
-from antdrive.views.recollection import Recollection, containers
+from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders
 from antdrive.views.scene import Scene
 
 LISTED = 14  # obstacles whose first sight is drawn: those that the robot came nearest to
@@ -41,14 +41,14 @@ def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float
         InputError: a suffix that is none of .png, .pdf, .svg.
         ValueError: the log has no scans.
     """
-    scene, seen = Scene.of(rollout), Recollection(rollout)
+    scene, seen = Scene.of(rollout), MapReconstruction(rollout)
     moments = np.unique(np.append(np.linspace(0.0, float(rollout.t[-1]), CURVE), rollout.t[-1]))
     explored = []
     for at in moments:
         seen.advance(float(at))
         explored.append(seen.explored)
     listed = sorted(sightings(rollout, seen.met)[:LISTED], key=lambda sight: sight.nearest_at)
-    shown = scene.around(rollout.route)
+    shown = scene.map_bounds(rollout.route)
     wide, high = map_size(scene, shown)
     with sheet(path, (wide + 5.4, high + 0.9), dpi) as figure:
         areas = figure.add_gridspec(2, 2, width_ratios=[wide, 5.0], height_ratios=[1.0, 1.6])
@@ -60,11 +60,11 @@ def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float
         curve.set(title="ground on the robot's map [m²]", ylim=(0, None), xlim=(0, max(float(rollout.t[-1]), 1e-3)))
         curve.set_title(f"{explored[-1]:.1f} m² at the end", loc="right", fontsize=9, weight="normal")
         _draw_sights(figure.add_subplot(areas[1, 1], sharex=curve, label="first sights"), rollout, listed)
-        head(figure, f"{scene.name}   ·   what {scene.robot.name} knew", rollout.outcome)
+        draw_title(figure, f"{scene.name}   ·   what {scene.robot.name} knew", rollout.outcome)
     return figure
 
 
-def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, listed: list[Sighting]) -> None:
+def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: MapReconstruction, listed: list[Sighting]) -> None:
     """Draw the robot's map over the world, the route and the drive, and the numbers of the listed obstacles."""
     draw_map(axes, scene, floor=False)
     x0, y0, x1, y1 = scene.bounds
@@ -76,7 +76,7 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, l
     ground = np.where(seen.seen, 1.0, np.nan)
     white = ListedColormap(["white"])
     axes.imshow(ground, origin="lower", extent=extent, cmap=white, zorder=0.6, interpolation="nearest", aspect="equal")
-    never = scene.obstacles[np.isinf(seen.met)[containers(scene.obstacles)]]
+    never = scene.obstacles[np.isinf(seen.met)[enclosing_cylinders(scene.obstacles)]]
     discs = [Circle((x, y), r) for x, y, r, _ in never]
     axes.add_collection(PatchCollection(discs, facecolor=hexed(PALE), edgecolor=hexed(OBSTACLE), lw=0.6, zorder=3.1))
     hits = [Circle((x, y), max(r, 0.012)) for x, y, r in seen.map.discs()]
@@ -99,7 +99,7 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, l
         Patch(fc=hexed(PALE), ec=hexed(HATCH), hatch="////", lw=0, label="ground not known to be free"),
     ]
     if scene.mover_radii:
-        known.append(Patch(fc=hexed(MOVER), label=scene.movers_said))
+        known.append(Patch(fc=hexed(MOVER), label=scene.movers_label))
     legend_above(axes, [*handles, *known], handlelength=1.6)
 
 

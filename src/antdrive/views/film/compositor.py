@@ -21,8 +21,8 @@ from antdrive.views.colours import Colour
 from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film.camera import Camera, Picture
 from antdrive.views.film.ground import capsules, dashes, kerb_width, paint_ground
+from antdrive.views.film.lidar_view import BeamPainter, OwnMapPainter
 from antdrive.views.film.meshes import Part, cylinder, kerb, robot_height, robot_parts
-from antdrive.views.film.sight import FanPainter, SightPainter
 from antdrive.views.film.solids import Box, Solid, Solids, draw_solids, merged, overlap, placed
 from antdrive.views.film.text import glow, put
 from antdrive.views.scene import Scene
@@ -74,12 +74,12 @@ class Compositor:
     """
 
     def __init__(
-        self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, sight: FanPainter | None = None
+        self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, sight: BeamPainter | None = None
     ) -> None:
         self.scene = scene
         self.camera = camera
         self.fine = fine
-        self._sight = sight
+        self._lidar_view = sight
         self.tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
         self._route = np.ascontiguousarray(route, dtype=np.float64).reshape(-1, 2)
         self._sun, self._light = _sun(camera)
@@ -132,10 +132,10 @@ class Compositor:
         x, y, yaw = (float(value) for value in np.asarray(pose))
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
         frame = self._canvas.copy()
-        if self._sight is not None:
-            if isinstance(self._sight, SightPainter):
-                self._sight.cover(frame, self.backdrop, self.fine)
-            self._sight.lay_fan(frame, self.backdrop)
+        if self._lidar_view is not None:
+            if isinstance(self._lidar_view, OwnMapPainter):
+                self._lidar_view.hatch_unknown(frame, self.backdrop, self.fine)
+            self._lidar_view.draw_beams(frame, self.backdrop)
             for label in self._labels:
                 self._put_label(frame, *label)
         for rows in self._changing_route:
@@ -148,8 +148,8 @@ class Compositor:
         for box in merged([b for b in boxes if b is not None]):
             inside = [body for body, b in zip(bodies, boxes, strict=True) if b is not None and overlap(b, box)]
             self._put_bodies(frame, box, [solid for body in inside for solid in body])
-        if isinstance(self._sight, SightPainter):
-            self._sight.put_hits(frame, self.backdrop)
+        if isinstance(self._lidar_view, OwnMapPainter):
+            self._lidar_view.draw_hits(frame, self.backdrop)
         if followed is not None:
             self._draw_followed(frame, followed)
         return frame

@@ -31,7 +31,7 @@ def paint_ground(
     tints = np.array([GROUND, PAPER, GRID], dtype=np.float64)
     kernels.lay_floor(brush.rgb, ground, brush.inside, brush.inverse, bounds, step, 1.0, tints)
     line = 1.5 * camera.pixel
-    if scene.has_zones:
+    if scene.has_no_go_area:
         brush.zones(scene, line)
     shade = np.ones((height, width), dtype=np.float32)
     cylinders = scene.obstacles.copy()

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 from antdrive.sim.log.outcome import Outcome
 from antdrive.views import colours
 from antdrive.views.film.camera import Picture
-from antdrive.views.film.replay import SLOW_MOTION
+from antdrive.views.film.playback import SLOW_MOTION
 from antdrive.views.film.text import Sprite, fitted, font, pill, plate, put, text_width, wrapped
 from antdrive.views.scene import Scene
 
@@ -147,7 +147,9 @@ class Band:
 
 def _widest_verdict(unit: int) -> int:
     size = round(1.08 * unit)
-    widest = max(text_width(text, size, True) for text, _ in (*colours.VERDICTS.values(), DRIVING, PLANNING, SLOWED))
+    widest = max(
+        text_width(text, size, True) for text, _ in (*colours.OUTCOME_LABELS.values(), DRIVING, PLANNING, SLOWED)
+    )
     return widest + 2 * round(0.75 * size)
 
 
@@ -191,10 +193,10 @@ def legend_entries(
         found = [LegendEntry("ramp", colours.INK, speeds), LegendEntry("dash", colours.ROUTE, "planned route")]
     if replans:
         found.append(LegendEntry("dot", colours.ROUTE, "new route"))
-    if scene.has_zones:
+    if scene.has_no_go_area:
         found.append(LegendEntry("zone", colours.ZONE, f"inflated by {scene.inflate:.2f} m"))
     if scene.unseen.any():
-        found.append(LegendEntry("dot", colours.UNSEEN, scene.unseen_said))
+        found.append(LegendEntry("dot", colours.UNSEEN, scene.unseen_label))
     if beams:
         found.append(LegendEntry("zone", colours.BEAM, "beams of the lidar"))
     if sight:
@@ -314,7 +316,7 @@ def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "") -> Spr
 
     A robot is stuck for one of several reasons: where one is given, it stands for the general sentence.
     """
-    name, colour = colours.VERDICTS[outcome]
+    name, colour = colours.OUTCOME_LABELS[outcome]
     sentence = "stuck" if reason and outcome is Outcome.STUCK else outcome.value
     sentence = sentence[0].upper() + sentence[1:]
     size = round(1.5 * layout.unit)

@@ -8,16 +8,16 @@ import numpy as np
 
 from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import CONTACT, GOAL, ROUTE, START, VERDICTS, Colour
+from antdrive.views.colours import CONTACT, GOAL, OUTCOME_LABELS, ROUTE, START, Colour
 from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film import overlay
 from antdrive.views.film.camera import Camera, Picture, camera_for
 from antdrive.views.film.compositor import Compositor, drawn_height
+from antdrive.views.film.film_options import FilmOptions
 from antdrive.views.film.ground import grid_step
+from antdrive.views.film.lidar_view import BeamPainter, OwnMapPainter
 from antdrive.views.film.meshes import robot_height
-from antdrive.views.film.options import FilmOptions
-from antdrive.views.film.replay import ReplanEvent, Replay
-from antdrive.views.film.sight import FanPainter, SightPainter
+from antdrive.views.film.playback import Playback, ReplanEvent
 from antdrive.views.film.text import Sprite, burst, label, put
 from antdrive.views.scene import Scene
 from antdrive.worlds import Grid
@@ -33,23 +33,25 @@ class Shot:
     def __init__(self, rollout: Rollout, *, planning: bool = False, bare: bool = False, **options: Any) -> None:
         self.options = FilmOptions(**options)
         size, note, speed = self.options.size, self.options.note, self.options.speed
-        self.replay = Replay(rollout)
-        self.slow_motion = self.replay.slow_motion(speed)
+        self.playback = Playback(rollout)
+        self.slow_motion = self.playback.slow_motion(speed)
         self._flash = FLASH * speed
         self.scene = scene = Scene.of(rollout)
         self.outcome = rollout.outcome
         self._follows = self.options.camera == "follow"
         self._follows_movers = not planning and len(rollout.tracks) > 0
-        self._sight = SightPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
-        self._fan = self._sight or (FanPainter(rollout) if not planning and len(rollout.scans) else None)
-        replans = not planning and any(event.caption for event in self.replay.replans)
+        self._own_map = (
+            OwnMapPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
+        )
+        self._fan = self._own_map or (BeamPainter(rollout) if not planning and len(rollout.scans) else None)
+        replans = not planning and any(event.caption for event in self.playback.replans)
         legend = self._lay_out(rollout, planning=planning, replans=replans, bare=bare)
         planner = rollout.record.planner.name
         subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
         fields = overlay.PLAN_FIELDS if planning else overlay.DRIVE_FIELDS
         self._band = overlay.Band(self._layout, scene.name, subtitle, None if planning else note, legend, fields)
         fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
-        fixed = not (planning or self.replay.replans or self._fan)  # a route that changes is drawn in every frame
+        fixed = not (planning or self.playback.replans or self._fan)  # a route that changes is drawn in every frame
         route = rollout.route[: None if fixed else 0]
         self._compositor = Compositor(scene, self._camera, route=route, fine=fine, sight=self._fan)
         self._replan_caption = REPLAN_CAPTION * speed
@@ -59,12 +61,12 @@ class Shot:
         self._banner = overlay.banner(self.outcome, self._layout, room, rollout.record.reason)
         self.shown = 0.0  # the trail reaches to this moment [s]
         self._add_labels()
-        if self.replay.replans or self._fan:
+        if self.playback.replans or self._fan:
             self._show_route(0)
 
     def _lay_out(self, rollout: Rollout, *, planning: bool, replans: bool, bare: bool) -> overlay.LegendRows:
         """Choose layout, camera and legend: a card in a corner or, if it would cover the world, rows of the band."""
-        shows = {"beams": self._fan is not None, "sight": self._sight is not None, "followed": self._follows_movers}
+        shows = {"beams": self._fan is not None, "sight": self._own_map is not None, "followed": self._follows_movers}
         size = self.options.size
         for rows in range(1 + MOST_LEGEND_ROWS):
             layout = overlay.Layout.of(size, rows, self.options.note or "")
@@ -87,15 +89,15 @@ class Shot:
 
     def last_frame(self) -> Picture:
         """The frame (H, W, 3) at the run's end, with the outcome as a sentence."""
-        at = self.replay.duration
+        at = self.playback.duration
         view = self.view(at, last=True)
         unit = self._layout.unit
-        robot_high = self._compositor.pixel(*self.replay.pose(at)[:2])[1] < 0.4 * view.shape[0]
+        robot_high = self._compositor.pixel(*self.playback.pose(at)[:2])[1] < 0.4 * view.shape[0]
         low = robot_high or self._legend_width + self._banner.shape[1] > view.shape[1]
         top = view.shape[0] - self._banner.shape[0] - round(1.2 * unit) if low else round(1.2 * unit)
         left = max((view.shape[1] - self._banner.shape[1]) // 2, 0 if low else self._legend_width)
         put(view, self._banner, left, top)
-        return self._with_band(view, at, VERDICTS[self.outcome])
+        return self._with_band(view, at, OUTCOME_LABELS[self.outcome])
 
     def planning_frame(self, values: overlay.Values, grid: Grid, levels: Floats, path: Floats) -> Picture:
         """A frame (H, W, 3) of planning: a planner's field, and its best path (N, 2) [m] so far."""
@@ -106,35 +108,35 @@ class Shot:
     def extend_trail(self, at: float) -> None:
         """Continue the driven path to a moment [s]."""
         if at > self.shown:
-            self._compositor.extend_trail(*self.replay.trail(self.shown, at))
+            self._compositor.extend_trail(*self.playback.trail(self.shown, at))
             self.shown = at
 
     def view(self, at: float, *, last: bool = False) -> Picture:
         """The frame at a moment [s] without the band; `last` keeps the flash of a contact."""
-        replay, compositor = self.replay, self._compositor
+        playback, compositor = self.playback, self._compositor
         if self._follows:
-            compositor.set_camera(self._camera.moved(*replay.camera_target(at)))
+            compositor.set_camera(self._camera.moved(*playback.camera_target(at)))
         self.extend_trail(at)
-        count = replay.replan_count(at)
+        count = playback.replan_count(at)
         if self._fan is not None:
             self._fan.advance(at)
-        if count != self._replans_shown or self._sight is not None:
+        if count != self._replans_shown or self._own_map is not None:
             self._show_route(count)
         followed = self._followed(at) if self._follows_movers else None
-        velocities = None if self._follows_movers else replay.mover_velocities(at)
-        view = compositor.frame(replay.pose(at), replay.wheels(at), replay.movers(at), velocities, followed)
+        velocities = None if self._follows_movers else playback.mover_velocities(at)
+        view = compositor.frame(playback.pose(at), playback.wheels(at), playback.movers(at), velocities, followed)
         if count:
-            self._put_replan_caption(view, at, replay.replans[count - 1])
+            self._put_replan_caption(view, at, playback.replans[count - 1])
         self._mark_contact(view, at, self._flash, last)
         self._put_legend(view)
         return view
 
     def _followed(self, at: float) -> Floats:
         """The movers that the robot follows, where they lie in the world; without a map the robot's own frame drifts."""
-        found = self.replay.followed(at)
-        if self._sight is not None:
-            found[:, :2] = self._sight.laid(found[:, :2])
-            found[:, 2:4] = self._sight.laid(found[:, 2:4]) - self._sight.laid(np.zeros((1, 2)))
+        found = self.playback.followed(at)
+        if self._own_map is not None:
+            found[:, :2] = self._own_map.to_world(found[:, :2])
+            found[:, 2:4] = self._own_map.to_world(found[:, 2:4]) - self._own_map.to_world(np.zeros((1, 2)))
         return found
 
     def put_label(self, view: Picture, text: str, x: float, y: float) -> None:
@@ -145,8 +147,8 @@ class Shot:
         _put_above(view, label(text, round(0.95 * self._layout.unit), CONTACT), px, py - size)
 
     def _with_band(self, view: Picture, at: float, verdict: tuple[str, Colour]) -> Picture:
-        replay = self.replay
-        values = overlay.drive_values(at, replay.speed(at), replay.clearance(at), replay.min_clearance(at))
+        playback = self.playback
+        values = overlay.drive_values(at, playback.speed(at), playback.clearance(at), playback.min_clearance(at))
         return np.vstack([view, self._band.draw(values, verdict)])
 
     def _put_legend(self, view: Picture) -> None:
@@ -182,11 +184,11 @@ class Shot:
 
     def _show_route(self, count: int) -> None:
         """Show the route after `count` replans, and where the robot replanned."""
-        replay = self.replay
-        route = replay.replans[count - 1].route if count else self._route
-        if self._sight is not None:  # planned on the robot's own map
-            route = self._sight.laid(route)
-        places = [replay.pose(event.t)[:2] for event in replay.replans[:count] if event.caption]
+        playback = self.playback
+        route = playback.replans[count - 1].route if count else self._route
+        if self._own_map is not None:  # planned on the robot's own map
+            route = self._own_map.to_world(route)
+        places = [playback.pose(event.t)[:2] for event in playback.replans[:count] if event.caption]
         self._compositor.show_route(route, np.array(places).reshape(-1, 2))
         self._replans_shown = count
 
@@ -195,13 +197,13 @@ class Shot:
         if not event.caption or at - event.t > self._replan_caption:
             return
         sprite = label(event.caption, self._layout.unit, ROUTE)
-        x, y, _ = self.replay.pose(at)
+        x, y, _ = self.playback.pose(at)
         px, py = self._compositor.pixel(x, y, robot_height(self.scene.robot))
         _put_above(view, sprite, px, py - 2.2 * self._layout.unit)
 
     def _mark_contact(self, view: Picture, at: float, flash: float, last: bool) -> None:
         """Mark the point of the first contact; let the picture's border flash while a contact is recent."""
-        contact = self.replay.contact(at)
+        contact = self.playback.contact(at)
         if contact is None:
             return
         x, y, age = contact

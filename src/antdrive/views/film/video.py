@@ -28,9 +28,9 @@ from antdrive.base.types import Floats
 from antdrive.runs.pool import Pool, cores
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.film.camera import Picture
-from antdrive.views.film.options import ENCODERS, STILLS, FilmInfo, FilmOptions
+from antdrive.views.film.film_options import ENCODERS, STILLS, FilmInfo, FilmOptions
+from antdrive.views.film.playback import SLOW_MOTION, Playback
 from antdrive.views.film.prelude import check_field, planning_frames
-from antdrive.views.film.replay import SLOW_MOTION, Replay
 from antdrive.views.film.shot import Shot
 
 HOLD = 1.0  # the last picture stays this long [s]
@@ -77,8 +77,8 @@ def film(
     target = Path(path)
     known_suffix(target, ENCODERS)
     options = FilmOptions(camera, size, fps, speed, note).checked()
-    replay = Replay(rollout)
-    times = frame_times(replay.duration, fps, speed, replay.slow_motion(speed))
+    playback = Playback(rollout)
+    times = frame_times(playback.duration, fps, speed, playback.slow_motion(speed))
     before, hold = round(prelude * fps), round(HOLD * fps)
     if before:
         check_field(rollout)
@@ -132,7 +132,7 @@ def still(
     target = Path(path)
     kind = known_suffix(target, STILLS)
     shot = Shot(rollout, **asdict(FilmOptions(camera, size, note=note).checked()))
-    picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.replay.duration))
+    picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.playback.duration))
     with atomic_write(target) as temporary:
         Image.fromarray(picture).save(temporary, format=kind[1:], **STILLS[kind])
     return target

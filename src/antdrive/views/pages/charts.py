@@ -18,7 +18,7 @@ from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.success import StepCurve, distributions, performance_profiles
 from antdrive.views.colours import INK, MUTED, LabelStyle, hexed
 from antdrive.views.figures.canvas import new_figure, styled
-from antdrive.views.pages.summary import CampaignSummary, known_metrics, measure_title
+from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics, measure_title
 
 WORST = 10_000.0  # times the best value: the right end of a profile
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
@@ -95,7 +95,7 @@ def _steps(
 ) -> None:
     for k, (curve, style) in enumerate(zip(curves, styles, strict=True)):
         inside = curve.x <= high
-        x, share = _thinned(curve.x[inside], curve.share[inside], low, high, log)
+        x, share = _thinned(curve.x[inside], curve.fraction[inside], low, high, log)
         x = np.concatenate([[low], x, [high]])
         share = np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]])
         (line,) = axes.step(x, share, where="post", color=style.light, ls=style.dash, lw=1.6)

@@ -1,0 +1,192 @@
+"""Compile every kernel once, into the cache that `antdrive.base.kernel_cache` describes.
+
+Compiling takes about half a minute on two idle cores. The command line does it before the first command that plans, drives or
+films (`compile_once`), and `antdrive warm` does it on request.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.metadata
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from antdrive.base import kernel_cache
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
+# Planners that share kernels are compiled by one process; the groups that take longest come first.
+TOGETHER = (
+    ("tangent",),
+    ("aco-han", "as", "pfaco"),
+    ("ga-han", "hybrid"),
+    ("sipp",),
+    ("dstar-lite", "dstar"),
+    ("apf", "mmas-dstar"),
+)
+LOCK = "antdrive-compiling.lock"
+COMPILING = "compiling the planners, once for this installation; this takes a minute or two"
+
+
+def compile_once(say: Callable[[str], None] | None = None) -> None:
+    """Compile every kernel if this installation has not done so yet; processes that come at the same time wait for one of them.
+
+    A bar shows it on a terminal, a line elsewhere; `say` prints the line in any case. Nothing is done where no cache can be
+    kept. Each kernel is then compiled when it is first called, which for a single command is quicker than compiling all.
+    """
+    folder = kernel_cache.cache_folder()
+    if is_warm() or folder is None:
+        return
+    with _turn(folder):
+        if is_warm():
+            return
+        if say is not None:
+            say(COMPILING)
+            warm()
+            return
+        from antdrive.cli.console import bar, print_error
+
+        if not sys.stderr.isatty():
+            print_error(COMPILING)
+        with bar("compiling the planners, once") as progress:
+            warm(progress=progress)
+
+
+@contextlib.contextmanager
+def _turn(folder: Path) -> Iterator[None]:
+    """A context that one process is in at a time; any number of them where the system or the folder has no locks."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(ImportError, OSError):
+            import fcntl
+
+            file = stack.enter_context((folder / LOCK).open("a"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def is_warm() -> bool:
+    """Whether `warm` has run for these sources, this Python, this numba and this processor."""
+    marker = _marker()
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") or (marker is not None and marker.exists())
+
+
+def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
+    """Plan with every planner, drive once and film it, so that every kernel is in the cache."""
+    from antdrive.planners import PLANNERS
+    from antdrive.runs.pool import Pool, cores
+
+    # The second round reads the cache, and compiles what two processes wrote at the same moment and one of them lost.
+    first = [TOGETHER[0], None, *TOGETHER[1:]]
+    second = [tuple(PLANNERS), None]
+    done = 0
+    with Pool(jobs or cores()) as pool:
+        for groups in (first, second):
+            for _ in pool.results(_compile, groups, in_order=False):
+                done += 1
+                if progress is not None:
+                    progress(done / (len(first) + len(second)))
+    marker = _marker()
+    if marker is not None:
+        with contextlib.suppress(OSError):
+            marker.parent.mkdir(parents=True, exist_ok=True)
+            marker.touch()
+
+
+def _scenario() -> Scenario:
+    """A scenario in a world so small that compiling is nearly all it costs."""
+    from antdrive.planners import PLANNERS
+    from antdrive.robots import load_robot
+    from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Cruising, Disc, Task, World
+
+    mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))
+    world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),), movers=(mover,))
+    task = Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25)
+    return Scenario(task=task, planner=PLANNERS["astar"], robot=load_robot("turtlebot"))
+
+
+def _compile(planners: Sequence[str] | None) -> None:
+    """Plan with planners; None: drive and film."""
+    _drive_and_film() if planners is None else _plan_with(planners)
+
+
+def _plan_with(names: Sequence[str]) -> None:
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.pipeline import plan
+
+    for name in names:
+        plan(replace(_scenario(), planner=PLANNERS[name]))
+
+
+def _drive_and_film() -> None:
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.pipeline import run
+    from antdrive.views.film.video import film
+    from antdrive.worlds import Cruising
+
+    _sense()
+    log = run(_scenario()).rollout
+    task = _scenario().task
+    comes = Cruising(radius=0.2, position=(2.5, 0.75), velocity=(-2.0, 0.0))  # the robot has to escape from it
+    run(replace(_scenario(), task=replace(task, world=replace(task.world, movers=(comes,)))))
+    ants = run(replace(_scenario(), planner=PLANNERS["as"], planner_name="as")).rollout
+    assert log is not None
+    assert ants is not None
+    with tempfile.TemporaryDirectory() as folder:
+        film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2)
+        film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2, camera="follow")
+        film(ants, Path(folder) / "warm.mp4", size=(160, 160), fps=2, prelude=1.0)
+
+
+def _sense() -> None:
+    """Scan a tiny world, map it and follow a mover in it."""
+    import numpy as np
+
+    from antdrive.robots import load_robot
+    from antdrive.sim.sensing import MappedGround, MoverTracker, OccupancyMap, Scanner, clear_distance
+
+    robot = load_robot("turtlebot")
+    assert robot.lidar is not None
+    scanner, seen, tracker = (
+        Scanner.of(robot.lidar, _scenario().task.world),
+        OccupancyMap(robot.lidar),
+        MoverTracker(robot.lidar),
+    )
+    ground = MappedGround(seen, 10)
+    for k in range(4):
+        ranges = scanner.scan(
+            (0.75, 0.75, 0.0), np.array([[2.2 - 0.1 * k, 0.8]]) + (90 if k == 0 else 0), np.array([0.2])
+        )
+        seen.insert((0.75, 0.75, 0.0), ranges, tracker.update(ground, (0.75, 0.75, 0.0), ranges, 0.2 * k))
+    seen.mark_free((0.75, 0.75), 0.2)
+    seen.clear_hits((2.0, 0.8), 0.3)
+    seen.discs()
+    clear_distance(seen, (0.75, 0.75, 0.0), 0.5, 0.1, robot.footprint, 1.0)
+
+
+def _marker() -> Path | None:
+    """The file whose presence says that the kernels are compiled; None where nothing can be kept."""
+    folder = kernel_cache.cache_folder()
+    if folder is None:
+        return None
+    numba = importlib.metadata.version("numba")
+    facts = (
+        kernel_cache.sources_stamp(),
+        platform.python_version(),
+        platform.machine(),
+        numba,
+        os.environ.get("NUMBA_CPU_NAME", ""),
+    )
+    return folder / f"antdrive-warm-{hashlib.sha256('|'.join(facts).encode()).hexdigest()[:16]}"
+
+
+if __name__ == "__main__":
+    warm()

@@ -1,0 +1,369 @@
+"""Plan validation before anything is drawn or driven."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+import numbers
+import sys
+import traceback
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antdrive.base import Floats
+from antdrive.base.errors import InputError, Terminated
+from antdrive.base.plane import polyline_length, segment_lengths, wrap_angle
+from antdrive.planners.plan import (
+    Cell,
+    History,
+    Planner,
+    PlannerError,
+    PlanResult,
+    PlanStatus,
+    Query,
+    TimedPlan,
+    path_cost,
+)
+from antdrive.worlds.route import end_reach, longest_line
+
+RELATIVE = 1e-9  # relative tolerance of costs and lengths
+NEAR = 1e-6  # m: tolerance of waypoints and clearances
+
+
+def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
+    """Return a planner's plan without checking it.
+
+    Args:
+        planner: the planner
+        query: the query
+        rng: the planner's source of randomness
+        name: the planner's name in errors; empty: its class
+
+    Raises:
+        InputError: the planner rejects the query.
+        PlannerError: the planner raised another exception, or returned no `PlanResult`.
+    """
+    with planner_errors(planner, name):
+        answer: Any = planner.plan(query, rng)
+    return require_result(planner, answer, name)
+
+
+@contextlib.contextmanager
+def planner_errors(planner: Planner, name: str = "") -> Iterator[None]:
+    """Turn exceptions raised in this block into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
+
+    Args:
+        planner: the planner whose code runs in the block
+        name: the planner's name in errors; empty: its class
+
+    Raises:
+        PlannerError: the block raised an exception; names its class and line.
+    """
+    try:
+        yield
+    except (InputError, PlannerError, Terminated):
+        raise
+    except (Exception, SystemExit) as error:  # a third-party planner may raise anything, and call exit()
+        says = f"{type(error).__name__}: {error}".strip().removesuffix(":")
+        raise PlannerError(name or type(planner).__name__, f"raised {says} ({_place(planner, error)})") from error
+
+
+def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
+    """Return the answer of a planner or its replanner if it is a `PlanResult`.
+
+    Args:
+        planner: the planner
+        answer: the returned value
+        name: the planner's name in errors; empty: its class
+
+    Raises:
+        PlannerError: the answer has another type.
+    """
+    if isinstance(answer, PlanResult):
+        return answer
+    called = name or type(planner).__name__
+    raise PlannerError(called, f"returned {answer!r:.60} instead of a PlanResult ({_place(planner)})")
+
+
+def _place(planner: Planner, error: BaseException | None = None) -> str:
+    """Return the file and line of the planner's module that raised the error; without an error, of its `plan`."""
+    home = getattr(sys.modules.get(type(planner).__module__), "__file__", None)
+    frames = traceback.extract_tb(error.__traceback__) if error is not None else []
+    frames = [frame for frame in frames if frame.filename != __file__]
+    for frame in [*(f for f in reversed(frames) if f.filename == home), *reversed(frames)]:
+        return f"{Path(frame.filename).name}:{frame.lineno}"
+    code = getattr(getattr(planner, "plan", None), "__code__", None)
+    return f"{Path(code.co_filename).name}:{code.co_firstlineno}" if code else type(planner).__module__
+
+
+def checked(query: Query, answer: PlanResult) -> PlanResult:
+    """Return the plan if it is valid, else one without a path, with status `INVALID` and the reason.
+
+    Args:
+        query: the query
+        answer: the planner's answer
+    """
+    problem = check_plan(query, answer)
+    if not problem:
+        if len(answer.cells) and answer.cells.dtype != np.int32:
+            return dataclasses.replace(answer, cells=np.ascontiguousarray(answer.cells, dtype=np.int32))
+        return answer
+    sane = isinstance(answer.wall_s, float) and 0 <= answer.wall_s < math.inf
+    return PlanResult(status=PlanStatus.INVALID, reason=problem, wall_s=answer.wall_s if sane else 0.0)
+
+
+def check_plan(query: Query, result: PlanResult) -> str:
+    """Return the first error in a plan and its place; empty if the plan is valid.
+
+    Cells run from start to goal along allowed moves; their cost is that of `path_cost`. Waypoints join the same ends
+    and keep the clearance; `length` is that of a curve that rounds their corners. From a start with less clearance,
+    the first leg comes no closer within `end_reach`. Waypoints are no longer than `longest_line` allows for their
+    cells. A plan with waypoints may have an infinite cost: the grid has no path, and the cells are those under
+    the line. The times of a `TimedPlan` increase. Paths of plans that stopped early are checked as well.
+
+    Args:
+        query: the query
+        result: the planner's answer
+    """
+    problem = _types(result) or _figure_data(query, result)
+    if problem:
+        return problem
+    if not len(result.cells):
+        if result.solved:
+            return "cells: none, but the status is SOLVED"
+        return "" if result.waypoints is None else "waypoints: given without cells"
+    if result.status is PlanStatus.NO_PATH:
+        return "cells: given, but the status is NO_PATH"
+    if query.motions and result.solved and not isinstance(result, TimedPlan):
+        return "times: none, but a query with motions needs a TimedPlan"
+    off_grid = result.waypoints is not None and result.cost == math.inf
+    if query.blocked_end and result.waypoints is None:
+        return f"cells: given, but {query.blocked_end}"
+    problem = _cells(query, result, off_grid)
+    if not problem and result.waypoints is not None:
+        problem = _waypoints(query, result, query.grid.xy(result.waypoints))
+    elif not problem and result.length is not None and not _same(result.length, result.cost):
+        problem = f"length: {result.length:.9g} m, but the cells are {result.cost:.9g} m long"
+    if not problem and isinstance(result, TimedPlan):
+        problem = _times(query, result)
+    return problem
+
+
+def _types(result: PlanResult) -> str:
+    """Return the first field of a plan with an invalid type, shape or value; or empty."""
+    if result.status not in (PlanStatus.SOLVED, PlanStatus.NO_PATH, PlanStatus.STOPPED):
+        return f"status: must be SOLVED, NO_PATH or STOPPED, got {result.status!r:.40}"
+    cells, waypoints = result.cells, result.waypoints
+    if not (isinstance(cells, np.ndarray) and cells.dtype.kind in "iu" and cells.ndim == 2 and cells.shape[1] == 2):
+        return f"cells: must be an array of whole numbers (N, 2), got {_kind(cells)}"
+    if waypoints is not None:
+        if not (_floats(waypoints) and waypoints.ndim == 2 and waypoints.shape[1] == 2 and len(waypoints)):
+            return f"waypoints: must be an array of numbers (M, 2), got {_kind(waypoints)}"
+        if not np.isfinite(waypoints).all():
+            return f"waypoints: number {int(np.argwhere(~np.isfinite(waypoints))[0, 0])} is not finite"
+        if result.length is None:
+            return "length: missing; a plan with waypoints needs one"
+    for key in ("cost", "length", "wall_s", "work"):
+        value: Any = getattr(result, key)
+        whole = key == "work"
+        wanted = numbers.Integral if whole else numbers.Real
+        if key == "length" and value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, wanted):
+            return f"{key}: must be a {'whole ' if whole else ''}number, got {value!r:.40}"
+        infinite = key == "cost" and (waypoints is not None or not len(cells))
+        if not (0 <= float(value) < math.inf or (infinite and value == math.inf)):
+            return f"{key}: must be finite and at least 0, got {value}"
+    for key in ("reason", "work_unit"):
+        if not isinstance(getattr(result, key), str):
+            return f"{key}: must be text, got {getattr(result, key)!r:.40}"
+    options: Any = result.options
+    if not isinstance(options, Mapping):
+        return f"options: must be a mapping, got {options!r:.40}"
+    return ""
+
+
+def _figure_data(query: Query, result: PlanResult) -> str:
+    """Return the first error in the field and the history, which figures draw; or empty."""
+    field, history = result.field, result.history
+    made: Any = history  # by third-party code
+    if field is not None and not (_floats(field) and field.shape == query.grid.shape):
+        return f"field: must be an array of numbers {query.grid.shape}, got {_kind(field)}"
+    if not isinstance(made, History):
+        return f"history: must be a History, got {made!r:.40}"
+    count = len(history.best) if _floats(history.best) and history.best.ndim == 1 else 0
+    for key in ("best", "iteration_best", "iteration_mean", "arrived"):
+        values = getattr(history, key)
+        if not (_floats(values) and values.shape == (count,)):
+            return f"history: {key} must be an array of numbers ({count},), got {_kind(values)}"
+    return ""
+
+
+def _floats(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "fiu"
+
+
+def _kind(value: Any) -> str:
+    return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.40}"
+
+
+def _same(one: float, other: float) -> bool:
+    return abs(one - other) <= RELATIVE * max(abs(one), abs(other))
+
+
+def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
+    """Return the first invalid cell, step or cost; `off_grid`: cells need only be neighbours."""
+    grid, cells = query.grid, result.cells.astype(np.int64)
+    outside = ((cells < 0) | (cells >= grid.shape)).any(axis=1)
+    if outside.any():
+        k = int(outside.argmax())
+        return f"cells: number {k}, {_cell(cells[k])}, is outside the grid of {grid.shape[0]} x {grid.shape[1]} cells"
+    for k, key, wanted in ((0, "start", query.start), (-1, "goal", query.goal)):
+        if tuple(cells[k].tolist()) != wanted:
+            return f"cells: the {'first' if k == 0 else 'last'} is {_cell(cells[k])}, but the {key} is {_cell(wanted)}"
+    steps = np.diff(cells, axis=0)
+    bits = _bits()[tuple(np.clip(steps, -1, 1).T + 1)]
+    bits[(np.abs(steps) > 1).any(axis=1)] = 8
+    wrong = bits == 8
+    if not off_grid:
+        wrong |= grid.moves[tuple(cells[:-1].T)].astype(np.int64) >> bits & 1 == 0
+    if wrong.any():
+        k = int(wrong.argmax())
+        why = "is no allowed move" if bits[k] < 8 else "does not lead to a neighbour"
+        return f"cells: step {k} from {_cell(cells[k])} to {_cell(cells[k + 1])} {why}"
+    cost = path_cost(cells, grid.cell)
+    if not off_grid and not _same(result.cost, cost):
+        return f"cost: {result.cost:.9g} m, but the cells are {cost:.9g} m long"
+    return ""
+
+
+def check_step(query: Query, cell: Cell, to: Any) -> str:
+    """Return the error in a cell-by-cell planner's step; empty for an allowed move or a wait.
+
+    Args:
+        query: the query
+        cell: the robot's cell
+        to: the next cell, or None to wait
+    """
+    if to is None:
+        return ""
+    if not (isinstance(to, tuple) and len(to) == 2 and all(isinstance(k, numbers.Integral) for k in to)):
+        return f"step: must be a cell (row, col) or None, got {to!r:.40}"
+    grid, step = query.grid, (int(to[0]) - cell[0], int(to[1]) - cell[1])
+    bit = 8 if max(map(abs, step)) > 1 else int(_bits()[step[0] + 1, step[1] + 1])
+    if bit == 8 or not int(grid.moves[cell]) >> bit & 1:
+        return f"step: from {_cell(cell)} to {_cell(to)} is no allowed move"
+    return ""
+
+
+def _bits() -> Any:
+    """Return the bit of `Grid.moves` by row and column step, each + 1 (3, 3); 8 where there is no step."""
+    from antdrive.worlds import DIRECTIONS  # imports the compiler
+
+    bits = np.full((3, 3), 8)
+    for bit, (row, col) in enumerate(DIRECTIONS):
+        bits[row + 1, col + 1] = bit
+    return bits
+
+
+def _cell(cell: Any) -> str:
+    return f"({int(cell[0])}, {int(cell[1])})"
+
+
+def _waypoints(query: Query, result: PlanResult, xy: Floats) -> str:
+    """Return the first error in a plan's line (M, 2) [m]: its ends, clearance or length; or empty."""
+    length = result.length
+    assert length is not None
+    for k, key, ends in zip((0, -1), ("start", "goal"), _ends(query), strict=True):
+        if min(math.dist(xy[k], end) for end in ends) > NEAR:
+            return f"waypoints: the {'first' if k == 0 else 'last'} is not at the {key}"
+    if len(xy) > 1:
+        close = _too_close(query, xy)
+        if close.any():
+            k = int(close.argmax())
+            (ax, ay), (bx, by) = xy[k], xy[k + 1]
+            keeps = f"{query.grid.inflate:g} m from obstacles" if query.task is not None else "to free cells"
+            return f"waypoints: step {k} from ({ax:.3f}, {ay:.3f}) to ({bx:.3f}, {by:.3f}) does not keep {keeps}"
+    drawn = polyline_length(xy)
+    slack = RELATIVE * drawn + NEAR
+    if not drawn - _rounded_off(xy) - slack <= length <= drawn + slack:
+        return f"length: {length:.9g} m, but the waypoints are {drawn:.9g} m long"
+    if length > longest_line(result.cost, _leads(query, result), query.grid.cell) + slack:
+        return f"waypoints: {length:.9g} m long, but their cells only {result.cost:.9g} m"
+    return ""
+
+
+def _leads(query: Query, result: PlanResult) -> float:
+    """Return the summed distance of the first cell from the exact start and of the last from the exact goal [m]."""
+    if query.task is None:
+        return 0.0
+    first, last = query.grid.xy(result.cells[[0, -1]])
+    return math.dist(first, query.task.start[:2]) + math.dist(last, query.task.goal)
+
+
+def _ends(query: Query) -> list[list[tuple[float, float]]]:
+    """Return the points where a line may begin and those where it may end: cell centres and exact ends."""
+    cells = [[(float(x), float(y))] for x, y in query.grid.xy([query.start, query.goal])]
+    if query.task is not None:
+        # Without a usable start cell, the line must begin at the exact start.
+        cells[0] = [query.task.start[:2], *([] if query.blocked_end else cells[0])]
+        cells[1].append(query.task.goal)
+    return cells
+
+
+def _too_close(query: Query, xy: Floats) -> Any:
+    """Return which segments of a line (M, 2) [m] violate the clearance (M - 1,)."""
+    task, inflate = query.task, query.grid.inflate
+    if task is None:
+        from antdrive.planners.anyangle.lines import clear_line
+
+        pairs = zip(xy[:-1].tolist(), xy[1:].tolist(), strict=True)
+        return np.array([not clear_line(query, tuple(a), tuple(b)) for a, b in pairs])
+    from antdrive.worlds.geometry import point_clearance, segment_clearance  # imports the compiler
+
+    keep = np.full(len(xy) - 1, inflate)
+    # A start below the clearance: the first segment must not come closer.
+    keep[0] = min(inflate, float(point_clearance(task.world, xy[:1])[0]))
+    close = segment_clearance(task.world, xy[:-1], xy[1:]) < keep - NEAR
+    fraction = end_reach(inflate, query.grid.cell) / max(math.dist(xy[0], xy[1]), 1e-9)
+    if fraction < 1:
+        away = xy[:1] + fraction * (xy[1:2] - xy[:1])
+        close[0] |= segment_clearance(task.world, away, xy[1:2])[0] < inflate - NEAR
+    return close
+
+
+def _rounded_off(xy: Floats) -> float:
+    """Return how much rounding the corners with arcs can shorten a line (M, 2)."""
+    sides = segment_lengths(xy)
+    steps = np.diff(xy, axis=0)[sides > 0]
+    heading, sides = np.arctan2(steps[:, 1], steps[:, 0]), sides[sides > 0]
+    half = np.abs(wrap_angle(np.diff(heading))) / 2
+    half = half[(corner := half > 1e-9)]
+    reach = np.minimum(sides[:-1], sides[1:])[corner]
+    return float((2 * reach * (1 - half / np.tan(half))).sum())
+
+
+def _times(query: Query, plan: TimedPlan) -> str:
+    """Return the first invalid time or cell centre of a plan; or empty."""
+    count = len(plan.cells)
+    for key in ("arrive", "leave"):
+        times = getattr(plan, key)
+        if not (_floats(times) and times.shape == (count,) and np.isfinite(times).all()):
+            return f"{key}: must be a finite time for each of the {count} cells, got {_kind(times)}"
+    wrong = plan.leave < plan.arrive
+    wrong[1:] |= plan.arrive[1:] <= plan.leave[:-1]
+    if wrong.any():
+        k = int(wrong.argmax())
+        return (
+            f"times: cell {k} is reached at {plan.arrive[k]:g} s and left at {plan.leave[k]:g} s, which do not increase"
+        )
+    if plan.arrive[0] < query.start_time - 1e-9:
+        return f"arrive: begins at {plan.arrive[0]:g} s, but the robot sets out at {query.start_time:g} s"
+    shaped = _floats(plan.xy) and plan.xy.shape == (count, 2)
+    if not (shaped and np.allclose(plan.xy, query.grid.xy(plan.cells), rtol=0, atol=NEAR)):
+        return "xy: must be the centres of the cells"
+    return ""

@@ -1,0 +1,102 @@
+"""Whether a robot fits where it stands, and what is in its way. Needs numpy alone, but for one kernel."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import Floats, Pose
+from antdrive.robots.spec import Footprint, RobotSpec
+from antdrive.worlds import Disc, World
+
+WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
+
+
+def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike) -> Floats:
+    """Distance from the footprint at each pose to the nearest disc surface or wall, shape (N,) [m].
+
+    It is negative where the footprint overlaps a disc or a wall. Its size is then a bound on the depth of the
+    overlap, not the exact depth.
+
+    Args:
+        world: the discs and walls
+        footprint: the robot's footprint
+        poses: x, y and yaw of the robot's centre, shape (N, 3) [m, rad]
+    """
+    from antdrive.robots import _kernels_footprint
+
+    rows = np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3)
+    out = np.empty(len(rows))
+    bounds = np.asarray(world.bounds, dtype=np.float64)
+    _kernels_footprint.footprint_clearances(rows, *kernel_shape(footprint), world.discs, bounds, out)
+    return out
+
+
+def kernel_shape(footprint: Footprint) -> tuple[Floats, Floats]:
+    """A footprint as kernels take it: half length, half width and rounding (3,), and a polygon's corners (K, 2) [m]."""
+    shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
+    return shape, np.array(footprint.corners, dtype=np.float64).reshape(-1, 2)
+
+
+def footprint_distances(world: World, spec: RobotSpec, poses: npt.ArrayLike) -> Floats:
+    """The distance from the robot's footprint to each obstacle and then each of `WALLS`, negative in it, (P, N + 4) [m]."""
+    x, y, yaw = np.asarray(poses, dtype=np.float64).reshape(-1, 3, 1).swapaxes(0, 1)
+    foot, discs = spec.footprint, world.discs
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    dx, dy = discs[:, 0] - x, discs[:, 1] - y
+    if foot.corners:
+        to_discs = _beyond_polygon(foot, cos * dx + sin * dy, cos * dy - sin * dx) - foot.rounding - discs[:, 2]
+        cx, cy = np.array(foot.corners).T
+        at_x, at_y = x + cos * cx - sin * cy, y + sin * cx + cos * cy
+        xmin, ymin, xmax, ymax = world.bounds
+        room = at_x.min(1) - xmin, at_y.min(1) - ymin, xmax - at_x.max(1), ymax - at_y.max(1)
+        return np.hstack([to_discs, np.stack(room, axis=1) - foot.rounding])
+    ahead, beside = np.abs(cos * dx + sin * dy) - foot.half_length, np.abs(cos * dy - sin * dx) - foot.half_width
+    outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(beside, 0.0))
+    to_discs = outside + np.minimum(np.maximum(ahead, beside), 0.0) - foot.rounding - discs[:, 2]
+    reach_x = foot.half_length * np.abs(cos) + foot.half_width * np.abs(sin) + foot.rounding
+    reach_y = foot.half_length * np.abs(sin) + foot.half_width * np.abs(cos) + foot.rounding
+    xmin, ymin, xmax, ymax = world.bounds
+    return np.hstack([to_discs, x - reach_x - xmin, y - reach_y - ymin, xmax - x - reach_x, ymax - y - reach_y])
+
+
+def _beyond_polygon(footprint: Footprint, x: Floats, y: Floats) -> Floats:
+    """The distance from a footprint's polygon to points in its frame, negative within it [m]."""
+    corners = np.array(footprint.corners)
+    over, apart = np.full(x.shape, -np.inf), np.full(x.shape, np.inf)
+    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        length = float(np.hypot(bx - ax, by - ay))
+        ex, ey = ((bx - ax) / length, (by - ay) / length) if length else (0.0, 0.0)
+        along = np.clip((x - ax) * ex + (y - ay) * ey, 0.0, length)
+        apart = np.minimum(apart, np.hypot(x - ax - along * ex, y - ay - along * ey))
+        over = np.maximum(over, (x - ax) * ey - (y - ay) * ex if length else np.inf)
+    return np.where(over <= 0, over, apart)
+
+
+def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
+    """What messages call an obstacle or a wall."""
+    count = len(world.obstacles)
+    if index >= count:
+        return WALLS[index - count]
+    disc, known = world.obstacles[index], count - unseen
+    key = f"obstacles[{index}]" if index < known else f"unseen[{index - known}]"
+    return f"{key} at ({disc.x:g}, {disc.y:g}) with radius {disc.radius:g}"
+
+
+def overlap_at(world: World, spec: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
+    """What the robot's footprint overlaps or touches most at a pose, and by how much; empty where it fits.
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        spec: the robot
+        pose: x, y and yaw of its centre [m, rad]
+        unseen: further obstacles
+    """
+    full = World(world.name, world.bounds, world.obstacles + unseen)
+    gap = footprint_distances(full, spec, [pose])[0]
+    worst = int(gap.argmin())
+    if gap[worst] > 0:
+        return ""
+    depth = -float(gap[worst])
+    touches = f"overlaps {{}} by {depth:.3g} m" if depth > 1e-9 else "touches {}"
+    return touches.format(obstacle_name(full, worst, len(unseen)))

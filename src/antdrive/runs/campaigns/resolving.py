@@ -1,0 +1,308 @@
+"""The worlds, planners and tasks of a campaign: what its file lists, each under the name that tables call it."""
+
+from __future__ import annotations
+
+import dataclasses
+import glob
+import itertools
+import math
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antdrive.base.checks import show, suggest
+from antdrive.base.document import Location
+from antdrive.base.errors import FieldError, InputError
+from antdrive.planners import PLANNERS, Query, load_planner, planner_version
+from antdrive.robots import RobotSpec, overlap_at
+from antdrive.runs.campaigns.campaign import Campaign, RandomTasks, seeds_of
+from antdrive.runs.campaigns.job import NamedTask, PlannerVariant
+from antdrive.sim.forms import option_text, seed_list
+from antdrive.sim.log.record import canonical_hash, settings_of
+from antdrive.worlds import Disc, Grid, Task, World, list_worlds, load_task, load_tasks, rasterise
+from antdrive.worlds.formats.importing import import_file
+from antdrive.worlds.generators.generate import generated
+
+OWN = "own"  # the name of the task that a world brings
+
+
+def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
+    """The worlds of a campaign with their own tasks, in its order; files of a pattern by name.
+
+    Worlds that share a name have their path or options in what the campaign calls them, so that no two are called the same.
+    Several problems of one map are tasks of one world.
+    """
+    found: list[tuple[NamedTask, str]] = []
+    for i, entry in enumerate(campaign.entry.worlds):
+        place: Location = ("worlds", i)
+        if isinstance(entry, str):
+            found += _named(campaign, place, entry)
+        elif "generate" in entry:
+            found += _random(campaign, place, dict(entry))
+        elif "import" in entry:
+            found += _imported(campaign, place, dict(entry))
+        else:
+            raise campaign.error(place, "write a name, a file, {generate: forest, seeds: 20} or {import: FILES}")
+    return _distinct(found)
+
+
+def _distinct(found: list[tuple[NamedTask, str]]) -> list[NamedTask]:
+    """The tasks, each once; no two of them, and no two worlds, are called the same."""
+    geometries: dict[str, World] = {}
+    tasks: dict[tuple[str, str], NamedTask] = {}
+    for one, second in found:
+        geometry = dataclasses.replace(one.task.world, source=None)
+        for world in itertools.chain((one.world, second), (f"{second} ({n})" for n in itertools.count(2))):
+            there = tasks.get((world, one.name))
+            if there is None and geometries.setdefault(world, geometry) == geometry:
+                tasks[world, one.name] = dataclasses.replace(one, world=world)
+                break
+            if there is not None and _same(there.task, one.task):
+                break
+    return list(tasks.values())
+
+
+def _same(task: Task, other: Task) -> bool:
+    """Whether two tasks differ in nothing but what is said of where their worlds come from."""
+    return dataclasses.replace(task, world=dataclasses.replace(task.world, source=other.world.source)) == other
+
+
+def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[NamedTask, str]]:
+    known = list_worlds()
+    if name in known:
+        yield NamedTask(name, OWN, load_task(known[name]), name, place, load_tasks(name)), name
+        return
+    for path in _files(campaign, place, name, f"nor a world of the catalogue; {suggest(Path(name).stem, known)}"):
+        task = load_task(path)
+        yield (
+            NamedTask(task.world.name, OWN, task, None, place, load_tasks(path)),
+            os.path.relpath(path, campaign.folder),
+        )
+
+
+def _files(campaign: Campaign, place: Location, pattern: str, otherwise: str) -> list[Path]:
+    """The files that a pattern or a path names, in the order of their names."""
+    paths = sorted(glob.glob(str(campaign.folder / pattern), recursive=True))
+    if not paths:
+        raise campaign.error(place, f"{pattern}: no such file{' here, ' + otherwise if otherwise else ''}")
+    return [Path(path) for path in paths]
+
+
+def _random(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Iterator[tuple[NamedTask, str]]:
+    kind = entry.pop("generate")
+    if not isinstance(kind, str):
+        raise campaign.error((*place, "generate"), f"must be the name of a generator, got {show(kind)}")
+    if "seed" in entry and "seeds" in entry:
+        raise campaign.error((*place, "seed"), "keep one of seed and seeds")
+    key = "seed" if "seed" in entry else "seeds"
+    given = entry.pop(key, 1)
+    try:
+        seeds = seeds_of([given] if key == "seed" else given)
+    except ValueError as error:
+        raise campaign.error((*place, key), str(error)) from None
+    options = tuple((name, option_text(value)) for name, value in entry.items())
+    suffix = "".join(f" {name}={text}" for name, text in options)
+    for seed in seeds:
+        try:
+            task = generated(kind, seed, options)
+        except InputError as error:
+            raise campaign.error(place, str(error)) from None
+        yield NamedTask(f"{kind}-{seed}{suffix}", OWN, task, None, place), f"{kind}-{seed}{suffix} ({place[1]})"
+
+
+def _imported(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Iterator[tuple[NamedTask, str]]:
+    pattern, barn = entry.pop("import"), entry.pop("barn", False)
+    if not isinstance(pattern, str) or not isinstance(barn, bool):
+        raise campaign.error(place, "write {import: FILES, barn: true} with the options of antdrive worlds import")
+    problems = _problems(campaign, place, entry)
+    suffix = "".join(f" {key}={option_text(value)}" for key, value in entry.items())
+    options = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+    for path in _files(campaign, (*place, "import"), pattern, ""):
+        for problem in problems:
+            try:
+                tasks = import_file(path, barn=barn, problem=problem, **options)
+            except FieldError as error:
+                raise campaign.error((*place, error.key), error.problem) from None
+            except TypeError:
+                raise campaign.error(place, "an option has a value of the wrong type") from None
+            for task in tasks:
+                name = OWN if problem is None else f"problem-{problem}"
+                second = f"{os.path.relpath(path, campaign.folder)}#{task.world.name}{suffix}"
+                yield NamedTask(task.world.name, name, task, None, place), second
+
+
+def _problems(campaign: Campaign, place: Location, entry: dict[str, Any]) -> list[int] | list[None]:
+    """The problems of a map that an entry lists as 7, [3, 7] or 0-99; it is left without them."""
+    given = entry.pop("problem", None)
+    if given is None:
+        return [None]
+    try:
+        return seed_list([given] if type(given) is int else given)
+    except ValueError as error:
+        raise campaign.error((*place, "problem"), str(error)) from None
+
+
+MOST_VALUES = 10_000  # of one range
+PLANNER_FILES = "planners"  # the folder in a campaign's folder with the files that its commands name
+
+
+def planner_variants(campaign: Campaign) -> list[PlannerVariant]:
+    """The planners of a campaign, in its order; the last of several options with lists varies fastest."""
+    found: dict[str, PlannerVariant] = {}
+    for i, entry in enumerate(campaign.entry.planners):
+        for variant in _variants(campaign, ("planners", i), {"name": entry} if isinstance(entry, str) else dict(entry)):
+            taken = found.setdefault(variant.label, variant)
+            if taken.source != variant.source:  # the same class name in another file of the same name
+                written = entry if isinstance(entry, str) else entry["name"]
+                label = variant.label.replace(variant.name, written, 1)
+                found[label] = dataclasses.replace(variant, label=label, name=written)
+    return list(found.values())
+
+
+def _variants(campaign: Campaign, place: Location, options: dict[str, Any]) -> Iterator[PlannerVariant]:
+    given_name = options.pop("name", None)
+    if not isinstance(given_name, str):
+        raise campaign.error((*place, "name"), "missing; write the planner's name, such as {name: aco-han, ants: 50}")
+    file, _, inner = given_name.rpartition(":")
+    path = (campaign.folder / file).absolute() if file.endswith(".py") else None
+    source = given_name if path is None else f"{path}:{inner}"
+    name = given_name if path is None else f"{path.name}:{inner}"
+    try:
+        version = planner_version(source)
+    except InputError as error:
+        raise _at_option(campaign, place, str(error)) from None
+    word = name if path is None else f"{PLANNER_FILES}/{version.rpartition(' ')[2]}/{name}"
+    lists = [values_of(campaign, (*place, key), value) for key, value in options.items()]
+    for values in itertools.product(*lists):
+        given = dict(zip(options, values, strict=True))
+        try:
+            planner = load_planner(source, **given)
+        except InputError as error:
+            raise _at_option(campaign, place, str(error)) from None
+        resolved = settings_of(planner) if dataclasses.is_dataclass(planner) else settings_of(given)
+        label = " ".join([name, *(f"{key}={option_text(value)}" for key, value in given.items())])
+        yield PlannerVariant(label, name, source, word, path, version, given, resolved)
+
+
+def _at_option(campaign: Campaign, place: Location, text: str) -> InputError:
+    """The error of `load_planner` at the option that it names."""
+    key, mark, problem = text.partition(": ")
+    if mark and key.startswith("planner."):
+        return campaign.error((*place, key.removeprefix("planner.")), problem)
+    return campaign.error(place, text.removeprefix("planner: "))
+
+
+def values_of(campaign: Campaign, place: Location, value: Any) -> list[Any]:
+    """The values that an option takes: those of a list or of a range {from, to, step}, or one."""
+    if isinstance(value, list):
+        if not value or any(isinstance(one, list | dict) for one in value):
+            raise campaign.error(place, f"must be a list of values, got {show(value)}")
+        return value
+    if not isinstance(value, dict):
+        return [value]
+    numbers = [value.get(key, "") for key in ("from", "to", "step")]
+    if len(value) != 3 or any(isinstance(number, bool) or not isinstance(number, int | float) for number in numbers):
+        raise campaign.error(place, "a range is written {from: 10, to: 50, step: 10}")
+    first, last, step = numbers
+    if not (all(map(math.isfinite, numbers)) and step > 0 and last >= first and (last - first) / step < MOST_VALUES):
+        raise campaign.error(place, f"must go up from a number in at most {MOST_VALUES} steps above 0")
+    count = int((last - first) / step + 1e-9) + 1
+    whole = all(isinstance(n, int) for n in numbers)
+    return [first + k * step if whole else round(first + k * step, 12) for k in range(count)]
+
+
+NAMED = "named"  # the value of a campaign's key tasks that means those of the worlds' files
+TRIES = 1000  # pairs that are drawn for one task
+ROOM = 0.03  # the margin of drawn tasks where the campaign's margins are chosen later [m]
+
+
+def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequence[RobotSpec]) -> Iterator[NamedTask]:
+    """The tasks of a campaign: each world with each of its starts and goals."""
+    if isinstance(campaign.tasks, RandomTasks):
+        margins = [ROOM if margin == "auto" else float(margin) for margin in campaign.values("margin")]
+        inflate = max(robot.radius for robot in robots) + max(margins)
+        for world in _each_once(worlds):
+            yield from _drawn(campaign, campaign.tasks, world, robots, inflate)
+    elif campaign.entry.tasks == NAMED:
+        for world in worlds:
+            if not world.others:
+                raise campaign.error(
+                    ("tasks",), f"the file of world {world.world} lists no tasks; write them there, or own"
+                )
+            for name, task in world.others.items():
+                yield dataclasses.replace(world, name=name, task=task, catalogue=None)
+    elif campaign.tasks:
+        for world in _each_once(worlds):
+            yield from _listed(campaign, world)
+    else:
+        yield from worlds
+
+
+def _each_once(worlds: Sequence[NamedTask]) -> Iterable[NamedTask]:
+    """The worlds, each with the first of its own tasks, which others take the place of."""
+    found: dict[str, NamedTask] = {}
+    for one in worlds:
+        found.setdefault(one.world, one)
+    return found.values()
+
+
+def _listed(campaign: Campaign, world: NamedTask) -> Iterator[NamedTask]:
+    assert isinstance(campaign.tasks, tuple)
+    for i, entry in enumerate(campaign.tasks):
+        x, y, yaw = entry.start
+        try:
+            task = dataclasses.replace(world.task, start=(x, y, yaw), goal=(entry.goal[0], entry.goal[1]))
+        except FieldError as error:
+            raise campaign.error(("tasks", i, error.key), f"in world {world.world}: {error.problem}") from None
+        yield dataclasses.replace(world, name=entry.name or str(i), task=task, catalogue=None)
+
+
+def _drawn(
+    campaign: Campaign, request: RandomTasks, world: NamedTask, robots: Sequence[RobotSpec], inflate: float
+) -> Iterator[NamedTask]:
+    """Random tasks in one world. They depend on it, the seed and what needs room, not on the campaign's other worlds."""
+    unseen = tuple(
+        dict.fromkeys(Disc(d.x, d.y, d.radius, d.height) for one in campaign.settings for d in one.get("unseen", ()))
+    )
+    content = int(canonical_hash(world.task)[:16], 16)
+    rng = np.random.default_rng([request.seed, content])
+    cell = max(entry.get("cell") or world.task.cell for entry in campaign.settings)
+    grid = rasterise(world.task.world, cell, inflate)
+    free = np.argwhere(grid.moves > 0)
+    for number in range(request.random):
+        task = _draw(rng, grid, free, request.min_distance, world.task, robots, unseen) if len(free) else None
+        if task is None:
+            problem = (
+                f"no start and goal {request.min_distance:g} m apart with a path between them found in {TRIES} draws in world "
+                f"{world.world} for a robot of radius {inflate:.3g} m with its margin; use a smaller min_distance"
+            )
+            raise campaign.error(("tasks",), problem)
+        yield dataclasses.replace(world, name=f"random-{request.seed}-{number}", task=task, catalogue=None)
+
+
+def _draw(
+    rng: np.random.Generator,
+    grid: Grid,
+    free: np.ndarray,
+    distance: float,
+    own: Task,
+    robots: Sequence[RobotSpec],
+    unseen: tuple[Disc, ...],
+) -> Task | None:
+    """A task with the start and the goal in free cells, the robot facing the goal; None if none was found."""
+    for _ in range(TRIES):
+        (x, y), (goal_x, goal_y) = grid.xy(free[rng.integers(len(free), size=2)]).tolist()
+        if math.hypot(goal_x - x, goal_y - y) < max(distance, own.goal_tolerance):
+            continue
+        start = x, y, math.atan2(goal_y - y, goal_x - x)
+        try:
+            task = dataclasses.replace(own, start=start, goal=(goal_x, goal_y))
+        except FieldError:
+            continue
+        fits = not any(overlap_at(task.world, robot, start, unseen) for robot in robots)
+        if fits and PLANNERS["astar"].plan(Query.between(grid, task), rng).solved:
+            return task
+    return None

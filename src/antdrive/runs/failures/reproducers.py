@@ -1,0 +1,95 @@
+"""What is handed over about the failures that a search found: each repeated, shrunk, and in a suite."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from antdrive.runs.failures.failure import Attempt
+from antdrive.runs.failures.handover import Handover, renamed, run_elsewhere, suite_elsewhere, write_suite
+from antdrive.runs.failures.hunt import Finding, Hunt
+from antdrive.runs.failures.shrinker import Shrunk, shrink
+from antdrive.runs.suites.demands import Bound
+
+SUITE = "failures.drive.yaml"
+
+
+@dataclass(frozen=True, eq=False)
+class Reproducer:
+    """A failure as it is handed over."""
+
+    name: str  # its name in the suite, and of its world
+    finding: Finding  # the failure as it was found
+    small: Attempt  # what came of the small scenario
+    # whether the found scenario, and the small one as it is read from its files, gave the same bits in another
+    # process
+    repeats: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {
+            "name": self.name,
+            "run": self.finding.number,
+            **dataclasses.asdict(self.finding.failure),
+            "repeats": self.repeats,
+            "obstacles_found": len(self.finding.scenario.task.world.obstacles),
+            "obstacles": len(self.small.scenario.task.world.obstacles),
+        }
+
+
+def write_reproducers(
+    hunt: Hunt, folder: Path, *, seconds: float = 20.0, progress: Callable[[float], None] | None = None
+) -> list[Reproducer]:
+    """Shrink the different failures of a search, write them, and run what was written again in another process.
+
+    A suite and the worlds are written. Ctrl-C ends the shrinking; what is not shrunk by then is handed over as it was found.
+    """
+    small: list[Attempt] = []
+    for k, finding in enumerate(hunt.distinct):
+        name, scenario = _name(k), finding.scenario
+        if seconds > 0:
+            try:
+                scenario = shrink(scenario, seconds=seconds, journal=folder / "journals" / f"{name}.json").scenario
+            except KeyboardInterrupt:
+                seconds = 0.0
+        small.append(Attempt.of(renamed(scenario, name)))
+        if progress is not None:
+            progress((k + 1) / (len(hunt.distinct) + 1))
+    suite = _write(small, hunt.distinct, folder)
+    found, written = run_elsewhere([finding.scenario for finding in hunt.distinct]), suite_elsewhere(suite)
+    return [
+        Reproducer(_name(k), finding, done, _repeats(finding, done, found[k], written[k]))
+        for k, (finding, done) in enumerate(zip(hunt.distinct, small, strict=True))
+    ]
+
+
+def _name(index: int) -> str:
+    return f"failure-{index + 1}"
+
+
+def _repeats(finding: Finding, small: Attempt, found_elsewhere: str, small_elsewhere: str) -> bool:
+    """Whether a failure and its small scenario gave the same bits in another process, and fail in the same way."""
+    same = (found_elsewhere, small_elsewhere) == (finding.fingerprint, small.fingerprint)
+    return same and small.failure() == finding.failure
+
+
+def write_reproducer(
+    shrunk: Shrunk, name: str, folder: Path, *, bound: Bound | None, planner: str | Mapping[str, Any] | None
+) -> tuple[Attempt, Path, bool]:
+    """Write the suite of one small failure; the failure, the suite, and whether that gives the same in another process."""
+    note = f"shrunk from {shrunk.original.task.world.name}: {shrunk.summary}"
+    small = Attempt.of(renamed(shrunk.scenario, name, note))
+    handover = Handover(name, small, bound, shrunk.failure.sentence, planner)
+    suite = write_suite(folder / f"{name}.drive.yaml", [handover])
+    repeats = suite_elsewhere(suite) == [small.fingerprint] and small.failure(bound) == shrunk.failure
+    return small, suite, repeats
+
+
+def _write(small: Sequence[Attempt], findings: Sequence[Finding], folder: Path) -> Path:
+    """Write the suite and the worlds of failures; the suite's path."""
+    pairs = enumerate(zip(small, findings, strict=True))
+    handovers = [Handover(_name(k), done, note=finding.failure.sentence) for k, (done, finding) in pairs]
+    return write_suite(folder / SUITE, handovers)

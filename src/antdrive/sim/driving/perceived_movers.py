@@ -1,0 +1,150 @@
+"""The movers as a robot perceives them, and the prediction that follows: by ground truth, or by tracks of its lidar."""
+
+from __future__ import annotations
+
+import abc
+import math
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import Floats, Point
+from antdrive.sim.policy import Perception
+from antdrive.worlds import Trajectories
+
+if TYPE_CHECKING:
+    from antdrive.sim.driving.survey import MoverTracking
+    from antdrive.sim.sensing.tracking import TrackedMovers
+
+CHUNK = 240  # control periods whose positions and velocities are computed at once
+STANDS = 0.08  # a mover that is slower than this, as far as scans tell, stands still [m/s]
+
+#: The numbers (P,) of movers.
+Numbers: TypeAlias = npt.NDArray[np.int64]
+
+
+class PerceivedMovers(abc.ABC):
+    """The movers as the robot perceives them, within range. Each goes on at the velocity that the robot knows.
+
+    Attributes:
+        guesses: whether movers may do something else than is predicted
+    """
+
+    uncertain = True
+
+    def __init__(self, perception: Perception, hz: int) -> None:
+        self._perception, self._hz = perception, hz
+
+    @abc.abstractmethod
+    def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
+        """The numbers (M,) of all movers in a tick, their places (M, 2) [m], velocities (M, 2) [m/s] and radii (M,) [m]."""
+
+    @abc.abstractmethod
+    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
+        """The numbers (P,) of the perceived movers, and the places of all by number (M, 2) [m]; nan where not known."""
+
+    @abc.abstractmethod
+    def radius_of(self, mover: int) -> float:
+        """The radius of a mover [m]."""
+
+    @abc.abstractmethod
+    def name_of(self, mover: int) -> str:
+        """What people call a mover."""
+
+    def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
+        """The positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
+        _, places, velocities, radii = self._near(tick, position)
+        return places + ahead[:, None, None] * velocities, radii
+
+    def within_range(self, tick: int, position: Point) -> Numbers:
+        """The numbers (P,) of the perceived movers."""
+        return self._near(tick, position)[0]
+
+    def _near(self, tick: int, position: Point) -> tuple[Numbers, Floats, Floats, Floats]:
+        numbers, places, velocities, radii = self._now(tick)
+        if self._perception.range == math.inf:
+            return numbers, places, velocities, radii
+        near = np.hypot(*(places - position).T) - radii <= self._perception.range
+        return numbers[near], places[near], velocities[near], radii[near]
+
+
+class GroundTruth(PerceivedMovers):
+    """Movers by ground truth: positions, velocities or motions."""
+
+    def __init__(self, trajectories: Trajectories, perception: Perception, hz: int) -> None:
+        super().__init__(perception, hz)
+        self.uncertain = perception.kind in ("velocities", "lidar")
+        self._trajectories, self._everyone = trajectories, np.arange(len(trajectories.radii))
+        self._first, self._positions, self._velocities = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
+
+    def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
+        """The positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
+        if self._perception.kind != "motions":
+            return super().predict(tick, position, ahead)
+        perceived, _, _, radii = self._near(tick, position)
+        positions = self._trajectories.positions(ahead + tick / self._hz)
+        return np.ascontiguousarray(positions[:, perceived]), radii
+
+    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
+        """The numbers (P,) of the perceived movers, and the places of all (M, 2) [m]."""
+        return self.within_range(tick, position), self._now(tick)[1]
+
+    def radius_of(self, mover: int) -> float:
+        """The radius of a mover [m]."""
+        return float(self._trajectories.radii[mover])
+
+    def name_of(self, mover: int) -> str:
+        """What people call a mover."""
+        return f"movers[{mover}]"
+
+    def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
+        if not self._first <= tick < self._first + len(self._positions):
+            t = np.arange(tick, tick + CHUNK) / self._hz
+            self._first, self._positions = tick, self._trajectories.positions(t)
+            still = self._perception.kind == "positions"
+            self._velocities = np.zeros_like(self._positions) if still else self._trajectories.velocities(t)
+        row = tick - self._first
+        return self._everyone, self._positions[row], self._velocities[row], self._trajectories.radii
+
+
+class Tracked(PerceivedMovers):
+    """Movers by tracks of a lidar, counted as they are found.
+
+    Attributes:
+        watch: what the scans tell
+    """
+
+    def __init__(self, tracking: MoverTracking, perception: Perception, hz: int) -> None:
+        super().__init__(perception, hz)
+        self.tracking = tracking
+
+    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
+        """The numbers (P,) of the movers that are followed, and the places of all (M, 2) [m]; nan: not followed any more."""
+        numbers, places, _, _ = self._now(tick)
+        everywhere = np.full((self.tracking.tracker.tracks_begun, 2), np.nan)
+        everywhere[numbers] = places
+        return self.within_range(tick, position), everywhere
+
+    def visible(self, tick: int) -> Floats:
+        """Where the movers are in a tick that the last scan met (N, 2) [m]: not those that are hidden."""
+        return self._now(tick)[1][self._followed.met]
+
+    def radius_of(self, mover: int) -> float:
+        """The radius of a mover that is followed [m]."""
+        return float(self._followed.radii[self._followed.numbers == mover][0])
+
+    def name_of(self, mover: int) -> str:
+        """What people call a mover."""
+        return f"tracked mover {mover}"
+
+    @property
+    def _followed(self) -> TrackedMovers:
+        """The movers at the last scan."""
+        return self.tracking.tracker.movers()
+
+    def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
+        found = self._followed
+        velocities = np.where(np.hypot(*found.velocities.T)[:, None] < STANDS, 0.0, found.velocities)
+        places = found.positions + (tick - self.tracking.tick) / self._hz * velocities
+        return found.numbers, places, velocities, found.radii

@@ -1,0 +1,221 @@
+"""Films of several runs side by side, each in its own tile, all at the same moment."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from antdrive.base.errors import InputError
+from antdrive.base.files import known_suffix
+from antdrive.sim.log.rollout import Rollout
+from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, planner_style
+from antdrive.views.film.camera import Picture, turns
+from antdrive.views.film.film_options import ENCODERS, FilmInfo, FilmOptions
+from antdrive.views.film.shot import Shot
+from antdrive.views.film.text import fitted, font, pill, put, text_width
+from antdrive.views.film.video import HOLD, encoded, frame_times
+from antdrive.views.scene import Scene
+
+MAX_RUNS = 6
+FULL = (1280, 720)  # of a film whose size nobody chose [px]
+LEAST_TILE = 360  # its least width, for the words in its head [px]
+FILLED = 0.92  # the part of a picture's sides that the world takes, seen from above
+
+
+def compare_film(
+    rollouts: Sequence[Rollout],
+    path: str | Path,
+    *,
+    camera: str = "oblique",
+    size: tuple[int, int] | None = None,
+    fps: float = 30.0,
+    speed: float = 1.0,
+    titles: Sequence[str] | None = None,
+    mark: Mark | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> FilmInfo:
+    """Film two to six runs side by side. A run that ends before the others keeps its last picture."""
+    target = Path(path)
+    known_suffix(target, ENCODERS)
+    options = FilmOptions(camera, size or FULL, fps, speed).checked()
+    if not 2 <= len(rollouts) <= MAX_RUNS:
+        raise InputError(f"compare: needs 2 to {MAX_RUNS} runs, got {len(rollouts)}")
+    options = replace(options, size=size or fitting_size(rollouts, camera))
+    times = frame_times(max(float(log.t[-1] - log.t[0]) for log in rollouts), fps, speed)
+    screen = SplitScreen(rollouts, camera, options.size, titles, mark)
+    moments = [*times.tolist(), *itertools.repeat(math.inf, round(2 * HOLD * fps))]
+    return encoded(target, options, len(moments), map(screen.frame, moments), progress)
+
+
+class Mark(NamedTuple):
+    """A place that is marked in a film."""
+
+    t: float  # from when on [s]
+    x: float  # where [m]
+    y: float  # where [m]
+    text: str  # what is written there
+
+
+class SplitScreen:
+    """The frames of several runs, each in a tile."""
+
+    def __init__(
+        self,
+        rollouts: Sequence[Rollout],
+        camera: str,
+        size: tuple[int, int],
+        titles: Sequence[str] | None = None,
+        mark: Mark | None = None,
+    ) -> None:
+        cols, rows = _tiling(rollouts, camera, size)
+        wide, high = (size[0] // cols) // 2 * 2, (size[1] // rows) // 2 * 2
+        self._size = size
+        self._corners = [((k % cols) * wide, (k // cols) * high) for k in range(len(rollouts))]
+        one_world = len({log.record.task.world.name for log in rollouts}) == 1
+        names = titles or [_title(log, one_world) for log in rollouts]
+        room = (wide - 2, high - 2)
+        self._tiles = [Tile(log, camera, room, name, mark) for log, name in zip(rollouts, names, strict=True)]
+
+    def frame(self, at: float) -> Picture:
+        """The frame (H, W, 3) at a moment of all runs [s]."""
+        frame = np.full((*self._size[::-1], 3), (210, 216, 225), dtype=np.uint8)
+        for (x, y), tile in zip(self._corners, self._tiles, strict=True):
+            part = tile.frame(at)
+            frame[y : y + part.shape[0], x : x + part.shape[1]] = part
+        return frame
+
+
+class Tile:
+    """One run among several: a head with its name and the run's numbers, and the picture below."""
+
+    def __init__(
+        self, rollout: Rollout, camera: str, size: tuple[int, int], name: str, mark: Mark | None = None
+    ) -> None:
+        self._unit, self._head = _head_of(size)
+        self.shot = Shot(rollout, camera=camera, size=(size[0], size[1] - self._head), bare=True)
+        self._name, self._mark = name, mark
+        self._colour = planner_style(rollout.record.planner.name)[0]
+        self._outcome = rollout.outcome
+        self._length = rollout.record.plan.length_m
+        self._last: Picture | None = None  # the tile once the run is over
+
+    def frame(self, at: float) -> Picture:
+        """The tile (h, w, 3) at a moment [s]; after the run's end, the last one."""
+        end = self.shot.playback.duration
+        if at < end:
+            return self._with_head(self._marked(self.shot.view(at), at), at, False)
+        if self._last is None:
+            self._last = self._with_head(self._marked(self.shot.view(end, last=True), end), end, True)
+        return self._last
+
+    def _marked(self, view: Picture, at: float) -> Picture:
+        """The picture with the mark, from its moment on."""
+        if self._mark is not None and at >= self._mark.t:
+            self.shot.put_label(view, self._mark.text, self._mark.x, self._mark.y)
+        return view
+
+    def _with_head(self, view: Picture, at: float, over: bool) -> Picture:
+        unit, wide = self._unit, view.shape[1]
+        image = Image.new("RGB", (wide, self._head), BAND)
+        draw = ImageDraw.Draw(image)
+        draw.rectangle((0, 0, round(0.5 * unit), self._head), fill=self._colour)
+        words, colour = OUTCOME_LABELS[self._outcome] if over else (f"{at:.1f} s", CALM)
+        verdict = pill(words, round(0.85 * unit), colour)
+        room = wide - verdict.shape[1] - round(2.2 * unit)
+        large, small = round(1.15 * unit), round(0.8 * unit)
+        name = fitted(self._name, room, large, True)
+        draw.text((1.2 * unit, 0.3 * unit), name, font=font(large, True), fill=INK)
+        facts = [f"path {self._length:.2f} m", f"min clearance {self.shot.playback.min_clearance(at):.3f} m"]
+        facts = [*facts, f"took {at:.1f} s"] if over else facts
+        while len(facts) > 1 and text_width("  ·  ".join(facts), small) > wide - 2 * unit:
+            facts.pop(0)
+        draw.text((1.2 * unit, 1.9 * unit), "  ·  ".join(facts), font=font(small), fill=MUTED)
+        head = np.array(image)
+        put(head, verdict, wide - verdict.shape[1] - round(0.5 * unit), 0.25 * unit)
+        return np.vstack([head, view])
+
+
+def _title(log: Rollout, one_world: bool) -> str:
+    planner = log.record.planner.name
+    return planner if one_world else f"{planner} · {log.record.task.world.name}"
+
+
+def fitting_size(rollouts: Sequence[Rollout], camera: str) -> tuple[int, int]:
+    """The size of a film that shows the worlds as large as `FULL` does; from above it has no empty ground beside them."""
+    if camera != "top":
+        return FULL
+    extents = [_extent(log) for log in rollouts]
+    cols, rows = _tiling(rollouts, camera, FULL)
+    full = (FULL[0] // cols - 2, FULL[1] // rows - 2)
+    scale, head = _scale(extents, full), _head_of(full)[1]
+    shapes = [shape[::-1] if turns(shape[0] / shape[1], (full[0], full[1] - head)) else shape for shape in extents]
+    need = [max(sides) * scale / FILLED + 2 for sides in zip(*shapes, strict=True)]
+    wide, high = max(need[0], LEAST_TILE), need[1] + head
+    return _even(cols * wide, FULL[0]), _even(rows * high, FULL[1])
+
+
+def _even(length: float, most: int) -> int:
+    """The next even number, from 160 to `most`."""
+    return min(max(2 * math.ceil(length / 2), 160), most)
+
+
+def _head_of(tile: tuple[int, int]) -> tuple[int, int]:
+    """The height of small text in a tile of this size, and of its head [px]."""
+    unit = max(11, round(min(tile[0] / 30, tile[1] / 22)))
+    return unit, 2 * round(1.55 * unit)
+
+
+def _tiling(rollouts: Sequence[Rollout], camera: str, size: tuple[int, int]) -> tuple[int, int]:
+    """Columns and rows of tiles."""
+    count = len(rollouts)
+    if camera != "top":
+        return _arrangement(count, size, _proportion(rollouts) if camera == "oblique" else 1.0)
+    extents = [_extent(log) for log in rollouts]
+
+    def scale(cols: int) -> float:
+        return _scale(extents, (size[0] // cols - 2, size[1] // -(-count // cols) - 2))
+
+    cols = max(range(1, count + 1), key=scale)
+    return cols, -(-count // cols)
+
+
+def _extent(log: Rollout) -> tuple[float, float]:
+    """Width and height of the ground that a camera from above shows of a run [m]."""
+    low, high = Scene.of(log).region(np.vstack([log.pose[:, :2], log.route]))
+    wide, tall = (high - low).tolist()
+    return wide, tall
+
+
+def _scale(extents: Sequence[tuple[float, float]], tile: tuple[int, int]) -> float:
+    """How large a tile shows the largest of the worlds [px/m]."""
+    view = (tile[0], tile[1] - _head_of(tile)[1])
+
+    def of(extent: tuple[float, float]) -> float:
+        wide, tall = extent[::-1] if turns(extent[0] / extent[1], view) else extent
+        return min(view[0] / wide, view[1] / tall)
+
+    return FILLED * min(map(of, extents))
+
+
+def _proportion(rollouts: Sequence[Rollout]) -> float:
+    """Width over height of the widest world, at least 1."""
+    bounds = [log.record.task.world.bounds for log in rollouts]
+    return max(1.0, *((xmax - xmin) / (ymax - ymin) for xmin, ymin, xmax, ymax in bounds))
+
+
+def _arrangement(count: int, size: tuple[int, int], proportion: float) -> tuple[int, int]:
+    """Columns and rows of tiles, with few empty ones, whose pictures suit a world of this width over height."""
+
+    def cost(cols: int) -> float:
+        rows = -(-count // cols)
+        return abs(float(np.log(size[0] / cols / (size[1] / rows) / (1.2 * proportion)))) + 0.4 * (cols * rows - count)
+
+    cols = min(range(1, count + 1), key=cost)
+    return cols, -(-count // cols)

@@ -1,0 +1,94 @@
+"""What a robot's lidar sees, in a film: beams, and without a map hits, ground not known to be free, obstacles never seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from antdrive.base.types import Floats
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import beams_of, lidar_of
+from antdrive.views import _kernels_seen as kernels
+from antdrive.views.colours import BEAM, HATCH, HIT, PALE
+from antdrive.views.film import _kernels_paint as painting
+from antdrive.views.film.camera import Picture
+from antdrive.views.film.ground import capsules
+from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders, world_points
+from antdrive.views.scene import Scene
+
+if TYPE_CHECKING:
+    from antdrive.views.film.compositor import Backdrop
+
+
+VEIL, LINES = 0.62, 0.75  # how much of ground not known to be free is covered by the veil, and by its hatching
+PALENESS = 0.80  # of obstacles that were never seen
+TINT, BEAMS = 0.13, 0.30  # strength of the fan of beams and of its lines
+DRAWN_BEAMS = 90  # in a full circle, at most
+HATCHING = 9.0  # distance between the lines of the hatching [px]
+
+
+class BeamPainter:
+    """Paints the beams of the last scan into frames."""
+
+    def __init__(self, rollout: Rollout) -> None:
+        self._rollout, self._lidar = rollout, lidar_of(rollout)
+        self._times = rollout.t[rollout.scan_rows]
+        self._last = 0
+
+    def advance(self, at: float) -> None:
+        """Go on to a moment [s]."""
+        self._last = max(0, int(np.searchsorted(self._times, at + 1e-9, side="right")) - 1)
+
+    def draw_beams(self, frame: Picture, backdrop: Backdrop) -> None:
+        """Lay the beams of the last scan on the ground."""
+        lidar, (eye, first, reaches) = self._lidar, beams_of(self._rollout, self._last)
+        every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
+        style, colour = np.array([TINT, BEAMS, backdrop.camera.pixel]), np.array(BEAM, dtype=np.float64)
+        fan = (eye, first, lidar.spacing, lidar.full_circle, reaches, every)
+        kernels.lay_fan(frame, backdrop.visible, backdrop.forward, backdrop.inverse, *fan, style, colour)
+
+
+class OwnMapPainter(BeamPainter):
+    """Paints what a robot without a map had seen into frames. Moments are asked for in increasing order."""
+
+    def __init__(self, rollout: Rollout, scene: Scene) -> None:
+        super().__init__(rollout)
+        self._reconstruction, self._scene = MapReconstruction(rollout), scene
+        self._drift = self._reconstruction.drift(0.0)
+        self._discs = np.empty((0, 3))
+        self._around = enclosing_cylinders(scene.obstacles)
+
+    def advance(self, at: float) -> None:
+        """Go on to a moment [s]."""
+        super().advance(at)
+        reconstruction = self._reconstruction
+        reconstruction.advance(at)
+        self._drift = reconstruction.drift(at)
+        discs = reconstruction.map.discs()
+        self._discs = np.column_stack([world_points(discs[:, :2], self._drift), discs[:, 2]])
+
+    def to_world(self, points: Floats) -> Floats:
+        """Where places (N, 2) on the robot's map lie in the world now [m]."""
+        return world_points(points, self._drift)
+
+    def hatch_unknown(self, frame: Picture, backdrop: Backdrop, fine: int) -> None:
+        """Hatch the ground that is not known to be free, and pale the obstacles that no beam has met."""
+        seen, pixel = self._reconstruction.map, backdrop.camera.pixel
+        style = np.array([VEIL, LINES, HATCHING * pixel, pixel])
+        tints = np.array([PALE, HATCH], dtype=np.float64)
+        arrays, bounds, visible = seen.arrays, np.array(self._scene.bounds), backdrop.visible
+        ground = (arrays.free, arrays.occupied, arrays.frame)
+        kernels.veil(frame, visible, backdrop.inverse, bounds, self._drift, *ground, style, tints)
+        unmet = np.isinf(self._reconstruction.met)[self._around]
+        if unmet.any():
+            kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
+
+    def draw_hits(self, frame: Picture, backdrop: Backdrop) -> None:
+        """Put the hits on the robot's map over everything, at the height of the beams."""
+        camera = backdrop.camera
+        plane = camera.plane(min(self._reconstruction.lidar.height, 0.3))
+        places, radii = self._discs[:, :2], np.maximum(self._discs[:, 2], 1.1 * camera.pixel)
+        everywhere, colour = np.ones_like(backdrop.visible), np.array(HIT, dtype=np.float64)
+        rows = capsules(places, places, radii)
+        painting.blend_capsules(frame, everywhere, plane, np.linalg.inv(plane), rows, colour, 0.9)

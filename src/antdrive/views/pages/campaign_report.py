@@ -1,0 +1,217 @@
+"""Reports and comparisons of campaigns: a page that works offline, Markdown for pull requests, LaTeX for papers, CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from antdrive.base.atomic import write_text
+from antdrive.base.errors import FieldError, input_error
+from antdrive.base.files import known_suffix
+from antdrive.runs.campaigns.results import common_folder, read_runs
+from antdrive.runs.statistics.run_table import HASHES, RunTable
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.outcome import Outcome
+from antdrive.views.pages.campaign_summary import CampaignSummary, headline, measure_title, summarise
+from antdrive.views.pages.rendering import json_column, json_texts, link_to, page_data, rendered
+from antdrive.views.pages.tables import (
+    WORDS,
+    all_cells,
+    allowance_cells,
+    pair_cells,
+    success_cells,
+    success_note,
+    write_csv,
+    write_latex,
+)
+
+MARKDOWN_ROWS = 60  # of a table
+MARKDOWN_FAILURES = 25  # that are listed
+#: The columns that a campaign's page shows, if there; a task and settings stand between them where they differ.
+SHOWN = ("world", "planner", "outcome", "seed")
+MEASURED = ("plan_length_m", "driven_length_m", "duration_s", "min_clearance_m", "plan_s")
+SENTENCES = {
+    **{outcome.key: outcome.value for outcome in Outcome},
+    "crashed": "the process of the run died",
+    "planner_fault": "the planner raised an error",
+    "too_slow": "the run took longer than the campaign allows",
+}
+
+
+def summarise_campaign(
+    folder: str | Path | Sequence[str | Path],
+    *,
+    title: str | None = None,
+    metrics: Sequence[str] | None = None,
+    against: str | None = None,
+    planners: Sequence[str] = (),
+    allow: Mapping[str, float] = MappingProxyType({}),
+    where: Mapping[str, str] = MappingProxyType({}),
+    strict: bool = False,
+) -> CampaignSummary:
+    """Success of each planner and paired comparisons, from the runs that are done so far.
+
+    Args:
+        folder: the campaign's folder, or several: a planner that two of them ran under the same conditions is told apart by
+            its folder, as in "astar @today"
+        title: of the report; the folders' names without
+        metrics: to compare besides success; driven length, duration and planning time without
+        against: label of the planner that each other one is compared with; every pair without
+        planners: labels of those to look at; all without
+        allow: by how much a planner may be worse than `against` and still count as not worse, such as {"success": 0.02}
+        where: take only runs with these values, by column, such as {"noise": "1"}; also "0,1" and, for numbers, "10..20"
+        strict: refuse where no two planners can be compared, instead of saying so in the report
+
+    Raises:
+        InputError: the folder holds no campaign, no finished run, or no such planner or metric.
+    """
+    folders = _folders(folder)
+    try:
+        table, size = read_runs(folders, where, planners)
+        named = title or ", ".join(one.resolve().name for one in folders)
+        asked: dict[str, Any] = {"against": against, "planners": planners, "allow": allow, "strict": strict}
+        return summarise(table, title=named, size=size, metrics=metrics, **asked)
+    except FieldError as error:
+        raise input_error(" ".join(map(str, folders)), str(error)) from None
+
+
+def _folders(folder: str | Path | Sequence[str | Path]) -> list[Path]:
+    return [Path(one) for one in ([folder] if isinstance(folder, str | Path) else folder)]
+
+
+def report_campaign(
+    folder: str | Path | Sequence[str | Path],
+    out: str | Path,
+    *,
+    title: str | None = None,
+    metrics: Sequence[str] | None = None,
+    against: str | None = None,
+    planners: Sequence[str] = (),
+    allow: Mapping[str, float] = MappingProxyType({}),
+    where: Mapping[str, str] = MappingProxyType({}),
+) -> list[Path]:
+    """Write a report about a campaign: a page, or its tables.
+
+    Args:
+        folder: the campaign's folder, or several: a planner that two of them ran under the same conditions is told apart by
+            its folder, as in "astar @today"
+        out: the file to write: .html, .md, .tex or .csv
+        title: of the report; the folders' names without
+        metrics: to compare besides success; driven length, duration and planning time without
+        against: label of the planner that each other one is compared with; every pair without
+        planners: labels of those to report about; all without
+        allow: by how much a planner may be worse than `against` and still count as not worse, such as {"success": 0.02}
+        where: take only runs with these values, by column, such as {"noise": "1"}; also "0,1" and, for numbers, "10..20"
+
+    Returns:
+        The files written; for .csv the second holds the pairs.
+
+    Raises:
+        InputError: the folder holds no campaign, no finished run, or no such planner or metric; another suffix.
+    """
+    target = Path(out)
+    check_suffix(target)
+    summary = summarise_campaign(
+        folder, title=title, metrics=metrics, against=against, planners=planners, allow=allow, where=where
+    )
+    return write_campaign_report(summary, common_folder(_folders(folder)), target)
+
+
+def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
+    """Write a report about a campaign in the format of the file's suffix."""
+    return WRITERS[check_suffix(out)](summary, folder, out)
+
+
+def check_suffix(out: Path) -> str:
+    """The suffix of a report, checked before any work."""
+    return known_suffix(out, WRITERS)
+
+
+def _write_markdown(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
+    failures = [k for k, good in enumerate(summary.table.success) if not good]
+    facts = {name: summary.table.texts(name) for name in ("world", "planner", "seed", "outcome", "reason", "command")}
+    listed = [{name: texts[k] for name, texts in facts.items()} for k in failures[:MARKDOWN_FAILURES]]
+    tables = {"tables": all_cells(summary), "words": WORDS, "most": MARKDOWN_ROWS}
+    text = rendered("page.md.j2", **_common(summary), **tables, failures=listed, failed=len(failures))
+    return [write_text(out, text)]
+
+
+def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
+    from antdrive.views.colours import label_styles
+    from antdrive.views.pages.charts import campaign_charts
+
+    names = dict(zip(summary.table.texts("planner"), summary.table.texts("planner_name"), strict=True))
+    planners = summary.paired.planners
+    styles = label_styles(planners, [names[label] or label for label in planners])
+    base = link_to(folder, out.parent) + "/"
+    text = rendered(
+        "page.html.j2",
+        **_common(summary),
+        styles=styles,
+        planners=planners,
+        number={label: k for k, label in enumerate(planners)},
+        success=list(zip(summary.success, success_cells(summary).rows, strict=True)),
+        success_headings=success_cells(summary).headings,
+        success_note=success_note,
+        pairs=[(name, pair_cells(name, found)) for name, found in summary.comparisons.items()],
+        allowances=allowance_cells(summary) if summary.allowances else None,
+        measure_title=measure_title,
+        words=WORDS,
+        charts=campaign_charts(summary, styles),
+        rows=len(summary.table),
+        data=campaign_data(summary.table, planners, base),
+    )
+    return [write_text(out, text)]
+
+
+def campaign_data(table: RunTable, planners: Sequence[str], base: str) -> str:
+    """Return a campaign's runs as JSON that may stand in a script element."""
+    columns = [json_column(name, table.columns[name]) for name in table.columns if name != "command"]
+    kept = [column for column in (*columns, {"name": "command", **_commands(table)}) if column is not None]
+    axes = [name for name in ("folder", "task", *table.settings) if name not in HASHES]
+    different = [name for name in axes if len(set(table.columns.get(name, [None]))) > 1]
+    options = [name for name in table.columns if name.startswith("option.")]
+    names = {column["name"] for column in kept}
+    return page_data(
+        kept,
+        [name for name in (*SHOWN[:2], *different, *options, *SHOWN[2:], *MEASURED) if name in names],
+        {column["name"]: _title(column["name"]) for column in kept},
+        [bool(value) for value in table.success],
+        planners,
+        sentences=SENTENCES,
+        base=base,
+    )
+
+
+def _commands(table: RunTable) -> dict[str, Any]:
+    """Commands, without the seed at their end where all have it there, so that they repeat."""
+    commands: list[str | None] = list(table.columns.get("command", [None] * len(table)))
+    tails = [f" --seed {seed}" for seed in table.texts("seed")]
+    if all(command is None or command.endswith(tail) for command, tail in zip(commands, tails, strict=True)):
+        short = [None if one is None else one.removesuffix(tail) for one, tail in zip(commands, tails, strict=True)]
+        return {**json_texts(short), "seeded": True}
+    return json_texts(commands)
+
+
+def _title(name: str) -> str:
+    if name not in METRICS and name.endswith("_m"):
+        return f"{name.removesuffix('_m').replace('_', ' ')} [m]"
+    return measure_title(name) if name in METRICS else name.removeprefix("option.").replace("_", " ")
+
+
+def _common(summary: CampaignSummary) -> dict[str, Any]:
+    definitions = {name: METRICS[name].definition for name in summary.comparisons if name in METRICS}
+    parts = {"cards": headline(summary), "notes": summary.notes, "definitions": definitions}
+    return {"title": summary.title, "summary": summary, **parts}
+
+
+WRITERS: Mapping[str, Callable[[CampaignSummary, Path, Path], list[Path]]] = MappingProxyType(
+    {
+        ".html": _write_page,
+        ".md": _write_markdown,
+        ".tex": lambda summary, _, out: write_latex(summary, out),
+        ".csv": lambda summary, _, out: write_csv(summary, out),
+    }
+)

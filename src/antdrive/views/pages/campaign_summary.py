@@ -1,0 +1,274 @@
+"""What is said about a campaign, computed once for pages, tables and the terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from antdrive.base.errors import FieldError
+from antdrive.runs.statistics.comparison import (
+    ALPHA,
+    SUCCESS,
+    NonInferiority,
+    PairedComparison,
+    compare_metric,
+    compare_success,
+    not_worse,
+    pairs_of,
+)
+from antdrive.runs.statistics.intervals import Interval
+from antdrive.runs.statistics.pairing import PairedRuns
+from antdrive.runs.statistics.price import prices
+from antdrive.runs.statistics.run_table import HASHES, RunTable
+from antdrive.runs.statistics.significance import FLIPS
+from antdrive.runs.statistics.success import PlannerSuccess, common_medians, success_table
+from antdrive.sim.log.metrics import METRICS
+from antdrive.views.pages.rendering import percent, percents
+
+DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
+TITLES = {"plan_s": "planning time", "drive_wall_s": "wall time of the drive", "path_length_m": "planned length"}
+UNITS = ("_rad_per_m", "_m", "_s")  # that the names of metrics end with
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignSummary:
+    """A campaign's runs and its two tables."""
+
+    title: str  # of the page
+    paired: PairedRuns  # the runs, by instance and planner
+    size: int  # how many runs of these planners the campaign has; fewer may be done
+    success: Sequence[PlannerSuccess]  # a row for each planner
+    # by measure, "success" first, a row for each pair of planners; empty with one planner
+    comparisons: Mapping[str, Sequence[PairedComparison]]
+    common: int  # number of instances in which every planner succeeded
+    # by metric, the median of each planner over those instances, with its interval
+    medians: Mapping[str, Sequence[tuple[float, Interval]]]
+    refusal: str = ""  # why planners are not compared; empty where they are
+    # whether planners are not worse than one of them by more than was allowed; empty where that is not asked
+    allowances: Sequence[NonInferiority] = ()
+
+    @property
+    def table(self) -> RunTable:
+        """The runs."""
+        return self.paired.table
+
+    @property
+    def notes(self) -> list[str]:
+        """What a reader of the tables must know about this campaign, a sentence each."""
+        found: list[str] = []
+        if len(self.table) < self.size:
+            found.append(f"{self.size - len(self.table)} of {self.size} runs are not done yet.")
+        found += [*_shares(self), *_mixed(self), *_repeated(self.success)]
+        if len(self.paired.worlds) == 1:
+            found.append("There is one world: the intervals and tests say nothing about other worlds.")
+        else:
+            found += _too_few_worlds(self.comparisons)
+        if self.refusal:
+            found.append(f"Planners are not compared: {self.refusal}.")
+        return found + [price.sentence for price in prices(self.table) if price.unpaired < price.drives]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {
+            "runs": len(self.table),
+            "size": self.size,
+            "planners": [row.as_dict() for row in self.success],
+            "comparisons": {name: [row.as_dict() for row in rows] for name, rows in self.comparisons.items()},
+            "not_worse": [row.as_dict() for row in self.allowances],
+            "common": self.common,
+            "medians": {
+                name: [
+                    {"planner": planner, "median": median, "interval": list(interval)}
+                    for planner, (median, interval) in zip(self.paired.planners, rows, strict=True)
+                ]
+                for name, rows in self.medians.items()
+            },
+            "notes": self.notes,
+        }
+
+
+def summarise(
+    table: RunTable,
+    *,
+    title: str,
+    size: int | None = None,
+    metrics: Sequence[str] | None = None,
+    against: str | None = None,
+    planners: Sequence[str] = (),
+    allow: Mapping[str, float] = MappingProxyType({}),
+    strict: bool = False,
+) -> CampaignSummary:
+    """Compute a campaign's tables."""
+    paired = PairedRuns.of(table, planners)
+    table = paired.table
+    chosen = list(metrics) if metrics is not None else known_metrics(paired, DEFAULT_METRICS)
+    for name in chosen:
+        if name not in METRICS:
+            raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
+    comparisons: dict[str, Sequence[PairedComparison]] = {}
+    refusal = ""
+    try:
+        pairs = pairs_of(paired, against)
+    except FieldError as error:
+        if strict or against is not None:
+            raise
+        refusal = error.problem
+    else:
+        comparisons[SUCCESS] = compare_success(paired, pairs)
+        for name in chosen:
+            comparisons[name] = compare_metric(paired, pairs, name, METRICS[name].better)
+    common, medians = common_medians(paired, chosen)
+    rows = success_table(paired)
+    allowances = _allowances(paired, against, allow)
+    return CampaignSummary(title, paired, size or len(table), rows, comparisons, common, medians, refusal, allowances)
+
+
+def _allowances(paired: PairedRuns, against: str | None, allow: Mapping[str, float]) -> list[NonInferiority]:
+    if allow and against is None:
+        raise FieldError("allow", "needs a planner to compare with (against)")
+    found = []
+    for name, allowed in allow.items():
+        if name != SUCCESS and name not in METRICS:
+            raise FieldError("allow", f"unknown {name!r}; choose from {', '.join([SUCCESS, *METRICS])}")
+        better = "higher" if name == SUCCESS else METRICS[name].better
+        found += not_worse(paired, against or "", name, allowed, better)
+    return found
+
+
+def known_metrics(paired: PairedRuns, names: Sequence[str]) -> list[str]:
+    """Those of the metrics that some successful run has."""
+    return [name for name in names if np.isfinite(paired.values(name)).any()]
+
+
+def measure_title(name: str) -> str:
+    """What a measure is called in headings, with its unit."""
+    if name not in METRICS:
+        return name.replace("_", " ")
+    unit = METRICS[name].unit
+    short = next((name.removesuffix(suffix) for suffix in UNITS if name.endswith(suffix)), name)
+    plain = TITLES.get(name, short.replace("_", " "))
+    return plain if unit == "1" else f"{plain} [{unit}]"
+
+
+NAMED = 3  # planners that a card names
+VALUES = 5  # of a setting that a note names
+
+
+def headline(summary: CampaignSummary) -> list[tuple[str, str]]:
+    """The headline numbers, each with its meaning."""
+    table, paired, rows = summary.table, summary.paired, summary.success
+    runs, good = sum(row.runs for row in rows), int(paired.success.sum())
+    done = ("run" if runs == 1 else "runs") if runs >= summary.size else f"of {summary.size:,} runs done"
+    died = sum(row.outcomes.get("crashed", 0) + row.outcomes.get("planner_fault", 0) for row in rows)
+    return [
+        (f"{runs:,}", done),
+        (f"{good:,}", "runs succeeded, of all planners" if len(rows) > 1 else "runs succeeded"),
+        *(_counted(len(paired.planners), "planner"), _counted(len(paired.worlds), "world")),
+        _counted(len(set(table.texts("seed"))), "seed"),
+        *([_best(rows, paired)] if paired.shared.any() else []),
+        *([(str(died), "ended by a crash or a planner's error")] if died else []),
+    ]
+
+
+def _counted(count: int, what: str) -> tuple[str, str]:
+    return f"{count:,}", what if count == 1 else f"{what}s"
+
+
+def _best(rows: Sequence[PlannerSuccess], paired: PairedRuns) -> tuple[str, str]:
+    """The highest share of successes, and all planners that have it."""
+    share = max(row.fraction for row in rows)
+    best = [row for row in rows if row.fraction == share]
+    if len(best) == len(rows) > 1:
+        names = "every planner"
+    else:
+        names = ", ".join(row.planner for row in best[:NAMED])
+        names += f" and {len(best) - NAMED} more" if len(best) > NAMED else ""
+    intervals = [row.across_worlds for row in best]
+    wide = Interval(min(one.low for one in intervals), max(one.high for one in intervals))
+    over = "over worlds" if len(paired.worlds) > 1 else "in this world"
+    most = ", the highest share" if len(best) < len(rows) else ""
+    return f"{percent(share)} %", f"succeeded with {names}{most} (95 % {over}: {percents(wide)})"
+
+
+def _shares(summary: CampaignSummary) -> list[str]:
+    """Over which instances shares are taken, where planners ran different ones."""
+    paired = summary.paired
+    shared = int(paired.shared.sum())
+    if shared == len(paired.row):
+        return []
+    if not shared:
+        return [
+            "No instance was run by every planner: each share is over its planner's own, and shares are not comparable."
+        ]
+    more = ", ".join(f"{row.planner} {row.elsewhere}" for row in summary.success if row.elsewhere)
+    return [f"Shares are over the {shared} instances that every planner ran. Runs elsewhere, left out of them: {more}."]
+
+
+def _mixed(summary: CampaignSummary) -> list[str]:
+    """Settings over several values of which shares and medians are taken."""
+    table, found = summary.table, []
+    worlds = table.texts("world")
+    for name in table.settings:
+        texts = table.texts(name)
+        if name in HASHES or len(set(zip(worlds, texts, strict=True))) == len(set(worlds)):
+            continue  # the same everywhere, or different from world to world only
+        values = [_plain(text) for text in dict.fromkeys(texts)]
+        some = ", ".join(value or "none" for value in values[:VALUES]) + (", …" if len(values) > VALUES else "")
+        one = next(value for value in values if value)
+        found.append(f"Shares and medians are over several values of {name} ({some}); --where {name}={one} takes one.")
+    return found
+
+
+def _plain(text: str) -> str:
+    try:
+        return f"{float(text):g}"
+    except ValueError:
+        return text
+
+
+def _repeated(rows: Sequence[PlannerSuccess]) -> list[str]:
+    still = [row.planner for row in rows if row.counted < row.runs - row.elsewhere]
+    if not still:
+        return []
+    return [
+        f"Drives of {', '.join(still)} repeat with other seeds. Repetitions count once, except in pairs with a planner whose "
+        "drives the seed changes; planning times are medians over them."
+    ]
+
+
+def _too_few_worlds(comparisons: Mapping[str, Sequence[PairedComparison]]) -> list[str]:
+    """Where the worlds are too few for any pair of planners to be told apart, whatever the runs give."""
+    least: dict[tuple[int, int], list[str]] = {}
+    for measure, rows in comparisons.items():
+        if any(row.pairs for row in rows) and not any(_decidable(row, rows) for row in rows):
+            place = max(row.worlds for row in rows), sum(row.pairs > 0 for row in rows)
+            least.setdefault(place, []).append(measure)
+    found = []
+    for (worlds, pairs), measures in least.items():
+        of = "" if len(measures) == len(comparisons) else f" by {', '.join(measures)}"
+        told = "a pair" if pairs == 1 else f"{pairs} pairs"
+        corrected = "" if pairs == 1 else " after Holm's correction"
+        need = math.floor(1 + math.log2(pairs / ALPHA)) + 1
+        fewer = "" if pairs == 1 else ", or fewer pairs (--against, --planner)"
+        found.append(
+            f"{worlds} {'world is' if worlds == 1 else 'worlds are'} too few to tell {told} of planners apart{of}: no p-value "
+            f"over worlds can be below {ALPHA:g}{corrected}. "
+            f"It takes {need} worlds{fewer}."
+        )
+    return found
+
+
+def _decidable(row: PairedComparison, rows: Sequence[PairedComparison]) -> bool:
+    """Whether a pair's p-values could be below 0.05 if all of its runs agreed, corrected for all pairs of its table."""
+
+    def reached(units: int, tests: int) -> bool:
+        return bool(units) and tests * max(2.0 ** (1 - units), 1 / (FLIPS + 1)) < ALPHA
+
+    over = [other for other in rows if not math.isnan(other.p_worlds)]
+    single = reached(row.pairs, sum(other.pairs > 0 for other in rows))
+    return single and (math.isnan(row.p_worlds) or reached(row.worlds, len(over)))

@@ -1,0 +1,129 @@
+"""The folder of a run: log, result, figures and films."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from antdrive.base.errors import InputError
+from antdrive.base.files import file_name, write_json
+from antdrive.runs.results_folder import free_folder
+
+if TYPE_CHECKING:
+    from antdrive.sim.log.rollout import Rollout
+    from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import Scenario
+
+FIGURES = ("overview", "certificate", "sight", "plan", "tour", "history", "field-bars", "field-contours")
+#: Every file that `write_run` may write into a folder.
+RUN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES for suffix in (".png", ".pdf")))
+
+
+def check_folder(folder: Path) -> None:
+    """Make a folder and try to write into it, before any work is done for it."""
+    from antdrive.base.atomic import atomic_write
+
+    probe = folder / ".antdrive"
+    try:
+        with atomic_write(probe) as temporary:
+            temporary.touch()
+    except InputError as error:
+        raise InputError(str(error).replace(str(probe), str(folder), 1)) from None
+    probe.unlink(missing_ok=True)
+
+
+def check_film(path: Path) -> None:
+    """Check that a film can be written to `--film PATH`, before any work is done for it."""
+    from antdrive.views.film.film_options import ENCODERS
+
+    if path.suffix.lower() not in ENCODERS:
+        raise InputError(f"--film {path}: films are written as {', '.join(ENCODERS)}")
+    if path.is_dir():
+        raise InputError(f"--film {path}: is a directory; name a file")
+    check_folder(path.parent)
+
+
+def default_folder(scenario: Scenario) -> Path:
+    """The folder of a run for which no `--out` is given: below `out`, and never that of another scenario.
+
+    Where the folder of that name holds a run of another scenario, the fingerprint is part of the name.
+    """
+    parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
+    return free_folder(Path("out") / "-".join(map(file_name, parts)), "result.json", fingerprint(scenario))
+
+
+def fingerprint(scenario: Scenario, *more: object) -> str:
+    """Eight hexadecimal digits that differ between scenarios."""
+    return scenario.identity(*more)[:8]
+
+
+def suffixes(vector: bool) -> tuple[str, ...]:
+    """The suffixes that figures are written with."""
+    return (".png", ".pdf") if vector else (".png",)
+
+
+def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
+    """Write a run's log and figures into a folder; the files by name, with the `result.json` that is still to write.
+
+    Files of an earlier run in that folder are removed first, because they would contradict the new result.
+    """
+    for name in RUN_FILES:
+        (folder / name).unlink(missing_ok=True)
+    files = {"result": str(folder / "result.json")}
+    if run.rollout is not None:
+        log = str(run.rollout.save(folder / "rollout.npz"))
+        files |= _write_figures(run, folder, log, suffixes(vector)) if figures else {"rollout": log}
+    elif figures:
+        from antdrive.views.figures.run_figures import draw_run
+
+        files["figure"] = str(folder / "overview.png")
+        draw_run(run, files["figure"])
+    return files
+
+
+def _write_figures(run: Run, folder: Path, log: str, kinds: Sequence[str]) -> dict[str, str]:
+    from antdrive.views.figures.canvas import endings
+    from antdrive.views.figures.plan_figures import plan_figures
+    from antdrive.views.figures.run_figures import certificate_figure, overview
+    from antdrive.views.figures.sight_figure import sight_figure
+
+    assert run.rollout is not None
+    s, files = run.scenario, {"rollout": log}
+    for suffix, end in endings(kinds):
+        files["figure" + end] = str(folder / f"overview{suffix}")
+        overview(run.rollout, files["figure" + end])
+        if run.certificate is not None:
+            files["certificate" + end] = str(folder / f"certificate{suffix}")
+            certificate_figure(run.rollout, run.certificate, files["certificate" + end])
+        if run.rollout.record.exploring and len(run.rollout.scans):
+            files["sight" + end] = str(folder / f"sight{suffix}")
+            sight_figure(run.rollout, files["sight" + end])
+    known: dict[str, Any] = {"name": s.planner_name, "suffixes": kinds, "mapped": s.map == "given"}
+    made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, **known)
+    return files | {name: str(path) for name, path in made.items()}
+
+
+def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, Any]:
+    """Write a run's `result.json`, at `files["result"]`; what was written."""
+    result = {**run.as_dict(), "fingerprint": fingerprint(run.scenario), "files": dict(files), "command": command}
+    write_json(Path(files["result"]), result)
+    return result
+
+
+def write_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
+    """Film a drive, or several side by side; facts about the film."""
+    from antdrive.views.film.comparison_film import compare_film
+    from antdrive.views.film.video import film
+
+    several = len(logs) > 1
+    info = compare_film(logs, path, **options) if several else film(logs[0], path, note=caption(logs[0]), **options)
+    return {"file": str(info.path), "frames": info.frames, "size": list(info.size), "fps": info.fps}
+
+
+def caption(log: Rollout) -> str:
+    """The line in a film that says whether the drive is certified."""
+    from antdrive.sim.log.certificate import certify
+
+    c = certify(log)
+    return f"certified: never closer than {c.bound:.3f} m" if c.certified else "not certified collision-free"

@@ -1,0 +1,262 @@
+"""Plans are checked: a right plan passes, and one that is wrong in any place is refused with that place."""
+
+import dataclasses
+import math
+import pickle
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from antdrive.base import InputError
+from antdrive.base.errors import Terminated
+from antdrive.planners import (
+    History,
+    PlannerError,
+    PlanResult,
+    PlanStatus,
+    Query,
+    SafeIntervals,
+    TimedPlan,
+    check_plan,
+    checked,
+    load_planner,
+    path_cost,
+    request_plan,
+)
+from antdrive.worlds import Cruising, Disc, Grid, Task, Trajectories, World, rasterise
+from tests.planners.worlds_to_solve import catalogue
+
+QUERY = catalogue()["trap"]
+RNG = np.random.default_rng
+
+
+def solved(name, query=QUERY):
+    return load_planner(name).plan(query, RNG(0))
+
+
+RIGHT = solved("astar")
+LINE = solved("tangent")
+
+
+def timed():
+    mover = Cruising(radius=0.3, position=(5.0, 2.0), velocity=(0.0, 0.5))
+    world = World("movers", (0, 0, 10, 10), (Disc(7.0, 7.0, 0.5),), movers=(mover,))
+    task = Task(world, (1.0, 1.0, 0.0), (9.0, 9.0))
+    query = Query.between(rasterise(world, 0.5, 0.25), task)
+    motions = Trajectories.of(world, task.start[:2], 0).motions
+    query = dataclasses.replace(query, motions=motions)
+    return query, SafeIntervals().plan(query, RNG(0))
+
+
+def with_cells(cells):
+    """The right plan with other cells, priced right."""
+    return dataclasses.replace(RIGHT, cells=cells, cost=path_cost(cells, QUERY.grid.cell))
+
+
+def test_a_right_plan_is_left_as_it_is():
+    assert checked(QUERY, RIGHT) is RIGHT
+    assert checked(QUERY, LINE) is LINE
+    assert check_plan(*timed()) == ""
+
+
+@given(st.data())
+def test_a_plan_that_was_changed_in_one_place_is_refused(data):
+    cells, count = RIGHT.cells.copy(), len(RIGHT.cells)
+    kind = data.draw(st.sampled_from(("drop", "jump", "swap", "price", "twice", "reverse", "cut")))
+    k = data.draw(st.integers(1, count - 2))
+    mutant = RIGHT
+    if kind == "drop":
+        mutant = with_cells(np.delete(cells, k, axis=0))
+        # Beside a bend, the cell that is left out may have been no more than a detour.
+        if np.abs(np.diff(mutant.cells, axis=0)).max() == 1:
+            return
+    elif kind == "jump":
+        shift = data.draw(st.tuples(st.integers(-99, 99), st.integers(-99, 99)).filter(lambda s: max(map(abs, s)) > 2))
+        cells[k] += np.array(shift, dtype=np.int32)
+        mutant = with_cells(cells)
+    elif kind == "swap":
+        other = data.draw(st.integers(1, count - 2).filter(lambda j: abs(j - k) > 3))
+        cells[[k, other]] = cells[[other, k]]
+        mutant = with_cells(cells)
+    elif kind == "price":
+        off = data.draw(st.floats(1e-8, 1e3)) * data.draw(st.sampled_from((-1, 1)))
+        mutant = dataclasses.replace(RIGHT, cost=RIGHT.cost * (1 + off))
+    elif kind == "twice":
+        mutant = with_cells(np.insert(cells, k, cells[k], axis=0))
+    elif kind == "reverse":
+        mutant = with_cells(cells[::-1])
+    else:
+        mutant = with_cells(cells[:k])
+    assert check_plan(QUERY, mutant)
+    assert checked(QUERY, mutant).status is PlanStatus.INVALID
+    assert not len(checked(QUERY, mutant).cells)
+
+
+def test_the_first_wrong_step_is_named():
+    cells = RIGHT.cells.copy()
+    cells[3] += 5
+    cells[7] += 5
+    (r, c), (rr, cc) = cells[2], cells[3]
+    assert (
+        check_plan(QUERY, with_cells(cells))
+        == f"cells: step 2 from ({r}, {c}) to ({rr}, {cc}) does not lead to a neighbour"
+    )
+
+
+def test_a_move_that_the_grid_forbids_is_refused():
+    grid = Grid.from_free([[True, False], [True, True]])
+    query = Query(grid, (0, 0), (1, 1))
+    diagonal = PlanResult(status=PlanStatus.SOLVED, cells=np.array([[0, 0], [1, 1]]), cost=math.sqrt(2))
+    assert check_plan(query, diagonal) == "cells: step 0 from (0, 0) to (1, 1) is no allowed move"
+    around = PlanResult(status=PlanStatus.SOLVED, cells=np.array([[0, 0], [1, 0], [1, 1]]), cost=2.0)
+    assert check_plan(query, around) == ""
+    assert checked(query, around).cells.dtype == np.int32
+
+
+def test_a_negative_cell_is_outside_and_not_the_last_one():
+    query = Query(Grid.from_free(np.ones((3, 3))), (0, 0), (0, 2))
+    back = PlanResult(status=PlanStatus.SOLVED, cells=np.array([[0, 0], [0, -1], [0, 2]]), cost=2.0)
+    assert "number 1, (0, -1), is outside" in check_plan(query, back)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"status": "solved"}, "status: must be"),
+        ({"status": PlanStatus.INVALID}, "status: must be"),
+        ({"status": PlanStatus.NO_PATH}, "cells: given"),
+        ({"cells": np.empty((0, 2), dtype=np.int32)}, "cells: none"),
+        ({"cells": RIGHT.cells.tolist()}, "cells: must be an array of whole numbers"),
+        ({"cells": RIGHT.cells.astype(float)}, "cells: must be an array of whole numbers"),
+        ({"cells": RIGHT.cells.ravel()}, "cells: must be an array of whole numbers"),
+        ({"cost": math.nan}, "cost: must be finite"),
+        ({"cost": math.inf}, "cost: must be finite"),
+        ({"cost": "1"}, "cost: must be a number"),
+        ({"cost": None}, "cost: must be a number"),
+        ({"length": 1.0}, "length: 1 m, but the cells are"),
+        ({"work": 1.5}, "work: must be a whole number"),
+        ({"wall_s": math.nan}, "wall_s: must be finite"),
+        ({"reason": None}, "reason: must be text"),
+        ({"options": None}, "options: must be a mapping"),
+        ({"field": "none"}, "field: must be an array"),
+        ({"field": np.zeros(3)}, "field: must be an array"),
+        ({"history": None}, "history: must be a History"),
+        ({"history": History(best=None)}, "history: best must be an array"),
+        ({"history": History(best=np.ones((2, 2)))}, "history: best must be an array"),
+        ({"history": History(best=np.ones(3))}, "history: iteration_best must be an array of numbers (3,)"),
+    ],
+    ids=lambda value: str(value)[:24],
+)
+def test_a_field_of_the_wrong_kind_is_named(change, says):
+    assert check_plan(QUERY, dataclasses.replace(RIGHT, **change)).startswith(says)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda w: w[1:], "the first is not at the start"),
+        (lambda w: w[:-1], "the last is not at the goal"),
+        (lambda w: w[[0, -1]], "step 0 from .* does not keep 0.25 m"),
+        (lambda w: np.insert(w, 1, (500.0, 500.0), axis=0), "does not keep"),
+        (lambda w: np.insert(w, 1, math.nan, axis=0), "number 1 is not finite"),
+        (lambda w: w[:, :1], "must be an array of numbers"),
+    ],
+    ids=["no start", "no goal", "through the trap", "out of bounds", "nan", "shape"],
+)
+def test_a_wrong_line_is_refused(change, says):
+    mutant = dataclasses.replace(LINE, waypoints=change(LINE.waypoints))
+    assert re.match(f"waypoints: .*{says}", check_plan(QUERY, mutant))
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.001, math.nan, math.inf])
+def test_a_line_of_another_length_is_refused(factor):
+    assert check_plan(QUERY, dataclasses.replace(LINE, length=LINE.length * factor)).startswith("length: ")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda p: {"arrive": p.arrive[::-1]},
+        lambda p: {"leave": p.arrive - 0.1},
+        lambda p: {"arrive": p.arrive - 5, "leave": p.leave - 5},
+        lambda p: {"arrive": np.full(len(p.cells), 1.0), "leave": np.full(len(p.cells), 1.0)},
+        lambda p: {"arrive": p.arrive[:-1]},
+        lambda p: {"arrive": np.where(p.arrive == p.arrive[3], np.nan, p.arrive)},
+        lambda p: {"xy": p.xy + 0.1},
+    ],
+    ids=["backwards", "left before", "too early", "all at once", "one missing", "nan", "elsewhere"],
+)
+def test_times_that_do_not_increase_are_refused(change):
+    query, plan = timed()
+    assert check_plan(query, dataclasses.replace(plan, **change(plan)))
+
+
+def test_among_motions_a_plan_without_times_is_refused():
+    query, plan = timed()
+    assert isinstance(plan, TimedPlan)
+    bare = PlanResult(status=PlanStatus.SOLVED, cells=plan.cells, cost=plan.cost)
+    assert "needs a TimedPlan" in check_plan(query, bare)
+
+
+def test_a_path_from_an_end_that_cannot_be_used_is_refused():
+    query = dataclasses.replace(QUERY, unreachable="no free cell near the start can be reached from it")
+    assert "no free cell near the start" in check_plan(query, RIGHT)
+
+
+class Broken:
+    """A planner that does something wrong."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def plan(self, query, rng):
+        if isinstance(self.answer, BaseException):
+            raise self.answer
+        return self.answer
+
+
+def test_a_planner_that_raises_is_named_with_the_place():
+    line = Broken.plan.__code__.co_firstlineno + 2
+    with pytest.raises(PlannerError) as error:
+        request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
+    assert error.value.planner == "mine"
+    assert str(error.value) == f"planner mine raised KeyError: 'row\\n2' (test_validation.py:{line})"
+    assert isinstance(error.value.__cause__, KeyError)
+
+
+def test_the_place_is_in_the_planners_module_and_not_in_what_it_calls():
+    class Caller(Broken):
+        def plan(self, query, rng):
+            return np.linalg.inv(np.zeros((2, 2)))
+
+    with pytest.raises(
+        PlannerError, match=rf"LinAlgError.*test_validation.py:{Caller.plan.__code__.co_firstlineno + 1}"
+    ):
+        request_plan(Caller(None), QUERY, RNG(0))
+
+
+@pytest.mark.parametrize("answer", [None, 3, RIGHT.cells, (RIGHT,)], ids=["None", "3", "cells", "tuple"])
+def test_an_answer_that_is_no_plan_result_is_a_planner_error(answer):
+    with pytest.raises(PlannerError, match=r"planner Broken returned .* instead of a PlanResult \(test_validation.py:"):
+        request_plan(Broken(answer), QUERY, RNG(0))
+
+
+def test_a_planner_that_exits_is_its_error_and_no_success():
+    with pytest.raises(PlannerError, match=r"planner Broken raised SystemExit: 0 \(test_validation.py:"):
+        request_plan(Broken(SystemExit(0)), QUERY, RNG(0))
+
+
+def test_a_planner_error_gets_to_another_process():
+    with pytest.raises(PlannerError) as error:
+        request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
+    copy = pickle.loads(pickle.dumps(error.value))
+    assert (str(copy), copy.planner, copy.problem) == (str(error.value), "mine", error.value.problem)
+
+
+def test_what_is_wrong_with_the_query_and_ctrl_c_pass():
+    for error in (InputError("query: has no task"), KeyboardInterrupt(), Terminated(143)):
+        with pytest.raises(type(error)):
+            request_plan(Broken(error), QUERY, RNG(0))

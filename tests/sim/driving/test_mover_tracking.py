@@ -1,0 +1,213 @@
+"""Drives among movers that the robot finds with its lidar: told nothing of them, it avoids what no map explains."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from antdrive.base.errors import FieldError
+from antdrive.runs.failures.rebuild import rebuilt
+from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
+from antdrive.sim.compose import compose
+from antdrive.sim.driving.perceived_movers import Tracked
+from antdrive.sim.driving.replay import replay
+from antdrive.sim.driving.survey import MoverTracking
+from antdrive.sim.log.certificate import certify
+from antdrive.sim.log.metrics import measure
+from antdrive.sim.log.record import PerceptionRecord
+from antdrive.sim.log.rollout import ranges_of
+from antdrive.sim.log.sights import passed
+from antdrive.sim.sensing import KnownGround, Scanner
+from antdrive.worlds import Disc, Keyframed, Task, World
+from tests.records import changed
+
+# A closet of touching posts in the lower right corner, into which no beam gets.
+CLOSET = tuple(Disc(5.0 + 0.14 * k, 1.2, 0.075) for k in range(22)) + tuple(
+    Disc(5.0, 0.14 * k, 0.075) for k in range(9)
+)
+CROSSING = Keyframed(radius=0.3, keyframes=((0.0, 4.2, 3.5), (4.0, 4.2, 1.7)), loop="pingpong")
+HIDDEN = Keyframed(radius=0.2, keyframes=((0.0, 6.0, 0.6), (4.0, 7.2, 0.6)), loop="pingpong")
+HALL = World("hall", (0.0, 0.0, 8.0, 4.5), CLOSET, movers=(CROSSING,))
+TASK = Task(HALL, (0.8, 2.2, 0.0), (7.0, 2.2), goal_tolerance=0.25, cell=0.1)
+BOX = (Disc(2.3, 2.2, 0.15),)  # stands on the route, and is on no map
+LIDAR = Perception(kind="lidar")
+
+
+def scenario(robot, task=TASK, **settings):
+    given = {"perception": LIDAR, "unseen": BOX, **settings}
+    return Scenario.of(task, "astar", robot, **given)
+
+
+@pytest.fixture(scope="module")
+def drive(jackal):
+    return run(scenario(jackal))
+
+
+@pytest.fixture(scope="module")
+def log(drive):
+    return drive.rollout
+
+
+def test_what_is_on_no_map_is_seen_and_avoided(drive, log, jackal):
+    blind = run(scenario(jackal, avoidance=None, replanning=None))
+    assert blind.outcome is Outcome.COLLIDED
+    assert drive.succeeded, (drive.outcome, drive.reason, drive.certificate)
+    assert (log.record.perception.kind, drive.scenario.as_dict()["settings"]["perception"]) == (
+        "lidar",
+        {"kind": "lidar"},
+    )
+
+
+def test_the_log_tells_where_the_robot_believed_movers_to_be(log, tmp_path):
+    rows, x, y, vx, vy, radius = (log.tracks[:, k] for k in (0, 2, 3, 4, 5, 6))
+    there = log.movers[rows.astype(int), 0]
+    off = np.hypot(x - there[:, 0], y - there[:, 1])
+    on_box = np.hypot(x - BOX[0].x, y - BOX[0].y) < 0.1
+    assert (on_box | (off < 0.15)).all()  # nothing else is followed
+    mine = ~on_box & (rows > 0.5 * 240)
+    assert len(np.unique(log.tracks[mine, 1])) == 1  # one track all the time
+    assert np.median(off[mine]) < 0.02
+    assert np.abs(radius[mine] - 0.3).max() < 0.05
+    assert np.median(np.hypot(vx[mine], np.abs(vy[mine]) - 0.45)) < 0.05
+    assert np.hypot(vx[on_box], vy[on_box])[20:].max() < 0.08
+    again = Rollout.load(log.save(tmp_path / "rollout.npz"))
+    assert again.digest == log.digest
+    assert np.array_equal(again.tracks, log.tracks)
+    broken = replace(log, tracks=log.tracks[::-1].copy())
+    assert any("tracks" in problem for problem in broken.problems())
+    assert certify(log).certified
+    told = replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
+    flat = log.tracks * np.array([1, 1, 1, 1, 1, 1, 0], dtype=np.float32)
+    for forged in (replace(log, record=told), replace(log, tracks=flat)):
+        assert any("tracks" in problem for problem in certify(forged).problems)
+
+
+def test_a_mover_that_no_beam_meets_changes_nothing(jackal, log):
+    hidden = changed(TASK, "world", movers=(CROSSING, HIDDEN))
+    other = run(scenario(jackal, hidden)).rollout
+    assert other.movers.shape[1] == 2
+    for name in ("pose", "twist", "command", "limiter", "scans", "tracks"):
+        assert np.array_equal(getattr(other, name), getattr(log, name)), name
+    seen = replace(HIDDEN, keyframes=tuple((t, x, y + 1.2) for t, x, y in HIDDEN.keyframes))
+    outside = changed(TASK, "world", movers=(CROSSING, seen))
+    differs = run(scenario(jackal, outside, time_limit=0.5)).rollout
+    assert not np.array_equal(differs.tracks, log.tracks[log.tracks[:, 0] < len(differs.t)])
+
+
+def test_a_robot_without_a_map_follows_movers_too(jackal):
+    short = replace(TASK, start=(2.6, 2.2, 0.0), goal=(5.6, 2.2))
+    done = run(scenario(jackal, short, map="none", localisation="matching", noise=1.0, unseen=()))
+    assert done.succeeded, (done.outcome, done.reason, done.certificate)
+    tracks = done.rollout.tracks
+    there = done.rollout.movers[tracks[:, 0].astype(int), 0]
+    off = np.hypot(*(tracks[:, 2:4] - there).T)
+    assert np.median(off) < 0.1
+    assert rebuilt(done.rollout.record).perception == LIDAR
+
+
+def test_the_map_reaches_farther_among_movers(jackal):
+    told = scenario(jackal, map="none", perception=Perception(), unseen=())
+    tracks_movers = replace(told, perception=LIDAR)
+    assert [compose(s).guide.survey.map.horizon for s in (told, tracks_movers)] == [10.0, 16.0]
+
+
+def test_an_empty_world_is_watched_as_well(turtlebot):
+    empty = Task(World("empty", (0.0, 0.0, 4.0, 3.0)), (0.8, 1.5, 0.0), (3.2, 1.5), cell=0.1)
+    done = run(scenario(turtlebot, empty, unseen=()))
+    assert done.succeeded
+    assert not len(done.rollout.tracks)
+    assert done.rollout.record.perception is not None
+    assert done.rollout.record.replans == ()
+
+
+def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal):
+    tracking, hall = MoverTracking(jackal.lidar, 60), World("hall", (-5.0, -5.0, 5.0, 5.0))
+    scanner = Scanner(jackal.lidar, np.empty((0, 3)), bounds=hall.bounds)
+    ground = KnownGround(jackal.lidar, hall)
+    for tick in range(31):
+        places = np.array([[3.0 - tick / 60, 1.0], [2.0, -2.0]])
+        tracking.read(ground, (0.0, 0.0, 0.0), scanner.scan((0.0, 0.0, 0.0), places, np.array([0.3, 0.2])), tick)
+    predictor = Tracked(tracking, LIDAR, 60)
+    places, radii = predictor.predict(36, (0.0, 0.0), np.array([0.0, 1.0]))
+    numbers, everywhere = predictor.perceived(36, (0.0, 0.0))
+    first = int(np.argmin(places[0, :, 1] < 0))
+    assert np.allclose(places[:, first], [[2.4, 1.0], [1.4, 1.0]], atol=0.05)
+    assert np.array_equal(places[0, 1 - first], places[1, 1 - first])  # it stands
+    assert radii[first] == pytest.approx(0.3, abs=0.03)
+    assert np.array_equal(everywhere[numbers], places[0])
+    assert predictor.radius_of(int(numbers[first])) == radii[first]
+    near = Tracked(tracking, Perception(kind="lidar", range=2.3), 60)
+    assert near.within_range(36, (0.0, 0.0)).tolist() == [numbers[first]]
+    assert math.hypot(2.0, 2.0) - 0.2 > 2.3
+
+
+def test_a_robot_without_a_map_is_told_of_movers_only_by_name(jackal):
+    nobody = changed(TASK, "world", movers=())
+    given, alone, still = (
+        scenario(jackal, task, map=map, perception=None, unseen=())
+        for task, map in ((TASK, "given"), (TASK, "none"), (nobody, "none"))
+    )
+    assert [s.known_perception.kind for s in (given, alone, still)] == ["velocities", "lidar", "velocities"]
+    assert alone.as_dict() == replace(alone, perception=LIDAR).as_dict()
+    assert replace(alone, perception=Perception()).known_perception == Perception()
+    for drifting in ("odometry", "matching"):
+        assert replace(alone, localisation=drifting).known_perception.kind == "lidar"
+        with pytest.raises(FieldError, match=f"velocities: the pose drifts with localisation {drifting}") as caught:
+            replace(alone, localisation=drifting, perception=Perception())
+        assert caught.value.key == "sees"
+        replace(still, localisation=drifting, perception=Perception())
+
+
+def test_without_a_map_a_mover_that_no_beam_meets_changes_nothing(jackal):
+    """It is behind posts beside the robot, and comes towards it: a robot that is told of it evades."""
+    closet = tuple(Disc(0.1 + 0.14 * k, 1.4, 0.075) for k in range(22)) + tuple(
+        Disc(3.1, 1.4 - 0.14 * k, 0.075) for k in range(11)
+    )
+    mover = Keyframed(radius=0.2, keyframes=((0.0, 1.8, 0.25), (0.8, 1.8, 1.1)), loop="pingpong")
+    other = replace(mover, keyframes=((0.0, 2.6, 0.4), (1.0, 2.6, 0.5)))
+    logs = []
+    for hidden in (mover, other):
+        task = changed(TASK, "world", obstacles=closet, movers=(hidden,))
+        logs.append(run(scenario(jackal, task, map="none", perception=None, unseen=(), time_limit=1.0)).rollout)
+    one, two = logs
+    assert not np.array_equal(one.movers, two.movers)
+    for name in ("pose", "twist", "command", "limiter", "scans", "tracks"):
+        assert np.array_equal(getattr(one, name), getattr(two, name)), name
+
+
+def test_the_scans_of_a_robot_with_a_map_are_in_its_log(log, jackal):
+    assert log.scans.shape[1] == jackal.lidar.beams
+    assert (len(log.scans) - 1) / log.t[log.scan_rows[-1]] == pytest.approx(jackal.lidar.rate, rel=0.01)
+    k, rows = 30, log.scan_rows
+    exact = replace(jackal.lidar, resolution=0.0)
+    radii = np.array([mover.radius for mover in log.record.world.movers])
+    expected = Scanner.of(exact, log.record.world).scan(tuple(log.pose[rows[k]].tolist()), log.movers[rows[k]], radii)
+    assert np.abs(ranges_of(log.scans[k]) - expected).max() < 0.0056  # half the resolution, and rounding
+    assert np.isnan(measure(log)["explored_m2"])  # it had a map
+    assert {sight.obstacle for sight in passed(log) if sight.mover} == {0}
+
+
+def test_replays_take_the_scans_of_a_robot_with_a_map_again(log):
+    assert replay(log).problems == ()
+    scans = log.scans.copy()
+    scans[40, 300] += 10
+    (problem,) = replay(replace(log, scans=scans)).problems
+    assert problem == (
+        "replay: scans are not what the lidar measures from the logged poses, "
+        f"from t = {log.t[log.scan_rows[40]]:.3f} s"
+    )
+    fewer = replace(log, scans=np.delete(log.scans, 40, axis=0), scan_rows=np.delete(log.scan_rows, 40))
+    assert replay(fewer).problems == (problem,)
+    none = replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])  # as older logs are
+    assert replay(none).problems == ()
+    told = replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
+    forged = replace(log, record=told, tracks=log.tracks[:0])
+    assert "scans: must be empty, since the robot did not use its lidar" in certify(forged).problems
+
+
+def test_a_replay_draws_the_noise_of_scans_again(jackal):
+    noisy = run(scenario(jackal, noise=1.0, time_limit=0.7)).rollout
+    assert len(noisy.scans) > 30
+    assert replay(noisy).problems == ()
+    assert "scans" in replay(replace(noisy, scans=noisy.scans + np.uint16(2))).problems[0]

@@ -1,0 +1,230 @@
+"""A campaign's page: in a real browser it sorts, filters, opens runs and cells, and fits a phone; its charts are SVG."""
+
+import json
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from antdrive.runs.statistics.run_table import RunTable
+from antdrive.views.colours import _luminance, label_styles
+from antdrive.views.pages.campaign_report import campaign_data, write_campaign_report
+from antdrive.views.pages.campaign_summary import summarise
+from antdrive.views.pages.charts import campaign_charts
+from tests.runs.made_up_campaign import Skill, made_up_columns
+from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
+
+ODD = "</script><b>&\u2028odd"
+PLANNERS = {
+    "ants ants=10": Skill(0.6, 1.3, name="ants", options={"ants": 10}),
+    "ants ants=50": Skill(0.8, 1.2, name="ants", options={"ants": 50}),
+    "astar": Skill(0.9, 1.01, seeded=False),
+}
+
+PROBE = """<script>
+window.faults = [];
+window.onerror = (message) => { faults.push(String(message)); };
+window.addEventListener("load", () => {
+  const $ = (q, r = document) => r.querySelector(q), all = (q, r = document) => [...r.querySelectorAll(q)], found = {};
+  const lines = () => all("#runs tbody tr[data-row]"), rows = () => lines().map((line) => Number(line.dataset.row));
+  const set = (q, value) => { $(q).value = value; $(q).dispatchEvent(new Event(q === "#filter" ? "input" : "change")); };
+  const head = (name) => $(`#runs th[data-name="${name}"] button`);
+  found.lines = lines().length;
+  head("duration_s").click(); found.up = rows(); found.sorted = $('#runs th[data-name="duration_s"]').ariaSort;
+  head("duration_s").click(); found.down = rows();
+  head("world").click(); found.world = rows();
+  const box = $("#runs"); box.scrollTop = 1e7; box.dispatchEvent(new Event("scroll"));
+  found.last = rows().at(-1); found.deep = lines().length;
+  set("#filter", "astar duration_s>20"); found.words = rows(); found.count = $("#count").textContent;
+  set("#filter", "no such thing"); found.nothing = lines().length;
+  set("#filter", "ants=50"); found.option = rows().length; set("#filter", "");
+  set("#outcome", "failed"); found.failed = $("#count").textContent; set("#outcome", "");
+  set("#planner", "astar"); found.astar = $("#count").textContent; set("#planner", "");
+  head("seed").click(); const row = lines()[0]; row.click();
+  found.details = $("#details").textContent; found.of = Number(row.dataset.row); $("#details").close();
+  found.matrix = all("#matrix tbody tr").map((line) => all("td", line).map((cell) => cell.textContent));
+  const bad = all("#matrix button:not(.full)")[0]; bad.click();
+  found.cell = $("#details h3").textContent;
+  found.commands = all("#details pre").map((e) => e.textContent);
+  found.links = all("#details a").map((e) => e.getAttribute("href"));
+  $("#details").close();
+  set("#measure", "duration_s"); found.measure = all(".pairs").filter((part) => !part.hidden).map((part) => part.dataset.measure);
+  set("#against", "astar"); found.against = all(".pairs:not([hidden]) tbody tr").filter((line) => !line.hidden).length;
+  const legend = all(".legend button"); legend[0].click();
+  found.faded = all(".charts g[class^=planner-]").map((g) => [g.getAttribute("class"), g.style.opacity]);
+  found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+  found.paper = getComputedStyle(document.body).backgroundColor;
+  found.curve = getComputedStyle($(".charts g.planner-0 path")).stroke;
+  found.faults = faults;
+  const out = document.createElement("pre"); out.id = "found"; out.textContent = JSON.stringify(found); document.body.append(out);
+});
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def columns():
+    found = made_up_columns(PLANNERS, worlds=10, seeds=6)
+    found["world"] = [ODD if world == "world-003" else world for world in found["world"]]
+    found["reason"] = [ODD if reason else None for reason in found["reason"]]
+    return found
+
+
+@pytest.fixture(scope="module")
+def summary(columns):
+    return summarise(RunTable(columns), title=ODD)
+
+
+@pytest.fixture(scope="module")
+def page(summary, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    return write_campaign_report(summary, folder / "a campaign", folder / "page.html")[0]
+
+
+@pytest.fixture(scope="module")
+def found(page):
+    """What the probe finds in the page."""
+    return found_by(PROBE, page)
+
+
+@needs_browser
+def test_in_a_browser_it_sorts_filters_and_opens(found, columns):
+    assert found["faults"] == []
+    count, duration = len(columns["seed"]), columns["duration_s"]
+    assert (found["sorted"], found["lines"] < 60, found["deep"] < 60) == ("ascending", True, True)
+    known = [k for k in range(count) if duration[k] is not None]
+    ascending = sorted(known, key=lambda k: (float(f"{duration[k]:.6g}"), k))
+    assert found["up"] == ascending[: len(found["up"])]
+    descending = sorted(known, key=lambda k: (-float(f"{duration[k]:.6g}"), k))
+    assert found["down"] == descending[: len(found["down"])]
+    assert found["last"] == max(range(count), key=lambda k: (columns["world"][k] != ODD, columns["world"][k], k))
+    fits = [k for k in known if columns["planner"][k] == "astar" and duration[k] > 20]
+    assert sorted(found["words"]) == fits[: len(found["words"])]
+    assert found["count"] == f"{len(fits)} of {count} runs"
+    assert (found["nothing"], found["option"] > 0) == (0, True)
+    assert found["failed"] == f"{columns['succeeded'].count(False)} of {count} runs"
+    assert found["astar"] == f"{columns['planner'].count('astar')} of {count} runs"
+    assert columns["command"][found["of"]] in found["details"]
+    assert columns["digest"][found["of"]] in found["details"]
+
+
+@needs_browser
+def test_in_a_browser_cells_show_failures_and_pairs_are_chosen(found, columns):
+    names = sorted(set(columns["world"]), key=lambda name: (name != ODD, name))
+    for line, world in zip(found["matrix"], names, strict=True):
+        for cell, planner in zip(line, PLANNERS, strict=True):
+            done = [columns["succeeded"][k] for k in range(len(columns["seed"]))
+                    if (columns["world"][k], columns["planner"][k]) == (world, planner)]  # fmt: skip
+            assert cell == f"{sum(done)}/{len(done)}"
+    title, bad = found["cell"], found["commands"]
+    assert title.endswith(f"{len(bad)} of 6 runs failed")
+    assert set(bad) <= set(columns["command"])
+    assert all(link.startswith("a%20campaign/rollouts/") for link in found["links"])
+    assert len(found["links"]) == len(bad)
+    assert (found["measure"], found["against"]) == (["duration_s"], 2)
+    assert {(name == "planner-0", opacity) for name, opacity in found["faded"]} == {(True, "1"), (False, "0.12")}
+
+
+@needs_browser
+def test_the_page_follows_dark_mode(page, found):
+    light, dark = found, found_by(PROBE, page, "--force-dark-mode")
+    assert light["paper"] == "rgb(255, 255, 255)"
+    assert dark["paper"] == "rgb(20, 24, 31)"
+    assert light["curve"] != dark["curve"], "curves are lighter on a dark page"
+
+
+@needs_browser
+def test_on_a_phone_the_page_is_as_wide_as_the_screen(page):
+    assert overflow_on_a_phone(PROBE, page) <= 0
+
+
+def test_nothing_in_the_page_is_fetched_and_no_text_becomes_markup(page):
+    text = page.read_text()
+    assert "<b>&" not in text.replace("<b>&nbsp;", "")
+    assert not re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', text)
+    assert text.count("</script>") == 2
+    assert "http" not in re.sub(r'xmlns(:\w+)?="[^"]*"|"https?://www\.w3\.org[^"]*"', "", text)
+
+
+def test_the_data_come_back_as_they_are(columns):
+    text = campaign_data(RunTable(columns), list(PLANNERS), "x/")
+    assert not set("<\u2028") & set(text)
+    data = json.loads(text)
+    found = {column["name"]: column for column in data["columns"]}
+    for name, values in columns.items():
+        column = found.get(name)
+        if column is None:
+            assert all(value is None for value in values)
+        elif "numbers" in column:
+            for shown, value in zip(column["numbers"], values, strict=True):
+                assert (shown is None) == (value is None)
+                assert value is None or shown == pytest.approx(value, rel=1e-5)
+        else:
+            places = column.get("places", range(len(values)))
+            shown = [None if place < 0 else column["texts"][place] for place in places]
+            tails = [f" --seed {seed}" for seed in columns["seed"]] if column.get("seeded") else [""] * len(values)
+            assert [one and one + tail for one, tail in zip(shown, tails, strict=True)] == [
+                None if value is None else str(value) for value in values
+            ]
+    assert data["good"] == [int(done) for done in columns["succeeded"]]
+    assert data["shown"][:3] == ["world", "planner", "option.ants"]
+
+
+def test_charts_are_svg_with_a_curve_for_each_planner(summary):
+    styles = label_styles(summary.paired.planners, ["ants", "ants", "astar"])
+    charts = campaign_charts(summary, styles)
+    assert [chart.title for chart in charts] == [
+        "Performance profile: driven length", "Performance profile: planning time", "Distribution: duration",
+        "Distribution: planning time", "By size of the world: planning time", "By size of the world: gap to grid optimum",
+        "ants by ants: planning time", "ants by ants: gap to grid optimum",
+    ]  # fmt: skip
+    for chart in charts:
+        tree = ElementTree.fromstring(chart.svg)
+        assert "width" not in tree.attrib
+        if not chart.title.startswith(("By", "ants by")):
+            curves = [node for node in tree.iter() if node.get("class", "").startswith("planner-")]
+            assert len(curves) == 3
+            assert all(f"var(--{node.get('class')})" in ElementTree.tostring(node, "unicode") for node in curves)
+        assert "var(--planner-" in chart.svg
+    assert [chart.svg for chart in charts] == [chart.svg for chart in campaign_charts(summary, styles)]
+
+
+def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths():
+    columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)}, worlds=6, seeds=2)
+    columns["duration_s"] = columns["driven_length_m"] = columns["gap_to_grid_optimum"] = [None] * 24
+    for areas, says in (([4.0, 9.0, 400.0], "area of the world"), ([4.0] * 3, "shortest path on the grid")):
+        columns["area_m2"] = [areas[int(world[-1]) % 3] for world in columns["world"]]
+        charts = campaign_charts(summarise(RunTable(columns), title="t", metrics=[]), label_styles("ab", "ab"))
+        (chart,) = (chart for chart in charts if chart.title.startswith("By size"))
+        assert f"by {says}" in chart.note
+        assert "12 instances" in chart.note
+        assert ("(4, 4, 4 from" in chart.note) == ("area" in says)
+
+
+def test_charts_do_without_what_is_not_there():
+    columns = made_up_columns({"a": Skill(0.0), "b": Skill(0.0)}, worlds=2, seeds=2)
+    assert campaign_charts(summarise(RunTable(columns), title="t"), label_styles("ab", "ab")) == []
+    bare = {name: columns[name] for name in ("world", "planner", "seed", "outcome", "succeeded")}
+    assert campaign_charts(summarise(RunTable(bare), title="t"), label_styles("ab", "ab")) == []
+
+
+def test_styles_of_labels_differ_and_are_readable_on_their_ground():
+    names = ["ants"] * 6 + ["aco-han"] * 3 + ["astar", "mmas", "plugin"]
+    styles = label_styles([f"{name} {k}" for k, name in enumerate(names)], names)
+    assert len({style.light for style in styles}) == len(styles)
+    for style in styles:
+        light, dark = (
+            _luminance((int(c[1:3], 16), int(c[3:5], 16), int(c[5:7], 16))) for c in (style.light, style.dark)
+        )
+        assert light < 0.46
+        assert dark > 0.21
+
+
+@pytest.mark.slow
+def test_8500_runs_make_a_page_below_10_megabytes(tmp_path):
+    planners = {f"planner-{k}": Skill(0.98 - 0.01 * k, 1.0 + 0.02 * k) for k in range(17)}
+    summary = summarise(RunTable(made_up_columns(planners, worlds=50, seeds=10)), title="big")
+    page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0]
+    assert len(summary.table) == 8500
+    assert page.stat().st_size < 10_000_000
+    assert np.isfinite([row.interval.low for row in summary.success]).all()

@@ -1,0 +1,371 @@
+"""The report as text and in a real browser: it loads without errors, sorts, filters, plays films and fits a phone."""
+
+import html
+import json
+import os
+import re
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import antdrive
+from antdrive.base import InputError
+from antdrive.planners import load_planner
+from antdrive.sim import run
+from antdrive.views.figures.run_figures import overview
+from antdrive.views.film.video import film
+from antdrive.views.pages import run_report as reporting
+from antdrive.views.pages.reported_runs import MEASURED, ReportedRun
+from antdrive.views.pages.run_report import EMBEDDED_BYTES, write_report
+from tests.records import changed
+from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
+
+PROBE = """<script>
+window.faults = [];
+window.onerror = (message) => { faults.push(String(message)); };
+const lost = (e) => { if (e.target !== window) faults.push("cannot load " + (e.target.src || e.target.href)); };
+window.addEventListener("error", lost, true);
+window.onload = async () => {
+  const rows = () => [...document.querySelectorAll("#runs tbody tr[data-row]")];
+  const column = (k) => rows().map((r) => r.cells[k].textContent);
+  const heads = [...document.querySelectorAll("#runs th button")], found = {};
+  const named = (name) => heads.find((h) => h.textContent === name);
+  named("planner").click(); found.up = column(1);
+  named("planner").click(); found.down = column(1);
+  named("driven [m]").click(); found.driven = column(6);
+  const filter = document.querySelector("#filter");
+  filter.value = "astar COLLIDED"; filter.dispatchEvent(new Event("input"));
+  found.filtered = column(0); found.sections = [...document.querySelectorAll("section.run")].filter((s) => !s.hidden).length;
+  filter.value = "nothing at all"; filter.dispatchEvent(new Event("input"));
+  found.nothing = document.querySelector("#count").textContent;
+  filter.value = ""; filter.dispatchEvent(new Event("input"));
+  const outcome = document.querySelector("#outcome"); outcome.value = "succeeded, claimed";
+  outcome.dispatchEvent(new Event("change"));
+  found.succeeded = rows().length;
+  found.pictures = [...document.images].every((i) => i.complete && i.naturalWidth > 0);
+  found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+  const film = document.querySelector("video");
+  if (film) {
+    film.muted = true;
+    await film.play();
+    for (let k = 0, x = 0; k < 300 && !(film.currentTime > 0.1); k++) {
+      await new Promise((r) => setTimeout(r, 50));
+      for (let i = 0; i < 2e6; i++) x += Math.sqrt(i);  // the page's time is virtual; the decoder needs some of ours
+    }
+    found.film = [film.videoWidth, film.videoHeight, film.currentTime > 0.1, film.error && film.error.message];
+  }
+  found.faults = faults;
+  const out = document.createElement("pre"); out.id = "found"; out.textContent = JSON.stringify(found); document.body.append(out);
+};
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def runs(made_up_drive, tmp_path_factory):
+    """Three runs without logs, one with a film, one that collided."""
+    folder = tmp_path_factory.mktemp("runs")
+    for k, (planner, outcome) in enumerate((("mmas", "succeeded"), ("astar", "collided"), ("<b>odd</b>", "succeeded"))):
+        drive = made_up_drive(collide=outcome == "collided", outcome=outcome)
+        place = folder / f"run {k}"
+        place.mkdir()
+        overview(drive, place / "overview.png", dpi=60)
+        facts = {
+            "world": "made-up", "planner": planner, "robot": "turtlebot", "seed": k, "outcome": outcome, "reason": "",
+            "sentence": "touched an obstacle" if outcome == "collided" else "stopped at the goal without contact",
+            "succeeded": outcome == "succeeded", "command": f"antdrive run made-up --planner '{planner}'", "digest": "0",
+            "metrics": {"path_length_m": 3.0, "driven_length_m": (10.5, 9.25, 100.0)[k], "duration_s": 1.0},
+            "certificate": {"certified": outcome == "succeeded", "bound_m": 0.1, "problems": ["it touched"] * (k == 1)},
+        }  # fmt: skip
+        (place / "result.json").write_text(json.dumps(facts))
+    film(made_up_drive(), folder / "run 0" / "film.mp4", size=(320, 240), fps=10)
+    return folder
+
+
+BROWSER_WORDS = ("--autoplay-policy=no-user-gesture-required", "--virtual-time-budget=20000")
+
+
+@needs_browser
+@pytest.mark.parametrize("embed", [False, True])
+def test_in_a_browser_it_sorts_filters_and_plays(runs, tmp_path, embed):
+    page = (tmp_path if embed else runs) / "report.html"
+    write_report(runs, page, embed_films=embed)
+    found = found_by(PROBE, page, *BROWSER_WORDS)
+    assert found["faults"] == []
+    assert found["up"] == ["<b>odd</b>", "astar", "mmas"]
+    assert found["down"] == found["up"][::-1]
+    assert found["driven"] == ["9.25", "10.50", "100.00"], "as numbers, not as text"
+    assert found["filtered"] == ["made-up"]
+    assert found["sections"] == 1
+    assert found["nothing"] == "0 of 3 runs"
+    assert found["succeeded"] == 2
+    assert found["pictures"]
+    assert found["film"] == [320, 240, True, None]
+
+
+@needs_browser
+def test_on_a_phone_the_page_is_as_wide_as_the_screen(runs, tmp_path):
+    write_report(runs, tmp_path / "report.html")
+    assert overflow_on_a_phone(PROBE, tmp_path / "report.html", *BROWSER_WORDS, wait=18_000) == 0
+
+
+def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
+    assert write_report(runs, tmp_path / "report.html", title="Ours & theirs") == 3
+    text = (tmp_path / "report.html").read_text()
+    assert "Ours &amp; theirs" in text
+    assert "<b>odd</b>" not in text, "what files say is shown, not run"
+    assert not re.search(r"(src|href)=\"(https?:)?//", text)
+    assert text.count("data:image/webp") == 3
+    assert "run%200/film.mp4" in text
+    assert "antdrive run made-up --planner &#39;mmas&#39;" in text
+
+
+def test_the_page_stays_small_by_linking_figures(runs, tmp_path, monkeypatch):
+    write_report(runs, tmp_path / "all.html")
+    assert (tmp_path / "all.html").stat().st_size < 5_000_000
+    assert EMBEDDED_BYTES < 5_000_000
+    one = len(reporting._embedded(runs / "run 0" / "overview.png", "").source)
+    monkeypatch.setattr(reporting, "EMBEDDED_BYTES", 1.5 * one)
+    write_report(runs, tmp_path / "few.html")
+    text = (tmp_path / "few.html").read_text()
+    assert text.count("data:image/webp") == 1
+    assert "run%201/overview.png" in text
+
+
+def test_the_markdown_is_a_table_with_pictures_and_commands(runs, tmp_path):
+    write_report(runs, runs / "report.md")
+    text = (runs / "report.md").read_text()
+    lines = text.splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("| world"))
+    table = lines[start : start + 5]
+    assert all(line.startswith("|") for line in table)
+    assert len({line.count("|") for line in table}) == 1
+    assert "![overview.png](run%200/overview.png)" in lines
+
+
+def write_run(run, folder, **claims):
+    """A run as the command line leaves it, with some claims of result.json edited."""
+    folder.mkdir(parents=True)
+    run.rollout.save(folder / "rollout.npz")
+    facts = {**run.as_dict(), "command": "antdrive run small", **claims}
+    (folder / "result.json").write_text(json.dumps(facts))
+    return folder
+
+
+def reported(folder, tmp_path, kind="html"):
+    write_report(folder, tmp_path / f"report.{kind}")
+    return (tmp_path / f"report.{kind}").read_text()
+
+
+@pytest.mark.parametrize("kind", ["html", "md"])
+def test_the_log_is_believed_and_not_result_json(small_run, collided_run, tmp_path, kind):
+    claims = {**small_run.as_dict(), "digest": collided_run.rollout.digest, "world": "elsewhere"}
+    write_run(collided_run, tmp_path / "runs" / "a", **claims)
+    text = reported(tmp_path / "runs", tmp_path, kind)
+    assert "0 / 1" in text
+    assert "Not certified collision-free." in text
+    assert "physics reports" in text
+    assert "elsewhere" not in text
+    assert collided_run.rollout.record.outcome.value.capitalize() in text
+
+
+def test_a_genuine_run_is_shown_as_certified(small_run, tmp_path):
+    write_run(small_run, tmp_path / "runs" / "a")
+    text = reported(tmp_path / "runs", tmp_path)
+    assert "1 / 1" in text
+    assert "Certified collision-free: at least" in text
+    assert "result.json is about another log" not in text
+    write_run(small_run, tmp_path / "others" / "a", digest="0" * 64)
+    assert "result.json is about another log: its digest differs" in reported(tmp_path / "others", tmp_path)
+
+
+def test_without_a_log_a_drive_is_a_claim(small_run, tmp_path):
+    (write_run(small_run, tmp_path / "runs" / "a") / "rollout.npz").unlink()
+    text = reported(tmp_path / "runs", tmp_path)
+    assert "0 / 1" in text
+    assert "succeeded, claimed" in text
+    assert "Claimed by result.json: there is no log." in text
+
+
+def test_only_films_of_the_folder_and_of_this_log_are_shown(small_run, tmp_path):
+    outside = tmp_path / "outside.mp4"
+    outside.write_bytes(b"secret")
+    folder = write_run(small_run, tmp_path / "runs" / "a", files={"film": str(outside)})
+    (folder / "link.mp4").symlink_to(outside)
+    (folder / "folder.mp4").mkdir()
+    (folder / "earlier.mp4").write_bytes(b"old")
+    os.utime(folder / "earlier.mp4", (0, 0))
+    (folder / "mine.mp4").write_bytes(b"new")
+    write_report(tmp_path / "runs", tmp_path / "report.html", embed_films=True)
+    text = (tmp_path / "report.html").read_text()
+    assert "outside" not in text
+    assert "link.mp4" not in text
+    assert text.count("data:video/mp4") == 1
+    assert "earlier.mp4 (older than the log)" in text
+    (folder / "rollout.npz").unlink()
+    write_report(tmp_path / "runs", tmp_path / "report.html", embed_films=True)
+    assert "earlier.mp4 (older than result.json)" in (tmp_path / "report.html").read_text()
+
+
+ODD_NAME = "a|b|c `x` <script>alert(1)</script> ``` </details> [u](v) *s*"
+
+
+def test_markdown_shows_odd_names_as_they_are(small_run, tmp_path):
+    task = small_run.scenario.task
+    record = replace(small_run.rollout.record, task=changed(task, "world", name=ODD_NAME))
+    odd = changed(small_run, "rollout", record=record)
+    write_run(odd, tmp_path / "runs" / "a", command="antdrive run ```x\n```\n<b>")
+    text = reported(tmp_path / "runs", tmp_path, "md")
+    assert "<script>" not in text
+    assert text.count("</details>") == 1
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    assert len(rows) == 3
+    assert len({line.count("|") for line in rows}) == 1
+    assert "````sh\nantdrive run ```x ``` <b>\n````" in text
+    assert "a&#124;b&#124;c" in text
+
+
+ODD_VALUES = [
+    None, True, 0, -1.5, 10**400, "", "x" * 5000, "a\nb\x00\ud800", [], [1, [2]], {}, {"film": {}}, "/etc/hosts",
+]  # fmt: skip
+
+
+def test_no_value_in_result_json_ends_in_a_traceback(small_run, tmp_path):
+    """Each key with five odd values, two of them beside a log: seven runs on a page."""
+    rng = np.random.default_rng(3)
+    facts = json.loads((write_run(small_run, tmp_path / "runs" / "driven-0") / "result.json").read_text())
+    shutil.copytree(tmp_path / "runs" / "driven-0", tmp_path / "runs" / "driven-1")
+    for k in range(5):
+        (tmp_path / "runs" / f"claimed-{k}").mkdir()
+    for turn, key in enumerate([*facts, "files", "metrics.spl", "metrics.driven_length_m", "certificate.bound_m"]):
+        value = ODD_VALUES[rng.integers(len(ODD_VALUES))]
+        for k, odd in enumerate((value, None, [], 10**400, "a\ud800")):
+            edited = json.loads(json.dumps(facts))
+            place, _, inner = key.partition(".")
+            if inner:
+                edited[place][inner] = odd
+            else:
+                edited[place] = odd
+            for kind in ("driven", "claimed")[k > 1 :]:
+                (tmp_path / "runs" / f"{kind}-{k}" / "result.json").write_text(json.dumps(edited))
+        assert "2 / 7" in reported(tmp_path / "runs", tmp_path, ("html", "md")[turn % 2]), key
+
+
+def test_files_that_cannot_be_read_are_one_line(small_run, tmp_path):
+    folder = write_run(small_run, tmp_path / "runs" / "a")
+    (folder / "overview.png").write_bytes(b"no picture")
+    with pytest.raises(InputError, match=r"overview\.png: not a picture"):
+        write_report(tmp_path / "runs", tmp_path / "report.html")
+    (folder / "overview.png").unlink()
+    (folder / "rollout.npz").write_bytes(b"no log")
+    with pytest.raises(InputError, match=r"rollout\.npz: not a rollout"):
+        write_report(tmp_path / "runs", tmp_path / "report.html")
+
+
+def columns_of(page):
+    """The values of the columns of a page, and the names of those that it shows."""
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.S)[1])
+    found = {c["name"]: c.get("numbers") or [c["texts"][k] for k in c.get("places", range(data["rows"]))]
+             for c in data["columns"]}  # fmt: skip
+    return found, data["shown"]
+
+
+def test_settings_that_differ_between_runs_get_columns(small_scenario, tmp_path):
+    write_run(run(small_scenario), tmp_path / "runs" / "a")
+    same = reported(tmp_path / "runs", tmp_path)
+    assert columns_of(same)[1] == ["world", "planner", "outcome", "robot", "seed", *MEASURED]
+    write_run(run(replace(small_scenario, smoothing="none", noise=0.5)), tmp_path / "runs" / "b")
+    for name, ants in (("c", 20), ("d", 30)):
+        planner = load_planner("as", ants=ants, iterations=3)
+        write_run(run(replace(small_scenario, planner=planner, planner_name="as")), tmp_path / "runs" / name)
+    (tmp_path / "runs" / "d" / "rollout.npz").unlink()  # a claim shows its settings, too
+    text = reported(tmp_path / "runs", tmp_path)
+    columns, shown = columns_of(text)
+    assert shown[5:8] == ["options", "smoothing", "noise"], "not the cell: it is the same in all runs"
+    assert [columns[name] for name in shown[5:8]] == [
+        ["", "", "ants 20", "ants 30"], ["clearance", "none", "clearance", "clearance"], [0, 0.5, 0, 0],
+    ]  # fmt: skip
+    lines = [line for line in reported(tmp_path / "runs", tmp_path, "md").splitlines() if line.startswith("|")]
+    assert len({line.count("|") for line in lines}) == 1
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("noise", 0.25), ("smoothing", "taut"), ("options", {"ants": 3}), ("seed", 9)]
+)
+def test_a_setting_that_the_log_contradicts_is_told(small_run, tmp_path, key, value):
+    write_run(small_run, tmp_path / "runs" / "a", **{key: value})
+    assert f"result.json: {key}: differs from the log, which says" in reported(tmp_path / "runs", tmp_path)
+
+
+def fake_run(folder, *, outcome="succeeded", **more):
+    """The result.json of a run that is claimed, with a film beside it."""
+    folder.mkdir(parents=True)
+    facts = {"world": "w", "planner": "astar", "robot": "turtlebot", "seed": 0, "command": "antdrive run w"}
+    (folder / "result.json").write_text(json.dumps({**facts, "outcome": outcome, **more}))
+    (folder / "a film.mp4").write_bytes(b"film")
+
+
+def test_the_markdown_of_1000_runs_is_short_with_failures_first(tmp_path):
+    for k in range(1000):
+        long = {"reason": "*" * 190, "command": "`" * 3500} if k % 2 else {}
+        fake_run(tmp_path / "runs" / f"{k:04}", outcome="no_path" if k % 50 == 7 else "timed_out", seed=k, **long)
+    write_report(tmp_path / "runs", tmp_path / "report.md")
+    content = (tmp_path / "report.md").read_bytes()
+    assert 10_000 < len(content) < 60_000
+    text = content.decode()
+    rows = [line for line in text.splitlines() if line.startswith("| w |")]
+    told = re.search(r"Not in the table: (.*)\.", text).group(1)
+    assert len(rows) + sum(int(n.replace(",", "")) for n in re.findall(r"(\d[\d,]*) \w", told)) == 1000
+
+
+def test_markdown_puts_failures_first_and_links_films(small_run, collided_run, tmp_path):
+    folder = write_run(small_run, tmp_path / "runs" / "a")
+    (folder / "a film.mp4").write_bytes(b"film")
+    write_run(collided_run, tmp_path / "runs" / "b")
+    text = reported(tmp_path / "runs", tmp_path, "md")
+    rows = [line for line in text.splitlines() if line.startswith("| small")]
+    assert ["❌" in row for row in rows] == [True, False]
+    assert "Film: [a film.mp4](runs/a/a%20film.mp4)" in text
+    assert "Not in the table" not in text
+
+
+def test_runs_made_in_python_become_a_report_together_with_folders(small_run, collided_run, tmp_path):
+    write_run(small_run, tmp_path / "runs" / "a")
+    page = tmp_path / "page.html"
+    assert antdrive.write_report([small_run, collided_run, tmp_path / "runs"], str(page), title="mine") == 3
+    text = page.read_text()
+    assert "2 / 3" in text
+    assert text.count("data:image/webp") == 2
+    assert len(set(re.findall(r'<section class="run" id="(run-\d)"', text))) == 3
+    assert antdrive.write_report(small_run, page, figures=False, films=True) == 1
+    assert "data:image" not in page.read_text()
+    assert page.read_text().count("data:video/mp4") == 1
+    assert antdrive.write_report(small_run, tmp_path / "page.md") == 1
+    assert "1 / 1" in (tmp_path / "page.md").read_text()
+
+
+def test_a_run_that_was_edited_is_certified_anew(small_run, tmp_path):
+    shifted = replace(small_run.rollout, pose=small_run.rollout.pose + (0.0, 0.2, 0.0))
+    write_report(replace(small_run, rollout=shifted), tmp_path / "page.html", figures=False)
+    assert "0 / 1" in (tmp_path / "page.html").read_text()
+
+
+@pytest.mark.parametrize("kind", ["html", "md"])
+def test_a_run_that_a_test_drove_says_why_the_test_failed(small_run, tmp_path, kind):
+    """The drive itself succeeded; what result.json claims is text and nothing else."""
+    folder = tmp_path / "results"
+    write_run(small_run, folder / "plain")
+    assert "test failed" not in reported(folder, tmp_path, kind)
+    slower = "duration_s: 9 s, in the baseline 5 s: 4 s longer <script>"
+    write_run(small_run, folder / "test", faults=[slower, 3, None])
+    write_run(small_run, folder / "odd", faults="oops")
+    text = reported(folder, tmp_path, kind)
+    assert text.count("test failed") == (1 if kind == "html" else 4)
+    assert "9 s, in the baseline 5 s: 4 s longer" in html.unescape(text).replace("\\", "")
+    assert "longer <script>" not in text
+
+
+def test_the_heading_of_a_run_lists_settings_and_not_what_came_of_them():
+    run = ReportedRun(None, {}, None, 0, differing={"map": "none", "explored_m2": "94.7", "options": ""})
+    assert run.heading == {"map": "none"}
