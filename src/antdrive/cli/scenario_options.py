@@ -141,7 +141,7 @@ def with_chosen_margin(scenario: "Scenario") -> "Scenario":
     from antdrive.runs.margins.choice import DRIVES, known_margin
     from antdrive.runs.margins.choice import with_chosen_margin as choose
 
-    conditions = scenario.loss_conditions
+    conditions = scenario.loss_factors
     if known_margin(conditions) is not None:
         return choose(scenario)
     compile_once()

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Conditions:
+class LossFactors:
     """What the loss of margin depends on, as far as a calibration takes it into account."""
 
     robot: RobotSpec  # drives
@@ -55,7 +55,7 @@ class MarginChoice:
 
     margin: float  # the margin that was chosen [m]
     record: MarginRecord  # what records say of the choice
-    conditions: Conditions  # what the loss depends on
+    factors: LossFactors  # what the loss depends on
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,9 +192,9 @@ class Scenario(Settings):
         return hashlib.sha256(repr((text, *more)).encode()).hexdigest()
 
     @property
-    def loss_conditions(self) -> Conditions:
+    def loss_factors(self) -> LossFactors:
         """What the loss of margin depends on."""
-        return Conditions(
+        return LossFactors(
             robot=self.robot,
             controller=self.controller,
             noise=float(self.noise),
@@ -207,7 +207,7 @@ class Scenario(Settings):
     def chosen(self) -> MarginChoice | None:
         """What the margin was chosen by; None where it was given, or the conditions have changed."""
         choice = self.margin_choice
-        same = choice is not None and (choice.margin, choice.conditions) == (self.margin, self.loss_conditions)
+        same = choice is not None and (choice.margin, choice.factors) == (self.margin, self.loss_factors)
         return choice if same else None
 
     def as_dict(self) -> dict[str, Any]:

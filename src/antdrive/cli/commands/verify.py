@@ -27,7 +27,7 @@ def verify(
     Exit code 2: one cannot be read; the others are certified all the same.
     """
     from antdrive.robots.robot_file import load_robot
-    from antdrive.sim.verifying import verified
+    from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 
     task = None if world is None else load_task(world)
@@ -39,7 +39,7 @@ def verify(
         try:
             path = str(log_at(given))
             result = given / "result.json" if given.is_dir() else None
-            found = checked[path] = verified(Path(path), task, spec, result, replay=replay)
+            found = checked[path] = verify_log(Path(path), task, spec, result, replay=replay)
         except InputError as error:
             print_error(str(error))
             checked[path] = {"certified": False, "problems": [str(error)], "readable": False}

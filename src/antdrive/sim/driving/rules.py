@@ -161,7 +161,7 @@ class Avoid:
             step.command,
             self._state,
             movers,
-            radii - self._guide.closer(tick, pose[:2]),
+            radii - self._guide.clearance_reduction(tick, pose[:2]),
             speed_limit=step.speed_limit,
             backwards=self._backwards,
         )

@@ -192,7 +192,7 @@ def _draw_readings(axes: Any, certificate: Certificate, rollout: Rollout) -> Non
         (certificate.bound > 0, bound),
     )
     lines = [*readings, *((False, problem) for problem in certificate.problems[:3])]
-    verdict = certificate.verdict
+    verdict = certificate.statement
     colour = hexed(GOOD if certificate.certified else BAD)
     axes.text(0, 0.97, verdict, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes)
     for k, (fine, words) in enumerate(lines):
