@@ -30,7 +30,7 @@ from antdrive.sim import Engine, Rollout, Scenario, certify, run
 from antdrive.sim.driving.drive import follow
 from antdrive.worlds import import_map_server, load_task, rasterise, save_task
 from benchmarks.loop import task_among, winding
-from benchmarks.tables import chosen, command_line
+from benchmarks.markdown import chosen, command_line
 
 RESOLUTION = 0.05  # [m]
 SIZE = (40.0, 30.0)  # [m]

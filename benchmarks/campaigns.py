@@ -39,7 +39,7 @@ from antdrive.runs.campaigns.rows import fault_row
 from antdrive.runs.campaigns.running import Finished
 from antdrive.runs.campaigns.store import parts_in
 from antdrive.runs.campaigns.sweeping import sweep
-from benchmarks.tables import chosen, command_line, table
+from benchmarks.markdown import chosen, command_line, table
 
 SMALLEST = ("overhead --share 0.005",)
 OUT = Path("out/campaigns").resolve()

@@ -29,7 +29,7 @@ from antdrive.runs.pool import call_all
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import measure, tracking_error
 from antdrive.worlds import Task, generate, import_barn, rasterise
-from benchmarks.tables import command_line, missing, print_tables, table
+from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import BARN
 
 SMALLEST = ("--worlds 2 --jobs 1",)

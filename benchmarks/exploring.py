@@ -34,7 +34,7 @@ from antdrive.sim.driving.survey import SimulatedLidar
 from antdrive.sim.sensing import OccupancyMap
 from antdrive.sim.sensing.matching import ScanMatcher
 from benchmarks.drives import barn_tasks
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 from tools.shared_data import BARN
 
 SMALLEST = ("--drives 1 --worlds 1",)

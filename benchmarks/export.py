@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from antdrive.sim import Perception, Rollout, Scenario, run
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 
 SMALLEST = ("--rounds 1 --drives 1",)
 KINDS = ("mcap", "rosbag2", "csv")

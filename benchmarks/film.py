@@ -21,7 +21,7 @@ from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.video import film, process_count
-from benchmarks.tables import command_line
+from benchmarks.markdown import command_line
 
 SMALLEST = ("--rounds 1 --seconds 0.2 --frames 2", "--sight --rounds 1 --frames 2", "--memory --seconds 0.2")
 SIZES = ((640, 480), (1280, 720))

@@ -28,7 +28,7 @@ from antdrive.sim.driving.replay import replay
 from antdrive.sim.log.record import differences
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
 from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 
 SMALLEST = ("rows robot",)
 

@@ -31,8 +31,8 @@ from antdrive.sim import Certificate, Rollout, Scenario, run
 from antdrive.worlds import Task, generate
 from antdrive.worlds.files.world_file import save_task
 from benchmarks.dynamic import random_task
+from benchmarks.markdown import command_line, table
 from benchmarks.second_audit import Least, least_clearance
-from benchmarks.tables import command_line, table
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same values, read ten times faster
 ROOT = Path(__file__).parent.parent

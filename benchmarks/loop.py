@@ -23,7 +23,7 @@ from antdrive.sim.driving.rules import Avoid
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
-from benchmarks.tables import command_line
+from benchmarks.markdown import command_line
 
 SMALLEST = ("--rounds 1",)
 MOVERS = 24

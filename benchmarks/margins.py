@@ -18,7 +18,7 @@ from antdrive.runs.margins.choice import Calibration, choose_margin, with_chosen
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import generate
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 
 SMALLEST = ("--worlds 2 --robots turtlebot --smoothings taut --noises 0 --jobs 1",)
 FIRST_SEED = 50_000
@@ -87,7 +87,7 @@ def main() -> None:
     robots, smoothings = arguments.robots.split(","), arguments.smoothings.split(",")
     noises = map(float, arguments.noises.split(","))
     for robot, noise, smoothing in itertools.product(robots, noises, smoothings):
-        calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).loss_conditions)
+        calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).loss_factors)
         worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]
         calls = [partial(drive, *world, robot, noise, smoothing, arguments.fixed) for world in worlds]
         drives = call_all(calls, arguments.jobs)

@@ -19,7 +19,7 @@ import numpy as np
 from antdrive.planners import OnlineAgent, Query, agent_for, load_planner
 from antdrive.runs.papers.maps import environments
 from antdrive.runs.papers.paper_runs import Strollers, drive
-from benchmarks.tables import command_line, print_table, seconds
+from benchmarks.markdown import command_line, print_table, seconds
 
 SMALLEST = ("--seeds 1 --cases 1",)
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from antdrive import Disc, RobotSpec, World, load_robot
 from antdrive.base.types import Pose
-from antdrive.robots.placing import footprint_clearance
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.sim import Engine
-from benchmarks.tables import command_line
+from benchmarks.markdown import command_line
 
 ROBOTS = ("turtlebot", "jackal")
 RATES = (60, 120, 240, 1000)  # physics steps per second

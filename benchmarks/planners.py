@@ -29,7 +29,7 @@ from antdrive.planners import PLANNERS, Planner, PlanResult, Query, capabilities
 from antdrive.planners.colonies.colony import ColonyGraph, TourConstruction
 from antdrive.runs.papers.maps import blocks, environments, han_ants, optimum, scattered
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise
-from benchmarks.tables import command_line, percent, print_tables, seconds, table
+from benchmarks.markdown import command_line, percent, print_tables, seconds, table
 
 SMALLEST = ("--quick hasan",)
 SEEDS = range(10)

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from benchmarks.markdown import command_line, print_table
 from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, with_check, with_pytest
-from benchmarks.tables import command_line, print_table
 
 Edit = Callable[[Path], None]
 

@@ -25,7 +25,7 @@ from antdrive.runs.papers.maps import blocks, scattered
 from antdrive.runs.papers.paper_runs import PaperRun, solve
 from antdrive.runs.statistics.intervals import medians_by_world
 from antdrive.runs.statistics.significance import wilcoxon
-from benchmarks.tables import chosen, command_line
+from benchmarks.markdown import chosen, command_line
 
 Options = Mapping[str, Any]
 SMALLEST = ("iaco --seeds 1",)

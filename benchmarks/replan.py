@@ -16,7 +16,7 @@ import numpy as np
 
 from antdrive.planners import Planner, Query, load_planner, replanner_for
 from antdrive.worlds import Disc, Grid, World, rasterise
-from benchmarks.tables import command_line
+from benchmarks.markdown import command_line
 
 SIDE = 200
 SMALLEST = ("--worlds 1 --changes 3",)

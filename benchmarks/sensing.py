@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from antdrive.robots import Lidar, load_robot
 from antdrive.sim.sensing import MappedGround, MoverTracker, OccupancyMap, Scanner, clear_distance
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 
 SMALLEST = ("--blocks 1 --beams 36",)
 HALL = (-10.0, -10.0, 10.0, 10.0)
@@ -81,7 +81,7 @@ def tracks(lidar: Lidar, blocks: int) -> Iterator[list[str]]:
             started = time.process_time()
             theirs = tracker.update(MappedGround(seen, 100), (0, 0, 0), ranges, k / lidar.rate)
             spent.append(time.process_time() - started)
-            seen.insert((0, 0, 0), ranges, left_out=theirs)
+            seen.insert((0, 0, 0), ranges, omitted=theirs)
             most = max(most, len(tracker.movers().radii))
         yield [str(count), str(most), f"{1e6 * float(np.median(spent)):.0f}"]
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from antdrive.runs.failures.failure import failure_of
 from antdrive.runs.failures.passes import with_obstacles
-from antdrive.runs.failures.shrink import shrink
+from antdrive.runs.failures.shrinker import shrink
 from antdrive.sim import Run, Scenario, run
 from antdrive.worlds import generate
-from benchmarks.tables import command_line, print_table
+from benchmarks.markdown import command_line, print_table
 
 SMALLEST = ("--failures 1 --seconds 2",)
 FOREST = {"count": "60", "size": "14", "radius": "0.15,0.5", "clearance": "1.0"}

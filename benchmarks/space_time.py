@@ -17,7 +17,7 @@ import numpy as np
 from antdrive.base import Floats
 from antdrive.planners import Query, TimedPlan, plan_in_time, reachable
 from antdrive.worlds import Grid, MoverMotion
-from benchmarks.tables import command_line, print_table, seconds
+from benchmarks.markdown import command_line, print_table, seconds
 
 SMALLEST = ("--worlds 1 --sizes 1",)
 CELL, SPEED, INFLATE = 0.2, 0.5, 0.25

@@ -27,9 +27,9 @@ from pathlib import Path
 
 import yaml
 
+from benchmarks.markdown import command_line, print_table
 from benchmarks.resuming import append_line, current_commit, read_lines
 from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, rounds_with_pytest, with_check
-from benchmarks.tables import command_line, print_table
 
 SMALLEST = ("--scenarios 10 --jobs 1", "--repeats 1 --within 1")
 

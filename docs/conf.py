@@ -106,6 +106,7 @@ html_context = {"default_mode": "auto"}  # without it the theme writes an error 
 html_static_path = ["_static"]
 templates_path = ["_templates"]
 html_css_files = ["antdrive.css"]
+html_sidebars = {"notebook/*": []}  # no page of the main navigation
 html_copy_source = False
 html_show_sourcelink = False
 html_show_search_summary = False  # summaries are fetched, which browsers refuse for files on disk

@@ -21,7 +21,7 @@ hypothesis.settings.load_profile("repeatable")
 def kernels_are_compiled_when_called():
     """`make test` compiles all kernels before. Without it a test compiles those that it calls, not all in its first command."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("antdrive.cli.warm.is_warm", lambda: True)
+        patch.setattr("antdrive.cli.compiling.is_warm", lambda: True)
         yield
 
 

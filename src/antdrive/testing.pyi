@@ -1,5 +1,5 @@
-from .cli.testing.checking import CheckResult as CheckResult
-from .cli.testing.checking import check_case as check_case
+from .cli.testing.evaluation import CheckResult as CheckResult
+from .cli.testing.evaluation import check_case as check_case
 from .cli.testing.fixture import DriveFailure as DriveFailure
 from .cli.testing.fixture import DriveFixture as DriveFixture
 from .cli.testing.fixture import assert_collision_free as assert_collision_free

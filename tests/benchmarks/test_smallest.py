@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.tables import MISSING
+from benchmarks.markdown import MISSING
 
 ROOT = Path(__file__).parents[2]
 

@@ -11,13 +11,13 @@ from antdrive.runs.margins import choice
 from antdrive.runs.margins.choice import Calibration
 from antdrive.runs.margins.loss import Loss, calibration_key
 from antdrive.sim import Rollout
-from antdrive.sim.scenario import Conditions
+from antdrive.sim.scenario import LossFactors
 
 
 def keep(margin, **changes):
     """Put a calibration of the turtlebot into the cache."""
     usual = {"robot": load_robot("turtlebot"), "controller": PurePursuit(), "noise": 0.0, "smoothing": "clearance"}
-    key = calibration_key(Conditions(**{**usual, **changes}))
+    key = calibration_key(LossFactors(**{**usual, **changes}))
     choice._keep(
         Calibration(
             margin=margin, loss=margin - 0.011, largest=0.01, reserve=0.01, probability=1e-3, drives=80, key=key
@@ -104,7 +104,7 @@ def test_a_calibration_that_is_due_is_announced(antdrive, small, monkeypatch):
 
 def test_where_no_margin_is_enough_the_option_is_named(refused, small, monkeypatch):
     monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [Loss(margin, margin)] * choice.DRIVES)
-    monkeypatch.setattr("antdrive.cli.scenario.print_error", lambda text: None)
+    monkeypatch.setattr("antdrive.cli.scenario_options.print_error", lambda text: None)
     assert "--margin: auto: none of the 12 margins tried, up to 0.25 m, leaves 0.01 m" in refused(
         "plan", small, "--margin", "auto"
     )

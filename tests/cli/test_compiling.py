@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from antdrive.cli.warm import TOGETHER, compile_once
+from antdrive.cli.compiling import TOGETHER, compile_once
 from antdrive.planners import PLANNERS
 
 
@@ -46,7 +46,7 @@ def test_commands_that_plan_compile_first(antdrive, monkeypatch, command):
         raise Compiled
 
     words = {"compare": ["empty", "-p", "astar", "-p", "dijkstra"], "reproduce": ["lee2008"]}.get(command, ["empty"])
-    monkeypatch.setattr("antdrive.cli.warm.is_warm", stop)
+    monkeypatch.setattr("antdrive.cli.compiling.is_warm", stop)
     with pytest.raises(Compiled):
         antdrive(command, *words)
 

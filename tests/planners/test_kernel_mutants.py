@@ -108,22 +108,22 @@ def test_the_corridor_holds_the_cells_within_its_width():
 def test_random_numbers_are_those_of_xorshift64():
     state = 88172645463325252
     for _ in range(50):
-        found = int(next_random(np.uint64(state)))
+        actual = int(next_random(np.uint64(state)))
         for shift, left in ((13, True), (7, False), (17, True)):
             state ^= (state << shift if left else state >> shift) & (1 << 64) - 1
-        assert found == state
+        assert actual == state
 
 
 def test_the_goal_pulls_along_the_moves_that_lead_to_it():
     """The cosine of the angle between a move and the way to the goal; 0 for moves away from it or not allowed."""
     grid = Grid.from_free(np.random.default_rng(6).random((6, 7)) >= 0.1)
-    found = np.full((42, 8), np.nan)
-    goal_pull(grid.moves.ravel(), 7, 2, 4, found)
+    actual = np.full((42, 8), np.nan)
+    goal_pull(grid.moves.ravel(), 7, 2, 4, actual)
     for (r, c), k in itertools.product(np.ndindex(6, 7), range(8)):
         to, step = np.array([2.0 - r, 4.0 - c]), np.array(DIRECTIONS[k], dtype=float)
         allowed = grid.moves[r, c] >> k & 1 and to.any()
         cosine = to @ step / np.hypot(*to) / np.hypot(*step) if allowed else 0.0
-        np.testing.assert_allclose(found[r * 7 + c, k], max(0.0, cosine), atol=1e-12)
+        np.testing.assert_allclose(actual[r * 7 + c, k], max(0.0, cosine), atol=1e-12)
 
 
 def test_via_points_without_obstacles_go_to_the_line_between_their_neighbours():

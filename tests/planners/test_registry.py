@@ -16,7 +16,7 @@ import pytest
 import antdrive.planners
 from antdrive import Scenario
 from antdrive.base import InputError
-from antdrive.cli.warm import TOGETHER
+from antdrive.cli.compiling import TOGETHER
 from antdrive.planners import (
     PLANNERS,
     AcoHan,
@@ -101,7 +101,7 @@ def test_a_plugin_that_is_no_planner_is_refused(site):
 
 def test_a_plugin_cannot_take_a_name_of_ours(site):
     site.install("antdrive-thief", {"thief": "raise AssertionError('must not load')"}, {"astar": "thief:AStar"})
-    with pytest.warns(UserWarning, match="'astar' of antdrive-thief is left out: antdrive has one of that name"):
+    with pytest.warns(UserWarning, match="'astar' of antdrive-thief is omitted: antdrive already has that name"):
         assert list_planners()["astar"] is PLANNERS["astar"]
     assert load_planner("astar") is PLANNERS["astar"]
 
@@ -155,7 +155,7 @@ def test_a_planner_s_kernels_are_compiled_by_a_warm_up_group(name):
     groups = [names for names in TOGETHER if name in names]
     # The drive in the warm-up plans with `astar` and `as`, whose kernels other planners use, too.
     known = {kernel for names in (*TOGETHER, ("astar", "as")) for n in names for kernel in kernel_modules(PLANNERS[n])}
-    assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in cli/warm.py"
+    assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in cli/compiling.py"
 
 
 @pytest.mark.parametrize("name", PLANNERS)
@@ -217,7 +217,7 @@ def test_a_module_that_is_taken_from_elsewhere_is_refused(tmp_path, monkeypatch)
     (tmp_path / "json.py").write_text(MINE)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(
-        InputError, match=r"json is imported from .*, and there is one in the working directory; give it"
+        InputError, match=r"json is imported from .*, but another one exists in the working directory; rename it"
     ):
         load_planner("json:Mine")
 

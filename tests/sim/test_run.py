@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from antdrive.base import FieldError
-from antdrive.planners import keep_best, load_planner, tracking
+from antdrive.planners import keep_best, load_planner, on_progress
 from antdrive.robots import Footprint, PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Scenario, measure, plan, run
 from antdrive.sim.driving.drive import follow
@@ -160,7 +160,7 @@ def test_ctrl_c_while_planning_keeps_the_best_path_and_does_not_drive(small_scen
             raise KeyboardInterrupt
 
     s = replace(small_scenario, planner=load_planner("aco-han", ants=50))
-    with tracking(stop), keep_best():
+    with on_progress(stop), keep_best():
         result = run(s)
     assert result.outcome is Outcome.STOPPED
     assert result.rollout is None

@@ -10,7 +10,7 @@ from typing import TextIO
 
 from antdrive.base.errors import Terminated
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS
-from antdrive.cli.exits import BROKEN_PIPE, FAULT, SUCCEEDED, TERMINATED, WRONG_INPUT
+from antdrive.cli.exits import BROKEN_PIPE, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED, TERMINATED
 
 OPTIONS = """Options:
   --version   Show the version and exit.
@@ -32,15 +32,15 @@ def main() -> None:
 
             code = exit_code_of(words)
     except BrokenPipeError as error:
-        unread = [stream for stream in (sys.__stdout__, sys.__stderr__) if stream is not None and _is_unread(stream)]
+        unread = [stream for stream in (sys.__stdout__, sys.__stderr__) if stream is not None and _is_closed(stream)]
         for stream in unread:  # what it still holds goes nowhere, or Python would try again at its end
             with open(os.devnull, "wb") as nowhere:
                 os.dup2(nowhere.fileno(), stream.fileno())
         if not unread:  # another pipe, such as that to a process of the program's own
-            from antdrive.cli.groups import print_fault
+            from antdrive.cli.groups import print_exception
 
-            print_fault(error)
-        code = BROKEN_PIPE if unread else FAULT
+            print_exception(error)
+        code = BROKEN_PIPE if unread else INTERNAL_ERROR
     sys.exit(code)
 
 
@@ -57,10 +57,10 @@ def _show_help(words: list[str]) -> int:
     table = "".join(f"  {name:{width}}{text}\n" for name, text in summaries.items())
     sys.stdout.write(f"Usage: antdrive [OPTIONS] COMMAND [ARGS]...\n\n{about}\n{OPTIONS}\nCommands:\n{table}")
     sys.stdout.flush()
-    return SUCCEEDED if words else WRONG_INPUT
+    return SUCCEEDED if words else INVALID_INPUT
 
 
-def _is_unread(stream: TextIO) -> bool:
+def _is_closed(stream: TextIO) -> bool:
     """Whether a stream is a pipe whose other end is closed."""
     poll = select.poll()
     poll.register(stream.fileno(), 0)  # errors are always told

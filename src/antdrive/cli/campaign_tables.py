@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from antdrive.views.pages.campaign_summary import CampaignSummary
 
 #: Files of a campaign's folder, as `runs/campaigns/store` names them; that module would load much more.
-MARKS = ("manifest.json", "grid.parquet")
+CAMPAIGN_FILES = ("manifest.json", "grid.parquet")
 
 
 @dataclass(frozen=True)
-class Questions:
+class CampaignQuery:
     """The options that say what is asked about a campaign."""
 
     metric: Annotated[
@@ -79,25 +79,25 @@ class Questions:
 
 
 #: The options of `antdrive compare` that a campaign's folder takes.
-COMPARE_OPTIONS = ("worlds", "planner", *(one.name for one in dataclasses.fields(Questions)), "json")
+COMPARE_OPTIONS = ("worlds", "planner", *(one.name for one in dataclasses.fields(CampaignQuery)), "json")
 
 
 def is_campaign(folder: Path) -> bool:
     """Whether a folder is that of a campaign."""
-    return all((folder / name).is_file() for name in MARKS)
+    return all((folder / name).is_file() for name in CAMPAIGN_FILES)
 
 
-def refuse_questions(names: Iterable[str], folder: str | Path) -> None:
+def refuse_campaign_options(names: Iterable[str], folder: str | Path) -> None:
     """Refuse options about campaigns for a folder that is none."""
     for name in names:
         raise InputError(f"--{name}: is for the folder of a campaign; {folder} is none")
 
 
-def campaigns_of_words(words: Sequence[str], context: typer.Context, asked: Questions) -> list[Path]:
+def campaign_folders(words: Sequence[str], context: typer.Context, asked: CampaignQuery) -> list[Path]:
     """The campaigns' folders that `antdrive compare` was given, if they are."""
     folders = [Path(word) for word in words if is_campaign(Path(word))]
     if not folders:
-        refuse_questions(sorted(asked.given), words[0])
+        refuse_campaign_options(sorted(asked.given), words[0])
         return []
     if len(folders) < len(words):
         raise InputError(f"{' '.join(words)}: name folders of campaigns, or worlds")
@@ -111,7 +111,7 @@ def campaigns_of_words(words: Sequence[str], context: typer.Context, asked: Ques
     return folders
 
 
-def compare_campaigns(folders: Sequence[Path], planners: Sequence[str], asked: Questions, json: bool) -> None:
+def compare_campaigns(folders: Sequence[Path], planners: Sequence[str], asked: CampaignQuery, json: bool) -> None:
     """Print success of each planner and the comparison of each pair."""
     from antdrive.views.pages.campaign_report import summarise_campaign
 
@@ -131,7 +131,7 @@ def _tables(summary: "CampaignSummary") -> Iterator[str]:
 
 
 def report_campaigns(
-    folders: Sequence[Path], out: Path, json: bool, title: str | None, planners: Sequence[str], asked: Questions
+    folders: Sequence[Path], out: Path, json: bool, title: str | None, planners: Sequence[str], asked: CampaignQuery
 ) -> None:
     """Write the report of a campaign, or of several."""
     from antdrive.views.pages.campaign_report import report_campaign

@@ -83,13 +83,13 @@ def planning(label: str) -> Iterator[None]:
         if show is None:
             yield
             return
-        from antdrive.planners import watch
+        from antdrive.planners import on_progress
 
         def update(state: Any) -> None:
             best = f"best {state.best:.2f} m" if math.isfinite(state.best) else "no path yet"
             show(completed=state.done, total=state.total, note=best)
 
-        with watch(update):
+        with on_progress(update):
             yield
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from antdrive.base.errors import FieldError, InputError
-from antdrive.cli.scenario import GROUPS, grouped
+from antdrive.cli.scenario_options import GROUPS, grouped
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -64,7 +64,7 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
     return [Entrant(label, name, tuple(own[label])) for label, name in labels.items()]
 
 
-def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
+def repeat_command(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
     """The `antdrive run` that repeats one of the compared runs."""
     from antdrive.sim.forms import setting_words, written
 

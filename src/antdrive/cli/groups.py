@@ -16,7 +16,7 @@ import typer.main
 from antdrive.base.errors import FieldError, InputError, Terminated, input_error
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line
-from antdrive.cli.exits import FAILED, FAULT, INTERRUPTED, SUCCEEDED, WRONG_INPUT
+from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INTERRUPTED, INVALID_INPUT, SUCCEEDED
 from antdrive.sim.settings import PANELS
 
 SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
@@ -34,27 +34,27 @@ def exit_code_of(words: list[str]) -> int:
         code = _code_of(application()(args=words, prog_name="antdrive", standalone_mode=False))
     except (InputError, FieldError) as error:
         print_error(str(error))
-        code = WRONG_INPUT
+        code = INVALID_INPUT
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     except BrokenPipeError:
         raise
     except OSError as error:  # such as a full disk
         print_error(f"{error.filename or 'output'}: {error.strerror}")
-        code = WRONG_INPUT
+        code = INVALID_INPUT
     except _USAGE_ERROR as error:
         _print_usage_error(error)
-        code = WRONG_INPUT
+        code = INVALID_INPUT
     except Terminated:
         raise
     except SystemExit as error:
         if isinstance(error.__context__, BrokenPipeError):  # typer ends the program for it
             raise error.__context__ from None
         print_error("internal error: what was called ended the program; a planner must not call exit()")
-        code = FAULT
+        code = INTERNAL_ERROR
     except Exception as error:
-        print_fault(error)
-        code = FAULT
+        print_exception(error)
+        code = INTERNAL_ERROR
     if code == INTERRUPTED:  # typer turns Ctrl-C within a command into this code
         print_error("interrupted")
     return code
@@ -168,7 +168,7 @@ def _global_options(
     pass
 
 
-def print_fault(error: Exception) -> None:
+def print_exception(error: Exception) -> None:
     """Print one line about a fault of a planner or of antdrive itself; with `--debug`, the traceback before it."""
 
     from antdrive.planners import PlannerError

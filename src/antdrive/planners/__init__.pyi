@@ -2,12 +2,6 @@ from .anyangle.ga_han import GaHan as GaHan
 from .anyangle.hybrid import Hybrid as Hybrid
 from .anyangle.tangent import Tangent as Tangent
 from .anyangle.tangent import TangentPath as TangentPath
-from .checking import answered as answered
-from .checking import ask as ask
-from .checking import blaming as blaming
-from .checking import check_plan as check_plan
-from .checking import check_step as check_step
-from .checking import checked as checked
 from .colonies.aco_han import AcoHan as AcoHan
 from .colonies.ant_system import AgeingAnts as AgeingAnts
 from .colonies.ant_system import AntSystem as AntSystem
@@ -34,7 +28,7 @@ from .iterative import IterativePlanner as IterativePlanner
 from .iterative import Progress as Progress
 from .iterative import as_iterative as as_iterative
 from .iterative import keep_best as keep_best
-from .iterative import watch as watch
+from .iterative import on_progress as on_progress
 from .plan import Capabilities as Capabilities
 from .plan import Cell as Cell
 from .plan import Cells as Cells
@@ -64,3 +58,9 @@ from .smoothing.smooth import pull_taut as pull_taut
 from .smoothing.smooth import route_along as route_along
 from .smoothing.smooth import smooth as smooth
 from .user_code import record_name as record_name
+from .validation import check_plan as check_plan
+from .validation import check_step as check_step
+from .validation import checked as checked
+from .validation import planner_errors as planner_errors
+from .validation import request_plan as request_plan
+from .validation import require_result as require_result

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.cli.campaign_tables import MARKS
+from antdrive.cli.campaign_tables import CAMPAIGN_FILES
 from antdrive.runs.campaigns import store
 from tests.cli.conftest import written
 from tests.runs.made_up_campaign import Skill
@@ -103,4 +103,4 @@ def test_a_campaign_without_a_finished_run_is_refused(refused, camp):
 
 
 def test_a_campaign_is_told_by_the_files_that_its_store_writes():
-    assert MARKS == (store.MANIFEST, store.GRID_FILE)
+    assert CAMPAIGN_FILES == (store.MANIFEST, store.GRID_FILE)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from antdrive.base.plane import polyline_length
-from antdrive.planners import AcoHan, GaHan, Hybrid, PlanStatus, Query, Tangent, keep_best, load_planner, watch
+from antdrive.planners import AcoHan, GaHan, Hybrid, PlanStatus, Query, Tangent, keep_best, load_planner, on_progress
 from antdrive.worlds import Disc, Grid, Task, World, load_task, polyline_clearance, rasterise
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
@@ -183,7 +183,7 @@ def test_interrupted_during_the_ants_it_returns_their_pulled_path():
         if progress.done == 3:
             raise KeyboardInterrupt
 
-    with watch(stop), keep_best():
+    with on_progress(stop), keep_best():
         result = hybrid(query)
     assert result.status is PlanStatus.STOPPED
     assert result.reason == "interrupted after 3 of 200 iterations"

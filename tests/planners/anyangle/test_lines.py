@@ -45,9 +45,9 @@ def test_a_line_is_clear_if_its_clearance_exceeds_the_inflation():
     query = catalogue()["forest"]
     lines = rng.uniform(0, 10, (500, 2, 2))
     room = segment_clearance(query.task.world, lines[:, 0], lines[:, 1])
-    found = [clear_line(query, tuple(a), tuple(b)) for a, b in lines]
-    assert 10 < sum(found) < 490
-    assert found == list(room > query.grid.inflate)
+    clear = [clear_line(query, tuple(a), tuple(b)) for a, b in lines]
+    assert 10 < sum(clear) < 490
+    assert clear == list(room > query.grid.inflate)
 
 
 def test_on_a_bare_grid_a_clear_line_touches_no_blocked_cell_not_even_at_a_corner():

@@ -69,14 +69,14 @@ def test_the_length_lies_between_those_among_inner_and_outer_polygons():
     solved = sealed = 0
     for count in (1, 2, 3, 4, 5, 6, 8, 10, 12, 14) * 3:
         discs, ends, box = random_discs(rng, count), ((0.5, 0.5), (9.5, 9.5)), (0.0, 0.0, 10.0, 10.0)
-        found = shortest(discs, box, 0.0, *ends)
+        path = shortest(discs, box, 0.0, *ends)
         low, high = (polygon_bound(discs, box, ends, inside=inside) for inside in (True, False))
-        if found is None:
+        if path is None:
             sealed += 1
             assert math.isinf(high)
         else:
             solved += 1
-            assert low - 1e-6 <= found.length <= high + 1e-6
+            assert low - 1e-6 <= path.length <= high + 1e-6
     assert solved >= 15
     assert sealed >= 2
 
@@ -86,26 +86,26 @@ def test_the_length_lies_between_those_among_inner_and_outer_polygons():
 
 def test_the_path_around_one_disc_has_the_closed_form():
     """The radius-5 world of Han's thesis (2007): 30.071, where his genetic algorithm reached 33.1798."""
-    found = shortest([(10, 10, 5)], BOX, 0.0, (0, 0), (20, 20))
+    path = shortest([(10, 10, 5)], BOX, 0.0, (0, 0), (20, 20))
     to_centre = math.hypot(10, 10)
     by_hand = 2 * math.sqrt(to_centre**2 - 25) + 5 * (math.pi - 2 * math.acos(5 / to_centre))
-    assert found.length == pytest.approx(by_hand, abs=1e-12)
-    assert found.length == pytest.approx(30.071, abs=5e-4)
-    assert [type(piece) for piece in found.pieces] == [Line, Arc, Line]
+    assert path.length == pytest.approx(by_hand, abs=1e-12)
+    assert path.length == pytest.approx(30.071, abs=5e-4)
+    assert [type(piece) for piece in path.pieces] == [Line, Arc, Line]
 
 
 def test_two_overlapping_discs_are_passed_along_their_outer_tangent():
-    found = shortest([(-1, 0, 1.5), (1, 0, 1.5)], WIDE, 0.0, (-5, 0), (5, 0))
+    path = shortest([(-1, 0, 1.5), (1, 0, 1.5)], WIDE, 0.0, (-5, 0), (5, 0))
     tilt = math.acos(1.5 / 4)
     by_hand = 2 * math.sqrt(16 - 2.25) + 2 * 1.5 * (math.pi / 2 - tilt) + 2
-    assert found.length == pytest.approx(by_hand, abs=1e-12)
+    assert path.length == pytest.approx(by_hand, abs=1e-12)
 
 
 def test_the_path_between_two_discs_follows_their_inner_tangent():
     start, goal = (-1.0, 0.0), (5.0, 0.0)  # each on the rim of a disc, on opposite sides of the gap
-    found = shortest([(0, 0, 1), (4, 0, 1)], WIDE, 0.0, start, goal)
+    path = shortest([(0, 0, 1), (4, 0, 1)], WIDE, 0.0, start, goal)
     across = shortest([(0, 0, 1), (4, 0, 1)], WIDE, 0.0, (0, 1), (4, -1))
-    assert found.length == pytest.approx(math.pi + 4, abs=1e-9)
+    assert path.length == pytest.approx(math.pi + 4, abs=1e-9)
     tilt = math.acos(2 / 4)  # of the inner tangent's contact from the line of centres
     assert across.length == pytest.approx(2 * (math.pi / 2 - tilt) + math.sqrt(16 - 4), abs=1e-9)
 
@@ -123,15 +123,15 @@ def test_contact_closes_a_gap_between_discs_and_at_walls():
 
 
 def test_a_straight_line_that_only_grazes_discs_is_the_path():
-    found = shortest([(3, 1, 1), (5, -1, 1), (7, 1, 1)], WIDE, 0.0, (0, 0), (10, 0))
-    assert found.length == pytest.approx(10, abs=1e-9)
+    path = shortest([(3, 1, 1), (5, -1, 1), (7, 1, 1)], WIDE, 0.0, (0, 0), (10, 0))
+    assert path.length == pytest.approx(10, abs=1e-9)
 
 
 def test_a_disc_that_overlaps_a_wall_is_passed_on_its_open_side():
     box = (0.0, 0.0, 10.0, 4.0)
-    found = shortest([(5, 0.5, 1.5)], box, 0.0, (1, 0.2), (9, 0.2))
-    assert all(piece.start[1] >= 0.2 - 1e-9 for piece in found.pieces)
-    assert found.length > shortest([(5, 0.5, 1.5)], WIDE, 0.0, (1, 0.2), (9, 0.2)).length
+    path = shortest([(5, 0.5, 1.5)], box, 0.0, (1, 0.2), (9, 0.2))
+    assert all(piece.start[1] >= 0.2 - 1e-9 for piece in path.pieces)
+    assert path.length > shortest([(5, 0.5, 1.5)], WIDE, 0.0, (1, 0.2), (9, 0.2)).length
 
 
 def test_an_end_without_the_clearance_has_no_path():
@@ -142,9 +142,9 @@ def test_an_end_without_the_clearance_has_no_path():
 
 
 def test_the_path_from_a_point_to_itself_has_length_zero():
-    found = shortest([(5, 5, 1)], WIDE, 0.1, (1, 1), (1, 1))
-    assert found.length == 0.0
-    assert len(found.polyline(1e-3, [(5, 5, 1)], WIDE, 0.1)) == 2
+    path = shortest([(5, 5, 1)], WIDE, 0.1, (1, 1), (1, 1))
+    assert path.length == 0.0
+    assert len(path.polyline(1e-3, [(5, 5, 1)], WIDE, 0.1)) == 2
 
 
 def test_duplicate_and_nested_discs_do_not_change_the_path():
@@ -169,8 +169,8 @@ some_discs = st.lists(st.tuples(coordinate, coordinate, st.sampled_from([0.2, 0.
 
 
 def length(discs, start=START, goal=GOAL):
-    found = shortest(discs, WALLS, 0.1, start, goal)
-    return math.inf if found is None else found.length
+    path = shortest(discs, WALLS, 0.1, start, goal)
+    return math.inf if path is None else path.length
 
 
 @settings(max_examples=150)
@@ -218,17 +218,17 @@ def test_another_disc_never_shortens_the_path(discs, more):
 @settings(max_examples=100)
 @given(some_discs, st.sampled_from([1e-1, 1e-3, 1e-5]))
 def test_the_polyline_keeps_the_clearance_and_stays_close(discs, bulge):
-    found = shortest(discs, WALLS, 0.1, START, GOAL)
-    assume(found is not None)
-    assert isinstance(found, TangentPath)
-    line = found.polyline(bulge, np.array(discs).reshape(-1, 3), WALLS, 0.1)
+    path = shortest(discs, WALLS, 0.1, START, GOAL)
+    assume(path is not None)
+    assert isinstance(path, TangentPath)
+    line = path.polyline(bulge, np.array(discs).reshape(-1, 3), WALLS, 0.1)
     world = World("w", WALLS, tuple(Disc(*d) for d in discs))
     assert polyline_clearance(world, line) >= 0.1 - 1e-9
-    longer = np.hypot(*np.diff(line, axis=0).T).sum() - found.length
+    longer = np.hypot(*np.diff(line, axis=0).T).sum() - path.length
     assert -1e-7 <= longer <= 20 * bulge
-    for before, after in itertools.pairwise(found.pieces):
+    for before, after in itertools.pairwise(path.pieces):
         assert math.dist(before.end, after.start) < 1e-7
-    for arc in (piece for piece in found.pieces if isinstance(piece, Arc)):
+    for arc in (piece for piece in path.pieces if isinstance(piece, Arc)):
         rim = np.array([arc.at(abs(arc.sweep) * k / 50) for k in range(51)])
         assert polyline_clearance(world, rim[25:26]) >= 0.1 - 1e-9
         assert min(polyline_clearance(world, point[None]) for point in rim) >= 0.1 - 1e-9
@@ -328,15 +328,15 @@ def test_a_lattice_of_discs_that_all_touch_is_solved():
     discs = [(0.15 * c, 0.15 * r, 0.075) for r, c in np.argwhere(rng)]
     box, ends = (-0.5, -0.5, 5.0, 5.0), ((0.0, 0.0), (4.4, 4.4))
     for inflate in (0.0, 0.075, 0.1):
-        found = shortest(discs, box, inflate, *ends)
+        path = shortest(discs, box, inflate, *ends)
         world = World("w", box, tuple(Disc(*d) for d in discs))
         grid = rasterise(world, 0.05, inflate)
         query = Query(grid, *(grid.cell_at(*end) for end in ends))
         optimum = AStar().plan(query, RNG)
-        assert (found is not None) or not optimum.solved
-        if found is not None:
-            assert found.length <= optimum.cost + 0.2
-            assert polyline_clearance(world, found.polyline(1e-3, discs, box, inflate)) >= inflate - 1e-9
+        assert (path is not None) or not optimum.solved
+        if path is not None:
+            assert path.length <= optimum.cost + 0.2
+            assert polyline_clearance(world, path.polyline(1e-3, discs, box, inflate)) >= inflate - 1e-9
 
 
 # -- what makes it fast
@@ -344,14 +344,14 @@ def test_a_lattice_of_discs_that_all_touch_is_solved():
 
 @settings(max_examples=60)
 @given(some_discs, st.sampled_from([0.3, 0.999, 1.0, 1.05, 2.0]))
-def test_an_expected_length_right_or_wrong_changes_no_path(discs, share):
-    found = shortest(discs, WALLS, 0.1, START, GOAL)
-    expected = 1.0 if found is None else share * found.length + 1e-9
+def test_an_expected_length_right_or_wrong_changes_no_path(discs, fraction):
+    path = shortest(discs, WALLS, 0.1, START, GOAL)
+    expected = 1.0 if path is None else fraction * path.length + 1e-9
     again = shortest(discs, WALLS, 0.1, START, GOAL, expected=expected)
-    assert (found is None) == (again is None)
-    if found and again:
-        assert again.length == pytest.approx(found.length, abs=1e-12)
-        assert share < 1.0 or again.work <= found.work
+    assert (path is None) == (again is None)
+    if path and again:
+        assert again.length == pytest.approx(path.length, abs=1e-12)
+        assert fraction < 1.0 or again.work <= path.work
 
 
 def test_among_many_discs_a_path_on_the_grid_bounds_the_search(monkeypatch):
@@ -418,7 +418,7 @@ def flooded(task):
 
 
 def test_the_widest_disc_is_that_of_a_flood():
-    rng, through_gaps, found = np.random.default_rng(4), 0, 0
+    rng, through_gaps, solved = np.random.default_rng(4), 0, 0
     for _ in range(25):
         discs = tuple(Disc(*rng.uniform((0.4, 0.0), (3.6, 3.0)).tolist(), rng.uniform(0.1, 0.35)) for _ in range(18))
         ends = (0.2, 1.5), (3.8, 1.5)
@@ -428,11 +428,11 @@ def test_the_widest_disc_is_that_of_a_flood():
         if passage is None:
             assert flood <= STEP
             continue
-        found += 1
+        solved += 1
         assert passage.radius == pytest.approx(flood, abs=STEP)
         assert point_clearance(task.world, [passage.at])[0] == pytest.approx(passage.radius, abs=1e-9)
         through_gaps += bool(passage.between)
-    assert found > 15
+    assert solved > 15
     assert through_gaps > 8
 
 

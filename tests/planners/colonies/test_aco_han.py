@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.planners import AcoHan, Iteration, PlanStatus, Progress, keep_best, watch
+from antdrive.planners import AcoHan, Iteration, PlanStatus, Progress, keep_best, on_progress
 from antdrive.planners.colonies.colony import ColonyGraph, IterationState, TourConstruction, without_loops
 from tests.planners.colonies.test_colony import DIRECT, OPEN, walks
 from tests.planners.worlds_to_solve import catalogue
@@ -104,11 +104,11 @@ def test_elitism_concentrates_pheromone_on_the_best_path():
     query = catalogue()["forest"]
 
     def share_on_path(elitism):
-        shares = []
+        fractions = []
         for seed in range(3):
             result = AcoHan(ants=100, iterations=20, elitism=elitism).plan(query, np.random.default_rng(seed))
-            shares.append(result.field[tuple(result.cells.T)].sum() / result.field.sum())
-        return float(np.mean(shares))
+            fractions.append(result.field[tuple(result.cells.T)].sum() / result.field.sum())
+        return float(np.mean(fractions))
 
     assert share_on_path(100) > 1.3 * share_on_path(0)
 
@@ -155,7 +155,7 @@ def test_a_time_budget_ends_the_plan_early_with_a_reason():
 def test_a_watcher_is_called_after_every_iteration():
     seen = []
     planner = AcoHan(ants=20, iterations=4)
-    with watch(seen.append):
+    with on_progress(seen.append):
         result = planner.plan(catalogue()["empty"], np.random.default_rng(0))
     planner.plan(catalogue()["empty"], np.random.default_rng(0))  # outside the block, so not watched
     assert [p.done for p in seen] == [1, 2, 3, 4]
@@ -174,12 +174,12 @@ def interrupt_after(count):
 
 
 def test_ctrl_c_is_raised_outside_keep_best():
-    with watch(interrupt_after(3).append), pytest.raises(KeyboardInterrupt):
+    with on_progress(interrupt_after(3).append), pytest.raises(KeyboardInterrupt):
         AcoHan(ants=20, iterations=50).plan(catalogue()["empty"], np.random.default_rng(0))
 
 
 def test_ctrl_c_within_keep_best_returns_the_best_path_so_far():
-    with watch(interrupt_after(3).append), keep_best():
+    with on_progress(interrupt_after(3).append), keep_best():
         result = AcoHan(ants=20, iterations=50).plan(catalogue()["empty"], np.random.default_rng(0))
     assert result.status is PlanStatus.STOPPED
     assert not result.solved
@@ -190,7 +190,7 @@ def test_ctrl_c_within_keep_best_returns_the_best_path_so_far():
 
 
 def test_ctrl_c_before_any_ant_arrives_is_stopped_without_a_path():
-    with watch(interrupt_after(1).append), keep_best():
+    with on_progress(interrupt_after(1).append), keep_best():
         result = AcoHan(ants=5, max_steps=2).plan(catalogue()["empty"], np.random.default_rng(0))
     assert result.status is PlanStatus.STOPPED
     assert "interrupted" in result.reason

@@ -126,9 +126,9 @@ def test_backtracking_ants_leave_a_trap_in_which_others_die(planner):
     assert lost.status is PlanStatus.STOPPED
     assert "nothing arrived within 2 iterations" in lost.reason
     assert not planner.capabilities.complete
-    found = replace(planner, ants=5, iterations=2, backtrack=True)
-    assert found.capabilities.complete
-    assert solve(found, query).solved
+    rescued = replace(planner, ants=5, iterations=2, backtrack=True)
+    assert rescued.capabilities.complete
+    assert solve(rescued, query).solved
 
 
 def test_ants_that_give_up_deposit_nothing():
@@ -412,11 +412,11 @@ def test_the_first_pheromone_is_chance_by_the_given_share(mix, monkeypatch):
     """Eq. 14 of lee2008: mix x chance + (1 - mix) x potential / its largest value."""
     first = []
 
-    def look(self, trail, heuristic, alpha):
+    def record(self, trail, heuristic, alpha):
         first.append(trail.copy())
         return np.empty(0), 0
 
-    monkeypatch.setattr(AntPool, "run", look)
+    monkeypatch.setattr(AntPool, "run", record)
     query = Query(Grid.from_free(np.ones((20, 30))), (0, 0), (19, 29))
     planner = PotentialFieldAnts(mix=mix, min_pheromone=1e-9)
     next(planner.iterate(query, np.random.default_rng(3)))

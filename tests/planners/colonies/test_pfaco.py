@@ -54,8 +54,8 @@ def test_what_attracts_an_ant_is_that_worked_out_by_hand(form, expected):
     graph = ColonyGraph.of(query)
     drawn = planner.attractions(graph, planner.potential(query))
     step = {(0, 1): "east", (0, -1): "west", (1, 0): "north", (1, 1): "north east", (1, -1): "north west"}
-    found = {step[d]: drawn[1, k] for k, d in enumerate(DIRECTIONS) if drawn[1, k]}
-    assert found == pytest.approx(expected)
+    attraction = {step[d]: drawn[1, k] for k, d in enumerate(DIRECTIONS) if drawn[1, k]}
+    assert attraction == pytest.approx(expected)
 
 
 def test_a_local_potential_is_measured_from_the_lowest_cell_around():

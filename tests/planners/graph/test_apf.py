@@ -22,11 +22,11 @@ def test_distances_to_blocked_cells_equal_scipys():
     rng = np.random.default_rng(1)
     for _ in range(300):
         free = rng.random(rng.integers(1, 40, 2)) < rng.random() ** 0.2
-        found = obstacle_distance(Query(Grid.from_free(free, cell=0.5), (0, 0), (0, 0)))
+        distance = obstacle_distance(Query(Grid.from_free(free, cell=0.5), (0, 0), (0, 0)))
         if free.all():
-            assert np.isinf(found).all()
+            assert np.isinf(distance).all()
         else:
-            np.testing.assert_allclose(found, 0.5 * distance_transform_edt(free), rtol=1e-12)
+            np.testing.assert_allclose(distance, 0.5 * distance_transform_edt(free), rtol=1e-12)
 
 
 def test_distances_to_discs_are_exact_within_reach():

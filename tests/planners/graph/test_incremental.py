@@ -205,7 +205,7 @@ def test_the_first_query_is_unchanged_and_the_present_one_is_read_only(planner):
 @BOTH
 def test_a_local_change_takes_a_fraction_of_the_work(planner):
     rng = np.random.default_rng(0)
-    shares = []
+    fractions = []
     for _ in range(10):
         free = rng.random((200, 200)) >= 0.2
         free[0, 0] = free[199, 199] = True
@@ -214,11 +214,11 @@ def test_a_local_change_takes_a_fraction_of_the_work(planner):
         if len(path):
             replanner.block([path[8]])
             repaired = replanner.result()
-            anew = planner.plan(replanner.query, RNG)
-            assert repaired.cost == pytest.approx(anew.cost, abs=1e-9)
-            shares.append(repaired.work / anew.work)
-    assert len(shares) > 5
-    assert np.median(shares) < 0.02
+            fresh = planner.plan(replanner.query, RNG)
+            assert repaired.cost == pytest.approx(fresh.cost, abs=1e-9)
+            fractions.append(repaired.work / fresh.work)
+    assert len(fractions) > 5
+    assert np.median(fractions) < 0.02
 
 
 @BOTH

@@ -83,14 +83,14 @@ def first_tick(query, movers, horizon, *, slack, hurry, stay=False):
     and with `hurry` down as well.
     """
     free, (rows, cols), ticks = query.grid.free, query.grid.shape, round(horizon / TICK)
-    fine = 2  # looks per tick
+    fine = 2  # samples per tick
     t = np.arange(ticks * fine + 1) * TICK / fine
     where = [(m.at(t), m.radius + INFLATE + 2 * TOLERANCE + slack) for m in movers]
 
     def clear(path, n):
-        """For each tick, whether a robot that takes (S, 2) from there on, a look at a time, keeps its distance."""
-        looks = fine * np.arange(ticks - n + 1)[:, np.newaxis] + np.arange(len(path))
-        gaps = [np.hypot(*np.moveaxis(xy[looks] - path, -1, 0)) - reach for xy, reach in where]
+        """For each tick, whether a robot that takes (S, 2) from there on, a sample at a time, keeps its distance."""
+        samples = fine * np.arange(ticks - n + 1)[:, np.newaxis] + np.arange(len(path))
+        gaps = [np.hypot(*np.moveaxis(xy[samples] - path, -1, 0)) - reach for xy, reach in where]
         return np.asarray((np.array(gaps) >= 0).all(axis=(0, 2)))
 
     def centre(r, c):
@@ -133,7 +133,7 @@ def small_world(seed):
 
 HORIZON = 12.0
 FEW, MANY = range(14), pytest.param(range(14, 120), marks=pytest.mark.slow)
-ABOVE, BELOW = 0.03, -2.0 * TICK  # m: what robot and mover move between two looks, and in a tick
+ABOVE, BELOW = 0.03, -2.0 * TICK  # m: what robot and mover move between two samples, and in a tick
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +156,7 @@ def test_no_path_arrives_sooner_and_none_is_missed(seeds, stay):
         without += math.isinf(below)
         if math.isfinite(above):
             gaps.append(above - below)
-    # The oracle says something: it mostly leaves no more room than its rounding takes, and some worlds have no way.
+    # The oracle says something: it mostly leaves no more room than its rounding takes, and some worlds have no path.
     assert np.median(gaps) < 1.0
     assert len(gaps) > len(seeds) / 4
     assert without > 0
@@ -181,7 +181,7 @@ def test_the_distance_is_kept_at_every_instant(small_plans):
             assert plan.clearance(movers, step=0.002) >= INFLATE
             blind = plan_in_time(query, [], speed=SPEED)
             careless += blind.clearance(movers, step=0.002) < INFLATE
-    assert careless > 10  # who does not look where movers are comes too close
+    assert careless > 10  # paths that ignore movers come too close
 
 
 def test_a_timed_plan_moves_at_its_speed_along_allowed_moves(small_plans):
@@ -336,14 +336,14 @@ def test_conflicts_are_those_found_by_sampling(seed):
     lo, hi = conflict(np.array([begins, begins + span, *place, *velocity, reach]), 0.0, 0.0, *u, lasts)
     w, s = np.meshgrid(np.linspace(0, span, 241), np.linspace(0, lasts, 241))
     gap = np.hypot(*(place[k] + velocity[k] * w - u[k] * s for k in (0, 1)))
-    found = (begins + w - s)[gap < reach]
+    hits = (begins + w - s)[gap < reach]
     step = span / 240 + lasts / 240
-    if not len(found):
-        # What the look between its points may miss is thin: the way of both in one of its steps.
+    if not len(hits):
+        # Sampling may miss an interval shorter than what both move in one step.
         assert lo > hi or gap.min() < reach + step * (np.hypot(*velocity) + np.hypot(*u))
         return
-    assert lo <= found.min() + 1e-9
-    assert hi >= found.max() - 1e-9
+    assert lo <= hits.min() + 1e-9
+    assert hi >= hits.max() - 1e-9
     near = (begins + w - s)[gap < reach + step * (np.hypot(*velocity) + np.hypot(*u))]
     assert lo >= near.min() - step - 1e-9
     assert hi <= near.max() + step + 1e-9

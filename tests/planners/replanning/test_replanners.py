@@ -157,7 +157,7 @@ def cylinders(seed):
 
 
 def test_a_warm_started_colony_takes_a_fraction_of_the_work_and_stays_near_the_optimum():
-    shares, gaps = [], []
+    fractions, gaps = [], []
     for seed in range(6):
         query, rng = cylinders(seed), np.random.default_rng(seed)
         ants = WarmStartedColony(MergingAnts(), query, rng)
@@ -171,10 +171,10 @@ def test_a_warm_started_colony_takes_a_fraction_of_the_work_and_stays_near_the_o
                 break
             warm = ants.result()
             cold = MergingAnts().plan(ants.query, rng)
-            shares.append(warm.work / cold.work)
+            fractions.append(warm.work / cold.work)
             gaps.append(warm.cost / optimum(ants.query) - 1)
-    assert len(shares) > 8
-    assert np.median(shares) < 0.5
+    assert len(fractions) > 8
+    assert np.median(fractions) < 0.5
     assert np.median(gaps) < 0.01
     assert max(gaps) < 0.1
 

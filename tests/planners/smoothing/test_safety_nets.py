@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.planners.smoothing.smooth import SHRINK, _clears, _fault, _pulled, _runs, _smoothed
+from antdrive.planners.smoothing.smooth import SHRINK, _clears, _pulled, _rejection, _runs, _smoothed
 from antdrive.worlds import Disc, World
 
 INFLATE = 0.2
@@ -14,9 +14,9 @@ ABOVE = np.array([(1.0, 3.0), (4.0, 4.2), (7.0, 3.0)])
 BELOW = ABOVE * (1, -1) + (0, 6)
 
 
-def fault(xy, line=ABOVE, longest=math.inf):
+def rejection(xy, line=ABOVE, longest=math.inf):
     string = _pulled(line, WORLD.discs, INFLATE)
-    return _fault(string, xy, line, WORLD, INFLATE, longest)
+    return _rejection(string, xy, line, WORLD, INFLATE, longest)
 
 
 def length(xy):
@@ -29,16 +29,16 @@ def over(top):
 
 
 def test_a_line_on_the_other_side_is_refused():
-    assert fault(ABOVE) == ""
-    assert "on its other side" in fault(BELOW)
-    assert "on its other side" in fault(ABOVE, line=BELOW)
-    assert fault(BELOW, line=BELOW) == ""
+    assert rejection(ABOVE) == ""
+    assert "on its other side" in rejection(BELOW)
+    assert "on its other side" in rejection(ABOVE, line=BELOW)
+    assert rejection(BELOW, line=BELOW) == ""
 
 
 @pytest.mark.parametrize(("closer", "refused"), [(0.0, False), (5e-10, False), (1e-7, True), (0.005, True)])
 def test_a_line_that_comes_closer_than_the_clearance_is_refused(closer, refused):
     xy = over(3.7 - closer)
-    assert ("closer than the clearance" in fault(xy)) is refused
+    assert ("closer than the clearance" in rejection(xy)) is refused
     assert (not _clears(xy, WORLD.discs, WORLD.bounds, INFLATE)) is (closer > 1e-9)
     assert len(list(_runs(xy, WORLD, INFLATE))) == (3 if closer > 2e-9 else 1)
 
@@ -47,12 +47,12 @@ def test_a_line_that_comes_closer_than_the_clearance_is_refused(closer, refused)
     ("spare", "refused"), [(1e-8, False), (0.0, False), (-5e-10, False), (-1e-8, True), (-0.01, True)]
 )
 def test_a_line_that_is_longer_than_allowed_is_refused(spare, refused):
-    assert ("longer than the plan's" in fault(ABOVE, longest=length(ABOVE) + spare)) is refused
+    assert ("longer than the plan's" in rejection(ABOVE, longest=length(ABOVE) + spare)) is refused
 
 
 def test_a_string_that_comes_too_close_is_refused_though_its_drawing_does_not():
     narrow = _pulled(ABOVE, WORLD.discs, INFLATE - 0.005)
-    assert "closer than the clearance" in _fault(narrow, over(3.8), ABOVE, WORLD, INFLATE, math.inf)
+    assert "closer than the clearance" in _rejection(narrow, over(3.8), ABOVE, WORLD, INFLATE, math.inf)
 
 
 def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners():

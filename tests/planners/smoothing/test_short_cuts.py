@@ -54,8 +54,8 @@ def test_a_gap_that_the_line_passes_is_shared(seed):
     discs = np.column_stack((rng.uniform(-2, 2, 30), rng.uniform(-9, 9, 30), rng.uniform(0.2, 0.5, 30)))
     xy = np.column_stack((0.3 * np.sin(np.arange(20)), np.linspace(-9.5, 9.5, 20)))
     box, ends, most = np.array([-2.5, -10.0, 2.5, 10.0]), xy[[0, -1]], 0.2
-    found = np.empty(30)
-    kernels.room_to_grow(xy, discs, box, ends, most, found)
+    room = np.empty(30)
+    kernels.room_to_grow(xy, discs, box, ends, most, room)
     expected = np.clip(np.min([np.hypot(*(discs[:, :2] - e).T) - discs[:, 2] - 1e-6 for e in ends], axis=0), 0, most)
     for i, (x, y, r) in enumerate(discs):
         feet = [(2.5, y), (x, 10.0), (-2.5, y), (x, -10.0), *discs[:, :2]]
@@ -64,7 +64,7 @@ def test_a_gap_that_the_line_passes_is_shared(seed):
         for j, (foot, gap) in enumerate(zip(feet, gaps, strict=True)):
             if j != 4 + i and gap >= (0.0 if j < 4 else -1e-9) and kernels.crosses(xy, x, y, *foot):
                 expected[i] = min(expected[i], max(0.49 * gap, 0.0))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(room, expected, rtol=0, atol=1e-12)
 
 
 @settings(max_examples=100, deadline=None)

@@ -384,9 +384,9 @@ def test_none_is_the_plans_own_line_and_misuse_is_refused():
     assert (route.kind, route.curvature) == ("none", None)
     with pytest.raises(ValueError, match="kind: unknown smoothing 'tight'; choose from none, taut, clearance"):
         smooth(plan, grid, task, kind="tight")
-    for wrong in ({"clearance": -0.1}, {"stretch": math.nan}, {"bulge": 0.0}):
-        with pytest.raises(ValueError, match=next(iter(wrong))):
-            smooth(plan, grid, task, **wrong)
+    for invalid in ({"clearance": -0.1}, {"stretch": math.nan}, {"bulge": 0.0}):
+        with pytest.raises(ValueError, match=next(iter(invalid))):
+            smooth(plan, grid, task, **invalid)
     with pytest.raises(ValueError, match="no path"):
         smooth(PlanResult(status=PlanStatus.NO_PATH), grid, task)
     assert SMOOTHINGS == ("none", "taut", "clearance")
@@ -397,9 +397,9 @@ def test_a_routes_curvature_follows_its_points():
     np.testing.assert_allclose(route.xy, [[0, 0], [1, 0], [2, 0]])
     np.testing.assert_allclose(route.curvature, [2.0, 4.0, 5.0])
     assert not route.curvature.flags.writeable
-    for wrong in ([1.0], [1.0, math.inf]):
+    for invalid in ([1.0], [1.0, math.inf]):
         with pytest.raises(ValueError, match="curvature: must be 2 finite numbers"):
-            Route([[0, 0], [1, 0]], wrong)
+            Route([[0, 0], [1, 0]], invalid)
 
 
 def test_a_forest_of_400_discs_is_smoothed():

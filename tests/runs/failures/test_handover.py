@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from antdrive.cli.testing.checking import check_case
+from antdrive.cli.testing.evaluation import check_case
 from antdrive.planners import load_planner
 from antdrive.robots import Avoidance, PurePursuit, load_robot
 from antdrive.runs.failures.failure import Attempt

@@ -22,7 +22,7 @@ numba.njit(lambda: 0.0)()
 pytest_plugins = ["pytester"]
 PLUGIN = ("-p", "antdrive.cli.testing.plugin", "-p", "no:cacheprovider")
 RUN_FIGURES, PLAN_FIGURES = (f"antdrive.views.figures.{name}_figures." for name in ("run", "plan"))
-for module in (RUN_FIGURES, PLAN_FIGURES, "antdrive.cli.testing.checking"):  # what is replaced here is not forgotten
+for module in (RUN_FIGURES, PLAN_FIGURES, "antdrive.cli.testing.evaluation"):  # what is replaced here is not forgotten
     importlib.import_module(module.removesuffix("."))
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
@@ -307,8 +307,8 @@ def test_commands_work_where_pytest_was_started_and_in_its_rootdir(project):
 
 def test_kernels_are_compiled_before_the_first_drive_with_one_line(project, monkeypatch, capfd):
     compiled = []
-    monkeypatch.setattr("antdrive.cli.warm.is_warm", lambda: bool(compiled))
-    monkeypatch.setattr("antdrive.cli.warm.warm", lambda: compiled.append(1))
+    monkeypatch.setattr("antdrive.cli.compiling.is_warm", lambda: bool(compiled))
+    monkeypatch.setattr("antdrive.cli.compiling.warm", lambda: compiled.append(1))
     monkeypatch.setattr("antdrive.base.kernel_cache.cache_folder", lambda: project.path)
     for _ in range(2):
         project.runpytest(*PLUGIN, "-k", "closed", "--drive-update-new").assert_outcomes(passed=1, deselected=1)

@@ -197,7 +197,7 @@ def test_the_median_of_all_runs_is_drawn_within_its_interval():
     assert {color for band in (first, second) for color in map(tuple, band.get_facecolor()[:, :3])}.__len__() == 2
     corners = first.get_paths()[0].vertices
     assert corners[:, 1].min() <= 5
-    assert line(figure, "in the paper")[1] == [4.5]
+    assert line(figure, "paper")[1] == [4.5]
     low, high = figure.axes[0].get_ylim()
     assert low < 4.0
     assert high > 12.0

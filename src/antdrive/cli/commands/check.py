@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli import options
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, print_error, print_line, show
-from antdrive.cli.exits import FAILED, FAULT, SUCCEEDED, WRONG_INPUT
+from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.scenario import with_chosen_margin
-from antdrive.cli.warm import compile_once
+from antdrive.cli.scenario_options import with_chosen_margin
 
 if TYPE_CHECKING:
-    from antdrive.cli.testing.checking import CheckResult, Update
+    from antdrive.cli.testing.evaluation import CheckResult, Update
     from antdrive.views.artefacts import Films
 
 Suites = Annotated[
@@ -42,7 +42,7 @@ def check(
 
     Exit code 0: every drive is as its suite expects, and none is worse than its baseline.
     """
-    from antdrive.cli.testing.summary import add_to_page, drives_in, properties, save_junit
+    from antdrive.cli.testing.session_summary import add_to_page, drives_in, properties, save_junit
     from antdrive.cli.testing.unused import unused_beside
 
     found = drive_suites(tests, only, jobs, "", results, film, json=json)
@@ -121,12 +121,12 @@ def _print(result: "CheckResult") -> None:
 
 def _summarise(results: "list[CheckResult]", json: bool, unused: Sequence[str], *, strict: bool = False) -> int:
     """Print how many tests passed, and unused baselines; the exit code, which is that of the worst test."""
-    from antdrive.cli.testing.checking import FAULT as INTERNAL
-    from antdrive.cli.testing.checking import WRONG_INPUT as WRONG
-    from antdrive.cli.testing.summary import films_left_out, unused_lines
+    from antdrive.cli.testing.evaluation import INTERNAL_ERROR as INTERNAL
+    from antdrive.cli.testing.evaluation import INVALID_INPUT as WRONG
+    from antdrive.cli.testing.session_summary import films_omitted, unused_lines
 
     failed = [result for result in results if not result.passed]
-    worst = {WRONG: WRONG_INPUT, INTERNAL: FAULT}
+    worst = {WRONG: INVALID_INPUT, INTERNAL: INTERNAL_ERROR}
     code = max((worst.get(result.outcome, FAILED) for result in failed), default=SUCCEEDED)
     if strict and unused:
         code = max(code, FAILED)
@@ -134,7 +134,7 @@ def _summarise(results: "list[CheckResult]", json: bool, unused: Sequence[str], 
     gained = f"; {better} better than the baseline; antdrive accept renews it" if better else ""
     unfilmed = sum(result.unfilmed for result in results)
     lines = [*unused_lines(unused, strict), f"{len(results) - len(failed)} of {len(results)} passed{gained}"]
-    lines += [films_left_out(unfilmed, "--film always")] if unfilmed else []
+    lines += [films_omitted(unfilmed, "--film always")] if unfilmed else []
     tests = [result.as_dict() for result in results]
     show(json, {"passed": code == SUCCEEDED, "tests": tests, "unused": list(unused)}, lines)
     return code

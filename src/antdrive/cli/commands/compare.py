@@ -10,12 +10,12 @@ import typer
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
 from antdrive.cli import options
-from antdrive.cli.campaign_tables import Questions, campaigns_of_words, compare_campaigns
+from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
 from antdrive.cli.console import file_lines, planning, print_error, show, table
-from antdrive.cli.entrants import Entrant, check_worlds, entrants_of, repeating
+from antdrive.cli.entrants import Entrant, check_worlds, entrants_of, repeat_command
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, results_folder
-from antdrive.cli.scenario import Ends, Setup
+from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.runs.comparing import COMPARED, Compared, difference_cells, differences, mark_of, same_drives
 from antdrive.views.run_folder import check_film, check_folder, write_result, write_run
 
@@ -61,7 +61,7 @@ def compare(
         Path | None, option("FILE", "Film the first world's drives side by side: .mp4, .gif or .webp.")
     ] = None,
     speed: options.Speed = 1.0,
-    asked: Questions,
+    asked: CampaignQuery,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
@@ -70,7 +70,7 @@ def compare(
     The planners are paired by world and seed. Figures and film show the first of them. Exit code 0: every run succeeded.
     Folders of campaigns, made by `antdrive sweep`: success with intervals, outcomes, and tests of every pair.
     """
-    if campaigns := campaigns_of_words(worlds, context, asked):
+    if campaigns := campaign_folders(worlds, context, asked):
         compare_campaigns(campaigns, planner or (), asked, json)
         return True
     check_worlds(worlds)
@@ -102,7 +102,7 @@ def compare(
                 if not runs:  # an interrupted comparison leaves the results that it has, marked as its own
                     write_json(folder / MARKER, facts)
                 written = write_run(result, part / entrant.label, figures=figures and is_first)
-                write_result(result, written, repeating(scenario, entrant, world, robot, ends.words))
+                write_result(result, written, repeat_command(scenario, entrant, world, robot, ends.words))
                 runs.append(Compared.of(entrant.label, result, folder=str(part / entrant.label)))
                 if is_first and result.rollout is not None:
                     logs[entrant.label] = result.rollout

@@ -12,12 +12,12 @@ from antdrive.cli import options
 from antdrive.cli.console import bar, show, table
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, results_folder
-from antdrive.cli.scenario import Setup
+from antdrive.cli.scenario_options import Setup
 from antdrive.views.run_folder import RUN_FILES, fingerprint, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.hunt import Hunt
-    from antdrive.runs.failures.report import Reported
+    from antdrive.runs.failures.reproducers import Reproducer
 
 MARKER = "falsify.json"  # which search a folder is of
 
@@ -81,14 +81,14 @@ def falsify(
     return not hunt.findings
 
 
-def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reported]":
+def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reproducer]":
     """Shrink, repeat and write every failure that differs from the others, in place of those of an earlier search."""
-    from antdrive.runs.failures.report import SUITE, report
+    from antdrive.runs.failures.reproducers import SUITE, write_reproducers
 
     reported = []
     if hunt.findings:
         with bar("shrinking") as progress:
-            reported = report(hunt, folder, seconds=seconds, progress=progress)
+            reported = write_reproducers(hunt, folder, seconds=seconds, progress=progress)
     else:
         (folder / SUITE).unlink(missing_ok=True)
     for place in folder.glob("failure-*/"):
@@ -107,8 +107,8 @@ def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Rep
     return reported
 
 
-def _lines(hunt: "Hunt", reported: "list[Reported]", folder: Path, filmed: bool) -> Iterator[str]:
-    from antdrive.runs.failures.report import SUITE
+def _lines(hunt: "Hunt", reported: "list[Reproducer]", folder: Path, filmed: bool) -> Iterator[str]:
+    from antdrive.runs.failures.reproducers import SUITE
 
     ended = "interrupted after" if hunt.interrupted else "after"
     runs = f"{hunt.runs} runs, {hunt.driven} of them with a path on the grid"

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import planning, show, table
 from antdrive.cli.options import argument, option
-from antdrive.cli.scenario import Ends, Setup, random_world
-from antdrive.cli.warm import compile_once
+from antdrive.cli.scenario_options import Ends, Setup, random_world
 
 if TYPE_CHECKING:
     from antdrive.runs.margins.choice import MarginResult

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.atomic import folder_lock
 from antdrive.cli import options
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, planning, show
 from antdrive.cli.options import option
 from antdrive.cli.output import chosen_margin, in_brackets, plain
-from antdrive.cli.scenario import Ends, Setup
-from antdrive.cli.warm import compile_once
+from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.views.run_folder import suffixes
 
 if TYPE_CHECKING:

@@ -5,12 +5,12 @@ from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives
 from antdrive.cli.parse import log_at
 from antdrive.cli.parse import size as parse_size
-from antdrive.cli.warm import compile_once
 from antdrive.views.run_folder import caption
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.campaign_tables import Questions, is_campaign, refuse_questions, report_campaigns
+from antdrive.cli.campaign_tables import CampaignQuery, is_campaign, refuse_campaign_options, report_campaigns
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import argument, flag, option
 
@@ -22,7 +22,7 @@ def report(
     planner: Annotated[
         list[str] | None, option("LABEL", "Report about this planner of a campaign. May be repeated.")
     ] = None,
-    asked: Questions,
+    asked: CampaignQuery,
     json: options.Json = False,
 ) -> None:
     """Write one page about many runs.
@@ -37,7 +37,7 @@ def report(
     other = next(folder for folder in folders if folder not in campaigns)
     if campaigns:
         raise InputError(f"{other}: is no campaign's folder, as {campaigns[0]} is; report about them apart")
-    refuse_questions([*(["planner"] if planner else []), *asked.given], other)
+    refuse_campaign_options([*(["planner"] if planner else []), *asked.given], other)
     from antdrive.views.pages.run_report import write_report
 
     count = write_report(folders, out, title=title, embed_films=embed_films)

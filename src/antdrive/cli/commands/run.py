@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.atomic import folder_lock
 from antdrive.base.errors import InputError
 from antdrive.cli import options
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, planning, show, this_command
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, run_lines
-from antdrive.cli.scenario import Ends, Setup
-from antdrive.cli.warm import compile_once
+from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.sim.settings import SETTINGS
 from antdrive.views.run_folder import check_film, check_folder, default_folder, write_result, write_run
 

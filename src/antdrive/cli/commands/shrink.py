@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, show, this_command, working
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
-from antdrive.cli.scenario import with_chosen_margin
-from antdrive.cli.warm import compile_once
+from antdrive.cli.scenario_options import with_chosen_margin
 from antdrive.views.run_folder import fingerprint, write_result, write_run
 
 if TYPE_CHECKING:
-    from antdrive.runs.failures.shrink import Shrunk
+    from antdrive.runs.failures.shrinker import Shrunk
     from antdrive.runs.suites.demands import Bound
     from antdrive.runs.suites.suite import SuiteCase
     from antdrive.sim.scenario import Scenario
@@ -56,13 +56,13 @@ def shrink(
     """
     from antdrive.runs.failures.failure import parse_bound
     from antdrive.runs.failures.handover import planner_beside, scenario_name
-    from antdrive.runs.failures.report import hand_over
-    from antdrive.runs.failures.shrink import shrink as make_small
+    from antdrive.runs.failures.reproducers import write_reproducer
+    from antdrive.runs.failures.shrinker import shrink as make_small
 
     if planner is not None and "::" in failure:
         raise InputError(f"--planner: is for logs; the suite says which planner {failure} has")
     scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure, planner), None)
-    crossed = parse_bound(bound) if bound is not None else _bound_not_kept(case, scenario)
+    crossed = parse_bound(bound) if bound is not None else _broken_bound(case, scenario)
     name = f"{scenario_name(scenario.task.world.name)}-small"
     mark = fingerprint(scenario, str(crossed))
     with results_folder(out, Path("out") / name, MARKER, mark) as (folder, _):
@@ -70,7 +70,7 @@ def shrink(
             journal = folder / "journal.json"
             shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
         words = planner_beside(case, planner, scenario, folder)
-        small, suite, repeats = hand_over(shrunk, name, folder, bound=crossed, planner=words)
+        small, suite, repeats = write_reproducer(shrunk, name, folder, bound=crossed, planner=words)
         files = {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
         report: dict[str, Any] = {"files": files}
         if small.run is not None:  # else the planner raises something
@@ -101,7 +101,7 @@ def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
     return scenario_of(cases[0], with_chosen_margin), cases[0]
 
 
-def _bound_not_kept(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | None":
+def _broken_bound(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | None":
     """What counts as failing where a test's drive ends as expected and breaks a bound of the test or of its baseline."""
     from antdrive.runs.failures.failure import Attempt, bound_broken_in
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.campaigns import campaign_from, resumable
+from antdrive.cli.campaign_options import campaign_from, resumable
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import campaign_bar, print_error, show, table
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.warm import compile_once
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:

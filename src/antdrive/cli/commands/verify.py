@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import print_error, print_json, print_line
-from antdrive.cli.exits import WRONG_INPUT
+from antdrive.cli.exits import INVALID_INPUT
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import log_at
 
@@ -26,8 +26,8 @@ def verify(
     Exit code 0: every log proves that the robot touched nothing.
     Exit code 2: one cannot be read; the others are certified all the same.
     """
-    from antdrive.robots.files import load_robot
-    from antdrive.sim.verifying import verified
+    from antdrive.robots.robot_file import load_robot
+    from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 
     task = None if world is None else load_task(world)
@@ -39,7 +39,7 @@ def verify(
         try:
             path = str(log_at(given))
             result = given / "result.json" if given.is_dir() else None
-            found = checked[path] = verified(Path(path), task, spec, result, replay=replay)
+            found = checked[path] = verify_log(Path(path), task, spec, result, replay=replay)
         except InputError as error:
             print_error(str(error))
             checked[path] = {"certified": False, "problems": [str(error)], "readable": False}
@@ -52,4 +52,4 @@ def verify(
     readable = all(found["readable"] for found in checked.values())
     if json and (readable or len(checked) > 1):
         print_json({"certified": all_certified, "rollouts": checked})
-    return all_certified if readable else WRONG_INPUT
+    return all_certified if readable else INVALID_INPUT

@@ -11,8 +11,8 @@ def warm(jobs: options.Jobs = None) -> None:
     Needed once for an installation; otherwise the first command that plans or drives does it.
     """
     from antdrive.base.kernel_cache import cache_folder
-    from antdrive.cli.warm import is_warm
-    from antdrive.cli.warm import warm as compile_all
+    from antdrive.cli.compiling import is_warm
+    from antdrive.cli.compiling import warm as compile_all
 
     if cache_folder() is None:
         raise InputError("warm: no folder for compiled code can be written; name one in NUMBA_CACHE_DIR")

@@ -1,6 +1,6 @@
-from .checking import CheckResult as CheckResult
-from .checking import check_case as check_case
-from .checking import check_cases as check_cases
+from .evaluation import CheckResult as CheckResult
+from .evaluation import check_case as check_case
+from .evaluation import check_cases as check_cases
 from .fixture import DriveFailure as DriveFailure
 from .fixture import DriveFixture as DriveFixture
 from .fixture import assert_collision_free as assert_collision_free

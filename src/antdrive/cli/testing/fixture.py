@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.errors import FieldError
-from antdrive.cli.testing.checking import Check, CheckResult, Update
+from antdrive.cli.testing.evaluation import Check, CheckResult, Update
 from antdrive.planners import Planner
 from antdrive.robots import RobotSpec, list_robots
 from antdrive.runs.suites.demands import Demands

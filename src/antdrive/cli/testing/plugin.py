@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from antdrive.cli.testing.checking import CheckResult, Update
+    from antdrive.cli.testing.evaluation import CheckResult, Update
     from antdrive.cli.testing.fixture import DriveFixture
     from antdrive.runs.suites.suite import SuiteCase
     from antdrive.views.artefacts import Results
@@ -95,7 +95,7 @@ class DriveItem(pytest.Item):
 
     def runtest(self) -> None:
         """Drive and evaluate."""
-        from antdrive.cli.testing.checking import check_case
+        from antdrive.cli.testing.evaluation import check_case
         from antdrive.cli.testing.fixture import DriveFailure
 
         compile_first(self.config)
@@ -146,7 +146,7 @@ def compile_first(config: pytest.Config) -> None:
     if _COMPILED in config.stash:
         return
     config.stash[_COMPILED] = True
-    from antdrive.cli.warm import compile_once
+    from antdrive.cli.compiling import compile_once
 
     def say(text: str) -> None:
         capture = config.pluginmanager.getplugin("capturemanager")
@@ -158,7 +158,7 @@ def compile_first(config: pytest.Config) -> None:
 
 def note(item: pytest.Item, result: CheckResult) -> None:
     """Remember what came out of a drive, for reports."""
-    from antdrive.cli.testing.summary import properties
+    from antdrive.cli.testing.session_summary import properties
 
     item.stash.setdefault(_DROVE, []).append(result)
     item.user_properties.extend(properties(result))
@@ -177,10 +177,10 @@ def results_of(config: pytest.Config) -> Results:
 
     given = config.getoption("drive_results")
     folder = config.invocation_params.dir / given if given else default_folder(config.rootpath)
-    return Results(folder, config.getoption("drive_film"), Path(places_of(config)), config.rootpath)
+    return Results(folder, config.getoption("drive_film"), Path(counting_folder(config)), config.rootpath)
 
 
-def places_of(config: pytest.Config) -> str:
+def counting_folder(config: pytest.Config) -> str:
     """The folder in which all processes of this run of pytest count the films of failed drives."""
     if _PLACES not in config.stash:
         import tempfile
@@ -193,7 +193,7 @@ def places_of(config: pytest.Config) -> str:
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     """Tell a process of xdist where films are counted."""
-    node.workerinput[FILMS_KEY] = places_of(node.config)
+    node.workerinput[FILMS_KEY] = counting_folder(node.config)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -307,7 +307,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     unused = sorted(found)
     if not (told or unused):
         return
-    from antdrive.cli.testing.summary import add_to_page, drives_in, lines
+    from antdrive.cli.testing.session_summary import add_to_page, drives_in, lines
 
     drives = [drive for properties in told for drive in drives_in(properties)]
     terminalreporter.section("drives")

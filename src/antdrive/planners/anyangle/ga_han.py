@@ -51,7 +51,7 @@ class Incumbent:
         self.cells: Cells = np.empty((0, 2), dtype=np.int32)
         self.waypoints: Floats | None = None
 
-    def offer(self, via: Floats, length: float) -> bool:
+    def keep_if_shorter(self, via: Floats, length: float) -> bool:
         """Keep the line over via points (n, 2) [m], of this length without leads, if it is the best; whether it is."""
         length += self.ends.lead_length
         if length >= self.best:
@@ -67,7 +67,7 @@ class Incumbent:
         leads = self.ends.lead_length
         if len(lengths):
             first = int(lengths.argmin())
-            self.offer(population[first], float(lengths[first]))
+            self.keep_if_shorter(population[first], float(lengths[first]))
         return Iteration(
             cells=self.cells,
             best=self.best,

@@ -22,7 +22,7 @@ from antdrive.planners.anyangle.ga_han import Incumbent, ViaPointPlanner, seeded
 from antdrive.planners.anyangle.lines import RouteEnds, route_ends, terrain
 from antdrive.planners.colonies.catalog import colonies
 from antdrive.planners.colonies.colony import Colony
-from antdrive.planners.iterative import REHEARSED, Iteration
+from antdrive.planners.iterative import WARMUP_ITERATIONS, Iteration
 from antdrive.planners.plan import Cells, Query
 
 ROUNDS = 20  # how often each via point of a new path is tightened
@@ -84,10 +84,10 @@ class Hybrid(ViaPointPlanner):
         require("degrees_per_point", self.degrees_per_point, above=0, at_most=180)
         require("max_shift", self.max_shift, above=0)
 
-    def rehearsal(self) -> Hybrid:
+    def for_warmup(self) -> Hybrid:
         """This planner with one iteration of ants and two of the genetic algorithm."""
         few = dataclasses.replace(self, ant_runs=1, ant_iterations=1, time_budget=None)
-        return dataclasses.replace(few, iterations=min(self.iterations, 1 + REHEARSED))
+        return dataclasses.replace(few, iterations=min(self.iterations, 1 + WARMUP_ITERATIONS))
 
     @property
     def work_unit(self) -> str:
@@ -110,7 +110,7 @@ class Hybrid(ViaPointPlanner):
                     candidate = self._pulled(query, ends, state.cells)
                     # Paths are compared once they are tight: the shortest path of cells need not give the shortest line.
                     length = float(_kernels_ga.tighten_all(candidate, fixed, land, ROUNDS))
-                    if incumbent.offer(candidate, length):
+                    if incumbent.keep_if_shorter(candidate, length):
                         via = candidate
                 yield state._replace(cells=incumbent.cells, best=incumbent.best, waypoints=incumbent.waypoints)
                 if number >= self.ant_iterations and pulled:

@@ -64,9 +64,9 @@ def _candidates(task: Task, most: float) -> tuple[Floats, Floats, npt.NDArray[np
     dx, dy = x[second] - x[first], y[second] - y[first]
     away = np.hypot(dx, dy)
     gap = away - r[first] - r[second]
-    share = (r[first] + gap / 2) / np.where(away > 0, away, 1.0)
+    fraction = (r[first] + gap / 2) / np.where(away > 0, away, 1.0)
     radii = [gap / 2]
-    places = [np.stack([x[first] + share * dx, y[first] + share * dy], axis=1)]
+    places = [np.stack([x[first] + fraction * dx, y[first] + fraction * dy], axis=1)]
     pairs = [np.stack([first, second], axis=1)]
     walls = (x - r - xmin, y - r - ymin, xmax - x - r, ymax - y - r)
     middles = (

@@ -127,15 +127,15 @@ def shortest(
         if min(x - box[0], y - box[1], box[2] - x, box[3] - y, *rim) < -_kernels_tangent.EPS:
             return None
     inflated = np.ascontiguousarray(inflated[_kernels_tangent.keep_outer(inflated, box)])
-    way, checked = np.empty((0, 6)), 0
+    links, checked = np.empty((0, 6)), 0
     for limit in dict.fromkeys((expected, math.inf)):
-        way, _, more = _kernels_tangent.shortest_path(inflated, box, both, limit)
+        links, _, more = _kernels_tangent.shortest_path(inflated, box, both, limit)
         checked += more
-        if len(way):
+        if len(links):
             break
-    if not len(way):
+    if not len(links):
         return None
-    pieces = _pieces(way, inflated) or [Line(start, goal)]  # the ends may be one point
+    pieces = _pieces(links, inflated) or [Line(start, goal)]  # the ends may be one point
     return TangentPath(tuple(pieces), int(checked))
 
 
@@ -180,13 +180,13 @@ class Tangent(GridPlanner):
         grid, world = query.grid, query.task.world
         ends = route_ends(query, touching=True)
         reason = _unusable_ends(query, query.task, ends)
-        found = None
+        path = None
         if not reason:
             most = _expected(query, ends, rng) if len(world.discs) > MANY_DISCS else math.inf
-            found = shortest(world.discs, world.bounds, grid.inflate, ends.start, ends.goal, expected=most)
-        if found is None:
+            path = shortest(world.discs, world.bounds, grid.inflate, ends.start, ends.goal, expected=most)
+        if path is None:
             return PlanResult(status=PlanStatus.NO_PATH, reason=reason or NO_GAP, work_unit=WORK_UNIT)
-        xy = ends.with_leads(found.polyline(self.bulge, world.discs, world.bounds, grid.inflate))
+        xy = ends.with_leads(path.polyline(self.bulge, world.discs, world.bounds, grid.inflate))
         waypoints = grid.fractional(xy)
         cells = cells_along(query, waypoints) if query.blocked_end is None else np.empty((0, 2), dtype=np.int32)
         cost = path_cost(cells, grid.cell) if len(cells) else math.inf
@@ -197,8 +197,8 @@ class Tangent(GridPlanner):
             cells=cells,
             cost=cost,
             waypoints=waypoints,
-            length=found.length + ends.lead_length,
-            work=found.work,
+            length=path.length + ends.lead_length,
+            work=path.work,
             work_unit=WORK_UNIT,
         )
 
@@ -234,17 +234,17 @@ def _unusable_ends(query: Query, task: Task, ends: RouteEnds) -> str:
     return "; ".join(unusable)
 
 
-def _pieces(way: Floats, discs: Floats) -> list[Line | Arc]:
+def _pieces(links: Floats, discs: Floats) -> list[Line | Arc]:
     """The lines of the kernel and the arcs between them, without pieces of no length."""
     pieces: list[Line | Arc] = []
-    for k, (ax, ay, bx, by, disc, turn) in enumerate(way):
+    for k, (ax, ay, bx, by, disc, turn) in enumerate(links):
         if math.dist((ax, ay), (bx, by)) > 0.0:
             pieces.append(Line((float(ax), float(ay)), (float(bx), float(by))))
         if disc < 0:
             break
         x, y, radius = (float(v) for v in discs[int(disc)])
         begin = math.atan2(by - y, bx - x)
-        leave = math.atan2(way[k + 1, 1] - y, way[k + 1, 0] - x)
+        leave = math.atan2(links[k + 1, 1] - y, links[k + 1, 0] - x)
         sweep = (turn * (leave - begin)) % math.tau
         if 1e-9 < sweep < math.tau - 1e-7:
             pieces.append(Arc((x, y), radius, begin, float(turn * sweep)))

@@ -109,9 +109,9 @@ class AcoHan(Colony):
         """
         from antdrive.planners.colonies import _kernels_colony
 
-        shares = self.form == "equation"
+        by_fraction = self.form == "equation"
         _kernels_colony.attracted_weights(
-            trail, graph.mask, graph.offset, heuristic, self.attraction, shares, self.min_weight, weights
+            trail, graph.mask, graph.offset, heuristic, self.attraction, by_fraction, self.min_weight, weights
         )
 
     def update(self, trail: Floats, state: IterationState) -> None:

@@ -96,7 +96,7 @@ class AntSystem(Colony):
                 np.isfinite(graph.at_neighbours(np.ones(len(graph.mask)))), 1.0 / STEP, -np.inf
             )  # suganthi2019 eq. 6
         beta = ibraheem_beta(max(graph.shape)) if self.beta is None else self.beta
-        return shares(eta, beta)
+        return normalised(eta, beta)
 
     def choice_weights(
         self,
@@ -259,7 +259,7 @@ def ibraheem_beta(side: int) -> float:
     return 1.605e-17 * side**2 + 0.22 * side + 6.181e-15
 
 
-def shares(eta: Floats, beta: float) -> Weights:
+def normalised(eta: Floats, beta: float) -> Weights:
     """eta^beta (cells, 8) as a share of each cell's largest value; 0 for moves that are not allowed (eta = -inf).
 
     Ants choose by ratios within a cell, so the scale does not matter to them, and no power leaves the range

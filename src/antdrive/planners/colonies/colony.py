@@ -95,7 +95,7 @@ class Walks:
         return WalkSummary(*_kernels_colony.summarise(self.lengths))
 
     @classmethod
-    def room(cls, ants: int, room: int) -> Walks:
+    def allocate(cls, ants: int, room: int) -> Walks:
         """Rows to be filled, one per ant, each for up to `room` cells."""
         return cls(np.empty((ants, room), dtype=np.int32), np.zeros(ants, dtype=np.int64), np.empty(ants))
 
@@ -288,7 +288,7 @@ class Colony(IterativePlanner):
                     best_cells, best_number = graph.cells(best.cells[0]), number
                 state = IterationState(number, graph, walks, tours, daemon_tour, best, number - best_number, rng)
                 self.update(trail, state)
-                _picture(trail, picture)
+                _draw_field(trail, picture)
                 yield Iteration(
                     cells=best_cells,
                     best=math.inf if best is None else cell * float(best.lengths[0]),
@@ -321,7 +321,7 @@ class TourConstruction:
         room = 1 + (limit if planner.revisit else min(limit, len(graph.mask)))
         weights = tuple(np.zeros((len(graph.mask), 8), dtype=np.float32) for _ in planner.kinds)
         ants = sum(planner.kinds)
-        return cls(planner, graph, limit, weights, Walks.room(ants, room), Walks.room(ants, room))
+        return cls(planner, graph, limit, weights, Walks.allocate(ants, room), Walks.allocate(ants, room))
 
     def construct(self, rng: np.random.Generator, pool: Executor | None = None) -> tuple[Walks, int]:
         """Send every ant, on the threads of `pool` if there is one: their walks, and the steps of all together."""
@@ -377,12 +377,12 @@ def cut_short(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Wal
 
 
 def _cut(kernel: Callable[..., None], walks: Walks, graph: ColonyGraph, out: Walks | None) -> Walks:
-    tours = Walks.room(*walks.cells.shape) if out is None else out
+    tours = Walks.allocate(*walks.cells.shape) if out is None else out
     kernel(walks.cells, walks.sizes, graph.mask, graph.offset, tours.cells, tours.sizes, tours.lengths)
     return tours
 
 
-def _picture(trail: Floats, out: Floats) -> None:
+def _draw_field(trail: Floats, out: Floats) -> None:
     """Fill `out` (R, C) with the trail of each cell; for trails on arcs, the strongest arc that leaves the cell."""
     if trail.ndim == 1:
         out.ravel()[:] = trail

@@ -212,7 +212,7 @@ class WarmStartedColony(CachedReplanner):
         self._brief = dataclasses.replace(planner, settled=min(settled, planner.settled))
         self._memory = Memory()
 
-    def _plan_anew(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
+    def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
         warm = self._memory.tour is not None
         planner = self._brief if warm else self._planner
         if warm and self._memory.trail is not None and len(changed):
@@ -222,17 +222,17 @@ class WarmStartedColony(CachedReplanner):
 
 
 def even_out(trail: Floats, shape: tuple[int, int], changed: npt.NDArray[np.int64], reach: int) -> None:
-    """Move trails near changed cells towards the strongest trail, by a share of 1 - d / (reach + 1)."""
+    """Move trails near changed cells towards the strongest trail, by a fraction 1 - d / (reach + 1)."""
     near = np.zeros(shape, dtype=np.bool_)
     near.ravel()[changed] = True
-    share = near / (reach + 1.0)
+    fraction = near / (reach + 1.0)
     for _ in range(reach):  # the neighbourhood grows by one cell per pass, so nearer cells are counted more often
         near[1:] |= near[:-1].copy()
         near[:-1] |= near[1:].copy()
         near[:, 1:] |= near[:, :-1].copy()
         near[:, :-1] |= near[:, 1:].copy()
-        share += near / (reach + 1.0)
-    here = np.flatnonzero(share)
+        fraction += near / (reach + 1.0)
+    here = np.flatnonzero(fraction)
     strongest = float(trail.max())
     if math.isfinite(strongest):
-        trail[here] += share.ravel()[here, np.newaxis] * (strongest - trail[here])
+        trail[here] += fraction.ravel()[here, np.newaxis] * (strongest - trail[here])

@@ -17,11 +17,11 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.base.errors import require
 from antdrive.planners.colonies.colony import ColonyGraph, Flat
-from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import Capabilities, Cell, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.planners.replanners import SteppingAgent
 
-SPREAD_ANEW = "spread pheromone anew around what was in the way"
+RESPREAD = "spread pheromone anew around what was in the way"
 PATIENCE = 4  # waits in a row, or visits of one cell, after which an agent spreads pheromone anew
 ONLINE_FACTOR = 2.0  # what an agent multiplies alpha by, as each circle costs it a detour that is really driven
 
@@ -73,7 +73,7 @@ class MaxMinDStar(GridPlanner):
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         unit = "cells propagated"
         if not reachable(query):
-            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit=unit)
+            return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work_unit=unit)
         graph, pheromone, work, notes = self.spread(query)
         if query.start == query.goal:
             here = np.array([query.start], dtype=np.int32)
@@ -175,7 +175,7 @@ class PheromoneAgent(SteppingAgent):
         self._planner = planner
         self._exponents = planner.exponents(factor=ONLINE_FACTOR, increment=0.0)
         self._alpha, self._beta = next(self._exponents)
-        blocked = query.blocked_end or ("" if reachable(query) else NO_WAY)
+        blocked = query.blocked_end or ("" if reachable(query) else UNREACHABLE)
         self._graph, self._pheromone, self.stats.propagated, notes = planner.spread(query)
         self._notes = [blocked] if blocked else notes
         self._visits = np.zeros(len(self._pheromone), dtype=np.int64)
@@ -203,7 +203,7 @@ class PheromoneAgent(SteppingAgent):
         elif astray or visits >= PATIENCE or self._idle >= PATIENCE - 1:
             self.stats.cycles += visits > 0
             self._idle = 0
-            self._spread_anew(blocked, here)
+            self._respread(blocked, here)
             to = self._best_neighbour(self._open_moves(self._graph, blocked), here)
         if to < 0:
             self._idle += 1
@@ -230,7 +230,7 @@ class PheromoneAgent(SteppingAgent):
         self._alpha, self._beta = next(self._exponents)
         self._forget_visits(here)
 
-    def _spread_anew(self, blocked: npt.NDArray[np.int64], here: int) -> None:
+    def _respread(self, blocked: npt.NDArray[np.int64], here: int) -> None:
         """Spread pheromone around what is blocked; if that leaves no path, over gate cells too."""
         retained = 1.0 - self._planner.evaporation
         for graph in (self._graph, ColonyGraph.of(self._query)):
@@ -241,8 +241,8 @@ class PheromoneAgent(SteppingAgent):
             if math.isfinite(pheromone[here]):
                 self._graph, self._pheromone = graph, pheromone
                 self._forget_visits(here)
-                if SPREAD_ANEW not in self._notes:
-                    self._notes.append(SPREAD_ANEW)
+                if RESPREAD not in self._notes:
+                    self._notes.append(RESPREAD)
                 return
 
     def _open_moves(self, graph: ColonyGraph, blocked: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:

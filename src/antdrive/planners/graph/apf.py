@@ -9,7 +9,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import require
-from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 
 
@@ -53,7 +53,7 @@ class PotentialField(GridPlanner):
         from antdrive.planners.graph import _kernels_apf  # imported here because it loads the compiler
 
         if not reachable(query):
-            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit="steps")
+            return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work_unit="steps")
         field = self.potential(query)
         cells = _kernels_apf.roll_down(query.grid.moves, field, *query.start, *query.goal)
         last, work = tuple(map(int, cells[-1])), len(cells) - 1

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
-from antdrive.planners.graph.search import NO_WAY
+from antdrive.planners.graph.search import UNREACHABLE
 from antdrive.planners.plan import (
     Capabilities,
     Cell,
@@ -139,16 +139,16 @@ class CachedReplanner(abc.ABC):
         blocked = self._query.blocked_end
         if blocked:
             return PlanResult(status=PlanStatus.NO_PATH, reason=blocked, wall_s=time.perf_counter() - started)
-        answer = self._rest_of_answer()
+        answer = self._remaining_path()
         if answer is None:
-            answer = self._last = self._plan_anew(self._query, self._take_edits())
+            answer = self._last = self._replan(self._query, self._take_edits())
         return dataclasses.replace(answer, wall_s=time.perf_counter() - started)
 
     @abc.abstractmethod
-    def _plan_anew(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
+    def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
         """The answer to a query whose ends are free, after the moves of these flat cells changed."""
 
-    def _rest_of_answer(self) -> PlanResult | None:
+    def _remaining_path(self) -> PlanResult | None:
         """The rest of the last path, if nothing has changed and the robot is on it."""
         if self._edits or self._last is None or not self._last.solved:
             return None
@@ -194,10 +194,10 @@ class CachedReplanner(abc.ABC):
 class IncrementalSearch(CachedReplanner):
     """A search that is repaired after an edit."""
 
-    def _plan_anew(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
+    def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
         cells, diagonal, work = self._repair(changed, self._index(query.start))
         if not len(cells):
-            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work=work)
+            return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work=work)
         cost = query.grid.cell * (len(cells) - 1 - diagonal + math.sqrt(2.0) * diagonal)
         return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=cost, work=work)
 
@@ -257,10 +257,10 @@ class DStarSearch(IncrementalSearch):
         self._kernels.begin(self._goal, self._state, self._h, self._back, self._heap, self._place)
 
     def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
-        found: tuple[Cells, int, int] = self._kernels.repair(
+        path: tuple[Cells, int, int] = self._kernels.repair(
             changed, self._moves, start, self._goal, self._state, self._h, self._back, self._heap, self._place
         )
-        return found
+        return path
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,7 +297,7 @@ class DStarLiteSearch(IncrementalSearch):
         )
 
     def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
-        found: tuple[Cells, int, int] = self._kernels.repair(
+        path: tuple[Cells, int, int] = self._kernels.repair(
             changed, self._moves, start, self._goal, self._state, self._g, self._rhs, self._heap, self._place
         )
-        return found
+        return path

@@ -9,7 +9,7 @@ import numpy as np
 
 from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query
 
-NO_WAY = "no sequence of allowed moves leads from the start to the goal"
+UNREACHABLE = "no sequence of allowed moves leads from the start to the goal"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +48,7 @@ def shortest(query: Query, *, informed: bool = True) -> PlanResult:
         query.grid.moves, *query.start, *query.goal, informed
     )
     if not len(cells):
-        return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work=expanded)
+        return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work=expanded)
     cost = query.grid.cell * (straight + math.sqrt(2.0) * diagonal)
     return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=cost, work=expanded)
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import segment_lengths
-from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, TimedPlan, path_cost
 from antdrive.worlds import MoverMotion
 
@@ -94,7 +94,7 @@ def plan_in_time(
     require("speed", speed, above=0, below=math.inf)
     require("horizon", horizon, above=0)
     started = time.perf_counter()
-    reason = query.blocked_end or ("" if reachable(query) else NO_WAY)
+    reason = query.blocked_end or ("" if reachable(query) else UNREACHABLE)
     plan = (
         TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
         if reason

@@ -83,7 +83,7 @@ def _straightened(xy: Floats) -> Floats:
 SMOOTHINGS: tuple[str, ...] = ("none", "taut", "clearance")
 
 #: What may be wrong with a smoothed line, by the numbers of the kernel `fault`.
-FAULTS: tuple[str, ...] = (
+REJECTIONS: tuple[str, ...] = (
     "",
     "the smoothed line would be longer than the plan's",
     "the smoothed line would come closer than the clearance",
@@ -266,7 +266,7 @@ def _smoothed(
     note = ""
     for fine in (bulge, bulge / 100.0):  # a plan whose arcs are drawn finer than ours may be shorter
         drawn = taut.drawn(world, inflate, fine)
-        note = _fault(taut, drawn[0], line, world, inflate, own)
+        note = _rejection(taut, drawn[0], line, world, inflate, own)
         if not note:
             break
     if note:
@@ -274,10 +274,10 @@ def _smoothed(
     piece = Piece(*drawn, "taut")
     if not extra:
         return piece
-    found = _with_clearance(
+    wider = _with_clearance(
         taut, piece.xy, world, inflate, extra, min(taut.length * (1.0 + stretch), own + spare), bulge
     )
-    return replace(piece, note="no room or length to spare for more clearance") if found is None else found
+    return replace(piece, note="no room or length to spare for more clearance") if wider is None else wider
 
 
 def _pulled(line: Floats, discs: Floats, inflate: float) -> TautString | None:
@@ -286,8 +286,8 @@ def _pulled(line: Floats, discs: Floats, inflate: float) -> TautString | None:
 
     grown = discs[kernels.outermost(discs)]
     grown[:, 2] += inflate - SHRINK
-    found, disc, turn, sweep = kernels.pull(line, grown)
-    if not found:
+    pulled, disc, turn, sweep = kernels.pull(line, grown)
+    if not pulled:
         return None
     ends = np.ascontiguousarray(line[[0, -1]])
     for more in (SHRINK, SHRINK * 0.6):  # if rounding closes a gap, there is no string among discs of exact radius
@@ -304,16 +304,16 @@ def _settled(
 ) -> TautString | None:
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
-    found, disc, turn, sweep, links = kernels.settle(kernels.Contacts(disc, turn, sweep), discs, ends)
-    return TautString(disc, turn, sweep, links, discs) if found else None
+    settled, disc, turn, sweep, links = kernels.settle(kernels.Contacts(disc, turn, sweep), discs, ends)
+    return TautString(disc, turn, sweep, links, discs) if settled else None
 
 
-def _fault(string: TautString, xy: Floats, line: Floats, world: World, inflate: float, longest: float) -> str:
+def _rejection(string: TautString, xy: Floats, line: Floats, world: World, inflate: float, longest: float) -> str:
     """The reason why a smoothed line cannot be used; empty if it can."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     box = np.asarray(world.bounds, dtype=np.float64)
-    return FAULTS[kernels.fault(string.compiled, xy, line, world.discs, box, inflate - SLACK, longest + SLACK)]
+    return REJECTIONS[kernels.fault(string.compiled, xy, line, world.discs, box, inflate - SLACK, longest + SLACK)]
 
 
 def _with_clearance(
@@ -329,8 +329,8 @@ def _with_clearance(
     box = np.array([xmin + inflate, ymin + inflate, xmax - inflate, ymax - inflate])
     room = np.empty(len(discs))
     kernels.room_to_grow(xy, discs, box, np.ascontiguousarray(xy[[0, -1]]), extra, room)
-    found, wide, curvature = kernels.widest(
+    fits, wide, curvature = kernels.widest(
         contacts, discs, room, extra, xy, world.discs, np.asarray(world.bounds, dtype=np.float64), inflate, SLACK,
         longest + SLACK, bulge,
     )  # fmt: skip
-    return Piece(wide, curvature, "clearance") if found else None
+    return Piece(wide, curvature, "clearance") if fits else None

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
 from antdrive.base.types import Floats
-from antdrive.robots.drawing import footprint_text, wheel_thickness
+from antdrive.robots.card import footprint_text, wheel_thickness
 from antdrive.robots.importing.hull import convex_hull
 from antdrive.robots.spec import RobotSpec
 from antdrive.views.colours import GOAL, INK, MUTED, ROUTE, hexed

@@ -192,9 +192,10 @@ def _draw_checks(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
         (certificate.bound > 0, bound),
     )
     lines = [*checks, *((False, problem) for problem in certificate.problems[:3])]
-    verdict = certificate.verdict
     colour = hexed(GOOD if certificate.certified else BAD)
-    axes.text(0, 0.97, verdict, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes)
+    axes.text(
+        0, 0.97, certificate.statement, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes
+    )
     for k, (fine, words) in enumerate(lines):
         place: dict[str, Any] = {"y": 0.78 - 0.13 * k, "va": "top", "transform": axes.transAxes}
         axes.text(x=0, s="✓" if fine else "✕", color=hexed(GOOD if fine else BAD), weight="bold", **place)

@@ -1,4 +1,4 @@
-"""Write what `antdrive reproduce all` found into the papers' pages: `python -m tools.papers FOLDER`.
+"""Write what `antdrive reproduce all` found into the papers' pages: `python -m tools.paper_tables FOLDER`.
 
 FOLDER is the one that the command wrote. In `docs/papers/PAPER.md` the lines between `<!-- claims -->` and `<!-- end -->`
 become the table of the paper's claims, in `docs/papers/README.md` those between `<!-- counts -->` and `<!-- end -->` that of

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, GridPlanner, Query, load_planner, watch
-from antdrive.planners.loading import kernels_loaded, tiny_query
+from antdrive.planners import PLANNERS, GridPlanner, Query, load_planner, on_progress
+from antdrive.planners.warmup import kernels_loaded, tiny_query
 
 # Each planner gets a process of its own, in which no kernel is loaded yet. It prints what its first plan loads by itself.
 PLANS = """
@@ -17,7 +17,7 @@ import gc, os, sys
 from dataclasses import replace
 from numba.core.dispatcher import Dispatcher
 from antdrive.planners import IterativePlanner, Query, load_planner
-from antdrive.planners.loading import load_kernels
+from antdrive.planners.warmup import load_kernels
 from antdrive.sim import Scenario
 from antdrive.worlds import rasterise
 
@@ -55,7 +55,7 @@ def overloads():
 
 loaded, driving = set(), False
 
-def watched(method):
+def recorded(method):
     def replan(self, *args):
         before = overloads()
         path = method(self, *args)
@@ -65,7 +65,7 @@ def watched(method):
     return replan
 
 for kind in (Replanning, CellByCell):
-    kind.replan = watched(kind.replan)
+    kind.replan = recorded(kind.replan)
 for words in sys.argv[1:]:
     if os.fork():
         os.wait()
@@ -91,7 +91,7 @@ def printed(script, *words):
     assert done.returncode == 0, done.stderr
     lines = [line.split(" - ") for line in done.stdout.splitlines()]
     assert len(lines) == len(words), done.stderr
-    return {name: found.split() for name, found in lines}
+    return {name: rest.split() for name, rest in lines}
 
 
 @needs_kernels
@@ -122,7 +122,7 @@ class Counting(GridPlanner):
         return PLANNERS["astar"].plan(query, rng)
 
 
-def test_a_planner_is_rehearsed_once_and_planners_within_it_not_at_all():
+def test_a_planner_warms_up_once_without_the_planners_inside_it():
     Counting.asked.clear()
     query = tiny_query(Query, motions=False, task=True)
     longer = replace(query, start=(1, 1))
@@ -132,11 +132,11 @@ def test_a_planner_is_rehearsed_once_and_planners_within_it_not_at_all():
 
 
 @pytest.mark.parametrize("name", ["aco-han", "ga-han", "hybrid"])
-def test_the_rehearsal_is_not_watched_and_leaves_the_random_numbers_alone(name):
+def test_warming_up_reports_no_progress_and_draws_no_random_numbers(name):
     query, seen = tiny_query(Query, motions=False, task=True), []
     planner = load_planner(name, iterations=7)
     rng, other = np.random.default_rng(5), np.random.default_rng(5)
-    with watch(lambda state: seen.append(state.total)):
+    with on_progress(lambda state: seen.append(state.total)):
         first = planner.plan(query, rng)
     assert set(seen) <= {7}
     again = planner.plan(query, other)

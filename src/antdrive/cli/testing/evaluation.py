@@ -29,7 +29,7 @@ from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, writ
 #: Which baselines are written: none, only those that are missing, or all.
 Update: TypeAlias = Literal["", "new", "all"]
 #: The outcomes of a test that could not be judged: what people wrote is wrong, or antdrive is.
-WRONG_INPUT, FAULT = "wrong_input", "internal_error"
+INVALID_INPUT, INTERNAL_ERROR = "wrong_input", "internal_error"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,13 +135,13 @@ class Check:
             wall_s=wall + (rollout.record.times.drive_wall_s if rollout else 0.0) + time.perf_counter() - started,
         )
 
-    def unjudged(self, outcome: str, fault: str, error: BaseException) -> CheckResult:
+    def failed_early(self, outcome: str, fault: str, error: BaseException) -> CheckResult:
         """The result of a test that an error ended; its results are where the error arose, unless the input was wrong."""
         files: dict[str, str] = {}
         details: tuple[str, ...] = ()
         if self.folder is not None:
             try:
-                if outcome == WRONG_INPUT:
+                if outcome == INVALID_INPUT:
                     remove_artefacts(self.folder)
                 else:
                     files = write_traceback(self.folder, error, self.commands)
@@ -220,23 +220,23 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     try:
         return check.evaluate(drive(scenario))
     except PlannerError as error:
-        return check.unjudged(RAISED, str(error), error)
+        return check.failed_early(RAISED, str(error), error)
 
 
-def _check_whatever_comes(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
+def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
     """The result of a test; it fails where it cannot be judged, so that one broken test hides no other."""
     raised: Exception
     try:
         return check_case(case, update=update, results=results)
     except FieldError as error:
-        outcome, fault, raised = WRONG_INPUT, str(case.error(error.key, error.problem)), error
+        outcome, fault, raised = INVALID_INPUT, str(case.error(error.key, error.problem)), error
     except InputError as error:
         key, mark, problem = str(error).partition(": ")
         of_the_suite = mark and key in ScenarioEntry.model_fields  # found only in the run, such as too small a cell
-        outcome, fault, raised = WRONG_INPUT, str(case.error(key, problem)) if of_the_suite else str(error), error
+        outcome, fault, raised = INVALID_INPUT, str(case.error(key, problem)) if of_the_suite else str(error), error
     except Exception as error:  # people's planners and robots are code too
-        outcome, fault, raised = FAULT, f"internal error: {type(error).__name__}: {error}", error
-    return _check_of(case, update, results).unjudged(outcome, fault, raised)
+        outcome, fault, raised = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}", error
+    return _check_of(case, update, results).failed_early(outcome, fault, raised)
 
 
 def check_cases(
@@ -262,7 +262,7 @@ def _check_in_turn(
 ) -> Iterator[CheckResult]:
     if jobs == 1 or len(cases) == 1:
         for case in cases:
-            yield _check_whatever_comes(case, update, results)
+            yield _check_or_fail(case, update, results)
         return
     work = functools.partial(_check_by_name, str(Path.cwd()), update, results)
     with Pool(jobs) as pool:
@@ -270,9 +270,9 @@ def _check_in_turn(
         for case, done in zip(cases, made, strict=True):
             if done.died:
                 fault = f"internal error: {done.died}"
-                yield _check_of(case, update, results).unjudged(FAULT, fault, WorkerDied(done.died))
+                yield _check_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
             elif isinstance(done.value, str):  # the suite has changed since it was read
-                yield _check_of(case, update, results).unjudged(WRONG_INPUT, done.value, InputError(done.value))
+                yield _check_of(case, update, results).failed_early(INVALID_INPUT, done.value, InputError(done.value))
             else:
                 yield done.value
 
@@ -287,4 +287,4 @@ def _check_by_name(folder: str, update: Update, results: Results | None, name: t
         return str(error)
     if found is None:
         return f"{suite}: has no test {test} any more"
-    return _check_whatever_comes(found, update, results)
+    return _check_or_fail(found, update, results)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.atomic import atomic_write
-from antdrive.cli.testing.checking import CheckResult
+from antdrive.cli.testing.evaluation import CheckResult
 
 #: The metrics that a test report gets.
 SHOWN = ("min_clearance_m", "duration_s", "driven_length_m")
@@ -63,7 +63,7 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
             yield f"results: {drive['results']}"
     unfilmed = sum(drive.get("film") == "none" for drive in drives)
     if unfilmed:
-        yield films_left_out(unfilmed, "--drive-film always")
+        yield films_omitted(unfilmed, "--drive-film always")
     yield from unused_lines(unused, strict)
 
 
@@ -72,7 +72,7 @@ def unused_lines(unused: Sequence[str], strict: bool) -> Iterator[str]:
     return (f"{'FAILED: ' if strict else ''}unused baseline: {path}; remove it" for path in unused)
 
 
-def films_left_out(count: int, option: str) -> str:
+def films_omitted(count: int, option: str) -> str:
     """That failed drives have no film, because a run makes no more than a few, and what makes them."""
     return f"{count} more failed drives have no film; the command that repeats a drive makes it, {option} makes all"
 

@@ -1,4 +1,4 @@
-"""How fast `astar` is beside other libraries' A*: `python -m benchmarks.search [--archive FILE]`.
+"""How fast `astar` is beside other libraries' A*: `python -m benchmarks.peers [--archive FILE]`.
 
 Needs the extra `peers`, best in an environment of its own. FILE is a .tar.xz with the MovingAI maps named in `MOVINGAI` and
 their problems. Every solver gets the same grids and queries in turns within one run, so the ratios mean something where times do
@@ -23,7 +23,7 @@ import numpy as np
 from antdrive.planners import Query, load_planner
 from antdrive.worlds import Disc, Grid, World, rasterise
 from antdrive.worlds.formats.movingai import import_movingai_map, import_movingai_problems
-from benchmarks.tables import command_line, missing, print_table
+from benchmarks.markdown import command_line, missing, print_table
 from tools.shared_data import MOVINGAI as ARCHIVE
 
 try:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, print_error
 from antdrive.cli.options import Planner, Robot, option
 from antdrive.cli.parse import numbers, pair
-from antdrive.cli.warm import compile_once
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 FRAMES = WORLD_FRAME, MAP_FRAME = "world", "map"  # of the places that people give
 GROUPS = ("planner", "controller")  # what `--set GROUP.KEY=VALUE` can set
-USUAL_TRIALS = 4  # margins that a calibration tries, as a rule
+TYPICAL_MARGINS = 4  # margins that a calibration tries, as a rule
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Ends:
             raise InputError(f"--frame {self.frame}: choose from {', '.join(FRAMES)}")
         if self.task is None and self.start is None and self.goal is None:
             return world
-        from antdrive.base.plane import out_of_map
+        from antdrive.base.plane import map_to_world
         from antdrive.worlds import load_task
 
         ends = {"start": numbers("--start", self.start, 3, "X,Y,YAW"), "goal": numbers("--goal", self.goal, 2, "X,Y")}
@@ -64,7 +64,7 @@ class Ends:
         try:
             found = load_task(world, self.task)
             if self.frame == MAP_FRAME:
-                given = {key: tuple(out_of_map(found.frame, [value])[0].tolist()) for key, value in given.items()}
+                given = {key: tuple(map_to_world(found.frame, [value])[0].tolist()) for key, value in given.items()}
             return dataclasses.replace(found, **given)
         except FieldError as error:
             there = " (places are in the world's frame)" if self.frame == MAP_FRAME and any(found.frame) else ""
@@ -141,15 +141,15 @@ def with_chosen_margin(scenario: "Scenario") -> "Scenario":
     from antdrive.runs.margins.choice import DRIVES, known_margin
     from antdrive.runs.margins.choice import with_chosen_margin as choose
 
-    conditions = scenario.loss_conditions
+    conditions = scenario.loss_factors
     if known_margin(conditions) is not None:
         return choose(scenario)
     compile_once()
     label = f"calibrating {conditions.robot.name}, noise {conditions.noise:g}, smoothing {conditions.smoothing}"
     if not sys.stderr.isatty():
-        print_error(f"{label}: about {USUAL_TRIALS * DRIVES} short drives, once")
+        print_error(f"{label}: about {TYPICAL_MARGINS * DRIVES} short drives, once")
     with bar(f"{label}, once") as progress:
-        return choose(scenario, lambda done, margin: progress(min(0.99, done / (USUAL_TRIALS * DRIVES))))
+        return choose(scenario, lambda done, margin: progress(min(0.99, done / (TYPICAL_MARGINS * DRIVES))))
 
 
 def random_world(unknown: str, kind: str, seed: int, values: Mapping[str, str], name: str) -> "Task":

@@ -33,7 +33,7 @@ TOGETHER = (
     ("apf", "mmas-dstar"),
 )
 LOCK = "antdrive-compiling.lock"
-NOTE = "compiling the planners, once for this installation; this takes a minute or two"
+COMPILING = "compiling the planners, once for this installation; this takes a minute or two"
 
 
 def compile_once(say: Callable[[str], None] | None = None) -> None:
@@ -49,13 +49,13 @@ def compile_once(say: Callable[[str], None] | None = None) -> None:
         if is_warm():
             return
         if say is not None:
-            say(NOTE)
+            say(COMPILING)
             warm()
             return
         from antdrive.cli.console import bar, print_error
 
         if not sys.stderr.isatty():
-            print_error(NOTE)
+            print_error(COMPILING)
         with bar("compiling the planners, once") as progress:
             warm(progress=progress)
 

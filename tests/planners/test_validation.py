@@ -20,11 +20,11 @@ from antdrive.planners import (
     Query,
     SafeIntervals,
     TimedPlan,
-    ask,
     check_plan,
     checked,
     load_planner,
     path_cost,
+    request_plan,
 )
 from antdrive.worlds import Cruising, Disc, Grid, Task, Trajectories, World, rasterise
 from tests.planners.worlds_to_solve import catalogue
@@ -127,8 +127,8 @@ def test_a_negative_cell_is_outside_and_not_the_last_one():
     [
         ({"status": "solved"}, "status: must be"),
         ({"status": PlanStatus.INVALID}, "status: must be"),
-        ({"status": PlanStatus.NO_PATH}, "cells: there are some"),
-        ({"cells": np.empty((0, 2), dtype=np.int32)}, "cells: there are none"),
+        ({"status": PlanStatus.NO_PATH}, "cells: given"),
+        ({"cells": np.empty((0, 2), dtype=np.int32)}, "cells: none"),
         ({"cells": RIGHT.cells.tolist()}, "cells: must be an array of whole numbers"),
         ({"cells": RIGHT.cells.astype(float)}, "cells: must be an array of whole numbers"),
         ({"cells": RIGHT.cells.ravel()}, "cells: must be an array of whole numbers"),
@@ -198,7 +198,7 @@ def test_among_motions_a_plan_without_times_is_refused():
     query, plan = timed()
     assert isinstance(plan, TimedPlan)
     bare = PlanResult(status=PlanStatus.SOLVED, cells=plan.cells, cost=plan.cost)
-    assert "must be a TimedPlan" in check_plan(query, bare)
+    assert "needs a TimedPlan" in check_plan(query, bare)
 
 
 def test_a_path_from_an_end_that_cannot_be_used_is_refused():
@@ -220,11 +220,11 @@ class Broken:
 
 def test_a_planner_that_raises_is_named_with_the_place():
     line = Broken.plan.__code__.co_firstlineno + 2
-    with pytest.raises(PlannerError) as found:
-        ask(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
-    assert found.value.planner == "mine"
-    assert str(found.value) == f"planner mine raised KeyError: 'row\\n2' (test_checking.py:{line})"
-    assert isinstance(found.value.__cause__, KeyError)
+    with pytest.raises(PlannerError) as error:
+        request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
+    assert error.value.planner == "mine"
+    assert str(error.value) == f"planner mine raised KeyError: 'row\\n2' (test_validation.py:{line})"
+    assert isinstance(error.value.__cause__, KeyError)
 
 
 def test_the_place_is_in_the_planners_module_and_not_in_what_it_calls():
@@ -232,29 +232,31 @@ def test_the_place_is_in_the_planners_module_and_not_in_what_it_calls():
         def plan(self, query, rng):
             return np.linalg.inv(np.zeros((2, 2)))
 
-    with pytest.raises(PlannerError, match=rf"LinAlgError.*test_checking.py:{Caller.plan.__code__.co_firstlineno + 1}"):
-        ask(Caller(None), QUERY, RNG(0))
+    with pytest.raises(
+        PlannerError, match=rf"LinAlgError.*test_validation.py:{Caller.plan.__code__.co_firstlineno + 1}"
+    ):
+        request_plan(Caller(None), QUERY, RNG(0))
 
 
 @pytest.mark.parametrize("answer", [None, 3, RIGHT.cells, (RIGHT,)], ids=["None", "3", "cells", "tuple"])
 def test_an_answer_that_is_no_plan_result_is_a_planner_error(answer):
-    with pytest.raises(PlannerError, match=r"planner Broken returned .* where a PlanResult is due \(test_checking.py:"):
-        ask(Broken(answer), QUERY, RNG(0))
+    with pytest.raises(PlannerError, match=r"planner Broken returned .* instead of a PlanResult \(test_validation.py:"):
+        request_plan(Broken(answer), QUERY, RNG(0))
 
 
 def test_a_planner_that_exits_is_its_error_and_no_success():
-    with pytest.raises(PlannerError, match=r"planner Broken raised SystemExit: 0 \(test_checking.py:"):
-        ask(Broken(SystemExit(0)), QUERY, RNG(0))
+    with pytest.raises(PlannerError, match=r"planner Broken raised SystemExit: 0 \(test_validation.py:"):
+        request_plan(Broken(SystemExit(0)), QUERY, RNG(0))
 
 
 def test_a_planner_error_gets_to_another_process():
-    with pytest.raises(PlannerError) as found:
-        ask(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
-    copy = pickle.loads(pickle.dumps(found.value))
-    assert (str(copy), copy.planner, copy.problem) == (str(found.value), "mine", found.value.problem)
+    with pytest.raises(PlannerError) as error:
+        request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
+    copy = pickle.loads(pickle.dumps(error.value))
+    assert (str(copy), copy.planner, copy.problem) == (str(error.value), "mine", error.value.problem)
 
 
 def test_what_is_wrong_with_the_query_and_ctrl_c_pass():
     for error in (InputError("query: has no task"), KeyboardInterrupt(), Terminated(143)):
         with pytest.raises(type(error)):
-            ask(Broken(error), QUERY, RNG(0))
+            request_plan(Broken(error), QUERY, RNG(0))
