@@ -142,7 +142,7 @@ def test_a_forged_scan_is_refused(log):
     fewer = replace(log, scans=np.delete(log.scans, 50, axis=0), scan_rows=np.delete(log.scan_rows, 50))
     assert replay(fewer).problems == (problem,)
     none = replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
-    assert "no scans" in replay(none).problems[0]
+    assert "must have scans" in replay(none).problems[0]
 
 
 def test_the_map_is_forgotten_where_plans_failed(log):
