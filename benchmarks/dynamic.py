@@ -25,7 +25,7 @@ from antdrive.planners import Query, plan_in_time
 from antdrive.robots import load_robot
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, run
-from antdrive.sim.log.sights import followed_rows
+from antdrive.sim.log.sights import tracked_rows
 from antdrive.worlds import (
     Cruising,
     Disc,
@@ -101,7 +101,7 @@ def warning(log: Rollout) -> str:
     if not 0 <= mover < log.movers.shape[1]:
         return ""
     scans = log.scan_rows[log.scan_rows < row]
-    lost = np.flatnonzero(~np.isin(scans, followed_rows(log)[mover]))
+    lost = np.flatnonzero(~np.isin(scans, tracked_rows(log)[mover]))
     words = [f"followed for {log.t[row] - log.t[scans[lost[-1]]] if len(lost) else log.t[row]:.1f} s"]
     way = np.diff(log.movers[max(0, row - round(LATELY * log.record.physics_hz)) : row + 1, mover], axis=0)
     jumped = np.hypot(*way.T) > JUMP

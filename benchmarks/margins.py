@@ -87,7 +87,7 @@ def main() -> None:
     robots, smoothings = arguments.robots.split(","), arguments.smoothings.split(",")
     noises = map(float, arguments.noises.split(","))
     for robot, noise, smoothing in itertools.product(robots, noises, smoothings):
-        calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).loss_conditions)
+        calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).loss_factors)
         worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]
         calls = [partial(drive, *world, robot, noise, smoothing, arguments.fixed) for world in worlds]
         drives = call_all(calls, arguments.jobs)

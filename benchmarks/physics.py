@@ -15,7 +15,7 @@ import numpy as np
 
 from antdrive import Disc, RobotSpec, World, load_robot
 from antdrive.base.types import Pose
-from antdrive.robots.placing import footprint_clearance
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.sim import Engine
 from benchmarks.markdown import command_line
 

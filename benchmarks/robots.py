@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from antdrive.robots import RobotSpec, list_robots, load_robot
-from antdrive.robots.importing.urdf import import_urdf
+from antdrive.robots.importing.urdf_import import import_urdf
 from antdrive.sim import Scenario, run
 from antdrive.worlds import Task
 from benchmarks.drives import barn_tasks
@@ -42,7 +42,7 @@ def importable() -> list[str]:
 
 def imported(name: str) -> RobotSpec:
     """The robot in one of the URDF files."""
-    return import_urdf(URDF / name, **TOLD.get(name, {})).robot
+    return import_urdf(URDF / name, **TOLD.get(name, {})).spec
 
 
 def values_of(robot: RobotSpec) -> dict[str, float]:

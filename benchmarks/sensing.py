@@ -81,7 +81,7 @@ def tracks(lidar: Lidar, blocks: int) -> Iterator[list[str]]:
             started = time.process_time()
             theirs = tracker.update(MappedGround(seen, 100), (0, 0, 0), ranges, k / lidar.rate)
             spent.append(time.process_time() - started)
-            seen.insert((0, 0, 0), ranges, left_out=theirs)
+            seen.insert((0, 0, 0), ranges, omitted=theirs)
             most = max(most, len(tracker.movers().radii))
         yield [str(count), str(most), f"{1e6 * float(np.median(spent)):.0f}"]
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from antdrive.runs.failures.failure import failure_of
 from antdrive.runs.failures.passes import with_obstacles
-from antdrive.runs.failures.shrink import shrink
+from antdrive.runs.failures.shrinker import shrink
 from antdrive.sim import Run, Scenario, run
 from antdrive.worlds import generate
 from benchmarks.markdown import command_line, print_table

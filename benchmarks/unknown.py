@@ -25,11 +25,11 @@ import yaml
 
 from antdrive.base.atomic import atomic_write
 from antdrive.robots import list_robots
-from antdrive.runs.barn import campaign_data, lines, reference_times, unpacked
+from antdrive.runs.barn_challenge import campaign_data, lines, reference_times, unpacked
 from antdrive.runs.campaigns import sweep
 from antdrive.runs.campaigns.results import SweepResults
 from antdrive.runs.statistics.price import Ratio, prices
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.run_table import RunTable
 from antdrive.views.film.video import film_failures
 from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import BARN

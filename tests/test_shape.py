@@ -16,8 +16,8 @@ PACKAGES = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli
 MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 #: Parameters that their name and type explain.
 PLAIN = {
-    "self", "cls", "args", "kwargs", "path", "seed", "rng", "name", "robot", "world", "task", "grid", "query", "plan", "planner",
-    "rollout", "route", "pose", "log",
+    "self", "cls", "args", "kwargs", "path", "seed", "rng", "name", "robot", "spec", "world", "task", "grid", "query", "plan",
+    "planner", "rollout", "route", "pose", "log",
 }  # fmt: skip
 
 

@@ -15,8 +15,8 @@ from .planners.registry import PLANNERS as PLANNERS
 from .planners.registry import list_planners as list_planners
 from .planners.registry import load_planner as load_planner
 from .robots.control.pursuit import PurePursuit as PurePursuit
-from .robots.files import list_robots as list_robots
-from .robots.files import load_robot as load_robot
+from .robots.robot_file import list_robots as list_robots
+from .robots.robot_file import load_robot as load_robot
 from .robots.spec import RobotSpec as RobotSpec
 from .runs.campaigns.sweeping import sweep as sweep
 from .sim.log.certificate import Certificate as Certificate

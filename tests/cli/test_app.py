@@ -161,7 +161,7 @@ def faulty(monkeypatch):
         (ZeroDivisionError("by zero"), r"raised ZeroDivisionError: by zero \(test_app\.py:\d+\)"),
         (ValueError(), r"raised ValueError \(test_app\.py:\d+\)"),
         (OSError(2, "No such file", "x"), r"raised FileNotFoundError: .* \(test_app\.py:\d+\)"),
-        (None, r"returned None where a PlanResult is due \(test_app\.py:\d+\)"),
+        (None, r"returned None instead of a PlanResult \(test_app\.py:\d+\)"),
     ],
     ids=["ZeroDivisionError", "ValueError", "OSError", "None"],
 )
@@ -202,7 +202,7 @@ def test_a_wrong_plan_is_an_outcome_and_is_not_driven(antdrive, small, faulty):
     assert not Path("r/rollout.npz").exists()
     code, out, err = antdrive("plan", small, "-p", "mine")
     assert (code, err) == (1, "")
-    assert "mine gave a wrong plan (cells: step 1 from " in out
+    assert "mine returned an invalid plan (cells: step 1 from " in out
 
 
 def test_the_help_explains_the_exit_codes(antdrive):

@@ -11,13 +11,13 @@ from antdrive.runs.margins import choice
 from antdrive.runs.margins.choice import Calibration
 from antdrive.runs.margins.loss import Loss, calibration_key
 from antdrive.sim import Rollout
-from antdrive.sim.scenario import Conditions
+from antdrive.sim.scenario import LossFactors
 
 
 def keep(margin, **changes):
     """Put a calibration of the turtlebot into the cache."""
     usual = {"robot": load_robot("turtlebot"), "controller": PurePursuit(), "noise": 0.0, "smoothing": "clearance"}
-    key = calibration_key(Conditions(**{**usual, **changes}))
+    key = calibration_key(LossFactors(**{**usual, **changes}))
     choice._keep(
         Calibration(
             margin=margin, loss=margin - 0.011, largest=0.01, reserve=0.01, probability=1e-3, drives=80, key=key

@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 from markdown_it import MarkdownIt
 
-from antdrive.robots.files import robot_from_text
+from antdrive.robots.robot_file import robot_from_text
 from antdrive.runs.campaigns import expand, make_campaign
 from antdrive.worlds import load_task, save_task
 from tools.pages import RUN, TESTED, blocks_of, pages_with_code

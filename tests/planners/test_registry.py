@@ -101,7 +101,7 @@ def test_a_plugin_that_is_no_planner_is_refused(site):
 
 def test_a_plugin_cannot_take_a_name_of_ours(site):
     site.install("antdrive-thief", {"thief": "raise AssertionError('must not load')"}, {"astar": "thief:AStar"})
-    with pytest.warns(UserWarning, match="'astar' of antdrive-thief is left out: antdrive has one of that name"):
+    with pytest.warns(UserWarning, match="'astar' of antdrive-thief is omitted: antdrive already has that name"):
         assert list_planners()["astar"] is PLANNERS["astar"]
     assert load_planner("astar") is PLANNERS["astar"]
 
@@ -217,7 +217,7 @@ def test_a_module_that_is_taken_from_elsewhere_is_refused(tmp_path, monkeypatch)
     (tmp_path / "json.py").write_text(MINE)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(
-        InputError, match=r"json is imported from .*, and there is one in the working directory; give it"
+        InputError, match=r"json is imported from .*, but another one exists in the working directory; rename it"
     ):
         load_planner("json:Mine")
 

@@ -127,8 +127,8 @@ def test_a_negative_cell_is_outside_and_not_the_last_one():
     [
         ({"status": "solved"}, "status: must be"),
         ({"status": PlanStatus.INVALID}, "status: must be"),
-        ({"status": PlanStatus.NO_PATH}, "cells: there are some"),
-        ({"cells": np.empty((0, 2), dtype=np.int32)}, "cells: there are none"),
+        ({"status": PlanStatus.NO_PATH}, "cells: given"),
+        ({"cells": np.empty((0, 2), dtype=np.int32)}, "cells: none"),
         ({"cells": RIGHT.cells.tolist()}, "cells: must be an array of whole numbers"),
         ({"cells": RIGHT.cells.astype(float)}, "cells: must be an array of whole numbers"),
         ({"cells": RIGHT.cells.ravel()}, "cells: must be an array of whole numbers"),
@@ -198,7 +198,7 @@ def test_among_motions_a_plan_without_times_is_refused():
     query, plan = timed()
     assert isinstance(plan, TimedPlan)
     bare = PlanResult(status=PlanStatus.SOLVED, cells=plan.cells, cost=plan.cost)
-    assert "must be a TimedPlan" in check_plan(query, bare)
+    assert "needs a TimedPlan" in check_plan(query, bare)
 
 
 def test_a_path_from_an_end_that_cannot_be_used_is_refused():
@@ -240,9 +240,7 @@ def test_the_place_is_in_the_planners_module_and_not_in_what_it_calls():
 
 @pytest.mark.parametrize("answer", [None, 3, RIGHT.cells, (RIGHT,)], ids=["None", "3", "cells", "tuple"])
 def test_an_answer_that_is_no_plan_result_is_a_planner_error(answer):
-    with pytest.raises(
-        PlannerError, match=r"planner Broken returned .* where a PlanResult is due \(test_validation.py:"
-    ):
+    with pytest.raises(PlannerError, match=r"planner Broken returned .* instead of a PlanResult \(test_validation.py:"):
         request_plan(Broken(answer), QUERY, RNG(0))
 
 

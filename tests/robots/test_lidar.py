@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from antdrive.robots import Lidar, Odometry, load_robot, robot_to_dict
-from antdrive.robots.files import robot_schema
+from antdrive.robots.robot_file import robot_schema
 from antdrive.sim.log.record import DriveRecord, canonical_hash
 
 CATALOG = Path(__file__).parent.parent.parent / "robots" / "catalog"

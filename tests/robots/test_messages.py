@@ -4,10 +4,10 @@ import dataclasses
 import math
 
 from antdrive.robots import Avoidance, Footprint, Noise, Odometry, list_robots, load_robot
-from antdrive.robots.importing.urdf import import_urdf
+from antdrive.robots.importing.urdf_import import import_urdf
 from tests.messages import check_messages, numbered
-from tests.robots import test_files, test_lidar, test_polygons
-from tests.robots.importing import test_urdf
+from tests.robots import test_lidar, test_polygons, test_robot_file
+from tests.robots.importing import test_urdf_import as test_urdf
 
 NOISE = ({"slip": 0.6}, {"pose_xy": -0.1}, {"delay": math.nan}, {"pose_rate": 0.5})
 AVOIDANCE = ({"horizon": 0.0}, {"step": 61.0}, {"min_clearance": math.nan}, {"reversal_margin": -0.1})
@@ -20,8 +20,8 @@ TRUCK = {
 
 def test_wrong_robots_are_refused_in_one_line(tmp_path, jackal, data_regression):
     def robot(old, new):
-        assert old in test_files.GOOD
-        (tmp_path / "mine.yaml").write_text(test_files.GOOD.replace(old, new))
+        assert old in test_robot_file.GOOD
+        (tmp_path / "mine.yaml").write_text(test_robot_file.GOOD.replace(old, new))
         return load_robot(tmp_path / "mine.yaml")
 
     def noisy(wrong):
@@ -29,7 +29,7 @@ def test_wrong_robots_are_refused_in_one_line(tmp_path, jackal, data_regression)
         return load_robot(tmp_path / "noisy.yaml")
 
     def truck():
-        text = test_files.GOOD
+        text = test_robot_file.GOOD
         for old, new in TRUCK.items():
             text = text.replace(old, new)
         (tmp_path / "truck.yaml").write_text(text)
@@ -41,7 +41,7 @@ def test_wrong_robots_are_refused_in_one_line(tmp_path, jackal, data_regression)
 
     calls = {
         "robot files": {
-            " ".join((new or f"no {old}").split()): lambda w=(old, new): robot(*w) for old, new in test_files.WRONG
+            " ".join((new or f"no {old}").split()): lambda w=(old, new): robot(*w) for old, new in test_robot_file.WRONG
         },
         "lidars": {str(wrong): lambda w=wrong: test_lidar.changed(tmp_path, **w) for wrong in test_lidar.WRONG},
         "urdf": numbered(

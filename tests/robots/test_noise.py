@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Noise, NoiseModel, Twist, footprint_clearance, load_robot, overlap_at
-from antdrive.robots.drawing import robot_svg
-from antdrive.robots.placing import gaps
+from antdrive.robots.card import robot_svg
+from antdrive.robots.clearance import footprint_distances
 from antdrive.worlds import Disc, World
 
 DT = 1 / 60
@@ -114,7 +114,7 @@ JACKAL = load_robot("jackal")
 def test_the_least_gap_is_the_footprints_clearance(x, y, yaw, rounding):
     robot = dataclasses.replace(JACKAL, footprint=dataclasses.replace(JACKAL.footprint, rounding=rounding))
     clearance = footprint_clearance(WORLD, robot.footprint, [(x, y, yaw)])
-    np.testing.assert_allclose(gaps(WORLD, robot, [(x, y, yaw)]).min(axis=1), clearance, atol=1e-12)
+    np.testing.assert_allclose(footprint_distances(WORLD, robot, [(x, y, yaw)]).min(axis=1), clearance, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from antdrive.base import FieldError
 from antdrive.robots import Footprint, footprint_clearance, load_robot
+from antdrive.robots.clearance import footprint_distances
 from antdrive.robots.control._kernels_obstacles import turn_clearance
-from antdrive.robots.placing import gaps
 from antdrive.robots.spec import yaw_inertia
 from antdrive.sim.driving._kernels_movers import lower_by_movers
 from antdrive.sim.log.certificate import _polygon_to_points, _polygon_to_walls
@@ -68,7 +68,7 @@ def test_the_distance_to_a_disc_is_that_of_the_outline_for_everyone_who_computes
     seen = (complex(x, y) - complex(*pose[:2])) * np.exp(-1j * pose[2])
     found = {
         "driving": footprint_clearance(world, foot, [pose])[0],
-        "placing": gaps(world, robot, [pose])[0, 0],
+        "placing": footprint_distances(world, robot, [pose])[0, 0],
         "movers": moving[0],
         "contacts": _gap(foot, pose, (x, y), radius),
         "certificate": _polygon_to_points(foot.corners, np.array([seen]))[0] - foot.rounding - radius,
@@ -93,7 +93,7 @@ def test_the_distance_to_the_walls_is_that_of_the_outline(foot, pose):
     np.testing.assert_allclose(walls, expected, atol=1e-4)
     robot = dataclasses.replace(load_robot("warehouse"), footprint=WIDE)
     object.__setattr__(robot, "footprint", foot)
-    left, low, right, high = gaps(world, robot, [pose])[0]
+    left, low, right, high = footprint_distances(world, robot, [pose])[0]
     np.testing.assert_allclose((left, right, low, high), expected, atol=1e-4)
 
 

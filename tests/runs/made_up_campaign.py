@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.run_table import RunTable
 from antdrive.sim.log.metrics import METRICS
 
 

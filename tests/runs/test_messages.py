@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from antdrive import Scenario
-from antdrive.runs.barn import unpacked
+from antdrive.runs.barn_challenge import unpacked
 from antdrive.runs.campaigns import expand, make_campaign, read_results, sweep
 from antdrive.runs.failures.failure import parse_bound
 from antdrive.runs.failures.hunt import find_failures
@@ -15,7 +15,7 @@ from antdrive.runs.margins.loss import Loss
 from antdrive.runs.statistics.comparison import compare_metric, not_worse, pairs_of
 from antdrive.runs.statistics.intervals import wilson
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.runs.statistics.runs import REQUIRED, RunTable, merged
+from antdrive.runs.statistics.run_table import REQUIRED, RunTable, merged
 from antdrive.runs.statistics.success import distributions, performance_profiles
 from antdrive.runs.suites import Baseline, Demands, load_suite, scenario_of
 from antdrive.runs.suites.strategies import worlds

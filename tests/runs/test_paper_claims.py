@@ -44,7 +44,7 @@ from antdrive.runs.papers.paper_runs import (
     solve,
     total_cost,
 )
-from antdrive.runs.papers.reproduce import load_runs, runs_key, save_runs, too_few_seeds
+from antdrive.runs.papers.reproduction import load_runs, runs_key, save_runs, too_few_seeds
 from antdrive.worlds import Grid
 
 ONE, TWO = Arm("m", "one"), Arm("m", "two")

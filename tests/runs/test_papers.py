@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from antdrive.base import InputError
-from antdrive.runs.papers import maps, reproduce
+from antdrive.runs.papers import maps, reproduction
 from antdrive.runs.papers.claims import CLAIMS, Decision
 from antdrive.runs.papers.experiments import PAPERS
-from antdrive.runs.papers.reproduce import reproduce as measure_again
+from antdrive.runs.papers.reproduction import reproduce as measure_again
 from antdrive.views import papers as pictures
 from tools.paper_tables import claims_table, counts_table, missing, replaced
 from tools.shared_data import data_folder
@@ -67,7 +67,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
     monkeypatch.setattr(pictures, "PC", (0.25,))
     monkeypatch.setattr(pictures, "PM", (0.1, 0.2))
     few = [e for e in PAPERS["han2007"]() if e.printed is not None and e.options.get("ants", 0) < 500]
-    monkeypatch.setattr(reproduce, "PAPERS", {"han2007": lambda: few})
+    monkeypatch.setattr(reproduction, "PAPERS", {"han2007": lambda: few})
     seen = []
     found = measure_again(["han2007"], tmp_path, seeds=2, progress=seen.append)
     rows, files = (

@@ -66,7 +66,7 @@ def test_a_run_that_finds_that_nothing_can_be_written_ends_the_campaign():
 
 
 def test_somebody_else_has_a_turn_while_a_run_takes_long(monkeypatch):
-    monkeypatch.setattr(pool, "LOOK", 0.05)
+    monkeypatch.setattr(pool, "POLL_INTERVAL", 0.05)
     turns = []
     rows = made(Deadly(seconds=0.5), 1, jobs(seeds=1), tick=lambda: turns.append(1))
     assert len(rows) == 1

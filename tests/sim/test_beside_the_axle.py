@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from antdrive.robots import Footprint, list_robots, load_robot
-from antdrive.robots.importing.urdf import import_urdf
+from antdrive.robots.importing.urdf_import import import_urdf
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.log.certificate import _between_steps, _clearances
 from antdrive.views.film.meshes import robot_parts
@@ -148,7 +148,7 @@ def barn_0(tmp_path_factory):
     ],
 )
 def test_an_imported_robot_drives_a_barn_world_certified(name, barn_0):
-    robot = import_urdf(URDF / name).robot
+    robot = import_urdf(URDF / name).spec
     done = run(Scenario.of(barn_0, "astar", robot))
     assert done.succeeded, (done.outcome, done.reason, done.certificate)
 
@@ -156,7 +156,7 @@ def test_an_imported_robot_drives_a_barn_world_certified(name, barn_0):
 @needs_barn
 def test_a_robot_that_is_too_large_for_a_barn_world_says_where_and_what_it_needs(barn_0):
     pytest.importorskip("xacrodoc")
-    robot = import_urdf(URDF / "warehouse.urdf.xacro").robot
+    robot = import_urdf(URDF / "warehouse.urdf.xacro").spec
     done = run(Scenario.of(barn_0, "astar", robot))
     assert done.outcome is Outcome.NO_PATH
     assert (

@@ -85,7 +85,7 @@ def test_a_line_that_leads_elsewhere_than_its_cells_is_a_wrong_plan():
     """The certificate refuses it as well; it is said before the robot drives."""
     task = Task(ROOM, (0.5, 2.0, 0.0), (5.5, 2.0), cell=0.2)
     assert with_line(task, (3.0, 2.4)) == ""
-    assert with_line(task, (0.5, 3.5), (5.5, 3.5)).startswith("waypoints: they are 8 m long, but the cells beside them")
+    assert with_line(task, (0.5, 3.5), (5.5, 3.5)).startswith("waypoints: 8 m long, but their cells")
 
 
 def test_a_plan_with_loops_is_driven_and_certified_but_not_with_the_cells_of_a_short_cut():

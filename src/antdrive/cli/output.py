@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, file_lines, this_command
-from antdrive.runs.folder import free_folder, opened
+from antdrive.runs.results_folder import free_folder, opened
 from antdrive.views.run_folder import check_folder
 
 if TYPE_CHECKING:

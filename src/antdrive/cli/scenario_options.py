@@ -56,7 +56,7 @@ class Ends:
             raise InputError(f"--frame {self.frame}: unknown; choose from {', '.join(FRAMES)}")
         if self.task is None and self.start is None and self.goal is None:
             return world
-        from antdrive.base.plane import out_of_map
+        from antdrive.base.plane import map_to_world
         from antdrive.worlds import load_task
 
         ends = {"start": numbers("--start", self.start, 3, "X,Y,YAW"), "goal": numbers("--goal", self.goal, 2, "X,Y")}
@@ -64,8 +64,8 @@ class Ends:
         try:
             task = load_task(world, self.task)
             if self.frame == MAP_FRAME:
-                given = {key: tuple(out_of_map(task.frame, [value])[0].tolist()) for key, value in given.items()}
-            return dataclasses.replace(task, **given)
+                given = {key: tuple(map_to_world(found.frame, [value])[0].tolist()) for key, value in given.items()}
+            return dataclasses.replace(found, **given)
         except FieldError as error:
             frame = " (in the world frame)" if self.frame == MAP_FRAME and any(task.frame) else ""
             raise InputError(f"--{error.key}: {error.problem}{frame}") from None
@@ -140,7 +140,7 @@ def with_chosen_margin(scenario: "Scenario") -> "Scenario":
     from antdrive.runs.margins.choice import DRIVES, known_margin
     from antdrive.runs.margins.choice import with_chosen_margin as choose
 
-    conditions = scenario.loss_conditions
+    conditions = scenario.loss_factors
     if known_margin(conditions) is not None:
         return choose(scenario)
     compile_once()

@@ -2,5 +2,5 @@
 
 import lazy_loader
 
-# __init__.pyi lists what this package offers, with types; each name is imported when it is first used.
+# __init__.pyi lists the public names with types; each is imported on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""The loop that all iterative planners share: budget, history, interruption, progress."""
+"""Common loop of iterative planners: budget, history, interruption, progress."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from antdrive.planners.plan import (
     path_cost,
 )
 
-WARMUP_ITERATIONS = 2  # iterations in which kernels are loaded: the second evaporates and reuses what the first left
+WARMUP_ITERATIONS = 2  # iterations that call every kernel: the second evaporates and reuses results of the first
 
 
 class Iteration(NamedTuple):
@@ -41,8 +41,8 @@ class Iteration(NamedTuple):
         cells: the best path so far as (row, col) of each cell (N, 2), empty while there is none
         best: length of the best path so far [m]
         iteration_best: length of this iteration's best path [m]
-        iteration_mean: mean length over those of this iteration that arrived [m]
-        arrived: how many ants or chromosomes of this iteration arrived
+        iteration_mean: mean length of this iteration's complete paths [m]
+        arrived: number of ants or chromosomes of this iteration that reached the goal
         work: the work of this iteration, in the planner's `work_unit`
         waypoints: the best path so far as a polyline of fractional (row, col) (M, 2), as in `PlanResult`
         field: the planner's field (R, C), as in `PlanResult`
@@ -59,11 +59,11 @@ class Iteration(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a planner has come.
+    """Progress of a planner.
 
     Attributes:
-        done: iterations done
-        total: iterations to do
+        done: completed iterations
+        total: maximum number of iterations
         best: length of the best path so far [m], infinite while there is none
     """
 
@@ -77,10 +77,10 @@ _progress_callback: ContextVar[Callable[[Progress], None] | None] = ContextVar("
 
 @contextmanager
 def on_progress(callback: Callable[[Progress], None]) -> Iterator[None]:
-    """Within this block, planners call `callback` after every iteration.
+    """Make planners call `callback` after every iteration within this block.
 
     Args:
-        callback: called with the progress; what it raises ends the planning
+        callback: receives the progress; an exception that it raises ends planning
     """
     token = _progress_callback.set(callback)
     try:
@@ -94,9 +94,9 @@ _keeping: ContextVar[bool] = ContextVar("_keeping", default=False)
 
 @contextmanager
 def keep_best() -> Iterator[None]:
-    """Within this block, Ctrl-C makes a planner return its best path so far, with the status `STOPPED`.
+    """Return the best path so far on Ctrl-C within this block, with the status `STOPPED`.
 
-    Outside such a block `KeyboardInterrupt` is raised as usual, so that it ends a series of plans.
+    Outside the block, `KeyboardInterrupt` is raised as usual and ends a series of plans.
     """
     token = _keeping.set(True)
     try:
@@ -109,12 +109,12 @@ def keep_best() -> Iterator[None]:
 class IterativePlanner(GridPlanner):
     """A planner that improves its answer in iterations.
 
-    It ends after `iterations` or at the `time_budget`, whichever comes first. A plan with a time budget
-    cannot be repeated: a faster machine gets further. Ctrl-C within `keep_best` returns the best path so far
-    as `STOPPED`.
+    It ends after `iterations` or at the `time_budget`, whichever comes first. A time budget makes plans
+    irreproducible, as faster machines complete more iterations. Ctrl-C within `keep_best` returns the best
+    path so far as `STOPPED`.
 
     Attributes:
-        iterations: how many iterations are made at most
+        iterations: maximum number of iterations
         time_budget: planning time after which no further iteration begins [s]; None for no limit
     """
 
@@ -128,34 +128,34 @@ class IterativePlanner(GridPlanner):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs."""
+        """Capabilities and requirements of this planner."""
         return Capabilities(iterative=True)
 
     def for_warmup(self) -> IterativePlanner:
-        """This planner with few iterations, which call the same kernels."""
+        """Return this planner with few iterations that call the same kernels."""
         return dataclasses.replace(self, iterations=min(self.iterations, WARMUP_ITERATIONS), time_budget=None)
 
     @abc.abstractmethod
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
-        """Improve the answer until there is nothing more to gain, or without end.
+        """Yield improving plans, until no improvement is possible or without end.
 
-        It is only called for queries whose goal can be reached from the start.
+        Only called for queries whose goal is reachable from the start.
         """
 
     @property
     @abc.abstractmethod
     def work_unit(self) -> str:
-        """What `work` counts."""
+        """The unit of `work`."""
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return self.answer(query, self.iterate(query, rng))
 
     def answer(self, query: Query, states: Iterator[Iteration]) -> PlanResult:
-        """The answer after as many iterations as the planner's options allow.
+        """Return the plan after as many iterations as the options allow.
 
         Args:
             query: the query, with both ends free
-            states: the iterations, as `iterate` yields them
+            states: the iterations yielded by `iterate`
         """
         if not reachable(query):
             return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work_unit=self.work_unit)
@@ -218,5 +218,5 @@ class IterativePlanner(GridPlanner):
 
 
 def as_iterative(planner: Planner) -> IterativePlanner | None:
-    """The planner itself if it declares that it plans in iterations, else None."""
+    """Return the planner if it declares itself iterative, else None."""
     return cast(IterativePlanner, planner) if capabilities_of(planner).iterative else None

@@ -1,4 +1,4 @@
-"""What every planner is asked, what it answers, and what it declares about itself."""
+"""Planner interface: queries, plans and declared capabilities."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from antdrive.planners.warmup import kernels_loaded
 from antdrive.worlds import MoverMotion, Task
 from antdrive.worlds.route import cells_beside
 
-if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
+if TYPE_CHECKING:  # importing a grid loads the compiler
     from antdrive.worlds import Grid
 
 #: A cell of a grid: row along +y, column along +x.
@@ -28,7 +28,7 @@ Cell: TypeAlias = tuple[int, int]
 #: Cells of a grid, (N, 2): row and column of each.
 Cells: TypeAlias = npt.NDArray[np.int32]
 
-END_BATCH = 16  # lines from an end to free cells that are looked at together, the shortest first
+END_BATCH = 16  # candidate lines from an end to free cells checked per batch, shortest first
 
 
 class PlanStatus(enum.Enum):
@@ -37,25 +37,24 @@ class PlanStatus(enum.Enum):
     SOLVED = "found a path"
     NO_PATH = "no path on this grid"
     STOPPED = "stopped early"
-    INVALID = "gave a wrong plan"
+    INVALID = "returned an invalid plan"
 
 
 @dataclass(frozen=True)
 class Query:
-    """What a planner is asked: a grid with a start cell and a goal cell.
+    """A planning problem: a grid with a start cell and a goal cell.
 
     Attributes:
         grid: the grid to plan on
         start: the start cell (row, col)
         goal: the goal cell (row, col)
-        task: the task whose world the grid was made from, for planners that are not bound to cells
-        unreachable: why the robot cannot get from the start to a free cell, or from one to the goal; empty if it can
+        task: the task whose world was rasterised, for any-angle planners
+        unreachable: why no free cell connects to the start or the goal; empty if both connect
         motions: the motions of the movers, for planners in space and time
-        start_time: when the robot sets out, on the clock of the motions [s]
+        start_time: departure time on the clock of the motions [s]
 
     Raises:
-        ValueError: a cell lies outside the grid. A blocked cell is not an error: planners answer it with
-            `NO_PATH`.
+        ValueError: a cell lies outside the grid. For a blocked cell, planners return `NO_PATH`.
     """
 
     grid: Grid
@@ -74,16 +73,16 @@ class Query:
 
     @classmethod
     def between(cls, grid: Grid, task: Task) -> Query:
-        """The query for a task: each end becomes the nearest free cell that the robot reaches on a straight line.
+        """Build the query for a task: each end becomes the nearest free cell reachable on a straight line.
 
-        If an end has no such cell, `unreachable` says so and planners answer `NO_PATH`.
+        If an end has no such cell, `unreachable` says so and planners return `NO_PATH`.
         """
         from antdrive.worlds.geometry import point_clearance  # imports the compiler
 
         own, room = point_clearance(task.world, [task.start[:2], task.goal]).tolist()
         start, can_leave = _entrance(grid, task, task.start[:2], math.inf, own)
-        # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal
-        # tolerance. It stops a little short of that cell's centre, or beside it, hence the allowance.
+        # A goal closer to an obstacle than the inflation: the robot stops at a free cell within the goal tolerance.
+        # The allowance covers the distance between the stopping point and the cell's centre.
         within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
         goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within, room)
         ends = {"the start": can_leave, "the goal": can_arrive}
@@ -94,7 +93,7 @@ class Query:
 
     @property
     def blocked_end(self) -> str | None:
-        """A sentence naming the end that cannot be used, or None if both can."""
+        """A sentence naming the unusable end; None if both are usable."""
         if self.unreachable:
             return self.unreachable
         for key, cell in (("start", self.start), ("goal", self.goal)):
@@ -104,14 +103,14 @@ class Query:
 
 
 def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -> tuple[Cell, bool]:
-    """The nearest free cell within `within` [m] whose centre a clear straight line joins to the point, and True.
+    """Return the nearest free cell within `within` [m] that a clear straight line joins to the point, and True.
 
-    If there is none, the cell that holds the point, and False. `own` is the point's clearance [m].
+    If there is none, return the cell of the point, and False. `own` is the point's clearance [m].
     """
     from antdrive.worlds.geometry import segment_clearance
 
     row, col = grid.cell_at(*point)
-    if grid.free[row, col]:  # no centre is nearer than that of the cell around the point
+    if grid.free[row, col]:  # the point's own cell has the nearest centre
         centre = grid.xy([(row, col)])
         off = np.abs(centre[0] - point)
         if off.max() < 0.5 * grid.cell - 1e-9 and math.hypot(*off) <= within:
@@ -126,12 +125,11 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -
     centres = grid.xy(near)
     distance = np.hypot(*(centres - point).T)
     ends = np.broadcast_to(np.asarray(point, dtype=np.float64), centres.shape)
-    # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the
-    # point.
+    # If the point is closer to a disc than the inflation, the line must not come closer than the point.
     needed = min(grid.inflate, own)
     order = np.argsort(distance, kind="stable")
     order = order[distance[order] <= within]
-    first, last = 0, 1  # most ends can be joined to the nearest one
+    first, last = 0, 1  # the nearest cell usually works
     while first < len(order):
         some = order[first:last]
         clear = segment_clearance(task.world, centres[some], ends[some]) >= needed - 1e-9
@@ -144,13 +142,13 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """What an iterative planner achieved in each of its I iterations; empty for a search. Infinite means no path.
+    """Results of each of the I iterations of an iterative planner; empty for a search. Infinite means no path.
 
     Attributes:
         best: length of the best path so far (I,) [m]
         iteration_best: length of the iteration's best path (I,) [m]
-        iteration_mean: mean length of the iteration's paths that arrived (I,) [m]
-        arrived: how many ants or chromosomes arrived in the iteration (I,)
+        iteration_mean: mean length of the iteration's complete paths (I,) [m]
+        arrived: number of ants or chromosomes that reached the goal (I,)
     """
 
     best: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
@@ -164,25 +162,24 @@ class History:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlanResult:
-    """A planner's answer, in cells.
+    """A plan, in cells.
 
-    `cells` runs along allowed moves of the grid from start to goal. A planner that was interrupted returns
-    its best path so far, if it has one, with the status `STOPPED`; such a path is drawn, not driven. A
-    planner that is not bound to the grid's eight directions also returns `waypoints`.
+    `cells` runs along allowed moves of the grid from start to goal. An interrupted planner returns its best
+    path so far, if any, with the status `STOPPED`; such a path is drawn, not driven. An any-angle planner also
+    returns `waypoints`.
 
     Attributes:
         status: how planning ended
         cells: the path as (row, col) of each cell (N, 2), empty without a path
         cost: length of `cells` [m], infinite without a path
-        waypoints: the polyline to drive as fractional (row, col) (M, 2); None if that is `cells`
-        length: exact length of the curve that `waypoints` approximates, arcs included [m]; None if that is
+        waypoints: the polyline to drive as fractional (row, col) (M, 2); None to drive `cells`
+        length: exact length of the curve that `waypoints` approximates, arcs included [m]; None if equal to
             `cost`
         reason: why there is no path, or a remark on the plan; may be empty
         work: the planner's effort, such as the number of cells expanded, in units of `work_unit`
-        work_unit: what `work` counts
-        history: what each iteration achieved
-        field: the planner's field, such as pheromone or potential, at the end (R, C), for plots; None
-            without one
+        work_unit: the unit of `work`
+        history: results of each iteration
+        field: the planner's final field for plots, such as pheromone or potential (R, C); None without one
         options: the planner's options by name
         wall_s: planning time [s]
     """
@@ -202,7 +199,7 @@ class PlanResult:
 
     @property
     def solved(self) -> bool:
-        """Whether there is a path to be driven."""
+        """Whether there is a path to drive."""
         return self.status is PlanStatus.SOLVED
 
     @property
@@ -216,7 +213,7 @@ class PlanResult:
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import card, curve_svg, path_svg
+        from antdrive.worlds.svg import card, curve_svg, path_svg
 
         picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
         facts = {
@@ -229,13 +226,13 @@ class PlanResult:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TimedPlan(PlanResult):
-    """A plan with times: each cell is reached at `arrive` and left at `leave`; the robot waits in between.
+    """A plan with times: the robot reaches each cell at `arrive`, waits, and leaves it at `leave`.
 
-    From one cell to the next it drives straight at the plan's speed.
+    Between cells it drives straight at the plan's speed.
 
     Attributes:
-        arrive: when each cell is reached (N,) [s]
-        leave: when each cell is left (N,) [s]
+        arrive: arrival time at each cell (N,) [s]
+        leave: departure time from each cell (N,) [s]
         xy: centres of the cells (N, 2) [m]
     """
 
@@ -245,16 +242,16 @@ class TimedPlan(PlanResult):
 
     @property
     def duration(self) -> float:
-        """Time from the departure to the arrival [s]; infinite without a path."""
+        """Time from departure to arrival [s]; infinite without a path."""
         return float(self.arrive[-1] - self.arrive[0]) if len(self.arrive) else math.inf
 
     @property
     def waited(self) -> float:
-        """The total time that the robot waits on its way [s]."""
+        """Total waiting time [s]."""
         return float((self.leave - self.arrive).sum())
 
     def at(self, t: npt.ArrayLike) -> Floats:
-        """Where the robot is (T, 2) [m] at times `t` (T,) [s]; before the plan begins and after it ends, at its ends.
+        """Return the robot's positions (T, 2) [m] at times `t` (T,) [s], clamped to the ends of the plan.
 
         Raises:
             ValueError: the plan has no path.
@@ -266,11 +263,11 @@ class TimedPlan(PlanResult):
         return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
 
     def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
-        """The least distance between the robot's centre and a mover's surface [m], sampled every `step` seconds.
+        """Return the minimum distance between the robot's centre and a mover's surface [m].
 
         Args:
             movers: the motions of the movers
-            step: time between two samples [s]
+            step: sampling period [s]
         """
         ticks = max(1, math.ceil(self.duration / step))
         t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
@@ -280,17 +277,15 @@ class TimedPlan(PlanResult):
 
 @dataclass(frozen=True, kw_only=True)
 class Capabilities:
-    """What a planner can do and what it needs.
+    """Capabilities and requirements of a planner.
 
     Attributes:
-        complete: it finds a path whenever there is one
-        iterative: it improves its answer in iterations, as an `IterativePlanner` does
-        needs_world: it plans among the world's discs, so the query must have a task
-        needs_motions: it plans in space and time among the query's motions, and solves it with a `TimedPlan`
-        own_replanner: it has a method `replanner(query, rng)`; planners without one plan anew after every
-            change
-        cell_by_cell: it has a method `agent(query, rng)` for driving; for planners without one, the robot
-            follows the route
+        complete: finds a path whenever there is one
+        iterative: improves its plan in iterations, as an `IterativePlanner` does
+        needs_world: plans among the world's discs, so the query must have a task
+        needs_motions: plans in space and time among the query's motions, and returns a `TimedPlan`
+        own_replanner: has a method `replanner(query, rng)`; other planners plan from scratch after every change
+        cell_by_cell: has a method `agent(query, rng)` for driving; for other planners the robot follows the route
     """
 
     complete: bool = True
@@ -302,11 +297,11 @@ class Capabilities:
 
 
 class PlannerError(RuntimeError):
-    """A planner raised something, or returned something that is not what was asked for; the message is one line.
+    """An exception raised by a planner, or a return value of the wrong type; the message is one line.
 
     Attributes:
         planner: the planner's name
-        problem: what it did
+        problem: the exception or the value, and its place
     """
 
     def __init__(self, planner: str, problem: str) -> None:
@@ -314,15 +309,15 @@ class PlannerError(RuntimeError):
         self.planner, self.problem = planner, problem
 
     def __reduce__(self) -> tuple[type[PlannerError], tuple[str, str]]:
-        """Another process makes it anew from the two parts."""
+        """Return the parts from which another process rebuilds the error."""
         return type(self), (self.planner, self.problem)
 
 
 @runtime_checkable
 class Planner(Protocol):
-    """Anything that answers a query. All randomness comes from `rng`: the same seed gives the same plan.
+    """A path planner. All randomness comes from `rng`: the same seed gives the same plan.
 
-    A planner that departs from the defaults of `Capabilities` declares so in an attribute `capabilities`.
+    An attribute `capabilities` declares deviations from the defaults of `Capabilities`.
     """
 
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -331,14 +326,14 @@ class Planner(Protocol):
 
 
 def capabilities_of(planner: Planner) -> Capabilities:
-    """What a planner declares; the defaults if it declares nothing, as other people's planners may.
+    """Return the declared capabilities of a planner; the defaults if it declares none.
 
     Raises:
-        PlannerError: what it declares are no `Capabilities`.
+        PlannerError: its attribute `capabilities` has another type.
     """
     declared: Any = getattr(planner, "capabilities", Capabilities())
     if not isinstance(declared, Capabilities):
-        raise PlannerError(type(planner).__name__, f"declares {declared!r:.40} where Capabilities are due")
+        raise PlannerError(type(planner).__name__, f"declares {declared!r:.40} instead of Capabilities")
     return declared
 
 
@@ -346,12 +341,12 @@ def capabilities_of(planner: Planner) -> Capabilities:
 class GridPlanner(abc.ABC):
     """A planner whose fields are its options.
 
-    It checks both ends and records the planning time, with the kernels loaded, and the options.
+    It checks both ends, warms up the kernels, and records the planning time and the options.
     """
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs."""
+        """Capabilities and requirements of this planner."""
         return Capabilities()
 
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -364,7 +359,7 @@ class GridPlanner(abc.ABC):
         return dataclasses.replace(result, options=options, wall_s=spent)
 
     def for_warmup(self) -> GridPlanner:
-        """This planner with as little work as calls the same kernels, which are loaded so before the clock starts."""
+        """Return this planner with minimal work that calls the same kernels, to load them before timing."""
         return self
 
     def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -377,7 +372,7 @@ class GridPlanner(abc.ABC):
 
 
 def path_cost(cells: npt.ArrayLike, cell: float) -> float:
-    """The length [m] of a path of cells (N, 2): a step costs 1 or sqrt(2) cell sides.
+    """Return the length [m] of a path of cells (N, 2): a step costs 1 or sqrt(2) cell sides.
 
     Args:
         cells: (row, col) of each cell of the path

@@ -1,4 +1,4 @@
-"""All planners by name, with their options checked. Planners of other packages join through entry points."""
+"""Registry of planners and their options. Other packages add planners through entry points."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from antdrive.planners.graph.sipp import SafeIntervals
 from antdrive.planners.plan import Planner
 from antdrive.planners.user_code import is_user_code, module_hash, user_code_version, user_object
 
-#: The planners of this package.
+#: The built-in planners.
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
     {
         "dijkstra": Dijkstra(),
@@ -42,20 +42,19 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
     }
 )
 
-#: The entry-point group through which other packages add a planner: an object with `plan`, or a class of such objects.
+#: The entry-point group for planners of other packages: an object with a method `plan`, or its class.
 GROUP = "antdrive.planners"
 
 
 def load_planner(name: str, /, **options: Any) -> Planner:
-    """The planner of that name, with options set.
+    """Return the named planner with options set.
 
     Args:
-        name: one of `list_planners()`, or FILE.py:CLASS or MODULE:CLASS for people's own code
+        name: one of `list_planners()`, or FILE.py:CLASS or MODULE:CLASS for user code
         options: the planner's options by name; values may be text, as from a command line
 
     Raises:
-        InputError: there is no such planner or option, or the option does not take the value; lists what is
-            valid.
+        InputError: the planner or option is unknown, or the value is invalid; lists the valid choices.
     """
     if is_user_code(name):
         return make_planner(user_object(name), name, **options)
@@ -69,18 +68,18 @@ def load_planner(name: str, /, **options: Any) -> Planner:
 
 
 def make_planner(made: Any, name: str, /, **options: Any) -> Planner:
-    """The planner that people's own code defines, with options set."""
+    """Return the planner defined in user code, with options set."""
     return _with_options(name, _instance(made, f"planner {name!r}"), options)
 
 
 def planner_version(name: str) -> str:
-    """What the code of a planner is: its distribution with version, and the hash of its file unless it is antdrive's.
+    """Return a planner's distribution and version, with the hash of its file for third-party planners.
 
     Args:
-        name: what `load_planner` takes
+        name: a name for `load_planner`
 
     Raises:
-        InputError: there is no such planner.
+        InputError: the planner is unknown.
     """
     if is_user_code(name):
         user_object(name)
@@ -94,9 +93,9 @@ def planner_version(name: str) -> str:
 
 
 def list_planners() -> Mapping[str, Planner]:
-    """All planners by name, those of other packages last.
+    """Return all planners by name, those of other packages last.
 
-    A planner that cannot be loaded is left out with a warning.
+    A planner that fails to load is omitted with a warning.
     """
     planners = dict(PLANNERS)
     for name, entry in _plugins().items():
@@ -108,7 +107,7 @@ def list_planners() -> Mapping[str, Planner]:
 
 
 def describe(planner: Planner) -> str:
-    """One line on what a planner does, and which of its options differ from the defaults of its class."""
+    """Return a one-line summary of a planner, with the options that differ from its class defaults."""
     summary = (type(planner).__doc__ or "No description.").strip().splitlines()[0]
     changed = [
         f"{f.name} {getattr(planner, f.name)}"
@@ -119,7 +118,7 @@ def describe(planner: Planner) -> str:
 
 
 def parse(key: str, kind: Any, value: Any) -> Any:
-    """The value of an option of a given type."""
+    """Convert the value of an option to its type."""
     origin, members = typing.get_origin(kind), typing.get_args(kind)
     if origin in (Union, types.UnionType) and type(None) in members:
         if value is None or (isinstance(value, str) and value.strip().lower() in ("none", "null", "")):
@@ -195,7 +194,7 @@ def _with_options(name: str, planner: Planner, options: Mapping[str, Any]) -> Pl
         return typing.cast(Planner, dataclasses.replace(typing.cast(Any, planner), **values))
     except FieldError as error:
         raise InputError(str(error.under("planner"))) from None
-    except ValueError as error:  # of another package's planner
+    except ValueError as error:  # from a third-party planner
         raise InputError(f"planner: {error}") from None
 
 
@@ -207,7 +206,7 @@ def _fields(planner: Planner) -> tuple[dataclasses.Field[Any], ...]:
 def _unknown(name: str, choices: Iterable[str], what: str = "planner") -> str:
     choices = sorted(choices)
     if not choices:
-        return f"no {what} is called {name!r}; there are none"
+        return f"no {what} is called {name!r}; it has none"
     close = difflib.get_close_matches(name, choices, n=3)
     hint = f"did you mean {' or '.join(close)}? " if close else ""
     return f"no {what} is called {name!r}; {hint}choose from {', '.join(choices)}"
@@ -219,7 +218,7 @@ def _plugins() -> dict[str, importlib.metadata.EntryPoint]:
         if entry.name in PLANNERS or (entry.name in entries and entries[entry.name].value != entry.value):
             taken = "antdrive" if entry.name in PLANNERS else _maker(entries[entry.name])
             warnings.warn(
-                f"planner {entry.name!r} of {_maker(entry)} is left out: {taken} has one of that name", stacklevel=3
+                f"planner {entry.name!r} of {_maker(entry)} is omitted: {taken} already has that name", stacklevel=3
             )
             continue
         entries.setdefault(entry.name, entry)
@@ -230,16 +229,16 @@ def _load(entry: importlib.metadata.EntryPoint) -> Planner:
     who = f"planner {entry.name!r} of {_maker(entry)}"
     try:
         made = entry.load()
-    except Exception as error:  # another package's import may raise anything
+    except Exception as error:  # a third-party import may raise anything
         raise InputError(f"{who} cannot be loaded ({entry.value}): {type(error).__name__}: {error}") from error
     return _instance(made, who, f" ({entry.value})")
 
 
 def _instance(made: Any, who: str, source: str = "") -> Planner:
-    """What other people's code defines, as a planner; `who` and `source` are for messages."""
+    """Return a third-party object or class as a planner; `who` and `source` are for messages."""
     try:
         planner = made() if isinstance(made, type) else made
-    except Exception as error:  # another package's constructor may raise anything
+    except Exception as error:  # a third-party constructor may raise anything
         raise InputError(f"{who} cannot be loaded{source}: {type(error).__name__}: {error}") from error
     if not isinstance(planner, Planner):
         raise InputError(f"{who} is not a planner{source}: it has no method `plan(query, rng)`")

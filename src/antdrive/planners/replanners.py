@@ -1,4 +1,4 @@
-"""Replanners for every planner, and agents: robots that decide cell by cell while cells are blocked and cleared around them."""
+"""Replanners for every planner, and agents that decide cell by cell on a changing grid."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from antdrive.planners.validation import planner_errors, request_plan
 
 
 def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> Replanner:
-    """The replanner of a planner; `rng` serves all its answers.
+    """Return the replanner of a planner; all its plans draw from `rng`.
 
-    Replanners know which cells are blocked but not by what. So they answer in cells, along allowed moves,
-    even for planners that draw lines of their own, and there is none for planners that need discs or motions.
+    A replanner knows which cells are blocked, not the obstacles. It plans in cells along allowed moves, even for
+    any-angle planners. Planners that need discs or motions have none.
 
     Raises:
-        ValueError: the planner does not plan on cells alone.
-        PlannerError: the planner raised something.
+        ValueError: the planner needs more than cells.
+        PlannerError: the planner raised an exception.
     """
     can = capabilities_of(planner)
     for needed, what in ((can.needs_world, "the world's discs"), (can.needs_motions, "known motions")):
@@ -40,7 +40,7 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
 
 
 class ReplanFromScratch(CachedReplanner):
-    """A replanner that asks its planner anew after every change."""
+    """A replanner that plans from scratch after every change."""
 
     def __init__(self, planner: Planner, query: Query, rng: np.random.Generator) -> None:
         super().__init__(query)
@@ -52,17 +52,17 @@ class ReplanFromScratch(CachedReplanner):
 
 @dataclass
 class AgentStats:
-    """What an agent has done so far.
+    """Statistics of an agent.
 
     Attributes:
         steps: moves to another cell
         waits: decisions to wait
         decisions: steps and waits
-        propagated: cells that were given pheromone, or that a search expanded
-        cycles: circles noticed and left
+        propagated: cells that received pheromone, or that a search expanded
+        cycles: cycles detected and broken
         length: length of the path so far [m]
         cost: the "total cost" of hasan's table: the cost of the remaining path in cells, summed over all
-            cells visited, the first one included. 65 steps straight ahead give 65 + 64 + ... + 1.
+            visited cells, the first included. 65 straight steps give 65 + 64 + ... + 1.
     """
 
     steps: int = 0
@@ -76,7 +76,7 @@ class AgentStats:
 
 @runtime_checkable
 class OnlineAgent(Protocol):
-    """A robot on a grid that is asked for one step after the other."""
+    """A robot on a grid that decides step by step."""
 
     stats: AgentStats
 
@@ -92,7 +92,7 @@ class OnlineAgent(Protocol):
 
     @property
     def note(self) -> str:
-        """A sentence on what the agent had to change to get on; empty if nothing."""
+        """A remark on what the agent changed to make progress; may be empty."""
         ...
 
     def move(self, cell: Cell) -> None:
@@ -104,29 +104,29 @@ class OnlineAgent(Protocol):
         ...
 
     def step(self, blocked: npt.ArrayLike) -> Cell | None:
-        """The cell to go to, an allowed move away, or None to wait.
+        """Return the next cell, an allowed move away, or None to wait.
 
         Args:
-            blocked: cells (N, 2) that are blocked now, besides those of the grid. Cells that the grid blocks
-                and cells outside it may be among them; the robot's own cell has no effect.
+            blocked: additional blocked cells (N, 2). Cells blocked in the grid, cells outside it and the robot's
+                own cell have no effect.
         """
         ...
 
 
 class CellByCellPlanner(Planner, Protocol):
-    """A planner that makes an agent of its own, as it declares by `Capabilities.cell_by_cell`."""
+    """A planner with its own agent, declared by `Capabilities.cell_by_cell`."""
 
     def agent(self, query: Query, rng: np.random.Generator) -> OnlineAgent:
-        """An agent at the query's start; `rng` serves all its decisions."""
+        """Return an agent at the query's start; all its decisions draw from `rng`."""
         ...
 
 
 def agent_for(planner: Planner, query: Query, rng: np.random.Generator) -> OnlineAgent:
-    """The agent that drives by a planner: the planner's own if it has one, else one that follows replanned paths.
+    """Return the planner's own agent if it has one, else an agent that follows replanned paths.
 
     Raises:
-        ValueError: the planner does not plan on cells alone.
-        PlannerError: the planner raised something.
+        ValueError: the planner needs more than cells.
+        PlannerError: the planner raised an exception.
     """
     if capabilities_of(planner).cell_by_cell:
         with planner_errors(planner):
@@ -135,7 +135,7 @@ def agent_for(planner: Planner, query: Query, rng: np.random.Generator) -> Onlin
 
 
 class SteppingAgent(abc.ABC):
-    """The part that all agents share: the robot's cell, and the statistics of its steps."""
+    """Base class of agents: the robot's cell and the statistics of its steps."""
 
     def __init__(self, query: Query) -> None:
         self.stats = AgentStats()
@@ -154,7 +154,7 @@ class SteppingAgent(abc.ABC):
 
     @property
     def note(self) -> str:
-        """A sentence on what the agent had to change to get on; empty if nothing."""
+        """A remark on what the agent changed to make progress; may be empty."""
         return ""
 
     def move(self, cell: Cell) -> None:
@@ -163,7 +163,7 @@ class SteppingAgent(abc.ABC):
         self._cell = self._query.start
 
     def step(self, blocked: npt.ArrayLike) -> Cell | None:
-        """The cell to go to, an allowed move away, or None to wait."""
+        """Return the next cell, an allowed move away, or None to wait."""
         if self.arrived:
             return None
         cells = np.asarray(blocked, dtype=np.int64).reshape(-1, 2)
@@ -180,7 +180,7 @@ class SteppingAgent(abc.ABC):
 
     @abc.abstractmethod
     def _decide(self, blocked: npt.NDArray[np.int64]) -> Cell | None:
-        """The next cell, or None to wait; the blocked cells (N, 2) lie on the grid."""
+        """Return the next cell, or None to wait; the blocked cells (N, 2) lie on the grid."""
 
 
 class ReplanningAgent(SteppingAgent):

@@ -1,4 +1,4 @@
-"""Planners in people's own files and modules: FILE.py:CLASS, or MODULE:CLASS."""
+"""Planners in users' files and modules: FILE.py:CLASS, or MODULE:CLASS."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ from typing import Any
 from antdrive.base.errors import InputError, Terminated, input_error
 
 DIGITS = 8  # hexadecimal digits of a file's hash
-FROM_FILE = "_antdrive_user_"  # what the names of modules begin with that were loaded from a file
+FROM_FILE = "_antdrive_user_"  # name prefix of modules loaded from files
 
-#: The folder that each module was imported for and lies in, by the module's name.
+#: The folder of each user module, by the module's name.
 _OWNERS: dict[str, Path] = {}
-#: Modules whose names another folder's modules have at present.
+#: Modules set aside while a module of the same name from another folder is in use.
 _ASIDE: dict[Path, dict[str, ModuleType]] = {}
 
 
 def is_user_code(name: str) -> bool:
-    """Whether a planner's name is that of a file or module, and not a registered one."""
+    """Return whether a planner's name refers to a file or module instead of the registry."""
     return ":" in name
 
 
 def record_name(name: str) -> str:
-    """What records and tables call a planner: the registered name, or that of the class in a file or module.
+    """Return a planner's name in records and tables: the registered name, or the class name in user code.
 
     Args:
-        name: what `load_planner` takes
+        name: a name for `load_planner`
     """
     return name.rpartition(":")[2]
 
 
 class UserCodeError(InputError):
-    """A file or module of people's own is not there, cannot be imported, or lacks the class.
+    """A user's file or module that is missing, fails to import, or lacks the class.
 
     Attributes:
-        problem: what is wrong, on one line
-        of_class: whether the file or module is there and lacks the class
+        problem: the error on one line
+        of_class: whether only the class is missing
     """
 
     def __init__(self, problem: str, of_class: bool = False) -> None:
@@ -58,24 +58,24 @@ class UserCodeError(InputError):
 
 
 def user_object(name: str) -> Any:
-    """What a file or module of people's own calls by the name behind the last colon."""
+    """Return the object of a user's file or module that the part after the last colon names."""
     source, _, word = name.rpartition(":")
     return load_object(source, word, is_file=source.endswith(".py"))
 
 
 def load_object(source: str, word: str, folder: Path | None = None, *, is_file: bool) -> Any:
-    """What a file or module of people's own calls by a name.
+    """Return a named object of a user's file or module.
 
-    A file is read again when its content has changed. Folders may have modules of the same name.
+    A file is read again after its content changes. Different folders may contain modules of the same name.
     """
     try:
         module = _from_file(source, folder) if is_file else _from_module(source, folder)
     except (InputError, Terminated):
         raise
     except SystemExit as error:
-        problem = f"{source}: ends the program while it is imported (exit code {error.code}); guard what it runs"
+        problem = f"{source}: calls exit on import (exit code {error.code}); guard its script code"
         raise UserCodeError(f'{problem} with if __name__ == "__main__"') from error
-    except Exception as error:  # people's own code may raise anything while it is imported
+    except Exception as error:  # user code may raise anything on import
         raise UserCodeError(f"{source}: cannot be imported ({type(error).__name__}: {error})") from error
     if not word or not hasattr(module, word):
         raise UserCodeError(f"{source} has no {word!r}; {_choices(module, word)}", of_class=True)
@@ -83,13 +83,13 @@ def load_object(source: str, word: str, folder: Path | None = None, *, is_file: 
 
 
 def is_importable_elsewhere(planner: object) -> bool:
-    """Whether other processes can import a planner's class; those of files and modules beside a suite only this one can."""
+    """Return whether other processes can import a planner's class: not from a file or a module beside a suite."""
     home = type(planner).__module__
     return not home.startswith(FROM_FILE) and home not in _OWNERS
 
 
 def user_code_version(name: str) -> str:
-    """What the code of a file or module is: its name and the beginning of its hash."""
+    """Return the name of a user's file or module with the beginning of its hash."""
     source = name.rpartition(":")[0]
     if source.endswith(".py"):
         return f"{Path(source).name} {_hash(_content(Path(source)))}"
@@ -97,7 +97,7 @@ def user_code_version(name: str) -> str:
 
 
 def module_hash(name: str) -> str:
-    """The beginning of the hash of a module's file; empty where it has none."""
+    """Return the beginning of the hash of a module's file; empty without a file."""
     file = getattr(sys.modules.get(name), "__file__", None)
     return _hash(Path(file).read_bytes()) if file is not None and Path(file).is_file() else ""
 
@@ -116,7 +116,7 @@ def _content(path: Path) -> bytes:
 
 
 def _choices(module: ModuleType, word: str) -> str:
-    """A hint at what could be meant by a name that a module lacks: its planners, or all that it has."""
+    """Return a hint for an unknown name: the closest match, the module's planners, or all its names."""
     known = {name: value for name, value in vars(module).items() if not name.startswith("_")}
     planners = [name for name, value in known.items() if inspect.getattr_static(value, "plan", None) is not None]
     close = difflib.get_close_matches(word, planners or known, n=1)
@@ -124,17 +124,17 @@ def _choices(module: ModuleType, word: str) -> str:
 
 
 def _from_module(name: str, folder: Path | None) -> ModuleType:
-    """A module that can be imported, or one in the working directory or a folder."""
+    """Import a module from the import path, the working directory or a folder."""
     if folder is None and str(Path.cwd()) not in sys.path and "" not in sys.path:
-        sys.path.append(str(Path.cwd()))  # for good: other processes are given this path; a command's begins elsewhere
+        sys.path.append(str(Path.cwd()))  # permanently: worker processes inherit this path
     home, top = (folder or Path()).resolve(), name.partition(".")[0]
     with _importing_for(home, owned=folder is not None):
         module = importlib.import_module(name)
     own, taken = _module_in(home, top), getattr(sys.modules.get(top), "__file__", None)
     if own is not None and taken is not None and Path(taken).resolve() != own:
         where = "beside the suite" if folder is not None else "in the working directory"
-        problem = f"{top} is imported from {taken}, and there is one {where}"
-        raise UserCodeError(f"{problem}; give it another name, or name its file")
+        problem = f"{top} is imported from {taken}, but another one exists {where}"
+        raise UserCodeError(f"{problem}; rename it, or name its file")
     return module
 
 
@@ -144,7 +144,7 @@ def _from_file(source: str, folder: Path | None) -> ModuleType:
 
 
 class _Source(importlib.machinery.SourceFileLoader):
-    """Compiles the file as it is: a cached compilation may be that of another text of the same second and length."""
+    """A loader that always compiles: cached bytecode may belong to another text of the same second and length."""
 
     def get_code(self, fullname: str) -> CodeType:
         path = self.get_filename(fullname)
@@ -152,12 +152,12 @@ class _Source(importlib.machinery.SourceFileLoader):
 
 
 def from_source(name: str, path: Path) -> ModuleType:
-    """A new module that runs a file as it is now, and is known by its name meanwhile and afterwards."""
+    """Execute a file as a new module and register it under a name."""
     spec = importlib.util.spec_from_loader(name, _Source(name, str(path)))
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
+    sys.modules[name] = module  # dataclasses look up their module
     try:
         spec.loader.exec_module(module)
     except BaseException:
@@ -168,7 +168,7 @@ def from_source(name: str, path: Path) -> ModuleType:
 
 @functools.lru_cache(maxsize=64)
 def _loaded(path: Path, content: str) -> ModuleType:
-    """A file's module, loaded once per process and content of the file. It may import modules beside it."""
+    """Load a file as a module, once per process and file content. It may import modules beside it."""
     name = f"{FROM_FILE}{path.stem}_{abs(hash((path, content))):x}"
     with _importing_for(path.parent, owned=True):
         return from_source(name, path)
@@ -176,9 +176,9 @@ def _loaded(path: Path, content: str) -> ModuleType:
 
 @contextlib.contextmanager
 def _importing_for(folder: Path, *, owned: bool) -> Iterator[None]:
-    """A context in which modules are also looked for in the working directory and a folder, after all others.
+    """Search the working directory and a folder for modules within this block, after the import path.
 
-    Modules of other folders are set aside where this folder has one of the same name.
+    Modules of other folders that share a name with one in this folder are set aside.
     """
     for name, owner in list(_OWNERS.items()):
         if owner != folder and _module_in(folder, name.partition(".")[0]) is not None:
@@ -199,14 +199,14 @@ def _importing_for(folder: Path, *, owned: bool) -> Iterator[None]:
 
 
 def _module_in(folder: Path, name: str) -> Path | None:
-    """The file of a module or package in a folder; None if there is none."""
+    """Return the file of a module or package in a folder; None if there is none."""
     spec = importlib.machinery.PathFinder.find_spec(name, [str(folder)])
     return Path(spec.origin).resolve() if spec is not None and spec.origin is not None else None
 
 
 @contextlib.contextmanager
 def _extended_path(*folders: Path) -> Iterator[None]:
-    """A context in which modules are also looked for in some folders, after all others."""
+    """Append folders to the import path within this block."""
     added = [text for text in dict.fromkeys(map(str, folders)) if text not in sys.path]
     sys.path.extend(added)
     try:

@@ -1,4 +1,4 @@
-"""Whether a planner kept its promises: its plan is checked before anything is drawn or driven."""
+"""Plan validation before anything is drawn or driven."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ from antdrive.planners.plan import (
 )
 from antdrive.worlds.route import end_reach, longest_line
 
-RELATIVE = 1e-9  # how far a cost may be off, as a fraction
-NEAR = 1e-6  # m: how far a waypoint may be off, and how much a line may come too close
+RELATIVE = 1e-9  # relative tolerance of costs and lengths
+NEAR = 1e-6  # m: tolerance of waypoints and clearances
 
 
 def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
-    """A planner's answer to a query. It is not checked.
+    """Return a planner's plan without checking it.
 
     Args:
         planner: the planner
-        query: what it is asked
-        rng: all its randomness
-        name: what errors call the planner; empty: its class
+        query: the query
+        rng: the planner's source of randomness
+        name: the planner's name in errors; empty: its class
 
     Raises:
-        InputError: the planner says that the query is wrong.
-        PlannerError: the planner raised anything else, or its answer is no `PlanResult`.
+        InputError: the planner rejects the query.
+        PlannerError: the planner raised another exception, or returned no `PlanResult`.
     """
     with planner_errors(planner, name):
         answer: Any = planner.plan(query, rng)
@@ -54,43 +54,43 @@ def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name:
 
 @contextlib.contextmanager
 def planner_errors(planner: Planner, name: str = "") -> Iterator[None]:
-    """Whatever is raised within becomes a `PlannerError`, but for `InputError`, Ctrl-C and SIGTERM.
+    """Turn exceptions raised in this block into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
 
     Args:
-        planner: whose code runs within
-        name: what errors call the planner; empty: its class
+        planner: the planner whose code runs in the block
+        name: the planner's name in errors; empty: its class
 
     Raises:
-        PlannerError: something was raised within; names its kind and the line.
+        PlannerError: the block raised an exception; names its class and line.
     """
     try:
         yield
     except (InputError, PlannerError, Terminated):
         raise
-    except (Exception, SystemExit) as error:  # another package's planner may raise anything, and call exit()
+    except (Exception, SystemExit) as error:  # a third-party planner may raise anything, and call exit()
         says = f"{type(error).__name__}: {error}".strip().removesuffix(":")
         raise PlannerError(name or type(planner).__name__, f"raised {says} ({_place(planner, error)})") from error
 
 
 def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
-    """The answer of a planner, or of what it made, if it is a `PlanResult`.
+    """Return the answer of a planner or its replanner if it is a `PlanResult`.
 
     Args:
-        planner: whose answer it is
-        answer: what was returned
-        name: what errors call the planner; empty: its class
+        planner: the planner
+        answer: the returned value
+        name: the planner's name in errors; empty: its class
 
     Raises:
-        PlannerError: the answer is something else.
+        PlannerError: the answer has another type.
     """
     if isinstance(answer, PlanResult):
         return answer
     called = name or type(planner).__name__
-    raise PlannerError(called, f"returned {answer!r:.60} where a PlanResult is due ({_place(planner)})")
+    raise PlannerError(called, f"returned {answer!r:.60} instead of a PlanResult ({_place(planner)})")
 
 
 def _place(planner: Planner, error: BaseException | None = None) -> str:
-    """The file and line of the planner's module where an error arose; without one, of its method `plan`."""
+    """Return the file and line of the planner's module that raised the error; without an error, of its `plan`."""
     home = getattr(sys.modules.get(type(planner).__module__), "__file__", None)
     frames = traceback.extract_tb(error.__traceback__) if error is not None else []
     frames = [frame for frame in frames if frame.filename != __file__]
@@ -101,11 +101,11 @@ def _place(planner: Planner, error: BaseException | None = None) -> str:
 
 
 def checked(query: Query, answer: PlanResult) -> PlanResult:
-    """The answer itself if it is right, else one without a path, whose status is `INVALID` and whose reason says why.
+    """Return the plan if it is valid, else one without a path, with status `INVALID` and the reason.
 
     Args:
-        query: what the planner was asked
-        answer: what it answered
+        query: the query
+        answer: the planner's answer
     """
     problem = check_plan(query, answer)
     if not problem:
@@ -117,33 +117,32 @@ def checked(query: Query, answer: PlanResult) -> PlanResult:
 
 
 def check_plan(query: Query, result: PlanResult) -> str:
-    """What is wrong with an answer first, with the first wrong step; empty if the answer is right.
+    """Return the first error in a plan and its place; empty if the plan is valid.
 
-    Cells run from the query's start to its goal along allowed moves, and cost what `path_cost` says. Waypoints join the
-    same ends, keep the clearance, and have the length of a curve that rounds their corners; a start that has less room
-    than that is left by a first leg that comes no closer, within `end_reach`. They are no longer than `longest_line` allows for
-    the cells beside them. With waypoints, the cost may be infinite: then the grid has no path, and the cells are merely those
-    that the line passes. The times of a `TimedPlan` increase. A path
-    that was found when planning stopped early is checked, too.
+    Cells run from start to goal along allowed moves; their cost is that of `path_cost`. Waypoints join the same ends
+    and keep the clearance; `length` is that of a curve that rounds their corners. From a start with less clearance,
+    the first leg comes no closer within `end_reach`. Waypoints are no longer than `longest_line` allows for their
+    cells. A plan with waypoints may have an infinite cost: the grid has no path, and the cells are those under
+    the line. The times of a `TimedPlan` increase. Paths of plans that stopped early are checked as well.
 
     Args:
-        query: what the planner was asked
-        result: what it answered
+        query: the query
+        result: the planner's answer
     """
     problem = _types(result) or _figure_data(query, result)
     if problem:
         return problem
     if not len(result.cells):
         if result.solved:
-            return "cells: there are none, but the plan is SOLVED"
-        return "" if result.waypoints is None else "waypoints: there are no cells beside them"
+            return "cells: none, but the status is SOLVED"
+        return "" if result.waypoints is None else "waypoints: given without cells"
     if result.status is PlanStatus.NO_PATH:
-        return "cells: there are some, but the status is NO_PATH"
+        return "cells: given, but the status is NO_PATH"
     if query.motions and result.solved and not isinstance(result, TimedPlan):
-        return "times: there are none, but among motions a plan must be a TimedPlan"
+        return "times: none, but a query with motions needs a TimedPlan"
     off_grid = result.waypoints is not None and result.cost == math.inf
     if query.blocked_end and result.waypoints is None:
-        return f"cells: there are some, but {query.blocked_end}"
+        return f"cells: given, but {query.blocked_end}"
     problem = _cells(query, result, off_grid)
     if not problem and result.waypoints is not None:
         problem = _waypoints(query, result, query.grid.xy(result.waypoints))
@@ -155,7 +154,7 @@ def check_plan(query: Query, result: PlanResult) -> str:
 
 
 def _types(result: PlanResult) -> str:
-    """The first field of an answer that has the wrong type or shape, or is not finite; or empty."""
+    """Return the first field of a plan with an invalid type, shape or value; or empty."""
     if result.status not in (PlanStatus.SOLVED, PlanStatus.NO_PATH, PlanStatus.STOPPED):
         return f"status: must be SOLVED, NO_PATH or STOPPED, got {result.status!r:.40}"
     cells, waypoints = result.cells, result.waypoints
@@ -167,7 +166,7 @@ def _types(result: PlanResult) -> str:
         if not np.isfinite(waypoints).all():
             return f"waypoints: number {int(np.argwhere(~np.isfinite(waypoints))[0, 0])} is not finite"
         if result.length is None:
-            return "length: waypoints need one"
+            return "length: missing; a plan with waypoints needs one"
     for key in ("cost", "length", "wall_s", "work"):
         value: Any = getattr(result, key)
         whole = key == "work"
@@ -189,9 +188,9 @@ def _types(result: PlanResult) -> str:
 
 
 def _figure_data(query: Query, result: PlanResult) -> str:
-    """What is wrong with what figures draw: the field, and the history of an iterative planner; or empty."""
+    """Return the first error in the field and the history, which figures draw; or empty."""
     field, history = result.field, result.history
-    made: Any = history  # by other people's code
+    made: Any = history  # by third-party code
     if field is not None and not (_floats(field) and field.shape == query.grid.shape):
         return f"field: must be an array of numbers {query.grid.shape}, got {_kind(field)}"
     if not isinstance(made, History):
@@ -217,7 +216,7 @@ def _same(one: float, other: float) -> bool:
 
 
 def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
-    """The first wrong cell or step, or a wrong cost; `off_grid`: cells need only be neighbours."""
+    """Return the first invalid cell, step or cost; `off_grid`: cells need only be neighbours."""
     grid, cells = query.grid, result.cells.astype(np.int64)
     outside = ((cells < 0) | (cells >= grid.shape)).any(axis=1)
     if outside.any():
@@ -243,11 +242,11 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
 
 
 def check_step(query: Query, cell: Cell, to: Any) -> str:
-    """What is wrong with the step of a planner that decides cell by cell; empty if it is an allowed move, or to wait.
+    """Return the error in a cell-by-cell planner's step; empty for an allowed move or a wait.
 
     Args:
-        query: what the planner was asked
-        cell: where the robot is
+        query: the query
+        cell: the robot's cell
         to: the next cell, or None to wait
     """
     if to is None:
@@ -262,7 +261,7 @@ def check_step(query: Query, cell: Cell, to: Any) -> str:
 
 
 def _bits() -> Any:
-    """The bit of `Grid.moves` by row and column step, each + 1 (3, 3); 8 is no bit, because it is no step."""
+    """Return the bit of `Grid.moves` by row and column step, each + 1 (3, 3); 8 where there is no step."""
     from antdrive.worlds import DIRECTIONS  # imports the compiler
 
     bits = np.full((3, 3), 8)
@@ -276,7 +275,7 @@ def _cell(cell: Any) -> str:
 
 
 def _waypoints(query: Query, result: PlanResult, xy: Floats) -> str:
-    """What is wrong with a plan's line (M, 2) [m]: its ends, its clearance or its length; or empty."""
+    """Return the first error in a plan's line (M, 2) [m]: its ends, clearance or length; or empty."""
     length = result.length
     assert length is not None
     for k, key, ends in zip((0, -1), ("start", "goal"), _ends(query), strict=True):
@@ -294,12 +293,12 @@ def _waypoints(query: Query, result: PlanResult, xy: Floats) -> str:
     if not drawn - _rounded_off(xy) - slack <= length <= drawn + slack:
         return f"length: {length:.9g} m, but the waypoints are {drawn:.9g} m long"
     if length > longest_line(result.cost, _leads(query, result), query.grid.cell) + slack:
-        return f"waypoints: they are {length:.9g} m long, but the cells beside them only {result.cost:.9g} m"
+        return f"waypoints: {length:.9g} m long, but their cells only {result.cost:.9g} m"
     return ""
 
 
 def _leads(query: Query, result: PlanResult) -> float:
-    """The distances of the first cell from the exact start and of the last from the exact goal, together [m]."""
+    """Return the summed distance of the first cell from the exact start and of the last from the exact goal [m]."""
     if query.task is None:
         return 0.0
     first, last = query.grid.xy(result.cells[[0, -1]])
@@ -307,17 +306,17 @@ def _leads(query: Query, result: PlanResult) -> float:
 
 
 def _ends(query: Query) -> list[list[tuple[float, float]]]:
-    """Where a line may begin, and where it may end: the centres of the end cells, and the exact ends."""
+    """Return the points where a line may begin and those where it may end: cell centres and exact ends."""
     cells = [[(float(x), float(y))] for x, y in query.grid.xy([query.start, query.goal])]
     if query.task is not None:
-        # From a start without a usable cell, only the exact start is where the robot is.
+        # Without a usable start cell, the line must begin at the exact start.
         cells[0] = [query.task.start[:2], *([] if query.blocked_end else cells[0])]
         cells[1].append(query.task.goal)
     return cells
 
 
 def _too_close(query: Query, xy: Floats) -> Any:
-    """Which segments of a line (M, 2) [m] do not keep the clearance (M - 1,)."""
+    """Return which segments of a line (M, 2) [m] violate the clearance (M - 1,)."""
     task, inflate = query.task, query.grid.inflate
     if task is None:
         from antdrive.planners.anyangle.lines import clear_line
@@ -327,7 +326,7 @@ def _too_close(query: Query, xy: Floats) -> Any:
     from antdrive.worlds.geometry import point_clearance, segment_clearance  # imports the compiler
 
     keep = np.full(len(xy) - 1, inflate)
-    # A robot that stands closer than the clearance leaves to a free cell nearby, but must not come closer still.
+    # A start below the clearance: the first segment must not come closer.
     keep[0] = min(inflate, float(point_clearance(task.world, xy[:1])[0]))
     close = segment_clearance(task.world, xy[:-1], xy[1:]) < keep - NEAR
     fraction = end_reach(inflate, query.grid.cell) / max(math.dist(xy[0], xy[1]), 1e-9)
@@ -338,7 +337,7 @@ def _too_close(query: Query, xy: Floats) -> Any:
 
 
 def _rounded_off(xy: Floats) -> float:
-    """How much shorter than a line (M, 2) a curve can be that touches every side and rounds the corners with arcs."""
+    """Return how much rounding the corners with arcs can shorten a line (M, 2)."""
     sides = segment_lengths(xy)
     steps = np.diff(xy, axis=0)[sides > 0]
     heading, sides = np.arctan2(steps[:, 1], steps[:, 0]), sides[sides > 0]
@@ -349,7 +348,7 @@ def _rounded_off(xy: Floats) -> float:
 
 
 def _times(query: Query, plan: TimedPlan) -> str:
-    """The first wrong time of a plan, or its centres if these are not those of the cells; or empty."""
+    """Return the first invalid time or cell centre of a plan; or empty."""
     count = len(plan.cells)
     for key in ("arrive", "leave"):
         times = getattr(plan, key)

@@ -1,7 +1,7 @@
-"""Kernels loaded before planning time is taken: the first call of a kernel reads its machine code, or compiles it.
+"""Warm-up of planner kernels before plans are timed.
 
-That takes 10 to 100 ms where planning may take 0.1 ms, and would make a process's first plan look slow. So each planner
-plans on a tiny grid first, once per process, with a random stream of its own: no answer depends on it.
+The first call of a kernel loads or compiles its machine code. That takes 10 to 100 ms, while planning may take 0.1 ms.
+Each planner therefore plans on a tiny grid once per process, with a separate random stream: no plan depends on it.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ import numpy as np
 if TYPE_CHECKING:
     from antdrive.planners.plan import PlanResult, Query
 
-#: Nested planners are part of the one that is timed: their kernels are loaded together with its own.
+#: Nested planners belong to the timed planner, whose warm-up loads their kernels.
 _within: ContextVar[bool] = ContextVar("_within", default=False)
-_loaded: set[str] = set()  # what has been rehearsed in this process
+_loaded: set[str] = set()  # planners warmed up in this process
 
 
 class WarmsUp(Protocol):
-    """A planner that can be tried before its time is taken."""
+    """A planner with a warm-up variant."""
 
     def for_warmup(self) -> WarmsUp:
-        """The same planner with as little work as calls the same kernels."""
+        """Return this planner with minimal work that calls the same kernels."""
         ...
 
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -37,7 +37,7 @@ class WarmsUp(Protocol):
 
 @contextlib.contextmanager
 def kernels_loaded(planner: WarmsUp, query: Query) -> Iterator[None]:
-    """A context for timed planning, with the planner's kernels loaded before it begins."""
+    """Load the planner's kernels, then run this block of timed planning."""
     if _within.get():
         yield
         return
@@ -50,7 +50,7 @@ def kernels_loaded(planner: WarmsUp, query: Query) -> Iterator[None]:
 
 
 def load_kernels(planner: WarmsUp, query: Query) -> None:
-    """Plan on a tiny grid, unless this planner with these options has done so in this process."""
+    """Plan on a tiny grid, once per process, planner and options."""
     shorter = planner.for_warmup()
     writeable = query.grid.free.flags.writeable
     kind = (bool(query.motions), query.task is not None, writeable)
@@ -58,7 +58,7 @@ def load_kernels(planner: WarmsUp, query: Query) -> None:
     if key in _loaded:
         return
     _loaded.add(key)
-    # A new context has no watcher, who would see these iterations too; a planner that fails here fails where it is timed.
+    # A new context has no progress callback. A planner that fails here fails again when timed.
     with contextlib.suppress(Exception):
         contextvars.Context().run(_warm_up, shorter, tiny_query(type(query), *kind))
 
@@ -69,7 +69,7 @@ def _warm_up(planner: WarmsUp, query: Query) -> None:
 
 
 def tiny_query(query_type: type[Query], motions: bool, task: bool, writeable: bool = False) -> Query:
-    """A query on 12 x 12 cells around a cylinder, of the same types as those of worlds."""
+    """Build a query on 12 x 12 cells around a cylinder, with the same types as queries of worlds."""
     from antdrive.worlds import Cruising, Disc, Task, Trajectories, World, rasterise
 
     mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))

@@ -1,3 +1,5 @@
+from .clearance import footprint_clearance as footprint_clearance
+from .clearance import overlap_at as overlap_at
 from .control.avoidance import Avoidance as Avoidance
 from .control.avoidance import AvoidanceState as AvoidanceState
 from .control.pursuit import LIMITERS as LIMITERS
@@ -7,14 +9,12 @@ from .control.pursuit import TrackedPath as TrackedPath
 from .control.pursuit import Twist as Twist
 from .control.speed_limits import SpeedProfile as SpeedProfile
 from .control.speed_limits import speed_profile as speed_profile
-from .files import list_robots as list_robots
-from .files import load_robot as load_robot
-from .files import robot_schema as robot_schema
-from .files import robot_to_dict as robot_to_dict
 from .lidar import Lidar as Lidar
 from .noise import NoiseModel as NoiseModel
-from .placing import footprint_clearance as footprint_clearance
-from .placing import overlap_at as overlap_at
+from .robot_file import list_robots as list_robots
+from .robot_file import load_robot as load_robot
+from .robot_file import robot_schema as robot_schema
+from .robot_file import robot_to_dict as robot_to_dict
 from .spec import Footprint as Footprint
 from .spec import Noise as Noise
 from .spec import Odometry as Odometry

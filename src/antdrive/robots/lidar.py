@@ -83,13 +83,13 @@ class Lidar:
         """
         return self if self.rate <= hz else dataclasses.replace(self, rate=float(hz))
 
-    def pose_on(self, robot: Pose) -> Pose:
+    def pose_on(self, pose: Pose) -> Pose:
         """The lidar's own pose on a robot: x, y [m] and yaw [rad].
 
         Args:
-            robot: the robot's pose
+            pose: the robot's pose
         """
-        x, y, yaw = robot
+        x, y, yaw = pose
         cos, sin = math.cos(yaw), math.sin(yaw)
         return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, yaw + self.yaw
 

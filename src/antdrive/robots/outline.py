@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Bounds, Point
 
-MOST_CORNERS = 32  # of a polygon
+MAX_CORNERS = 32  # of a polygon
 STRAIGHT = 1e-9  # a corner no farther from the line between its neighbours adds nothing [m]
 
 
@@ -31,7 +31,7 @@ class Footprint:
     half_width: float = 0.0
     rounding: float = 0.0
     # Records leave it out where there are none, so that the logs of centred robots are as they were.
-    corners: tuple[Point, ...] = field(default=(), metadata={"left_out_if_default": True})
+    corners: tuple[Point, ...] = field(default=(), metadata={"omit_if_default": True})
 
     @classmethod
     def disc(cls, radius: float, centre: Point = (0.0, 0.0)) -> Footprint:
@@ -193,8 +193,8 @@ class Footprint:
             FieldError: what is wrong with the corners.
         """
         corners = self.corners
-        if len(corners) == 2 or len(corners) > MOST_CORNERS:
-            raise FieldError("corners", f"must be 1 or 3 to {MOST_CORNERS}, got {len(corners)}")
+        if len(corners) == 2 or len(corners) > MAX_CORNERS:
+            raise FieldError("corners", f"must be 1 or 3 to {MAX_CORNERS}, got {len(corners)}")
         if not all(math.isfinite(v) and abs(v) < 1e6 for corner in corners for v in corner):
             raise FieldError("corners", "must be finite")
         if corners and (self.half_length or self.half_width):

@@ -141,7 +141,7 @@ class RobotSpec:
     wheel_friction: Annotated[float, Interval(ge=0.1, le=100.0)] = 1.5
     noise: Noise = Noise()
     source: str | None = None
-    lidar: Lidar | None = dataclasses.field(default=None, metadata={"left_out_if_default": True})
+    lidar: Lidar | None = dataclasses.field(default=None, metadata={"omit_if_default": True})
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -207,7 +207,7 @@ class RobotSpec:
 
     def _repr_html_(self) -> str:
         """The robot as notebooks show it."""
-        from antdrive.robots.drawing import robot_card
+        from antdrive.robots.card import robot_card
 
         return robot_card(self)
 
@@ -216,31 +216,31 @@ GRAVITY = 9.81  # [m/s^2]
 ROUNDED = 1e-3  # a lidar on the footprint's edge may be this far outside: files round places [m]
 
 
-def require_feasible(robot: RobotSpec) -> None:
+def require_feasible(spec: RobotSpec) -> None:
     """Refuse a robot whose wheels and motors cannot reach its own limits."""
-    if 2 * robot.wheel_radius > robot.height:
+    if 2 * spec.wheel_radius > spec.height:
         raise FieldError(
             "wheel_radius",
-            f"wheels of {robot.wheel_radius:g} m are higher than the body of {robot.height:g} m; "
-            f"at most {robot.height / 2:.3g} m fits",
+            f"wheels of {spec.wheel_radius:g} m are higher than the body of {spec.height:g} m; "
+            f"at most {spec.height / 2:.3g} m fits",
         )
-    if robot.lidar is not None:
-        require_on_robot(robot.lidar, robot.footprint)
-    rim = robot.max_wheel_speed * robot.wheel_radius
-    _require_reached("max_wheel_speed", f"{robot.max_wheel_speed:g} rad/s", robot, "max_speed", rim, "m/s")
-    turn = 2 * rim / robot.track
-    _require_reached("max_wheel_speed", f"{robot.max_wheel_speed:g} rad/s", robot, "max_yaw_rate", turn, "rad/s")
-    motor = robot.wheel_torque / robot.wheel_radius
-    grip = robot.wheel_friction * robot.mass * GRAVITY / 2
+    if spec.lidar is not None:
+        require_on_robot(spec.lidar, spec.footprint)
+    rim = spec.max_wheel_speed * spec.wheel_radius
+    _require_reached("max_wheel_speed", f"{spec.max_wheel_speed:g} rad/s", spec, "max_speed", rim, "m/s")
+    turn = 2 * rim / spec.track
+    _require_reached("max_wheel_speed", f"{spec.max_wheel_speed:g} rad/s", spec, "max_yaw_rate", turn, "rad/s")
+    motor = spec.wheel_torque / spec.wheel_radius
+    grip = spec.wheel_friction * spec.mass * GRAVITY / 2
     for key, what, force in (
-        ("wheel_torque", f"motors of {robot.wheel_torque:g} N m", motor),
-        ("wheel_friction", f"a friction of {robot.wheel_friction:g}", grip),
+        ("wheel_torque", f"motors of {spec.wheel_torque:g} N m", motor),
+        ("wheel_friction", f"a friction of {spec.wheel_friction:g}", grip),
     ):
-        _require_reached(key, what, robot, "max_acceleration", 2 * force / robot.mass, "m/s2")
-        _require_reached(key, what, robot, "max_yaw_acceleration", force * robot.track / yaw_inertia(robot), "rad/s2")
-    held = robot.wheel_friction * GRAVITY
-    what = f"a friction of {robot.wheel_friction:g}"
-    _require_reached("wheel_friction", what, robot, "max_lateral_acceleration", held, "m/s2")
+        _require_reached(key, what, spec, "max_acceleration", 2 * force / spec.mass, "m/s2")
+        _require_reached(key, what, spec, "max_yaw_acceleration", force * spec.track / yaw_inertia(spec), "rad/s2")
+    held = spec.wheel_friction * GRAVITY
+    what = f"a friction of {spec.wheel_friction:g}"
+    _require_reached("wheel_friction", what, spec, "max_lateral_acceleration", held, "m/s2")
 
 
 def require_on_robot(lidar: Lidar, foot: Footprint) -> None:
@@ -254,9 +254,9 @@ def require_on_robot(lidar: Lidar, foot: Footprint) -> None:
         )
 
 
-def yaw_inertia(robot: RobotSpec) -> float:
+def yaw_inertia(spec: RobotSpec) -> float:
     """Moment of inertia of a robot's body about the vertical axis through its axle's centre, mass spread evenly [kg m^2]."""
-    return yaw_inertia_of(robot.mass, robot.footprint)
+    return yaw_inertia_of(spec.mass, spec.footprint)
 
 
 def yaw_inertia_of(mass: float, foot: Footprint) -> float:
@@ -277,11 +277,11 @@ def yaw_inertia_of(mass: float, foot: Footprint) -> float:
     return mass * (half_length**2 + half_width**2) / 3
 
 
-def _require_reached(key: str, what: str, robot: RobotSpec, limit: str, reached: float, unit: str) -> None:
-    promised = getattr(robot, limit)
+def _require_reached(key: str, what: str, spec: RobotSpec, limit: str, reached: float, unit: str) -> None:
+    promised = getattr(spec, limit)
     if reached < promised:
         raise FieldError(
             key,
-            f"{what} on a robot of {robot.mass:g} kg with wheels of {robot.wheel_radius:g} m, {robot.track:g} m apart, "
+            f"{what} on a robot of {spec.mass:g} kg with wheels of {spec.wheel_radius:g} m, {spec.track:g} m apart, "
             f"reach {reached:.3g} {unit} at most, but {limit} is {promised:g}; raise {key} or lower {limit}",
         )

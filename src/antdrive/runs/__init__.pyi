@@ -7,5 +7,5 @@ from .failures.hunt import Finding as Finding
 from .failures.hunt import Hunt as Hunt
 from .failures.hunt import find_failures as find_failures
 from .failures.rebuild import rebuilt as rebuilt
-from .failures.shrink import Shrunk as Shrunk
-from .failures.shrink import shrink as shrink
+from .failures.shrinker import Shrunk as Shrunk
+from .failures.shrinker import shrink as shrink

@@ -29,7 +29,7 @@ Result = TypeVar("Result")
 
 ATTEMPTS = 2  # of a run that kills its process
 STILLBORN = 3  # workers in a row that end before they are ready, after which none is started
-LOOK = 1.0  # how long to wait for a result before something else is done [s]
+POLL_INTERVAL = 1.0  # how long to wait for a result before something else is done [s]
 GRACE = 1.0  # how long workers may take to end by themselves [s]
 CHUNK_SECONDS = 2.0  # how long a chunk should take [s]
 LONGEST_CHUNK = 256  # runs
@@ -283,10 +283,10 @@ class Pool:
     def _patience(self) -> float:
         """How long to wait for a result: a second at most, and no longer than until a run takes too long [s]."""
         if self._limit is None:
-            return LOOK
+            return POLL_INTERVAL
         now = time.monotonic()
         left = [one.since + self._limit - now for one in self._workers if one.ready and one.handed and not one.slow]
-        return max(0.0, min([LOOK, *left]))
+        return max(0.0, min([POLL_INTERVAL, *left]))
 
     def _end_slow(self) -> None:
         """End workers whose run takes too long; that they have ended shows when their pipe is read."""

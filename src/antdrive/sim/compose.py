@@ -58,7 +58,7 @@ class Parts(NamedTuple):
 
 def compose(s: Scenario) -> Parts:
     """The parts of a scenario's drive."""
-    perception, avoidance, hz = perceived(s), avoidance_of(s), s.control_hz
+    perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
     tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
     moving = tracks_movers or bool(s.driven_world.movers)
     localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, s.task.start, s.seed)
@@ -86,7 +86,7 @@ def compose(s: Scenario) -> Parts:
     if survey:
         # One scan may be as old as their period, and commands are late.
         reaction = 1 / hz + 1 / survey.lidar.rate + s.robot.noise.scaled(s.noise).delay
-        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_sight))
+        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_held))
     return Parts(
         localiser,
         scans.scan if scans else no_scan,
@@ -101,7 +101,7 @@ def compose(s: Scenario) -> Parts:
     )
 
 
-def perceived(s: Scenario) -> Perception:
+def perception_of(s: Scenario) -> Perception:
     """What the robot perceives of movers: their motions, if the planner is given them."""
     return Perception(kind="motions") if s.timed else s.known_perception
 
@@ -111,7 +111,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
     return RoutePlanner(
         planner=s.planner,
         planner_label=s.planner_label,
-        task=s.task if s.map == "given" else told(s.task),
+        task=s.task if s.map == "given" else mapless_task(s.task),
         robot=s.robot,
         controller=s.controller,
         margin=s.margin,
@@ -124,7 +124,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
     )
 
 
-def told(task: Task) -> Task:
+def mapless_task(task: Task) -> Task:
     """All that a robot without a map is given of a task: its first pose, where the goal is from there, and the tolerance."""
     (x0, y0), (x1, y1) = task.start[:2], task.goal
     empty = World("unknown", (min(x0, x1) - 1.0, min(y0, y1) - 1.0, max(x0, x1) + 1.0, max(y0, y1) + 1.0))
@@ -137,7 +137,7 @@ def avoidance_of(s: Scenario) -> Avoidance | None:
     Movers whose motions are known do not reverse unexpectedly, so reversals are not considered. A plan in
     space and time avoids the movers already, so the horizon is short.
     """
-    if s.avoidance is None or perceived(s).kind != "motions":
+    if s.avoidance is None or perception_of(s).kind != "motions":
         return s.avoidance
     horizon = min(s.avoidance.horizon, 1.0) if s.timed else s.avoidance.horizon
     return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=horizon)
@@ -156,7 +156,7 @@ def _exploration(s: Scenario, survey: Survey) -> Exploration:
     """What finds the routes of a robot without a map; around the movers that it tracks, if it is to."""
     policy, ahead = s.replanning or ReplanPolicy(), None
     if survey.tracking is not None and s.replanning is not None and policy.around_movers:
-        tracked = Tracked(survey.tracking, perceived(s), s.control_hz)
+        tracked = Tracked(survey.tracking, perception_of(s), s.control_hz)
         ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, s.control_hz)
     return Exploration(route_planner(s), survey, policy, ahead)
 
@@ -185,7 +185,7 @@ def _sensor(s: Scenario) -> SimulatedLidar:
     return SimulatedLidar.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)
 
 
-def load_replanning(s: Scenario) -> None:
+def warm_up_replanning(s: Scenario) -> None:
     """Replan twice in a tiny world, once per process and planner, so that the times of replans hold no loading of kernels."""
     if not s.driven_world.movers or s.replanning is None or not isinstance(s.planner, GridPlanner):
         return

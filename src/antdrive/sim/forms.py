@@ -251,7 +251,7 @@ def scenario_fields(given: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def said(entry: BaseModel) -> dict[str, Any]:
+def given_settings(entry: BaseModel) -> dict[str, Any]:
     """The values of a file's settings that are written there, by key."""
     keys = {one.key for one in SETTINGS.values()} & entry.model_fields_set
     return {one.key: getattr(entry, one.key) for one in SETTINGS.values() if one.key in keys}

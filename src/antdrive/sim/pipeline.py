@@ -8,7 +8,7 @@ from typing import Any
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import PlanResult, PlanStatus
-from antdrive.sim.compose import compose, load_replanning
+from antdrive.sim.compose import compose, warm_up_replanning
 from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.log.certificate import Certificate, certify
@@ -22,7 +22,7 @@ from antdrive.sim.recording import rollout_of
 from antdrive.sim.recording import versions as versions
 from antdrive.sim.scenario import Scenario, picture_of
 from antdrive.worlds import Grid
-from antdrive.worlds.drawing import LINE, card
+from antdrive.worlds.svg import LINE, card
 
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
 ENDED_BY = {
@@ -161,7 +161,7 @@ def run(
         return Run(s, grid, answer)
     route, path = parts.guide.route(grid, answer)
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
-    load_replanning(s)
+    warm_up_replanning(s)
     started = time.perf_counter()
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)
     with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:

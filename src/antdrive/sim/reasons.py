@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from antdrive.base.plane import place_name
+from antdrive.base.plane import format_position
 from antdrive.planners import AStar, Query
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible, widest_passage
 from antdrive.planners.graph.search import reachable
-from antdrive.robots.placing import name_of
+from antdrive.robots.clearance import obstacle_name
 from antdrive.worlds import Grid, Task, point_clearance, rasterise
 
 if TYPE_CHECKING:
@@ -43,9 +43,9 @@ def _narrowest_place(s: RoutePlanner) -> str:
     passage = widest_passage(task, s.inflate)
     if passage is None:
         return "not even a point gets through"
-    at = place_name(task.frame, *passage.at)
+    at = format_position(task.frame, *passage.at)
     ends = ((task.start[:2], "the start has no more room"), (task.goal, "the goal has no more room"))
-    where = " and ".join(name_of(task.world, k) for k in passage.between)
+    where = " and ".join(obstacle_name(task.world, k) for k in passage.between)
     where = f"between {where}" if where else next(says for end, says in ends if end == passage.at)
     return (
         f"the widest disc that passes has a radius of {passage.radius:.3g} m, at {at}, {where}; "
@@ -81,7 +81,7 @@ def _narrowest_cell(s: RoutePlanner, grid: Grid) -> str:
     free = rasterise(s.task.world, grid.cell, low)
     cells = AStar().plan(Query.between(free, s.task), np.random.default_rng(0)).cells
     room = point_clearance(s.task.world, free.xy(cells))
-    at = place_name(s.task.frame, *free.xy(cells)[int(room.argmin())].tolist())
+    at = format_position(s.task.frame, *free.xy(cells)[int(room.argmin())].tolist())
     return (
         f"on these cells, the widest disc that passes has a radius of about {low:.2g} m, near {at}; "
         f"{_what_it_takes(s, low)}"

@@ -15,7 +15,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
-from antdrive.base.plane import place_name
+from antdrive.base.plane import format_position
 from antdrive.planners import Planner, capabilities_of
 from antdrive.robots import RobotSpec, overlap_at
 from antdrive.robots.spec import Odometry
@@ -24,7 +24,7 @@ from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import Perception, usual_perception
 from antdrive.sim.settings import SETTINGS, SLOWEST_CONTROL, Settings, part_of_key
 from antdrive.worlds import Disc, Task, Trajectories, World
-from antdrive.worlds.drawing import card, world_svg
+from antdrive.worlds.svg import card, world_svg
 
 DRIFTING = "odometry", "matching"  # localisation without fixes
 FINE = 0.05  # without a map, plans are made on cells of this side at most [m]
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Conditions:
+class LossFactors:
     """What the loss of margin depends on, as far as a calibration takes it into account."""
 
     robot: RobotSpec  # drives
@@ -55,7 +55,7 @@ class MarginChoice:
 
     margin: float  # the margin that was chosen [m]
     record: MarginRecord  # what records say of the choice
-    conditions: Conditions  # what the loss depends on
+    factors: LossFactors  # what the loss depends on
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +94,7 @@ class Scenario(Settings):
             raise FieldError("control_hz", problem)
         overlap = overlap_at(self.task.world, self.robot, self.task.start, self.unseen)
         if overlap:
-            at = place_name(self.task.frame, *self.task.start[:2], "g")
+            at = format_position(self.task.frame, *self.task.start[:2], "g")
             raise FieldError("start", f"{self.robot.name} at {at} {overlap}; move the start away from it")
 
     def _check_kinds(self) -> None:
@@ -192,9 +192,9 @@ class Scenario(Settings):
         return hashlib.sha256(repr((text, *more)).encode()).hexdigest()
 
     @property
-    def loss_conditions(self) -> Conditions:
+    def loss_factors(self) -> LossFactors:
         """What the loss of margin depends on."""
-        return Conditions(
+        return LossFactors(
             robot=self.robot,
             controller=self.controller,
             noise=float(self.noise),
@@ -207,7 +207,7 @@ class Scenario(Settings):
     def chosen(self) -> MarginChoice | None:
         """What the margin was chosen by; None where it was given, or the conditions have changed."""
         choice = self.margin_choice
-        same = choice is not None and (choice.margin, choice.conditions) == (self.margin, self.loss_conditions)
+        same = choice is not None and (choice.margin, choice.factors) == (self.margin, self.loss_factors)
         return choice if same else None
 
     def as_dict(self) -> dict[str, Any]:
@@ -320,7 +320,7 @@ class Scenario(Settings):
 def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:
     """The driven world as SVG, with start, goal, the ways of movers, and lines: points, colour, whether dashed."""
     world, task = s.driven_world, s.task
-    goal, movers = (*task.goal, task.goal_tolerance), world.ways(task.start[:2], s.seed)
+    goal, movers = (*task.goal, task.goal_tolerance), world.mover_paths(task.start[:2], s.seed)
     return world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
 
 

@@ -83,7 +83,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= 100 else f"{text[:100]}…"
 
 
-def verified(
+def verify_log(
     log: Path, task: Task | None, robot: RobotSpec | None, result: Path | None, *, replay: bool
 ) -> dict[str, Any]:
     """Certify a log, and compare it with a world, a robot, its `result.json` and, with `replay`, its replay."""

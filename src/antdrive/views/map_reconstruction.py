@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import frame_at
+from antdrive.base.plane import relative_frame
 from antdrive.base.types import Flags, Floats, Pose
 from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of, reset_ticks, turning_room
 from antdrive.sim.log.rollout import Rollout, ranges_of
@@ -121,7 +121,7 @@ class MapReconstruction:
         The cosine and the sine of a turn, then x and y [m]: what they do to a point of the world gives its place on the map.
         """
         row = self._row(at)
-        x, y, turn = frame_at(self._rollout.pose[[row]], np.array([self._estimate(row)]))[0].tolist()
+        x, y, turn = relative_frame(self._rollout.pose[[row]], np.array([self._estimate(row)]))[0].tolist()
         return np.array([math.cos(turn), math.sin(turn), x, y])
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
-from antdrive.runs.folder import free_folder
+from antdrive.runs.results_folder import free_folder
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout

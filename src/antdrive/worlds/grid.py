@@ -78,7 +78,7 @@ class Grid:
         return min(max(row, 0), rows - 1), min(max(col, 0), cols - 1)
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import card, cells_svg
+        from antdrive.worlds.svg import card, cells_svg
 
         rows, cols = self.shape
         facts = {

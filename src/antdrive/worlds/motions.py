@@ -22,7 +22,7 @@ from antdrive.worlds.movers import Cruising, Keyframed, Mover, Wandering
 
 CLEAR_OF_ROBOT = 1.0  # a wanderer's random first cell is at least this far from the robot's start, surface to point [m]
 TRIES = 10_000
-WAY_POINTS = 120  # of a line that is drawn
+PATH_POINTS = 120  # of a line that is drawn
 _NEIGHBOURS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.float64)  # x, y
 
 
@@ -85,20 +85,20 @@ def require_few_draws(motions: Iterable[Motion]) -> None:
         )
 
 
-def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, robot: Point, seed: int) -> Motion:
+def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, start: Point, seed: int) -> Motion:
     """The motion of one mover of a world."""
     if isinstance(mover, Keyframed):
         return _KeyframedMotion(mover)
     if isinstance(mover, Cruising):
         return _CruisingMotion(mover, bounds)
     key = [seed, zlib.crc32(b"mover"), index] if mover.seed is None else [mover.seed]
-    return _WanderingMotion(mover, bounds, discs, robot, np.random.default_rng(key))
+    return _WanderingMotion(mover, bounds, discs, start, np.random.default_rng(key))
 
 
-def way_ahead(motion: Motion, seconds: float) -> Floats:
+def path_ahead(motion: Motion, seconds: float) -> Floats:
     """Where a mover goes from a run's start on, up to its first jump (N, 2) [m]: a line to draw."""
     end = float(min(motion.jump_times(seconds), default=seconds))
-    times = np.linspace(0.0, end, WAY_POINTS)
+    times = np.linspace(0.0, end, PATH_POINTS)
     return motion.at(times[:-1] if end < seconds else times)
 
 
@@ -221,10 +221,10 @@ class _CruisingMotion(Motion):
 class _WanderingMotion(Motion):
     """From cell to cell. Steps are drawn when they are first asked for, in order, so that later calls change nothing."""
 
-    def __init__(self, mover: Wandering, bounds: Bounds, discs: Floats, robot: Point, rng: np.random.Generator) -> None:
+    def __init__(self, mover: Wandering, bounds: Bounds, discs: Floats, start: Point, rng: np.random.Generator) -> None:
         self.radius = mover.radius
         self._mover, self._bounds, self._discs, self._rng = mover, bounds, discs, rng
-        self._stops = [self._first_stop(robot)]
+        self._stops = [self._first_stop(start)]
 
     def at(self, t: Floats) -> Floats:
         here, there, share = self._steps(t)
@@ -258,7 +258,7 @@ class _WanderingMotion(Motion):
         x, y = ends[free[self._rng.integers(len(free))]]
         return float(x), float(y)
 
-    def _first_stop(self, robot: Point) -> Point:
+    def _first_stop(self, start: Point) -> Point:
         mover, bounds = self._mover, self._bounds
         if mover.start is not None:
             return first_cell(mover, bounds, self._discs)
@@ -268,7 +268,7 @@ class _WanderingMotion(Motion):
             col, row = self._rng.integers(cols), self._rng.integers(rows)
             x = float(bounds[0] + mover.cell / 2 + col * mover.cell)
             y = float(bounds[1] + mover.cell / 2 + row * mover.cell)
-            clear = math.dist((x, y), robot) - mover.radius >= CLEAR_OF_ROBOT
+            clear = math.dist((x, y), start) - mover.radius >= CLEAR_OF_ROBOT
             if clear and _free_steps(self._discs, bounds, (x, y), np.array([(x, y)]), mover.radius)[0]:
                 return x, y
         raise FieldError(

@@ -12,12 +12,12 @@ import numpy as np
 from antdrive.base.caches import Keyed, bits
 from antdrive.base.errors import FieldError, require_finite, require_positive
 from antdrive.base.types import Bounds, Floats, Point, Pose
-from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.limits import MAX_CELLS, MAX_WALK, Coordinate, Size
-from antdrive.worlds.motions import Motion, first_cell, motion_of, require_few_draws, way_ahead
+from antdrive.worlds.motions import Motion, first_cell, motion_of, path_ahead, require_few_draws
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
+from antdrive.worlds.svg import card, world_svg
 
-WAY_DRAWN = 20.0  # how far ahead notebooks show the ways of movers [s]
+DRAWN_TIME = 20.0  # how far ahead notebooks show the ways of movers [s]
 
 
 @dataclass(frozen=True)
@@ -136,22 +136,22 @@ class World:
     def _repr_html_(self) -> str:
         facts = {"obstacles": len(self.obstacles), "size": "{:g} × {:g} m".format(*self.size)}
         facts |= {"movers": len(self.movers)} if self.movers else {}
-        return card(world_svg(self.bounds, self.discs, movers=self.ways()), self.name, facts)
+        return card(world_svg(self.bounds, self.discs, movers=self.mover_paths()), self.name, facts)
 
-    def ways(self, start: Point | None = None, seed: int | None = None) -> list[tuple[Floats, float]]:
+    def mover_paths(self, start: Point | None = None, seed: int | None = None) -> list[tuple[Floats, float]]:
         """The way (N, 2) [m] and the radius [m] of each mover over the next 20 s, to draw.
 
         Args:
             start: the robot's start [m]
             seed: the run's random seed; None: wanderers whose way depends on it are left out
         """
-        ways = []
+        paths = []
         for i, mover in enumerate(self.movers):
             if isinstance(mover, Wandering) and seed is None and (mover.seed is None or mover.start is None):
                 continue
             motion = motion_of(mover, i, self.bounds, self.discs, start or (math.inf, math.inf), seed or 0)
-            ways.append((way_ahead(motion, WAY_DRAWN), mover.radius))
-        return ways
+            paths.append((path_ahead(motion, DRAWN_TIME), mover.radius))
+        return paths
 
 
 class PointWorld(World):
@@ -258,7 +258,7 @@ class Task:
             "goal": "{:g}, {:g}".format(*self.goal),
         }
         facts |= {"movers": len(world.movers)} if world.movers else {}
-        movers = world.ways()
+        movers = world.mover_paths()
         return card(world_svg(world.bounds, world.discs, start=self.start, goal=goal, movers=movers), world.name, facts)
 
 

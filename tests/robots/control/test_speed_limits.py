@@ -104,7 +104,7 @@ def test_a_slight_corner_is_rounded_within_the_blend(turtlebot):
 
 
 def test_the_curvature_of_an_arc_is_exact_and_constant():
-    from antdrive.robots.files import load_robot
+    from antdrive.robots.robot_file import load_robot
 
     p = speed_profile(around(0.44, -2.5), load_robot("jackal"), blend=0.1)
     inner = (p.arc > 0.15) & (p.arc < p.arc[-1] - 0.15)
@@ -113,7 +113,7 @@ def test_the_curvature_of_an_arc_is_exact_and_constant():
 
 @given(st.lists(st.tuples(st.floats(0.05, 1.5), st.floats(-1.5, 1.5)), min_size=1, max_size=8), st.booleans())
 def test_all_limits_hold_on_random_routes(legs, fast_robot):
-    from antdrive.robots.files import load_robot
+    from antdrive.robots.robot_file import load_robot
 
     robot = load_robot("jackal" if fast_robot else "turtlebot")
     heading, points = 0.0, [np.zeros(2)]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.robots import Lidar
-from antdrive.robots.importing.urdf import import_urdf
+from antdrive.robots.importing.urdf_import import import_urdf
 
 BURGER = (Path(__file__).parent / "urdf" / "burger.urdf").read_text()
 SENSOR = (
@@ -36,14 +36,14 @@ def sensor(**changes):
 @pytest.mark.parametrize(("kind", "tag"), [("ray", "ray"), ("gpu_ray", "ray"), ("gpu_lidar", "lidar")])
 def test_a_lidar_is_read_where_it_is(tmp_path, kind, tag):
     found = imported(tmp_path, sensor(kind=kind, tag=tag))
-    assert found.robot.lidar == Lidar(
+    assert found.spec.lidar == Lidar(
         beams=360, field_of_view=6.283185, min_range=0.12, max_range=3.5, rate=5.0, resolution=0.015, sigma=0.01,
         x=-0.032, height=0.177,
     )  # fmt: skip
     assert (
         "# read: sensor lds of link scan\nlidar: {beams: 360, field_of_view: 6.283185, min_range: 0.12," in found.text
     )
-    assert imported(tmp_path).robot.lidar is None
+    assert imported(tmp_path).spec.lidar is None
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_a_lidar_is_read_where_it_is(tmp_path, kind, tag):
 def test_a_lidar_looks_where_the_middle_of_its_view_is(tmp_path, joint, pose, heading):
     found = imported(
         tmp_path, sensor(high="1.5707963", pose=pose), joint=f'xyz="0 0.01 0.167" rpy="{joint}"'
-    ).robot.lidar
+    ).spec.lidar
     assert found.yaw == pytest.approx(heading, abs=1e-5)
     assert (found.field_of_view, found.beams) == (pytest.approx(math.pi / 2, abs=1e-6), 360)
     spot = (-0.02, 0.06, 0.207) if pose else (0.0, 0.01, 0.177)  # the pose is in the turned link
@@ -83,7 +83,7 @@ def test_a_lidar_looks_where_the_middle_of_its_view_is(tmp_path, joint, pose, he
 )
 def test_a_lidar_that_cannot_be_used_is_left_out_with_the_reason(tmp_path, changes, says):
     found = imported(tmp_path, sensor(**changes))
-    assert found.robot.lidar is None
+    assert found.spec.lidar is None
     assert f"# no lidar: sensor lds of link scan is not used: {says}" in found.text.splitlines()
     other = imported(tmp_path, sensor(**changes), sensor(name="second"), sensor(name="third"))
     assert (
@@ -93,11 +93,11 @@ def test_a_lidar_that_cannot_be_used_is_left_out_with_the_reason(tmp_path, chang
 
 def test_what_is_no_lidar_is_none(tmp_path):
     found = imported(tmp_path, sensor(kind="camera"), sensor().replace('reference="scan"', 'reference="nowhere"'))
-    assert found.robot.lidar is None
+    assert found.spec.lidar is None
     assert "lidar" not in found.text
 
 
 def test_a_rate_that_is_missing_is_assumed(tmp_path):
     found = imported(tmp_path, sensor().replace("<update_rate>5</update_rate>", ""))
-    assert found.robot.lidar.rate == 10.0
+    assert found.spec.lidar.rate == 10.0
     assert "# read: sensor lds of link scan; rate of 10 Hz assumed" in found.text

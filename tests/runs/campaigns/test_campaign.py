@@ -16,7 +16,7 @@ from antdrive.base.errors import InputError
 from antdrive.planners import PLANNERS
 from antdrive.robots import list_robots
 from antdrive.runs.campaigns import campaign_schema, expand, load_campaign, make_campaign
-from antdrive.runs.campaigns.grid import values_of
+from antdrive.runs.campaigns.resolving import values_of
 from antdrive.runs.campaigns.rows import grid_row
 from antdrive.sim.log.record import hashes_of
 from antdrive.sim.pipeline import run

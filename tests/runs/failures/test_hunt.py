@@ -12,7 +12,7 @@ from antdrive.planners import AStar, Query, load_planner
 from antdrive.planners.anyangle.passage import feasible
 from antdrive.runs.failures import failure as failing
 from antdrive.runs.failures import hunt as hunting
-from antdrive.runs.failures import report as reporting
+from antdrive.runs.failures import reproducers
 from antdrive.runs.failures.failure import Attempt, failure_of
 from antdrive.runs.failures.handover import expectation
 from antdrive.runs.failures.hunt import (
@@ -28,8 +28,8 @@ from antdrive.runs.failures.hunt import (
     line_distance,
     rehearsed_clearance,
 )
-from antdrive.runs.failures.report import report
-from antdrive.runs.failures.shrink import shrink
+from antdrive.runs.failures.reproducers import write_reproducers
+from antdrive.runs.failures.shrinker import shrink
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.evaluation import unmet_demands
 from antdrive.runs.suites.scenarios import task_of as scenario_task
@@ -178,7 +178,7 @@ def test_a_planner_that_raises_is_a_finding(jackal, tmp_path, monkeypatch, metho
         return  # the rest does not depend on the method
     small = shrink(raised[0].scenario, seconds=1)
     assert small.failure == raised[0].failure
-    (handed,) = report(Hunt((raised[0],), 4), tmp_path, seconds=0)
+    (handed,) = write_reproducers(Hunt((raised[0],), 4), tmp_path, seconds=0)
     (case,) = load_suite(tmp_path / "failures.drive.yaml")
     assert handed.small.scenario.task.world.obstacles == scenario_task(case).world.obstacles
 
@@ -187,9 +187,9 @@ def test_ctrl_c_while_shrinking_hands_over_what_was_found(found, tmp_path, monke
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(reporting, "shrink", interrupted)
+    monkeypatch.setattr(reproducers, "shrink", interrupted)
     other = replace(found.distinct[0], fingerprint="of another drive")
-    reported = report(Hunt((found.distinct[0], other), 2), tmp_path)
+    reported = write_reproducers(Hunt((found.distinct[0], other), 2), tmp_path)
     assert [one.repeats for one in reported] == [True, False]
 
 

@@ -26,7 +26,7 @@ from antdrive.runs.margins.choice import (
 from antdrive.runs.margins.loss import Loss, calibration_key, course, least_bound, loss_on_course
 from antdrive.sim import Scenario, run
 from antdrive.sim.driving.rules import Pursuit
-from antdrive.sim.scenario import Conditions
+from antdrive.sim.scenario import LossFactors
 from antdrive.worlds import rasterise
 
 
@@ -59,7 +59,7 @@ def test_courses_differ_by_seed_and_only_by_seed():
 
 
 def conditions(robot, **changes):
-    return Conditions(**{"robot": robot, "controller": PurePursuit(), "noise": 1.0, "smoothing": "taut", **changes})
+    return LossFactors(**{"robot": robot, "controller": PurePursuit(), "noise": 1.0, "smoothing": "taut", **changes})
 
 
 def test_the_bound_is_that_of_the_certificate(small_run, collided_run):
@@ -237,7 +237,7 @@ def driven(monkeypatch):
 
 @pytest.fixture
 def robot(turtlebot):
-    return Conditions(robot=turtlebot, controller=PurePursuit(), noise=1.0, smoothing="none")
+    return LossFactors(robot=turtlebot, controller=PurePursuit(), noise=1.0, smoothing="none")
 
 
 def test_a_margin_is_calibrated_once(cache, driven, robot):
@@ -248,7 +248,7 @@ def test_a_margin_is_calibrated_once(cache, driven, robot):
     assert set(driven) == set(range(choice.DRIVES))
     assert choose_margin(robot, jobs=1) == first == known_margin(robot)
     assert len(driven) == count
-    noisier = Conditions(robot=robot.robot, controller=robot.controller, noise=3.0, smoothing="none")
+    noisier = LossFactors(robot=robot.robot, controller=robot.controller, noise=3.0, smoothing="none")
     assert choose_margin(noisier, jobs=1).margin > first.margin
     assert len(list(cache.iterdir())) == 2
 
@@ -309,7 +309,7 @@ def test_a_margin_is_chosen_for_the_scenarios_own_settings(made_up, jackal):
     )
     assert s.margin == s.chosen.margin
     assert 0.05 <= s.margin <= 0.056
-    assert s.loss_conditions == Conditions(robot=jackal, controller=controller, noise=2.0, smoothing="taut")
+    assert s.loss_factors == LossFactors(robot=jackal, controller=controller, noise=2.0, smoothing="taut")
     assert s.inflate == jackal.radius + s.margin
 
 
@@ -324,8 +324,8 @@ def test_a_choice_counts_as_long_as_its_conditions_hold(made_up, small_scenario)
 
 
 def test_plans_in_space_and_time_are_not_smoothed(turtlebot):
-    assert Scenario.of("plaza-moving", "sipp", turtlebot).loss_conditions.smoothing == "none"
-    assert Scenario.of("plaza-moving", "astar", turtlebot).loss_conditions.smoothing == "clearance"
+    assert Scenario.of("plaza-moving", "sipp", turtlebot).loss_factors.smoothing == "none"
+    assert Scenario.of("plaza-moving", "astar", turtlebot).loss_factors.smoothing == "clearance"
 
 
 def test_words_are_no_margin(small_scenario):

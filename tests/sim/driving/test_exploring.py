@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from antdrive.robots import PursuitState, Twist
 from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Rollout, Scenario, run
-from antdrive.sim.compose import compose, told
+from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, hit_within, point_at
 from antdrive.sim.driving.drive import Driver
 from antdrive.sim.driving.parts import Step
@@ -255,10 +255,10 @@ def test_plans_that_failed_long_ago_are_no_reason(jackal):
     said = []
     for tick in (60, 90, 120):
         assert exploration.replan(tick, TASK.start, "no way") is None
-        said.append(exploration.no_way(tick))
+        said.append(exploration.failure_note(tick))
     assert said == ["", "", "no way through what was seen, last at t = 2.0 s"]
-    assert exploration.no_way(120 + 30 * 60)
-    assert not exploration.no_way(121 + 30 * 60)
+    assert exploration.failure_note(120 + 30 * 60)
+    assert not exploration.failure_note(121 + 30 * 60)
 
 
 @pytest.mark.parametrize(("rate", "share"), [(1000.0, 5), (60.0, 5), (50.0, 4), (10.0, 1)])
@@ -300,8 +300,8 @@ def test_routes_begin_where_the_robot_believes_it_is_however_far_it_drifted(jack
 
 def test_the_robot_is_told_no_obstacle_and_no_wall():
     moved = replace(TASK, world=World("other", (-9.0, -9.0, 9.0, 9.0)))
-    assert told(TASK) == told(moved)
-    assert told(TASK).world.obstacles == ()
+    assert mapless_task(TASK) == mapless_task(moved)
+    assert mapless_task(TASK).world.obstacles == ()
 
 
 def test_a_drive_with_a_map_is_recorded_as_before(jackal):
@@ -469,23 +469,23 @@ def test_a_look_goes_both_ways_where_one_is_not_free(jackal, left, right, turns)
 def test_a_robot_looks_round_once_at_a_place(jackal, turtlebot):
     recovery = Recovery(survey_of(jackal, 9.0, 9.0), jackal, HERE, 60)
     assert not recovery.held(0.0, HERE)  # it sees enough to begin with
-    recovery.note_sight(1.0, FORWARD)
-    recovery.note_sight(1.4, FORWARD)
+    recovery.note_held(1.0, FORWARD)
+    recovery.note_held(1.4, FORWARD)
     assert [recovery.held(now, HERE) for now in (1.4, 1.6)] == [False, True]
     assert recovery.begin_scan_turn(HERE)
     recovery.end_scan_turn(3.0, HERE)
-    recovery.note_sight(3.0, FORWARD)
+    recovery.note_held(3.0, FORWARD)
     assert not recovery.held(9.0, HERE)
     assert not recovery.begin_scan_turn((4.2, 4.0, 1.0))
     assert recovery.held(9.0, (4.4, 4.0, 1.0))
-    recovery.note_sight(9.1, None)
+    recovery.note_held(9.1, None)
     assert not recovery.held(9.2, (4.4, 4.0, 1.0))
     around = Recovery(survey_of(turtlebot, 9.0, 9.0), turtlebot, HERE, 60)
-    around.note_sight(1.0, FORWARD)
+    around.note_held(1.0, FORWARD)
     assert not around.held(9.0, HERE)  # its lidar sees all around
     assert not around.begin_scan_turn(HERE)
     before_a_post = Recovery(survey_of(jackal, 9.0, 9.0, 0.05), jackal, HERE, 60)
-    before_a_post.note_sight(1.0, FORWARD)
+    before_a_post.note_held(1.0, FORWARD)
     assert not before_a_post.held(9.0, HERE)  # there is nothing to see
 
 
@@ -496,10 +496,10 @@ def test_ground_that_was_not_seen_is_told_from_what_was_hit(jackal):
     exploration = compose(s).guide
     survey, recovery = exploration.survey, exploration._recovery
     for twist, unseen in ((FORWARD, False), (Twist(-0.5, 0.0), True), (Twist(0.001, 1.0), False)):
-        recovery.note_sight(0.0, twist)
+        recovery.note_held(0.0, twist)
         seen, open_ = survey.clear_way(HERE, twist, 1.0), survey.clear_way(HERE, twist, 1.0, freespace=True)
         assert seen <= open_
-        assert recovery.misses_sight(HERE) == unseen, (twist, seen, open_)
+        assert recovery.held_by_unknown(HERE) == unseen, (twist, seen, open_)
 
 
 @settings(max_examples=60, deadline=None)

@@ -67,7 +67,7 @@ def test_the_rehearsal_and_physics_agree(cart, monkeypatch):
         planned = plan(s)
         with monkeypatch.context() as patch:
             patch.setattr("antdrive.sim.driving.routes.cannot_leave", lambda *_: "")
-            patch.setattr(PurePursuit, "step", lambda self, path, *now: step(self, path.for_any_turn, *now))
+            patch.setattr(PurePursuit, "step", lambda self, path, *now: step(self, path.ignoring_turn_clearance, *now))
             driven = run(s)
         said = "" if planned[1].solved else planned[1].reason
         assert ("would bring" in said) == (driven.outcome is Outcome.COLLIDED), (yaw, at, said, driven.outcome)
@@ -86,7 +86,7 @@ def test_a_rectangle_does_not_turn_into_a_post_on_its_way(jackal, side, gap):
     route = Route(np.array([(1.0, 3.0), (3.0, 3.0), goal]))
     tracked = controller.prepare(route, task.world, jackal, 0.03, 1 / 60)
     ends = {}
-    for name, path in (("checked", tracked), ("any turn", tracked.for_any_turn)):
+    for name, path in (("checked", tracked), ("any turn", tracked.ignoring_turn_clearance)):
         with Engine(task.world, jackal) as engine:
             ends[name] = follow(engine, controller, path, task, limit=20)
     assert ends["any turn"].outcome is Outcome.COLLIDED

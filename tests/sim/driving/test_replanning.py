@@ -354,14 +354,14 @@ def test_what_a_planners_own_replanner_raises_is_its_error(error, cell_by_cell):
 
 
 def test_an_answer_of_its_own_replanner_that_is_none_is_its_error():
-    with pytest.raises(PlannerError, match="planner Deciding returned 5 where a PlanResult is due"):
+    with pytest.raises(PlannerError, match="planner Deciding returned 5 instead of a PlanResult"):
         run(Scenario.of(MOVING, Deciding(5, cell_by_cell=False), time_limit=10.0))
 
 
 def test_capabilities_of_another_type_are_the_planners_error():
     planner = Deciding(None, cell_by_cell=True)
     planner.capabilities = "all"
-    with pytest.raises(PlannerError, match="planner Deciding declares 'all' where Capabilities are due"):
+    with pytest.raises(PlannerError, match="planner Deciding declares 'all' instead of Capabilities"):
         run(Scenario.of(MOVING, planner))
 
 

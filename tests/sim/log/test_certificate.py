@@ -133,7 +133,7 @@ def test_a_robot_that_stays_where_it_is_gets_a_verdict_of_its_own(log):
     certificate = certify(stays)
     assert certificate.certified, certificate.problems
     assert certificate.sentence.startswith("certified: touched nothing, went nowhere: ")
-    assert certify(log).verdict == "certified collision-free"
+    assert certify(log).statement == "certified collision-free"
     assert certify(log).moved > 1.0
 
 

@@ -95,7 +95,7 @@ def test_a_made_up_drive_is_certified():
     certificate = certify(drive())
     assert certificate.certified, certificate.problems
     assert certificate.min_clearance == certificate.bound == pytest.approx(0.82)
-    assert certificate.verdict == "certified: touched nothing, went nowhere"
+    assert certificate.statement == "certified: touched nothing, went nowhere"
     assert certificate.contacts == 0
     assert certificate.as_dict() == {
         "certified": True,
@@ -166,12 +166,12 @@ def test_a_robot_that_got_a_millimetre_away_went_somewhere(far, verdict):
     log = shifted(drive(), far, 1, 20)
     assert certify(log).certified, certify(log).problems
     assert certify(log).moved == pytest.approx(far)
-    assert verdict in certify(log).verdict
-    assert certify(with_record(log, margin=1.0)).verdict == "NOT certified collision-free"
+    assert verdict in certify(log).statement
+    assert certify(with_record(log, margin=1.0)).statement == "NOT certified collision-free"
 
 
 def test_a_millimetre_itself_is_nowhere():
-    assert "went nowhere" in Certificate(True, 0, 1.0, 1.0, (), moved=0.001).verdict
+    assert "went nowhere" in Certificate(True, 0, 1.0, 1.0, (), moved=0.001).statement
 
 
 def touched(gap, row=400, at=400):

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.base.plane import frame_at, laid
+from antdrive.base.plane import relative_frame, transform_points
 from antdrive.robots import load_robot
-from antdrive.robots.placing import footprint_clearance
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.sim import METRICS
 from antdrive.sim.log.rollout import millimetres, ranges_of
-from antdrive.sim.log.sights import PASSED, first_meetings, movers_met, passed, seen_ground, sightings
+from antdrive.sim.log.sights import PASSED, first_meetings, mover_sightings, passed, seen_ground, sightings
 from antdrive.worlds import Disc, World
 from tests.made_up_drive import scanned
 from tests.records import changed
@@ -115,7 +115,7 @@ def test_movers_are_first_seen_where_they_come_into_sight_and_passed_where_they_
     nearer = drive.movers[:, 1] - to / 6 - (0.0, 0.3)
     turned = np.stack([drive.movers[:, 0], nearer], axis=1)
     log = scanned(replace(drive, movers=turned))
-    rows, found = log.scan_rows, movers_met(log)
+    rows, found = log.scan_rows, mover_sightings(log)
     assert min(sight.seen_at for sight in found) == 0 < max(sight.seen_at for sight in found)  # behind the other
     for j, sight in enumerate(found):
         angles = np.linspace(0.0, 2 * np.pi, 200)
@@ -132,7 +132,7 @@ def test_movers_are_first_seen_where_they_come_into_sight_and_passed_where_they_
         assert sight.nearest_at == log.t[apart.argmin()]
         assert sight.seen_from == pytest.approx(apart[np.searchsorted(log.t, sight.seen_at)])
     assert {j for j, sight in enumerate(found) if sight.passed} == {s.obstacle for s in passed(log) if s.mover}
-    assert [sight.followed_at for sight in found] == [math.inf, math.inf]
+    assert [sight.tracked_at for sight in found] == [math.inf, math.inf]
 
 
 def test_a_mover_is_followed_from_its_first_track_on(made_up_drive):
@@ -145,13 +145,13 @@ def test_a_mover_is_followed_from_its_first_track_on(made_up_drive):
     tracks = np.zeros((3, 7), dtype=np.float32)
     tracks[:, 0], tracks[:, 1], tracks[:, 2], tracks[:, 3] = at, 4, -y + 0.4 + noise[0], x + noise[1]
     tracks[0, 2] += 0.2  # not yet the mover
-    first, second = movers_met(replace(log, tracks=tracks))
-    assert math.isinf(first.followed_at)
-    assert second.followed_at == log.t[at[1]]
+    first, second = mover_sightings(replace(log, tracks=tracks))
+    assert math.isinf(first.tracked_at)
+    assert second.tracked_at == log.t[at[1]]
     plain = second.as_dict()
-    assert (plain["mover"], plain["followed_s"], "obstacle" in plain) == (1, second.followed_at, False)
+    assert (plain["mover"], plain["followed_s"], "obstacle" in plain) == (1, second.tracked_at, False)
     touched = np.array([[200.0, len(log.record.world.obstacles) + 1, -0.001, 9.0]])
-    assert [sight.touched for sight in movers_met(replace(log, contacts=touched))] == [False, True]
+    assert [sight.touched for sight in mover_sightings(replace(log, contacts=touched))] == [False, True]
 
 
 RANDOM = np.random.default_rng(5)
@@ -163,7 +163,7 @@ def flat(points):
 
 
 def test_a_frame_lies_so_that_both_poses_are_one():
-    frames = frame_at(OWN, TRUE)
+    frames = relative_frame(OWN, TRUE)
     turn = np.exp(1j * frames[:, 2])
     np.testing.assert_allclose(flat(frames) + turn * flat(OWN), flat(TRUE), atol=1e-12)
     np.testing.assert_allclose(turn * np.exp(1j * OWN[:, 2]), np.exp(1j * TRUE[:, 2]), atol=1e-12)
@@ -173,7 +173,7 @@ def test_what_the_robot_sees_lies_as_it_lies_from_the_robot():
     seen = RANDOM.uniform(-9, 9, (40, 2))
     ahead = (flat(seen) - flat(OWN)) * np.exp(-1j * OWN[:, 2])
     there = flat(TRUE) + ahead * np.exp(1j * TRUE[:, 2])
-    np.testing.assert_allclose(flat(laid(seen, frame_at(OWN, TRUE))), there, atol=1e-12)
+    np.testing.assert_allclose(flat(transform_points(seen, relative_frame(OWN, TRUE))), there, atol=1e-12)
 
 
 @given(st.lists(st.floats(0.002, 65.0), max_size=20))

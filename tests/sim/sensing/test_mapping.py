@@ -237,7 +237,7 @@ def test_a_mover_can_be_forgotten_and_its_beams_left_out():
     scanner, grid = Scanner(EYE, np.empty((0, 3))), OccupancyMap(EYE)
     where, radii = np.array([[1.5, 0.0]]), np.array([0.3])
     ranges = scanner.scan((0, 0, 0), where, radii)
-    grid.insert((0, 0, 0), ranges, left_out=np.isfinite(ranges))
+    grid.insert((0, 0, 0), ranges, omitted=np.isfinite(ranges))
     assert not grid.occupied.any()
     grid.insert((0, 0, 0), ranges)
     assert len(grid.discs())

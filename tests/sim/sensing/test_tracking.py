@@ -37,7 +37,7 @@ def watched(lidar, start, velocity, radii, seconds, speed=0.0, seed=0):
         pose = (speed * t, 0.0, 0.0)
         ranges = scanner.scan(pose, places, radii, rng)
         theirs = tracker.update(MappedGround(grid, 100), pose, ranges, t)
-        grid.insert(pose, ranges, left_out=theirs)
+        grid.insert(pose, ranges, omitted=theirs)
     return tracker.movers(), places, grid
 
 
@@ -104,7 +104,7 @@ def test_a_mover_that_beams_pass_through_is_gone_and_a_hidden_one_is_remembered(
     for k in range(58):
         there = np.array([[2.0, 0.02 * k - 0.8]]) if 10 <= k < 40 else np.array([[90.0, 90.0]])
         ranges = scanner.scan((0, 0, 0), there, np.array([0.3]))
-        grid.insert((0, 0, 0), ranges, left_out=tracker.update(MappedGround(grid, 40), (0, 0, 0), ranges, k / 20))
+        grid.insert((0, 0, 0), ranges, omitted=tracker.update(MappedGround(grid, 40), (0, 0, 0), ranges, k / 20))
         assert k in range(10, 20) or k in (40, 41) or len(tracker.movers().radii) == (20 <= k < 40)
     known = KnownGround(lidar, World("hall", BOUNDS, tuple(Disc(*row) for row in POSTS.tolist())))
     tracker, screen = MoverTracker(lidar), Scanner(lidar, np.vstack([POSTS, [1.0, 0.0, 0.4]]), bounds=BOUNDS)
@@ -187,7 +187,7 @@ def test_there_is_room_for_however_many_tracks_a_scan_begins(jackal):
     tracker, scanner = MoverTracker(lidar, TrackingPolicy(gap=0.1)), Scanner(lidar, fence)
     for k in range(12):
         tracker.update(empty, (0.0, 0.0, 0.0), scanner.scan((0.0, 0.0, 0.0)), k / 50)
-    assert tracker.found == 80
+    assert tracker.tracks_begun == 80
     found = tracker.movers()
     assert len(found.radii) == 80
     assert np.hypot(*(found.positions - fence[:, :2]).T).max() < 0.03

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.run_table import RunTable
 from antdrive.views.colours import _luminance, label_styles
 from antdrive.views.pages.campaign_report import campaign_data, write_campaign_report
 from antdrive.views.pages.campaign_summary import summarise

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from antdrive.worlds import CellMap, Disc, World, cell_map, map_task, rasterise
-from antdrive.worlds.formats.cellmap import cover, watch_conversion
+from antdrive.worlds.formats.cellmap import conversion_progress, cover
 from tests.worlds.oracles import worlds
 
 CORNER = (math.sqrt(2) - 1) / 2
@@ -188,7 +188,7 @@ def test_a_conversion_says_how_far_it_is():
     free = np.ones((20, 20), dtype=np.bool_)
     free[8:12, 3:15] = False
     shares = []
-    with watch_conversion(shares.append):
+    with conversion_progress(shares.append):
         map_task(CellMap(free, 0.1), (0.3, 0.3, 0.0), (1.7, 1.7), name="made")
     map_task(CellMap(free, 0.1), (0.3, 0.3, 0.0), (1.7, 1.7), name="nobody watches")
     assert shares == sorted(shares)

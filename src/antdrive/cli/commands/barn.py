@@ -14,7 +14,7 @@ from antdrive.cli.options import argument, flag, option
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
-    from antdrive.runs.barn import BarnLine
+    from antdrive.runs.barn_challenge import BarnLine
     from antdrive.runs.campaigns.results import SweepResults
     from antdrive.runs.statistics.price import Price
 
@@ -42,11 +42,11 @@ def barn(
     Repeat the command to resume it. Exit code 0: all runs are done, whatever their outcomes.
     """
     from antdrive.base.optional import parquet_library
-    from antdrive.runs import barn as challenge
+    from antdrive.runs import barn_challenge as challenge
     from antdrive.runs.campaigns.campaign import make_campaign
     from antdrive.runs.campaigns.sweeping import sweep
     from antdrive.runs.statistics.price import prices
-    from antdrive.runs.statistics.runs import RunTable
+    from antdrive.runs.statistics.run_table import RunTable
 
     map = given["map"]
     if with_map and map != "none":
@@ -90,7 +90,7 @@ def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
 
 
 def _lines(found: "Sequence[BarnLine]", known: "BarnLine | None", price: "Price | None") -> Iterator[str]:
-    from antdrive.runs.barn import HEADS, OURS, PUBLISHED, PUBLISHED_HEADS
+    from antdrive.runs.barn_challenge import HEADS, OURS, PUBLISHED, PUBLISHED_HEADS
 
     listed = [*found, *([dataclasses.replace(known, world="all, with the map")] if known else [])]
     yield from table(HEADS, (line.cells for line in listed))

@@ -17,7 +17,7 @@ from antdrive.views.run_folder import RUN_FILES, fingerprint, write_result, writ
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.hunt import Hunt
-    from antdrive.runs.failures.report import Reported
+    from antdrive.runs.failures.reproducers import Reproducer
 
 MARKER = "falsify.json"  # identifies the search in its folder
 
@@ -79,14 +79,14 @@ def falsify(
     return not hunt.findings
 
 
-def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reported]":
-    """Shrink, repeat and write each distinct failure, replacing those of an earlier search."""
-    from antdrive.runs.failures.report import SUITE, report
+def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reproducer]":
+    """Shrink, repeat and write every failure that differs from the others, in place of those of an earlier search."""
+    from antdrive.runs.failures.reproducers import SUITE, write_reproducers
 
     reported = []
     if hunt.findings:
         with bar("shrinking") as progress:
-            reported = report(hunt, folder, seconds=seconds, progress=progress)
+            reported = write_reproducers(hunt, folder, seconds=seconds, progress=progress)
     else:
         (folder / SUITE).unlink(missing_ok=True)
     for place in folder.glob("failure-*/"):
@@ -105,8 +105,8 @@ def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Rep
     return reported
 
 
-def _lines(hunt: "Hunt", reported: "list[Reported]", folder: Path, filmed: bool) -> Iterator[str]:
-    from antdrive.runs.failures.report import SUITE
+def _lines(hunt: "Hunt", reported: "list[Reproducer]", folder: Path, filmed: bool) -> Iterator[str]:
+    from antdrive.runs.failures.reproducers import SUITE
 
     ended = "interrupted after" if hunt.interrupted else "after"
     runs = f"{hunt.runs} runs ({hunt.driven} with a path on the grid)"

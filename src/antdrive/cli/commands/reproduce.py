@@ -34,8 +34,8 @@ def reproduce(
     """
     from antdrive.runs.papers.claims import VERDICT_HEADS, verdict_cells, verdict_facts
     from antdrive.runs.papers.experiments import PAPERS
-    from antdrive.runs.papers.reproduce import HEADS, RUNS_FOLDER, row_cells, too_few_seeds
-    from antdrive.runs.papers.reproduce import reproduce as repeat
+    from antdrive.runs.papers.reproduction import HEADS, RUNS_FOLDER, row_cells, too_few_seeds
+    from antdrive.runs.papers.reproduction import reproduce as repeat
     from antdrive.views.papers import draw_figures
 
     papers = list(PAPERS) if paper == "all" else [paper]

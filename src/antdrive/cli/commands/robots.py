@@ -41,7 +41,7 @@ def show_robot(
 ) -> None:
     """Describe a robot and draw it from above."""
     from antdrive.robots import load_robot, robot_to_dict
-    from antdrive.robots.drawing import facts_of
+    from antdrive.robots.card import facts_of
 
     spec = load_robot(robot)
     if out is not None:
@@ -96,7 +96,7 @@ def import_robot(
     from antdrive.base.atomic import write_text
     from antdrive.robots import robot_to_dict
     from antdrive.robots.importing.model import checked_packages
-    from antdrive.robots.importing.urdf import import_urdf
+    from antdrive.robots.importing.urdf_import import import_urdf
 
     values = {"wheel_radius": wheel_radius} if wheel_radius is not None else {}
     for key, text in map(pair, given or ()):
@@ -121,8 +121,8 @@ def import_robot(
     if figure is not None:
         from antdrive.views.figures.robot_figure import robot_figure
 
-        robot_figure(found.robot, figure, pieces=found.pieces, above=found.above)
+        robot_figure(found.spec, figure, pieces=found.pieces, above=found.above)
         files["figure"] = str(figure)
     write_text(target, found.text)
-    facts = {**robot_to_dict(found.robot), "files": files, "left_out": list(found.left_out)}
+    facts = {**robot_to_dict(found.spec), "files": files, "left_out": list(found.missing_meshes)}
     show(json, facts, [found.text.rstrip(), *file_lines(files)])

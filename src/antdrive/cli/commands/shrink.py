@@ -15,7 +15,7 @@ from antdrive.cli.scenario_options import with_chosen_margin
 from antdrive.views.run_folder import fingerprint, write_result, write_run
 
 if TYPE_CHECKING:
-    from antdrive.runs.failures.shrink import Shrunk
+    from antdrive.runs.failures.shrinker import Shrunk
     from antdrive.runs.suites.demands import Bound
     from antdrive.runs.suites.suite import SuiteCase
     from antdrive.sim.scenario import Scenario
@@ -51,8 +51,8 @@ def shrink(
     """
     from antdrive.runs.failures.failure import parse_bound
     from antdrive.runs.failures.handover import planner_beside, scenario_name
-    from antdrive.runs.failures.report import hand_over
-    from antdrive.runs.failures.shrink import shrink as make_small
+    from antdrive.runs.failures.reproducers import write_reproducer
+    from antdrive.runs.failures.shrinker import shrink as make_small
 
     if planner is not None and "::" in failure:
         raise InputError(f"--planner: applies to logs only; the suite names the planner of {failure}")
@@ -65,7 +65,7 @@ def shrink(
             journal = folder / "journal.json"
             shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
         words = planner_beside(case, planner, scenario, folder)
-        small, suite, repeats = hand_over(shrunk, name, folder, bound=crossed, planner=words)
+        small, suite, repeats = write_reproducer(shrunk, name, folder, bound=crossed, planner=words)
         files = {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
         report: dict[str, Any] = {"files": files}
         if small.run is not None:  # else the planner raises an error

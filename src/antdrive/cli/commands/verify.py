@@ -23,8 +23,8 @@ def verify(
     In a run's folder, result.json must agree with the log. Exit code 0: every log proves its drive collision-free.
     Exit code 2: a log cannot be read; the others are still certified.
     """
-    from antdrive.robots.files import load_robot
-    from antdrive.sim.verifying import verified
+    from antdrive.robots.robot_file import load_robot
+    from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 
     task = None if world is None else load_task(world)
@@ -36,7 +36,7 @@ def verify(
         try:
             path = str(log_at(given))
             result = given / "result.json" if given.is_dir() else None
-            found = checked[path] = verified(Path(path), task, spec, result, replay=replay)
+            found = checked[path] = verify_log(Path(path), task, spec, result, replay=replay)
         except InputError as error:
             print_error(str(error))
             checked[path] = {"certified": False, "problems": [str(error)], "readable": False}

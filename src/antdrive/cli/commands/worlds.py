@@ -68,8 +68,8 @@ def show_world(
     json: options.Json = False,
     **asked: Any,
 ) -> None:
-    """Describe a world and check whether a robot can cross it."""
-    from antdrive.base.plane import in_map
+    """Describe a world, and whether a robot can cross it."""
+    from antdrive.base.plane import world_to_map
     from antdrive.planners import Query, load_planner, reachable
     from antdrive.robots import list_robots, load_robot, overlap_at
     from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
@@ -94,7 +94,7 @@ def show_world(
     said = {key + UNITS.get(key, ""): "-" if value is None else value for key, value in _facts(shown).items()}
     if any(shown.frame):
         for key, pose in {"start": shown.start, "goal": shown.goal}.items():
-            said[f"{key} in its map"] = in_map(shown.frame, [pose])[0].round(4).tolist()
+            said[f"{key} in its map"] = world_to_map(shown.frame, [pose])[0].round(4).tolist()
     said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m"
     said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
     lines = [f"{key:18} {value}" for key, value in said.items()]
@@ -176,13 +176,13 @@ def import_world(
     overhang of cylinders beyond blocked cells.
     """
     from antdrive.worlds import import_file, save_task
-    from antdrive.worlds.formats.cellmap import watch_conversion
+    from antdrive.worlds.formats.cellmap import conversion_progress
     from antdrive.worlds.formats.importing import IMPORTS, import_format
     from antdrive.worlds.formats.map_server import kept_tasks
 
     try:
         file_format = import_format(path, barn=barn)
-        with bar("converting") as progress, watch_conversion(progress):
+        with bar("converting") as progress, conversion_progress(progress):
             tasks = import_file(
                 path,
                 start=numbers("--start", start, 3, "X,Y,YAW"),

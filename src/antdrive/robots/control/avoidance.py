@@ -93,7 +93,7 @@ class Avoidance:
     def avoid(
         self,
         tracked: TrackedPath,
-        robot: RobotSpec,
+        spec: RobotSpec,
         pose: Pose,
         last: Twist,
         before: PursuitState,
@@ -108,7 +108,7 @@ class Avoidance:
 
         Args:
             tracked: the path that the controller follows
-            robot: the robot
+            spec: the robot
             pose: its estimated pose
             last: the command of the last period
             before: the controller's state before it chose `wanted`
@@ -120,17 +120,17 @@ class Avoidance:
             backwards: the highest speed backwards, as long as no mover is met at it, for a robot that does not see what
                 is behind it [m/s]
         """
-        candidates = self._candidates(robot, state, speed_limit, backwards)
+        candidates = self._candidates(spec, state, speed_limit, backwards)
         situation = (
             *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
             tracked.limits, tracked.tuning._replace(period=self.step),
-            _weights(self, tracked.tuning.robot_radius, robot.footprint), places, radii,
+            _weights(self, tracked.tuning.robot_radius, spec.footprint), places, radii,
         )  # fmt: skip
         chosen, contact = kernels.choose(*situation)
         if chosen == 0 and contact == math.inf:
             return wanted, False, AvoidanceState()
-        if contact < math.inf and backwards < robot.max_speed:
-            return self.avoid(tracked, robot, pose, last, before, wanted, state, places, radii, speed_limit)
+        if contact < math.inf and backwards < spec.max_speed:
+            return self.avoid(tracked, spec, pose, last, before, wanted, state, places, radii, speed_limit)
         stopping = abs(last.speed) / tracked.limits.acceleration
         if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
@@ -144,17 +144,17 @@ class Avoidance:
         return 2 * self.step if close else 0.0
 
     def _candidates(
-        self, robot: RobotSpec, state: AvoidanceState, speed_limit: float, backwards: float = math.inf
+        self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, backwards: float = math.inf
     ) -> Floats:
         """The robot's candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
-        table = _candidate_table(robot.max_speed, robot.max_yaw_rate, robot.max_lateral_acceleration)
-        if backwards < robot.max_speed:
+        table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
+        if backwards < spec.max_speed:
             slowest = table[:, [kernels.SPEED, kernels.NEXT_SPEED]].min(axis=1)
             table = table[slowest >= -backwards - 1e-9]
-        if not state.candidate and speed_limit >= robot.max_speed:
+        if not state.candidate and speed_limit >= spec.max_speed:
             return table
         table = table.copy()
-        table[0, kernels.SPEED] = min(robot.max_speed, speed_limit)
+        table[0, kernels.SPEED] = min(spec.max_speed, speed_limit)
         if state.candidate:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining

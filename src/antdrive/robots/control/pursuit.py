@@ -102,7 +102,7 @@ class TrackedPath:
         """Length of the route [m]."""
         return float(self.samples.arc[-1])
 
-    def among(self, obstacles: ObstacleIndex) -> TrackedPath:
+    def with_obstacles(self, obstacles: ObstacleIndex) -> TrackedPath:
         """The same path among other obstacles.
 
         Args:
@@ -113,12 +113,12 @@ class TrackedPath:
         )
 
     @property
-    def for_any_turn(self) -> TrackedPath:
+    def ignoring_turn_clearance(self) -> TrackedPath:
         """The same path for a robot that turns on the spot the shorter way round, whatever is in its way."""
         return replace(self, tuning=self.tuning._replace(half_length=0.0, half_width=0.0, corners=np.empty((0, 2))))
 
     @property
-    def without_turning(self) -> TrackedPath:
+    def preferring_arcs(self) -> TrackedPath:
         """The same path for a robot that takes every clear arc a driving robot would take, instead of turning first."""
         return replace(self, tuning=self.tuning._replace(rotate_above_at_rest=self.tuning.rotate_above))
 
@@ -189,7 +189,7 @@ class PurePursuit:
         self,
         route: Route,
         world: World,
-        robot: RobotSpec,
+        spec: RobotSpec,
         margin: float,
         period: float,
         tolerance: float = math.inf,
@@ -201,16 +201,18 @@ class PurePursuit:
         Args:
             route: the route
             world: the world as the controller knows it
-            robot: the robot
+            spec: the robot
             margin: the safety margin that the route keeps beyond the robot's radius [m]
             period: control period [s]
             tolerance: goal tolerance [m]; where it is small, the robot stops closer to the route's end
             spacing: distance between the samples at which lookaheads and speed limits are worked out [m]
             indexed: whether the obstacles are sorted by place; that pays where the robot drives among them for long
         """
-        tuning = self._tuning(route, robot, margin, period, min(self.goal_distance, tolerance / 2))
+        tuning = self._tuning(route, spec, margin, period, min(self.goal_distance, tolerance / 2))
         tuning = tuning._replace(spacing=spacing)
-        obstacles = self._index(world, tuning.lookahead_clearance) if indexed else unsorted(world.discs, world.bounds)
+        obstacles = (
+            self._index(world, tuning.lookahead_clearance) if indexed else unsorted_obstacles(world.discs, world.bounds)
+        )
         lookahead: Floats = np.empty(int(route.arc[-1] / spacing) + 2)
         _kernels_path.clear_lookaheads(
             route.xy, route.arc, obstacles, tuning.lookahead_clearance, spacing, self.lookahead_min,
@@ -219,7 +221,7 @@ class PurePursuit:
         at = spacing * np.arange(len(lookahead))
         profile = speed_profile(
             route,
-            robot,
+            spec,
             blend=self.blend if route.curvature is not None else self.corner_blend,
             rotate_in_place_above=self.rotate_in_place_above,
             braking=self.braking,
@@ -229,16 +231,16 @@ class PurePursuit:
         if route.curvature is None:
             curvature[:] = np.nan
         near_obstacles = self.min_speed_near_obstacles, self.clearance_time
-        braking = self.braking * robot.max_acceleration
-        speed = limits_along(route, world, robot.radius, profile, lookahead, tuning, near_obstacles, braking)
+        braking = self.braking * spec.max_acceleration
+        speed = limits_along(route, world, spec.radius, profile, lookahead, tuning, near_obstacles, braking)
         limits = MotionLimits(
-            speed=robot.max_speed,
-            yaw_rate=robot.max_yaw_rate,
-            acceleration=robot.max_acceleration,
-            yaw_acceleration=robot.max_yaw_acceleration,
-            lateral_acceleration=robot.max_lateral_acceleration,
-            half_track=robot.track / 2,
-            rim_speed=robot.max_wheel_speed * robot.wheel_radius,
+            speed=spec.max_speed,
+            yaw_rate=spec.max_yaw_rate,
+            acceleration=spec.max_acceleration,
+            yaw_acceleration=spec.max_yaw_acceleration,
+            lateral_acceleration=spec.max_lateral_acceleration,
+            half_track=spec.track / 2,
+            rim_speed=spec.max_wheel_speed * spec.wheel_radius,
         )
         samples = PathSamples(route.xy, route.arc, lookahead, speed, curvature, heading)
         return TrackedPath(route, tuning.goal_distance, samples, obstacles, limits, tuning)
@@ -263,18 +265,18 @@ class PurePursuit:
         return Twist(speed, yaw_rate), PursuitState(arc, turning, limiter)
 
     def _tuning(
-        self, route: Route, robot: RobotSpec, margin: float, period: float, goal_distance: float
+        self, route: Route, spec: RobotSpec, margin: float, period: float, goal_distance: float
     ) -> PursuitTuning:
         return PursuitTuning(
             period=period,
             spacing=SPACING,
-            lookahead_clearance=robot.radius + self.lookahead_margin * margin,
-            stopping_clearance=robot.radius + self.stopping_margin * margin,
-            robot_radius=robot.radius,
-            half_length=robot.footprint.half_length,
-            half_width=robot.footprint.half_width,
-            rounding=robot.footprint.rounding,
-            corners=np.array(robot.footprint.corners, dtype=np.float64).reshape(-1, 2),
+            lookahead_clearance=spec.radius + self.lookahead_margin * margin,
+            stopping_clearance=spec.radius + self.stopping_margin * margin,
+            robot_radius=spec.radius,
+            half_length=spec.footprint.half_length,
+            half_width=spec.footprint.half_width,
+            rounding=spec.footprint.rounding,
+            corners=np.array(spec.footprint.corners, dtype=np.float64).reshape(-1, 2),
             lookahead_time=self.corner_lookahead_time if route.curvature is None else self.lookahead_time,
             lookahead_min=self.lookahead_min,
             lookahead_max=self.lookahead_max,
@@ -298,7 +300,7 @@ class PurePursuit:
         return ObstacleIndex(discs, starts, bounds, side)
 
 
-def unsorted(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
+def unsorted_obstacles(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
     """Obstacles that all lie in one square."""
     return ObstacleIndex(discs, np.array([0, len(discs)]), np.asarray(bounds, dtype=np.float64), EVERYTHING)
 

@@ -56,7 +56,7 @@ class SpeedProfile:
 
 def speed_profile(
     route: Route,
-    robot: RobotSpec,
+    spec: RobotSpec,
     *,
     blend: float = 0.2,
     rotate_in_place_above: float = 1.0,
@@ -67,7 +67,7 @@ def speed_profile(
 
     Args:
         route: the route
-        robot: its limits are those of speed, acceleration, lateral acceleration, yaw rate, yaw acceleration
+        spec: its limits are those of speed, acceleration, lateral acceleration, yaw rate, yaw acceleration
             and wheels
         blend: the route's curvature is averaged over this distance on both sides, with weights that fall
             linearly: no robot follows a corner or a jump in curvature at speed [m]
@@ -88,18 +88,18 @@ def speed_profile(
     legs: list[tuple[Floats, ...]] = []
     now, turned = 0.0, 0.0
     for first, last, turn in zip([0.0, *stops], [*stops, route.length], [0.0, *turns], strict=True):
-        now += turning_time(turn, robot)
+        now += turning_time(turn, spec)
         turned += turn
         arc = np.linspace(first, last, max(3, math.ceil((last - first) / step) + 1))
         heading, curvature, change = _blended(arc, places, headings, blend)
-        speed, limit = _speeds(arc, curvature, change, robot, braking)
+        speed, limit = _speeds(arc, curvature, change, spec, braking)
         time = now + np.concatenate(([0.0], np.cumsum(2.0 * np.diff(arc) / (speed[1:] + speed[:-1]))))
         now = float(time[-1])
         legs.append((arc, speed, time, curvature, heading + turned, limit))
     return SpeedProfile(*(np.concatenate(parts) for parts in zip(*legs, strict=True)))
 
 
-def _speeds(arc: Floats, curvature: Floats, change: Floats, robot: RobotSpec, braking: float) -> tuple[Floats, Floats]:
+def _speeds(arc: Floats, curvature: Floats, change: Floats, spec: RobotSpec, braking: float) -> tuple[Floats, Floats]:
     """Speed and limit along a leg that begins and ends standing; the limit may begin at any speed."""
     from antdrive.robots.control import _kernels_profile
 
@@ -107,16 +107,16 @@ def _speeds(arc: Floats, curvature: Floats, change: Floats, robot: RobotSpec, br
     _kernels_profile.limit_speed(
         curvature,
         change,
-        robot.max_speed,
-        robot.max_lateral_acceleration,
-        robot.max_yaw_rate,
-        robot.max_yaw_acceleration,
-        robot.track / 2,
-        robot.max_wheel_speed * robot.wheel_radius,
+        spec.max_speed,
+        spec.max_lateral_acceleration,
+        spec.max_yaw_rate,
+        spec.max_yaw_acceleration,
+        spec.track / 2,
+        spec.max_wheel_speed * spec.wheel_radius,
         limit,
     )
     limit[-1] = 0.0
-    acceleration, yaw_acceleration = robot.max_acceleration, robot.max_yaw_acceleration
+    acceleration, yaw_acceleration = spec.max_acceleration, spec.max_yaw_acceleration
     _kernels_profile.limit_braking(arc, curvature, change, braking * acceleration, yaw_acceleration, limit)
     speed = limit.copy()
     speed[0] = 0.0
@@ -124,13 +124,13 @@ def _speeds(arc: Floats, curvature: Floats, change: Floats, robot: RobotSpec, br
     return speed, limit
 
 
-def turning_time(angle: float, robot: RobotSpec) -> float:
+def turning_time(angle: float, spec: RobotSpec) -> float:
     """How long the robot takes to rotate in place by an angle [rad], from standing to standing [s]."""
-    fastest = min(robot.max_yaw_rate, 2 * robot.max_wheel_speed * robot.wheel_radius / robot.track)
-    spin_up = fastest / robot.max_yaw_acceleration
+    fastest = min(spec.max_yaw_rate, 2 * spec.max_wheel_speed * spec.wheel_radius / spec.track)
+    spin_up = fastest / spec.max_yaw_acceleration
     if abs(angle) >= fastest * spin_up:
         return abs(angle) / fastest + spin_up
-    return 2.0 * math.sqrt(abs(angle) / robot.max_yaw_acceleration)
+    return 2.0 * math.sqrt(abs(angle) / spec.max_yaw_acceleration)
 
 
 def _headings(route: Route, rotate_in_place_above: float) -> tuple[Floats, Floats, list[float], list[float]]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from antdrive.base.types import Point
 from antdrive.robots.outline import Footprint
 
-MOST_OUTLINE = 12  # corners of an outline that was computed
+MAX_OUTLINE = 12  # corners of an outline that was computed
 STEP = 1e-5  # of the numbers of an outline that was computed [m]
 LOOSE = 1e-8  # what turns such as 1.5707963, which stand for a quarter, may move a corner by [m]
 ALIKE = 1e-4  # how far the left and the right of an outline may be from mirror images of each other [m]
@@ -110,7 +110,7 @@ def footprint_around(points: Iterable[Point], kind: str = "auto") -> Footprint:
     if kind == "rectangle" or (kind == "auto" and area >= LIKE * length * width):
         x, y = (0.0 if abs(m) < 5e-4 else m for m in middle)
         return Footprint.rectangle(_up(2 * max(xmax - x, x - xmin)), _up(2 * max(ymax - y, y - ymin)), (x, y))
-    return _polygon_around(held, fewer_corners(hull, MOST_OUTLINE))
+    return _polygon_around(held, fewer_corners(hull, MAX_OUTLINE))
 
 
 def _polygon_around(held: list[Point], corners: list[Point]) -> Footprint:

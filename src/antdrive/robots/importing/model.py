@@ -23,7 +23,7 @@ from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.formats.xml import parse_xml
 
-MOST_PACKAGES = 100  # that one file may refer to
+MAX_PACKAGES = 100  # that one file may refer to
 
 
 def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Path | None:
@@ -40,7 +40,7 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
         raise input_error(str(path), "no such file")
     xacrodoc = optional("xacrodoc", "urdf", "xacro files are expanded with it")
     known = dict(packages)
-    for _ in range(MOST_PACKAGES):
+    for _ in range(MAX_PACKAGES):
         xacrodoc.packages.reset()
         xacrodoc.packages.update_package_cache(known)
         try:
@@ -52,7 +52,7 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
             if missing is None or folder is None:
                 raise input_error(str(path), f"xacro cannot expand it: {_in_one_line(error)}{_help(error)}") from None
             known[missing] = folder
-    raise input_error(str(path), f"refers to more than {MOST_PACKAGES} packages")
+    raise input_error(str(path), f"refers to more than {MAX_PACKAGES} packages")
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
@@ -96,7 +96,7 @@ def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
 
 # Around a circle of radius 1, with sides ahead, behind, to the left and to the right: it is as long and as wide as the circle.
 CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
-MOST_LINKS = 10_000
+MAX_LINKS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ class UrdfModel:
     masses: dict[str, float]  # the mass of each link that has one [kg]
     # what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
     drive: dict[str, str]
-    left_out: tuple[str, ...]  # meshes that were not found
+    missing_meshes: tuple[str, ...]  # meshes that were not found
     lidars: tuple[UrdfSensor, ...] = ()  # the lidars that Gazebo would simulate
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
@@ -176,8 +176,8 @@ def read_model(
     if root.tag != "robot":
         raise input_error(str(path), f"its root element is <{root.tag}>; a URDF file begins with <robot>")
     links = {_named(path, link): link for link in root.findall("link")}
-    if not 0 < len(links) <= MOST_LINKS:
-        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MOST_LINKS}")
+    if not 0 < len(links) <= MAX_LINKS:
+        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MAX_LINKS}")
     found = [_joint(path, element) for element in root.findall("joint")]
     commanded = _commanded(path, root, {joint.name for joint in found})
     places, joints = _placed(path, set(links), [replace(joint, commanded=commanded.get(joint.name)) for joint in found])
@@ -193,9 +193,9 @@ def read_model(
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
-    lidars, left_out = lidar_sensors(root, places), tuple(reader.left_out)
+    lidars, missing_meshes = lidar_sensors(root, places), tuple(reader.missing_meshes)
     return UrdfModel(
-        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), left_out, lidars
+        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), missing_meshes, lidars
     )
 
 
@@ -352,7 +352,7 @@ class _Shapes:
 
     def __init__(self, path: Path, meshes: Path | None, without_meshes: bool, packages: Mapping[str, Path]) -> None:
         self._path, self._meshes, self._without, self._packages = path, meshes, without_meshes, packages
-        self.left_out: list[str] = []
+        self.missing_meshes: list[str] = []
 
     def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
         """The piece of a <collision>; none for a mesh that is left out."""
@@ -402,7 +402,7 @@ class _Shapes:
                     f"link {link}",
                     f"mesh {name} is not found; say where with --meshes FOLDER or --package NAME=FOLDER, or --without-meshes",
                 )
-            self.left_out.append(f"{link}: {name}")
+            self.missing_meshes.append(f"{link}: {name}")
             return None
         trimesh = optional("trimesh", "urdf", f"mesh {file.name} is read with it")
         try:

@@ -41,7 +41,7 @@ def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfS
     )
 
 
-def found_lidar(
+def import_lidar(
     sensors: tuple[UrdfSensor, ...], frame: Floats, floor: float, foot: Footprint
 ) -> tuple[Lidar | None, str]:
     """The first lidar that a robot's file can hold, and where it comes from; none, and why, where there is no such."""

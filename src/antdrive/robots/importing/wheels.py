@@ -27,7 +27,7 @@ class DrivenWheel:
     radius: float  # [m]
     width: float  # along its axis [m]
     read_from: str  # where these values come from, in words
-    told: bool = False  # whether the radius was given, or the drive plugin's
+    given: bool = False  # whether the radius was given, or the drive plugin's
 
 
 def driven_wheels(
@@ -120,7 +120,7 @@ def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, Dri
 
 def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWheel]) -> str:
     """Why fewer than two wheels were found: they turn too little, or something reaches lower; and what helps."""
-    told = "name the joints of its two driven wheels with --left and --right"
+    fix = "name the joints of its two driven wheels with --left and --right"
     limited = [
         joint
         for joint in model.joints.values()
@@ -139,8 +139,8 @@ def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWhee
         names = ", ".join(f"{name} by {height:.4g} m" for name, height in above.items() if math.isfinite(height))
         if names and lowest.link not in {joint.child for joint in turning}:
             lower = f"the collision geometry of link {lowest.link} lies lower than its wheels ({names})"
-            return f"{lower}, which then would not stand on the floor; if they drive it, {told}"
-    return f"has {len(wheels)} wheels that turn freely and stand on the floor; a differential drive has two; if there are, {told}"
+            return f"{lower}, which then would not stand on the floor; if they drive it, {fix}"
+    return f"has {len(wheels)} wheels that turn freely and stand on the floor; a differential drive has two; if there are, {fix}"
 
 
 def _bottom(model: UrdfModel, joint: UrdfJoint) -> float:
@@ -166,16 +166,16 @@ def _is_round(model: UrdfModel, joint: UrdfJoint) -> bool:
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
     own: list[CollisionPiece] = [piece for piece in model.pieces if piece.link == joint.child]
     if not own:
-        _, told = model.drive_number("wheel_radius", "wheelRadius")
+        _, given = model.drive_number("wheel_radius", "wheelRadius")
         _, diameter = model.drive_number("wheel_diameter", "wheelDiameter")
-        r = radius or told or (diameter or 0.0) / 2
+        r = radius or given or (diameter or 0.0) / 2
         if not r:
             raise input_error(
                 str(model.source), f"link {joint.child}", "has no collision geometry; say --wheel-radius METRES"
             )
         says = "given" if radius else "the drive plugin"
         how = f"{says}; width assumed, position from joint {joint.name}"
-        return DrivenWheel(joint, joint.place[:3, 3], r, 0.2 * r, how, told=True)
+        return DrivenWheel(joint, joint.place[:3, 3], r, 0.2 * r, how, given=True)
     piece = max(own, key=lambda piece: float(np.ptp(piece.points, axis=0).max()))
     along = piece.points @ joint.axis
     middle = joint.place[:3, 3] + joint.axis * (float(along.min() + along.max()) / 2 - joint.place[:3, 3] @ joint.axis)
@@ -185,7 +185,7 @@ def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWh
     how = f"{piece.kind} of link {joint.child}"
     if radius is not None:
         r, how = radius, f"given, instead of {r:.4g} from {how}"
-    return DrivenWheel(joint, middle, r, width, how, told=radius is not None)
+    return DrivenWheel(joint, middle, r, width, how, given=radius is not None)
 
 
 def _on_one_axle(a: DrivenWheel, b: DrivenWheel) -> bool:

@@ -16,7 +16,15 @@ from antdrive.base.checks import SchemaVersion, check, schema_of, show
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import InputError
 from antdrive.base.records import STRICT
-from antdrive.sim.forms import SEEDS_SCHEMA, TextOrMapping, file_fields, said, seed_list, written_default, written_kind
+from antdrive.sim.forms import (
+    SEEDS_SCHEMA,
+    TextOrMapping,
+    file_fields,
+    given_settings,
+    seed_list,
+    written_default,
+    written_kind,
+)
 from antdrive.sim.settings import SETTINGS
 
 MOST_SEEDS = 1_000_000  # given as a number
@@ -283,7 +291,7 @@ def _combinations(
     lists = [_alternatives(document, key, value, place) for key, value in given.items()]
     for values in itertools.product(*lists):
         data = dict(zip(given, values, strict=True))
-        yield said(check(SettingsEntry, _Part(document.source, data, whole=document, place=place))), place
+        yield given_settings(check(SettingsEntry, _Part(document.source, data, whole=document, place=place))), place
 
 
 def _alternatives(document: Document, key: str, value: Any, place: Location) -> list[Any]:

@@ -15,8 +15,8 @@ from antdrive.base.errors import FieldError
 from antdrive.base.files import file_name
 from antdrive.robots import list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
-from antdrive.runs.campaigns.grid import campaign_tasks, campaign_worlds, planner_variants
 from antdrive.runs.campaigns.job import Job, NamedRobot, NamedSettings, NamedTask, PlannerVariant, SweepCase, run_key
+from antdrive.runs.campaigns.resolving import campaign_tasks, campaign_worlds, planner_variants
 from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting_words
 from antdrive.sim.log.record import canonical_hash
 from antdrive.worlds import Task

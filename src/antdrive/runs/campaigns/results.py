@@ -15,7 +15,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.rows import NOT_CANONICAL
 from antdrive.runs.campaigns.store import GRID_FILE, TABLE, joined, read_manifest
-from antdrive.runs.statistics.runs import FOLDER, RunTable, column_named, matching, merged
+from antdrive.runs.statistics.run_table import FOLDER, RunTable, column_named, matching, merged
 
 if TYPE_CHECKING:
     import pyarrow

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.optional import parquet_library
-from antdrive.runs import folder as folders
+from antdrive.runs import results_folder
 from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, result_schema, result_table
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ class Store:
 @contextmanager
 def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
     """A context with a campaign's folder for this process alone."""
-    with folders.opened(Path(folder), MANIFEST, kind="a campaign") as path:
+    with results_folder.opened(Path(folder), MANIFEST, kind="a campaign") as path:
         (path / PARTS).mkdir(exist_ok=True)
         for left in (*path.glob(f"{UNFINISHED}*"), *(path / PARTS).glob(f"{UNFINISHED}*")):
             left.unlink(missing_ok=True)  # of a process that was killed

@@ -18,7 +18,7 @@ from antdrive.base.errors import InputError
 from antdrive.base.files import file_name
 from antdrive.planners import list_planners, load_planner
 from antdrive.robots import RobotSpec, list_robots, load_robot
-from antdrive.robots.files import footprint_to_dict
+from antdrive.robots.robot_file import footprint_to_dict
 from antdrive.runs.failures.failure import Attempt
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound

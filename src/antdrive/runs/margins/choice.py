@@ -26,7 +26,7 @@ from antdrive.sim.log.margin import budget
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import MarginRecord
 from antdrive.sim.pipeline import Run
-from antdrive.sim.scenario import Conditions, MarginChoice, Scenario
+from antdrive.sim.scenario import LossFactors, MarginChoice, Scenario
 
 PROBABILITY = 1e-3  # of a drive along a course that loses more than predicted
 RESERVE = 0.01  # part of the margin that the predicted loss leaves [m]
@@ -138,7 +138,7 @@ JOBS = 2  # processes at most
 
 
 def choose_margin(
-    conditions: Conditions, *, jobs: int = JOBS, progress: Callable[[int, float], None] | None = None
+    conditions: LossFactors, *, jobs: int = JOBS, progress: Callable[[int, float], None] | None = None
 ) -> Calibration:
     """The least margin whose predicted loss leaves the reserve: from the cache, or calibrated now and cached.
 
@@ -163,7 +163,7 @@ def with_chosen_margin(scenario: Scenario, progress: Callable[[int, float], None
         scenario: the scenario; its own margin does not count
         progress: is called after each of these drives with their number so far and the margin that is tried [m]
     """
-    return with_margin_of(scenario, choose_margin(scenario.loss_conditions, progress=progress))
+    return with_margin_of(scenario, choose_margin(scenario.loss_factors, progress=progress))
 
 
 def with_margin_of(scenario: Scenario, calibration: Calibration) -> Scenario:
@@ -174,11 +174,11 @@ def with_margin_of(scenario: Scenario, calibration: Calibration) -> Scenario:
         probability=calibration.probability,
         drives=calibration.drives,
     )
-    choice = MarginChoice(margin=calibration.margin, record=record, conditions=scenario.loss_conditions)
+    choice = MarginChoice(margin=calibration.margin, record=record, factors=scenario.loss_factors)
     return dataclasses.replace(scenario, margin=calibration.margin, margin_choice=choice)
 
 
-def known_margin(conditions: Conditions) -> Calibration | None:
+def known_margin(conditions: LossFactors) -> Calibration | None:
     """The calibration in the cache; None where there is none, or only a damaged one."""
     path = _path(calibration_key(conditions))
     if path is None:
@@ -191,7 +191,7 @@ def known_margin(conditions: Conditions) -> Calibration | None:
 
 
 def _driving(
-    conditions: Conditions, pool: Pool, progress: Callable[[int, float], None] | None
+    conditions: LossFactors, pool: Pool, progress: Callable[[int, float], None] | None
 ) -> Callable[[float], list[Loss]]:
     """A function that drives every course with a margin and returns the losses."""
     done = 0

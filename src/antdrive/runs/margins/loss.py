@@ -24,7 +24,7 @@ from antdrive.sim.driving.plants import Drive
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
-from antdrive.sim.scenario import Conditions
+from antdrive.sim.scenario import LossFactors
 from antdrive.worlds import Disc, Task, World, point_clearance, rasterise
 from antdrive.worlds.grid import DIRECTIONS
 
@@ -124,7 +124,7 @@ class Loss(NamedTuple):
     disc: float  # by the smallest disc around it, for which plans are made; never less than by the footprint [m]
 
 
-def calibration_key(conditions: Conditions) -> str:
+def calibration_key(conditions: LossFactors) -> str:
     """The SHA-256 of conditions, and of the versions of the code that the loss depends on."""
     facts = dataclasses.asdict(conditions)
     for label in ("name", "source"):
@@ -134,7 +134,7 @@ def calibration_key(conditions: Conditions) -> str:
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
-def loss_on_course(conditions: Conditions, margin: float, seed: int) -> Loss:
+def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     """How much of the margin a drive along a random course uses up; infinite where it does not reach the goal.
 
     A loss is the margin minus the least distance from an obstacle that a certificate would prove. It exceeds the margin where

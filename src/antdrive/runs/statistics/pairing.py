@@ -9,7 +9,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Flags, Floats, Ints
-from antdrive.runs.statistics.runs import OF_WORLDS, PLACE, RunTable
+from antdrive.runs.statistics.run_table import OF_WORLDS, PLACE, RunTable
 from antdrive.sim.log.metrics import WALL_CLOCK
 
 

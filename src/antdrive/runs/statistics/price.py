@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from antdrive.runs.statistics.intervals import means_by_world
-from antdrive.runs.statistics.runs import DRIVEN, PLACE, SENSING, RunTable
+from antdrive.runs.statistics.run_table import DRIVEN, PLACE, SENSING, RunTable
 
 TIME, LENGTH = "arrival_s", "driven_length_m"
 

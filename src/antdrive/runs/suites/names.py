@@ -12,7 +12,7 @@ from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.planners.plan import Planner
 from antdrive.planners.registry import load_planner, make_planner
 from antdrive.planners.user_code import UserCodeError, is_user_code, load_object, record_name
-from antdrive.robots.files import list_robots
+from antdrive.robots.robot_file import list_robots
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
 from antdrive.worlds.files.world_file import list_worlds
 

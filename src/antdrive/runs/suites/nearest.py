@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.base.records import STRICT
-from antdrive.robots.placing import gaps, name_of
+from antdrive.robots.clearance import footprint_distances, obstacle_name
 from antdrive.runs.suites.demands import CYLINDER, MOVER, UNSEEN, WALL
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Disc
 
-# Columns of `gaps` and indices in a log's contacts count the walls in different orders.
+# Columns of `footprint_distances` and indices in a log's contacts count the walls in different orders.
 _WALL_OF_CONTACT = (0, 2, 1, 3)  # left, right, lower, upper as columns after the obstacles
 
 
@@ -41,9 +41,9 @@ def nearest_of(rollout: Rollout) -> ClosestApproach:
     """What the robot came nearest to."""
     row = int(rollout.clearance.argmin())
     world = dataclasses.replace(rollout.record.world, movers=())
-    static = gaps(world, rollout.record.robot, [rollout.pose[row]])[0]
+    static = footprint_distances(world, rollout.record.robot, [rollout.pose[row]])[0]
     index, least = int(static.argmin()), float(static.min())
-    thing = name_of(world, index, len(rollout.record.unseen))
+    thing = obstacle_name(world, index, len(rollout.record.unseen))
     movers = _mover_gaps(rollout, row)
     if len(movers) and movers.min() < least:
         thing = _mover(rollout, int(movers.argmin()), row)
@@ -61,7 +61,7 @@ def first_contact(rollout: Rollout) -> ClosestApproach | None:
     if discs <= index < discs + movers:
         return _encounter(rollout, row, _mover(rollout, index - discs, row))
     column = index if index < discs else discs + _WALL_OF_CONTACT[index - discs - movers]
-    return _encounter(rollout, row, name_of(world, column, len(rollout.record.unseen)))
+    return _encounter(rollout, row, obstacle_name(world, column, len(rollout.record.unseen)))
 
 
 def _mover_gaps(rollout: Rollout, row: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
@@ -70,7 +70,7 @@ def _mover_gaps(rollout: Rollout, row: int) -> np.ndarray[tuple[int, ...], np.dt
     places = rollout.movers[row].tolist()
     discs = tuple(Disc(x, y, mover.radius) for (x, y), mover in zip(places, record.world.movers, strict=True))
     world = dataclasses.replace(record.world, obstacles=discs, movers=())
-    return np.asarray(gaps(world, record.robot, [rollout.pose[row]])[0, : len(discs)])
+    return np.asarray(footprint_distances(world, record.robot, [rollout.pose[row]])[0, : len(discs)])
 
 
 def _mover(rollout: Rollout, index: int, row: int) -> str:

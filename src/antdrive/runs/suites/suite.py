@@ -17,7 +17,7 @@ from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.records import STRICT
 from antdrive.runs.suites.demands import END, KINDS, Demands, causes
-from antdrive.sim.forms import SeedList, TextOrMapping, file_fields, said
+from antdrive.sim.forms import SeedList, TextOrMapping, file_fields, given_settings
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.settings import SETTINGS
@@ -129,7 +129,7 @@ class SuiteCase:
     @property
     def given(self) -> dict[str, Any]:
         """The settings that the scenario or the defaults give, by key."""
-        return said(self.entry)
+        return given_settings(self.entry)
 
     @property
     def id(self) -> str:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base import Floats, Pose
-from antdrive.base.plane import place_name
+from antdrive.base import Floats, Point, Pose
+from antdrive.base.plane import format_position
 from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.robots import TrackedPath
@@ -146,43 +146,43 @@ class Blockage:
         self._standing: npt.NDArray[np.int64] = np.empty(0, dtype=np.int64)
         self._places = np.empty((0, 2))
 
-    def pause(self, tick: int, robot: tuple[float, float]) -> bool:
+    def pause(self, tick: int, position: Point) -> bool:
         """Whether a search now would only repeat the last one."""
         if not self.failures:
             return False
-        if not self._still_there(tick, robot):
-            self.found()
+        if not self._still_there(tick, position):
+            self.route_found()
             return False
         return tick / self._hz < self._due
 
-    def found(self) -> None:
+    def route_found(self) -> None:
         """Take note that there is a way, or that there may be one soon."""
         self.failures = 0
 
     def failed(self, tick: int, pose: Pose) -> None:
         """Take note that a search from a pose [m, m, rad] found no route."""
-        now, robot = tick / self._hz, pose[:2]
-        standing = self.standing(tick, robot)
+        now, position = tick / self._hz, pose[:2]
+        standing = self.standing(tick, position)
         if self.failures and not self._closed(tick, pose, np.intersect1d(standing, self._standing)):
-            self.found()
+            self.route_found()
         if not self.failures:
             if not self._closed(tick, pose, standing):
                 return
             self._since, self._standing = now, standing
-            self._places = self._predictor.perceived(tick, robot)[1][standing]
+            self._places = self._predictor.perceived(tick, position)[1][standing]
         self.failures += 1
         if now - self._since >= self._patience:
             self.reason = self._sentence(tick, pose)
         wait = self._interval * 2.0 ** min(self.failures - 1, 30)
         self._due = min(now + wait, max(self._since + self._patience, now + self._interval))
 
-    def may_pass(self, tick: int, robot: tuple[float, float]) -> bool:
+    def may_pass(self, tick: int, position: Point) -> bool:
         """Allow the robot to pass noted movers at the safety margin, after a failure, if all movers have stood still since."""
         if not self.failures:
             return False
-        noted = np.setdiff1d(self._noted(tick, robot), [*self._passed, *self._refused])
-        perceived, positions = self._predictor.perceived(tick, robot)
-        if not len(noted) or not np.isin(perceived, self.standing(tick, robot)).all():
+        noted = np.setdiff1d(self._noted(tick, position), [*self._passed, *self._refused])
+        perceived, positions = self._predictor.perceived(tick, position)
+        if not len(noted) or not np.isin(perceived, self.standing(tick, position)).all():
             return False
         if len(positions) != len(self._all):  # a mover has come into sight
             return False
@@ -191,14 +191,14 @@ class Blockage:
         self._passed |= set(noted.tolist())
         return True
 
-    def note_gaps(self, tick: int, robot: tuple[float, float], tracked: TrackedPath, arc: float) -> None:
+    def note_gaps(self, tick: int, position: Point, tracked: TrackedPath, arc: float) -> None:
         """Note the movers that the route ahead passes hardly farther away than avoidance keeps, or than was noted before."""
-        standing = self.standing(tick, robot)
+        standing = self.standing(tick, position)
         if self._keeps <= self._grid.inflate or not len(standing):
             return
         ahead = np.arange(arc, min(arc + GAP_RANGE, tracked.length), GAP_STEP)
-        points, positions = points_at(tracked, ahead), self._predictor.perceived(tick, robot)[1]
-        noted = self._noted(tick, robot)
+        points, positions = points_at(tracked, ahead), self._predictor.perceived(tick, position)[1]
+        noted = self._noted(tick, position)
         for m in standing.tolist():
             gap = np.hypot(*(points - positions[m]).T).min(initial=np.inf) - self._predictor.radius_of(m)
             width = self._widths[m] if m in noted else self._keeps
@@ -210,9 +210,9 @@ class Blockage:
                     self._passed.remove(m)
                     self._refused.add(m)
 
-    def _noted(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
+    def _noted(self, tick: int, position: Point) -> npt.NDArray[np.int64]:
         """The movers (N,) that the robot noted and that stand where they stood."""
-        positions = self._predictor.perceived(tick, robot)[1]
+        positions = self._predictor.perceived(tick, position)[1]
         self._gaps = {m: at for m, at in self._gaps.items() if np.hypot(*(positions[m] - at)) <= STILL}
         self._passed &= self._gaps.keys()
         self._refused &= self._gaps.keys()
@@ -228,24 +228,24 @@ class Blockage:
             found += covered_discs(self._predictor, tick, ends, 0.0, self._grid, np.array([m]), wider)
         return found
 
-    def closer(self, tick: int, robot: tuple[float, float]) -> Floats:
+    def clearance_reduction(self, tick: int, position: Point) -> Floats:
         """How much closer than usual the robot may come to each mover that it perceives (P,) [m]."""
-        perceived = self._predictor.within_range(tick, robot)
+        perceived = self._predictor.within_range(tick, position)
         if not self._passed:
             return np.zeros(len(perceived))
-        passed = np.isin(perceived, self._noted(tick, robot)) & np.isin(perceived, list(self._passed))
+        passed = np.isin(perceived, self._noted(tick, position)) & np.isin(perceived, list(self._passed))
         return np.where(passed, self._keeps - self._grid.inflate, 0.0)
 
-    def standing(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
+    def standing(self, tick: int, position: Point) -> npt.NDArray[np.int64]:
         """The movers (S,) that the robot perceives and predicts to stand still for as long as its patience lasts."""
-        perceived = self._predictor.within_range(tick, robot)
+        perceived = self._predictor.within_range(tick, position)
         ahead = np.linspace(0.0, self._patience, 1 + math.ceil(self._patience / STANDING_STEP))
-        positions, _ = self._predictor.predict(tick, robot, ahead)
+        positions, _ = self._predictor.predict(tick, position, ahead)
         return np.asarray(perceived[np.hypot(*np.moveaxis(positions - positions[0], -1, 0)).max(axis=0) <= STILL])
 
-    def _still_there(self, tick: int, robot: tuple[float, float]) -> bool:
+    def _still_there(self, tick: int, position: Point) -> bool:
         """Whether the robot sees all movers that it noted at the first failure where they stood."""
-        perceived, positions = self._predictor.perceived(tick, robot)
+        perceived, positions = self._predictor.perceived(tick, position)
         near = np.hypot(*(positions[self._standing] - self._places).T) <= STILL
         return bool(near.all() and np.isin(self._standing, perceived).all())
 
@@ -268,7 +268,7 @@ class Blockage:
         order = self._standing[np.argsort(np.hypot(*(positions[self._standing] - pose[:2]).T), kind="stable")]
         alone = (m for m in order.tolist() if self._way(tick, pose, order[order != m]))
         mover = next(alone, int(order[0]))
-        at = place_name(self._task.frame, *positions[mover].tolist())
+        at = format_position(self._task.frame, *positions[mover].tolist())
         narrow = mover in self._noted(tick, pose[:2]) and self._way(tick, pose, order, narrow=True)
         closes = (
             f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self._keeps:.3g} m from it"

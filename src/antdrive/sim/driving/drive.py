@@ -49,7 +49,7 @@ def drive(
         ending = _control_period(tick, plant, decider, localiser, scan)
         if tick % (hz // PROGRESS_HZ or 1) == 0:
             progress(decider.fraction)
-    return decider.explained(ending or Ending(Outcome.TIMED_OUT), tick)
+    return decider.with_reason(ending or Ending(Outcome.TIMED_OUT), tick)
 
 
 def _control_period(tick: int, plant: Plant, decider: Decider, localiser: Localiser, scan: Scanning) -> Ending | None:
@@ -125,8 +125,8 @@ class Driver(Decider):
         trigger = guide.trigger(tick, pose, waiting, self.path, before.pursuit.arc)
         if trigger:
             self._follow(guide.replan(tick, pose, trigger))
-        if guide.wrong:
-            return self._wrong_plan(tick)
+        if guide.plan_error:
+            return self._invalid_plan(tick)
         if guide.blocked:
             return Ending(Outcome.BLOCKED, guide.blocked)
         self.path = guide.refreshed(self.path, pose)
@@ -137,7 +137,7 @@ class Driver(Decider):
         if step.arrived:
             return self._arrival(pose, state)
         ending = self._end_of_route(tick, pose, state)
-        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scans)
+        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
         return ending
 
     def gives_up(self, state: State) -> Ending | None:
@@ -147,11 +147,11 @@ class Driver(Decider):
             return None
         return Ending(Outcome.STUCK, clock.reason)
 
-    def explained(self, ending: Ending, tick: int) -> Ending:
+    def with_reason(self, ending: Ending, tick: int) -> Ending:
         """How the drive ends; of a robot that did not get on, whether it had found no way."""
         if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
             return ending
-        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.no_way(tick)))))
+        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.failure_note(tick)))))
 
     def _follow(self, path: TrackedPath | None) -> bool:
         """Go on along a new path; whether there is one."""
@@ -173,11 +173,11 @@ class Driver(Decider):
             return ending
         if self._follow(guide.missed(tick, pose)) or guide.may_wait:
             return None
-        return self._wrong_plan(tick) if guide.wrong else ending
+        return self._invalid_plan(tick) if guide.plan_error else ending
 
-    def _wrong_plan(self, tick: int) -> Ending:
+    def _invalid_plan(self, tick: int) -> Ending:
         """The ending of a drive on which the planner has given a wrong plan."""
-        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.wrong}")
+        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}")
 
     def _arrival(self, pose: Pose, state: State) -> Ending:
         """How the drive ends if the robot stops here, where it believes that it is at a pose, without a contact."""

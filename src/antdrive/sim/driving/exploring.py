@@ -18,7 +18,7 @@ import numpy as np
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.planners import PlanResult, PlanStatus, smooth
 from antdrive.robots import TrackedPath, Twist
-from antdrive.robots.control.pursuit import unsorted
+from antdrive.robots.control.pursuit import unsorted_obstacles
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
@@ -87,17 +87,17 @@ class Exploration(RouteGuide):
         self._known_as: tuple[tuple[Any, ...], Task] = (), planner.task
 
     @property
-    def wrong(self) -> str:
+    def plan_error(self) -> str:
         """What is wrong with a plan that the planner gave; empty if nothing is."""
-        return self._routes.wrong
+        return self._routes.plan_error
 
     @property
     def may_wait(self) -> bool:
         """Whether the robot stays where it is for a while: it has no way, and tries again, or it makes a scan turn."""
-        return self.lost or self.scans
+        return self.lost or self.scan_turning
 
     @property
-    def scans(self) -> bool:
+    def scan_turning(self) -> bool:
         """Whether the robot makes a scan turn."""
         return self._recovery.scan_turn is not None
 
@@ -151,7 +151,7 @@ class Exploration(RouteGuide):
             task = self._known(pose, movers.bounds(self._bounds(GROWTH[0], pose)))
             grid = self._grid(task, self._routes.margin)
             zones, soon = movers.zones(tick, pose, grid), movers.discs(tick, pose)
-            around = movers.way_round(pose, zones, soon, functools.partial(self._routes.around, task, grid))
+            around = movers.plan_around_zones(pose, zones, soon, functools.partial(self._routes.around, task, grid))
             if around is not None:
                 return (grid, *around)
         discs = movers.discs(tick, pose)
@@ -231,7 +231,7 @@ class Exploration(RouteGuide):
         x, y, _ = pose
         near = self._routes.controller.lookahead_max + path.tuning.lookahead_clearance + SPARE
         discs = self.survey.map.discs((x - near, y - near, x + near, y + near))
-        return path.among(unsorted(discs, path.obstacles.bounds))
+        return path.with_obstacles(unsorted_obstacles(discs, path.obstacles.bounds))
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """A new path to a goal that the robot missed, unless it looks for a way already."""
@@ -247,7 +247,7 @@ class Exploration(RouteGuide):
             return SCANNED if recovery.scan_turn.done else ""
         if self.lost:
             return LOST if now - self._planned_at >= INTERVAL else ""
-        recovery.note_way(now, pose, waiting=waiting, backwards=tracked.backwards)
+        recovery.note_progress(now, pose, waiting=waiting, backwards=tracked.backwards)
         if tracked.route is recovery.route:
             over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
             return (BACKED if tracked.backwards else MADE_ROOM) if over else ""
@@ -283,7 +283,7 @@ class Exploration(RouteGuide):
             self._failures = 0
             self.survey.reset(pose)
         grid, plan, avoided = self._plan_around(tick, pose)
-        self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.wrong)
+        self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0
             route, tracked = self._route(pose, grid, plan, avoided)
@@ -291,7 +291,7 @@ class Exploration(RouteGuide):
             return tracked
         self.note(now, trigger, time.perf_counter() - started, plan.work)
         self._failures += 1
-        self._recovery.rests(now, pose)
+        self._recovery.note_rest(now, pose)
         if self._failures >= PATIENCE:
             self._gave_up_at = now
             self._recovery.begin_scan_turn(pose)
@@ -304,24 +304,24 @@ class Exploration(RouteGuide):
             recovery.end_scan_turn(now, pose)
             return False, None
         if trigger in (BACKED, MADE_ROOM):
-            recovery.rests(now, pose)
+            recovery.note_rest(now, pose)
         if trigger == STALLED:
             recovery.note_stall(now, pose)
-        if (trigger != STALLED or recovery.misses_sight(pose)) and recovery.begin_scan_turn(pose):
+        if (trigger != STALLED or recovery.held_by_unknown(pose)) and recovery.begin_scan_turn(pose):
             return True, None
         if trigger == HELD:
             return True, None
-        found = recovery.way(pose) if trigger == STALLED else None
+        found = recovery.escape(pose) if trigger == STALLED else None
         if found is None:
             return False, None
         way = self._prepare(found, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
-    def note_sight(self, tick: int, held: Twist | None) -> None:
+    def note_held(self, tick: int, held: Twist | None) -> None:
         """Note whether the robot stands because its sight does not let it go on."""
-        self._recovery.note_sight(tick / self._hz, held)
+        self._recovery.note_held(tick / self._hz, held)
 
-    def no_way(self, tick: int) -> str:
+    def failure_note(self, tick: int) -> str:
         """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not."""
         if tick / self._hz - self._gave_up_at > LATELY:
             return ""

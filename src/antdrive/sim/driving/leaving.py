@@ -8,7 +8,7 @@ import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath, Twist, footprint_clearance
-from antdrive.robots.placing import gaps, name_of
+from antdrive.robots.clearance import footprint_distances, obstacle_name
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Decider, Ending, Step
@@ -39,15 +39,15 @@ def cannot_leave(
         halting = Leaving(tracked, controller, world, robot, halts=True)
         if _rehearsed(halting, world, robot, start, control_hz)[0].outcome is Outcome.SUCCEEDED:
             return ""
-    leaving = Leaving(tracked.for_any_turn, controller, world, robot)
+    leaving = Leaving(tracked.ignoring_turn_clearance, controller, world, robot)
     ending, plant = _rehearsed(leaving, world, robot, start, control_hz)
     if ending.outcome is not Outcome.COLLIDED:
         return ""
     touching = footprint_clearance(world, robot.footprint, plant.way) <= 0
-    gap = gaps(world, robot, plant.way[touching][:1])[0]
+    gap = footprint_distances(world, robot, plant.way[touching][:1])[0]
     does = "turning on the spot" if leaving.step.pursuit.turning else "driving off"
     return (
-        f"{does} at the start would bring {robot.name} into {name_of(world, int(gap.argmin()))}; "
+        f"{does} at the start would bring {robot.name} into {obstacle_name(world, int(gap.argmin()))}; "
         f"a free turn needs {robot.radius:.3f} m around its centre, the start has {_room(world, start):.3f} m"
     )
 

@@ -47,9 +47,9 @@ class Traffic:
         self._area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
         self._noted = _nowhere()
 
-    def observe(self, tick: int, robot: tuple[float, float]) -> None:
+    def observe(self, tick: int, position: Point) -> None:
         """Take note of the movers that the robot perceives in a tick from a position [m]."""
-        perceived, places = self._predictor.perceived(tick, robot)
+        perceived, places = self._predictor.perceived(tick, position)
         self._note(places[perceived], 1 / self._hz)
 
     def _note(self, places: Floats, period: float) -> None:
@@ -63,30 +63,30 @@ class Traffic:
         """Whether a side of the box has moved outwards by more than this [m] since the last `zones`."""
         return bool(self.samples) and bool((np.abs(self.box - self._noted) > by).any())
 
-    def rate(self, tick: int, robot: tuple[float, float]) -> float:
+    def rate(self, tick: int, position: Point) -> float:
         """How many movers a second would meet a robot that stands anywhere in the world [1/s].
 
         A mover sweeps the ground where it would touch the robot: as wide as both, as long as it gets in a second.
         """
-        places, radii = self._predictor.predict(tick, robot, np.array([0.0, SOON]))
+        places, radii = self._predictor.predict(tick, position, np.array([0.0, SOON]))
         speeds = np.hypot(*(places[1] - places[0]).T) / SOON
         return float((2 * (radii + self._radius) * speeds).sum() / self._area)
 
-    def widest(self, tick: int, robot: tuple[float, float]) -> float:
+    def widest(self, tick: int, position: Point) -> float:
         """The largest radius of the movers that the robot perceives from a position [m]."""
-        return float(self._predictor.predict(tick, robot, np.zeros(1))[1].max(initial=0.0))
+        return float(self._predictor.predict(tick, position, np.zeros(1))[1].max(initial=0.0))
 
-    def zones(self, tick: int, robot: tuple[float, float], goal: tuple[float, float], grid: Grid) -> list[Zone]:
+    def zones(self, tick: int, position: Point, goal: Point, grid: Grid) -> list[Zone]:
         """The ground that movers roam, as far as the robot can tell from a position [m]: as estimated, and as seen.
 
         The box of n places that were seen is too small by about a share of 1 / (n + 1) on each side, if movers are
         everywhere in theirs equally often.
         """
         self._noted = self.box.copy()
-        radius = self.widest(tick, robot)
+        radius = self.widest(tick, position)
         unseen = (self.box[2:] - self.box[:2]) / (self.samples + 1)
         larger = np.concatenate((self.box[:2] - unseen, self.box[2:] + unseen))
-        return [Zone(box, radius, robot, goal, grid) for box in (larger, self.box.copy())]
+        return [Zone(box, radius, position, goal, grid) for box in (larger, self.box.copy())]
 
 
 class TrackedTraffic(Traffic):
@@ -96,37 +96,37 @@ class TrackedTraffic(Traffic):
     seen; the ground that was in sight lately stands for it.
     """
 
-    def __init__(self, predictor: Tracked, robot: RobotSpec, hz: int) -> None:
-        super().__init__(predictor, robot.radius, (0.0, 0.0, 1.0, 1.0), hz)
-        self._tracks, self._fast = predictor, FAST * robot.max_speed
+    def __init__(self, predictor: Tracked, spec: RobotSpec, hz: int) -> None:
+        super().__init__(predictor, spec.radius, (0.0, 0.0, 1.0, 1.0), hz)
+        self._tracks, self._fast = predictor, FAST * spec.max_speed
         self._last, self._lately, self._most = -1, 0.0, 0.0
 
-    def observe(self, tick: int, robot: tuple[float, float]) -> None:
+    def observe(self, tick: int, position: Point) -> None:
         """Take note of the movers that the last scan met, if it is a new one, from a position [m]."""
         tracking = self._tracks.tracking
         if tracking.tick == self._last:
             return
         period = (tracking.tick - self._last) / self._hz
         self._last = tracking.tick
-        self._note(self._tracks.sighted(tick), period)
+        self._note(self._tracks.visible(tick), period)
         kept = math.exp(-period / MEMORY)
         self._lately *= kept
         if tracking.sight:
-            self._lately += (1 - kept) * self._sweep(tick, robot, tracking.reach) / tracking.sight
+            self._lately += (1 - kept) * self._sweep(tick, position, tracking.reach) / tracking.sight
         self._most = max(self._lately, self._most * math.exp(-period / FADING))
 
-    def rate(self, tick: int, robot: tuple[float, float]) -> float:
+    def rate(self, tick: int, position: Point) -> float:
         """How many fast movers a second would meet a robot that stands anywhere on ground that is in sight [1/s].
 
         Movers that are out of sight for a while are there still, so the most that was seen counts, and fades.
         """
         return self._most
 
-    def _sweep(self, tick: int, robot: tuple[float, float], reach: float) -> float:
+    def _sweep(self, tick: int, position: Point, reach: float) -> float:
         """The ground on which fast movers within reach [m] would touch the robot, in a second [m^2/s]."""
-        places, radii = self._predictor.predict(tick, robot, np.array([0.0, 1.0]))
+        places, radii = self._predictor.predict(tick, position, np.array([0.0, 1.0]))
         speeds = np.hypot(*(places[1] - places[0]).T)
-        counts = (np.hypot(*(places[0] - robot).T) - radii <= reach) & (speeds >= self._fast)
+        counts = (np.hypot(*(places[0] - position).T) - radii <= reach) & (speeds >= self._fast)
         return float((2 * (radii + self._radius) * speeds)[counts].sum())
 
 
@@ -140,12 +140,10 @@ class Zone:
         discs: discs along the edge of the box, which keep a smoothed route outside
     """
 
-    def __init__(
-        self, box: Floats, radius: float, robot: tuple[float, float], goal: tuple[float, float], grid: Grid
-    ) -> None:
+    def __init__(self, box: Floats, radius: float, position: Point, goal: Point, grid: Grid) -> None:
         self._box, self._grid = box, grid
         reach, half = radius + grid.inflate, OPENING * grid.cell
-        here, there = np.array(robot), np.array(goal)
+        here, there = np.array(position), np.array(goal)
         inside = float(_depth(here, box, reach))
         self._ways = [(here, here, inside + half)] if inside > 0 else []
         if _depth(there, box, reach) > 0:
@@ -274,7 +272,7 @@ class MoversAhead:
         assert self._traffic is not None
         return self._traffic.zones(tick, pose[:2], self._goal, grid)
 
-    def way_round(
+    def plan_around_zones(
         self, pose: Pose, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]
     ) -> tuple[PlanResult, list[Disc]] | None:
         """A plan around the first zone where it is not too long, and what it keeps off; None: all are too long."""
@@ -300,13 +298,13 @@ class MoversSeenAhead(MoversAhead):
         tracked: Tracked,
         survey: Survey,
         policy: ReplanPolicy,
-        robot: RobotSpec,
+        spec: RobotSpec,
         goal: Point,
         inflate: float,
         hz: int,
     ) -> None:
         grid = rasterise(World("measure", (0.0, 0.0, 1.0, 1.0)), COARSE, inflate)
-        self._roamed = TrackedTraffic(tracked, robot, hz)
+        self._roamed = TrackedTraffic(tracked, spec, hz)
         super().__init__(tracked, policy, goal, grid, hz, self._roamed)
         self._survey = survey
 

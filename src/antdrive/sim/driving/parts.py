@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from antdrive.base import Floats, Pose
+from antdrive.base import Floats, Point, Pose
 from antdrive.robots import PursuitState, TrackedPath, Twist
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord, finite_or_none
@@ -118,7 +118,7 @@ class Guide(Protocol):
     schedule: Schedule | None = None  # where the robot should be at each time; None: at no time in particular
 
     @property
-    def wrong(self) -> str:
+    def plan_error(self) -> str:
         """What is wrong with a plan that the planner gave during the drive; empty if nothing is."""
         return ""
 
@@ -133,7 +133,7 @@ class Guide(Protocol):
         return False
 
     @property
-    def scans(self) -> bool:
+    def scan_turning(self) -> bool:
         """Whether the robot makes a scan turn."""
         return False
 
@@ -153,11 +153,11 @@ class Guide(Protocol):
         """A new path for a robot that stands at the end of its route, but not at the goal."""
         return None
 
-    def closer(self, tick: int, robot: tuple[float, float]) -> Floats | float:
+    def clearance_reduction(self, tick: int, position: Point) -> Floats | float:
         """How much closer than usual the robot may pass each perceived mover (P,) [m]."""
         return 0.0
 
-    def no_way(self, tick: int) -> str:
+    def failure_note(self, tick: int) -> str:
         """What the guide adds to the reason of a drive that gets stuck or times out; may be empty."""
         return ""
 
@@ -213,6 +213,6 @@ class Decider(Protocol):
         """End the drive after a control period that led to a state."""
         return None
 
-    def explained(self, ending: Ending, tick: int) -> Ending:
+    def with_reason(self, ending: Ending, tick: int) -> Ending:
         """The ending with what the decider knows of its reason."""
         return ending

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base import Floats
+from antdrive.base import Floats, Point
 from antdrive.sim.policy import Perception
 from antdrive.worlds import Trajectories
 
@@ -31,7 +31,7 @@ class PerceivedMovers(abc.ABC):
         guesses: whether movers may do something else than is predicted
     """
 
-    guesses = True
+    uncertain = True
 
     def __init__(self, perception: Perception, hz: int) -> None:
         self._perception, self._hz = perception, hz
@@ -41,7 +41,7 @@ class PerceivedMovers(abc.ABC):
         """The numbers (M,) of all movers in a tick, their places (M, 2) [m], velocities (M, 2) [m/s] and radii (M,) [m]."""
 
     @abc.abstractmethod
-    def perceived(self, tick: int, robot: tuple[float, float]) -> tuple[Numbers, Floats]:
+    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
         """The numbers (P,) of the perceived movers, and the places of all by number (M, 2) [m]; nan where not known."""
 
     @abc.abstractmethod
@@ -52,20 +52,20 @@ class PerceivedMovers(abc.ABC):
     def name_of(self, mover: int) -> str:
         """What people call a mover."""
 
-    def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
+    def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
         """The positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
-        _, places, velocities, radii = self._near(tick, robot)
+        _, places, velocities, radii = self._near(tick, position)
         return places + ahead[:, None, None] * velocities, radii
 
-    def within_range(self, tick: int, robot: tuple[float, float]) -> Numbers:
+    def within_range(self, tick: int, position: Point) -> Numbers:
         """The numbers (P,) of the perceived movers."""
-        return self._near(tick, robot)[0]
+        return self._near(tick, position)[0]
 
-    def _near(self, tick: int, robot: tuple[float, float]) -> tuple[Numbers, Floats, Floats, Floats]:
+    def _near(self, tick: int, position: Point) -> tuple[Numbers, Floats, Floats, Floats]:
         numbers, places, velocities, radii = self._now(tick)
         if self._perception.range == math.inf:
             return numbers, places, velocities, radii
-        near = np.hypot(*(places - robot).T) - radii <= self._perception.range
+        near = np.hypot(*(places - position).T) - radii <= self._perception.range
         return numbers[near], places[near], velocities[near], radii[near]
 
 
@@ -74,21 +74,21 @@ class GroundTruth(PerceivedMovers):
 
     def __init__(self, trajectories: Trajectories, perception: Perception, hz: int) -> None:
         super().__init__(perception, hz)
-        self.guesses = perception.kind in ("velocities", "lidar")
+        self.uncertain = perception.kind in ("velocities", "lidar")
         self._trajectories, self._everyone = trajectories, np.arange(len(trajectories.radii))
         self._first, self._positions, self._velocities = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
 
-    def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
+    def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
         """The positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
         if self._perception.kind != "motions":
-            return super().predict(tick, robot, ahead)
-        perceived, _, _, radii = self._near(tick, robot)
+            return super().predict(tick, position, ahead)
+        perceived, _, _, radii = self._near(tick, position)
         positions = self._trajectories.positions(ahead + tick / self._hz)
         return np.ascontiguousarray(positions[:, perceived]), radii
 
-    def perceived(self, tick: int, robot: tuple[float, float]) -> tuple[Numbers, Floats]:
+    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
         """The numbers (P,) of the perceived movers, and the places of all (M, 2) [m]."""
-        return self.within_range(tick, robot), self._now(tick)[1]
+        return self.within_range(tick, position), self._now(tick)[1]
 
     def radius_of(self, mover: int) -> float:
         """The radius of a mover [m]."""
@@ -119,14 +119,14 @@ class Tracked(PerceivedMovers):
         super().__init__(perception, hz)
         self.tracking = tracking
 
-    def perceived(self, tick: int, robot: tuple[float, float]) -> tuple[Numbers, Floats]:
+    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
         """The numbers (P,) of the movers that are followed, and the places of all (M, 2) [m]; nan: not followed any more."""
         numbers, places, _, _ = self._now(tick)
-        everywhere = np.full((self.tracking.tracker.found, 2), np.nan)
+        everywhere = np.full((self.tracking.tracker.tracks_begun, 2), np.nan)
         everywhere[numbers] = places
-        return self.within_range(tick, robot), everywhere
+        return self.within_range(tick, position), everywhere
 
-    def sighted(self, tick: int) -> Floats:
+    def visible(self, tick: int) -> Floats:
         """Where the movers are in a tick that the last scan met (N, 2) [m]: not those that are hidden."""
         return self._now(tick)[1][self._followed.met]
 

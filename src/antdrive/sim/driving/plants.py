@@ -11,7 +11,7 @@ import numpy as np
 from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
 from antdrive.robots import Twist, footprint_clearance
-from antdrive.robots.placing import shape_of
+from antdrive.robots.clearance import kernel_shape
 from antdrive.sim.driving import _kernels_movers
 from antdrive.sim.driving.parts import Ending, Step
 from antdrive.sim.log.contacts import Attribution
@@ -102,7 +102,7 @@ class Bullet:
         movers = engine.mover_track(len(t))
         contacts = np.array(self._contacts, dtype=np.float64).reshape(-1, 4)
         if engine.trajectories:
-            shape = shape_of(engine.robot.footprint)
+            shape = kernel_shape(engine.robot.footprint)
             _kernels_movers.lower_by_movers(pose, *shape, movers, engine.trajectories.radii, clearance)
             if ending.outcome is Outcome.COLLIDED:
                 ending = _attribute(engine, engine.trajectories, t, pose, twist, movers, contacts)

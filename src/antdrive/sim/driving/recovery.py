@@ -90,14 +90,14 @@ class Recovery:
         self._stalls, self._stalled_at = 0, start[:2]
         self._turned_at = (math.inf, math.inf)
 
-    def note_way(self, now: float, pose: Pose, *, waiting: bool, backwards: bool) -> None:
+    def note_progress(self, now: float, pose: Pose, *, waiting: bool, backwards: bool) -> None:
         """Note where the robot is: whether it moves, and its track unless it follows that back."""
         if waiting or math.dist(self._rest[1], pose[:2]) > STALL_DISTANCE:
-            self.rests(now, pose)
+            self.note_rest(now, pose)
         if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
             self._trail.append(pose[:2])
 
-    def note_sight(self, now: float, held: Twist | None) -> None:
+    def note_held(self, now: float, held: Twist | None) -> None:
         """Note whether the robot stands because its sight does not let it go on."""
         if held is None:
             self._held_since = math.inf
@@ -105,7 +105,7 @@ class Recovery:
             self._held_since = now
         self._wanted = held
 
-    def rests(self, now: float, pose: Pose) -> None:
+    def note_rest(self, now: float, pose: Pose) -> None:
         """Count from now on how long the robot has not moved."""
         self._rest = now, pose[:2]
 
@@ -119,9 +119,9 @@ class Recovery:
             return False
         if self._turned_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW:
             return True
-        return now - self._held_since > HELD_TIME and self.misses_sight(pose)
+        return now - self._held_since > HELD_TIME and self.held_by_unknown(pose)
 
-    def misses_sight(self, pose: Pose) -> bool:
+    def held_by_unknown(self, pose: Pose) -> bool:
         """Whether the robot stands because it has not seen the ground ahead, not because something was hit there."""
         if self._wanted is None:
             return False
@@ -146,15 +146,15 @@ class Recovery:
     def end_scan_turn(self, now: float, pose: Pose) -> None:
         """Go on after a look."""
         self.scan_turn, self._held_since = None, math.inf
-        self.rests(now, pose)
+        self.note_rest(now, pose)
 
     def note_stall(self, now: float, pose: Pose) -> None:
         """Note a stall, and how many there were at this place."""
-        self.rests(now, pose)
+        self.note_rest(now, pose)
         self._stalls = self._stalls + 1 if math.dist(self._stalled_at, pose[:2]) < AGAIN else 1
         self._stalled_at = pose[:2]
 
-    def way(self, pose: Pose) -> Route | None:
+    def escape(self, pose: Pose) -> Route | None:
         """A way out for a robot that stalls again, or that its sight holds: back along the track, else ahead. None: no way."""
         tries = self._stalls - 2 if self._held_since == math.inf else self._stalls - 1
         if not 0 <= tries <= len(LENGTHS):

@@ -19,7 +19,7 @@ import time
 
 import numpy as np
 
-from antdrive.base import Floats, Pose
+from antdrive.base import Floats, Point, Pose
 from antdrive.base.plane import polyline_length
 from antdrive.planners import (
     AStar,
@@ -68,7 +68,7 @@ class Replanning(OneRoute):
         self._grid, policy = grid, self.policy
         movers, robot, task = self._predictor, self._routes.robot, self._task
         self.blockage = Blockage(task, grid, movers, self._hz, policy, self._keeps)
-        learns = policy.around_movers and movers.guesses and not self._timed
+        learns = policy.around_movers and movers.uncertain and not self._timed
         traffic = Traffic(movers, robot.radius, task.world.bounds, self._hz) if learns else None
         self._ahead = MoversAhead(movers, policy, task.goal, grid, self._hz, traffic, self.blockage)
         route, path = super().route(grid, plan)
@@ -84,9 +84,9 @@ class Replanning(OneRoute):
         """A new path for a robot that stands at the end of its route, but not at the goal."""
         return self.replan(tick, pose, MISSED)
 
-    def closer(self, tick: int, robot: tuple[float, float]) -> Floats:
+    def clearance_reduction(self, tick: int, position: Point) -> Floats:
         """How much closer than usual the robot may pass each perceived mover (P,) [m]."""
-        return self.blockage.closer(tick, robot)
+        return self.blockage.clearance_reduction(tick, position)
 
     def _track(self, plan: PlanResult, route: Route) -> None:
         """Note that the robot sets out on a route that was made from a plan."""
@@ -124,16 +124,16 @@ class Replanning(OneRoute):
             self.note(now, trigger)
             return None
         if self._timed:
-            plan = self._routes.ask(self._routes.query(self._grid, task, now), self._routes.rng)
+            plan = self._routes.plan(self._routes.query(self._grid, task, now), self._routes.rng)
         else:
             zones = self._ahead.zones(tick, pose, self._grid) if around_movers and self._ahead.heavy(tick, pose) else []
             around = functools.partial(self._routes.around, task, self._grid)
-            plan, discs = self._ahead.way_round(pose, zones, discs, around) or (around(discs), discs)
+            plan, discs = self._ahead.plan_around_zones(pose, zones, discs, around) or (around(discs), discs)
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
             discs = self._ahead.discs(tick, pose)
             plan = self._routes.around(task, self._grid, discs)
         route = None
-        if plan.solved and len(plan.cells) and not self._routes.wrong:
+        if plan.solved and len(plan.cells) and not self._routes.plan_error:
             # A timed plan's times are those of its cells, so its route must follow the cells.
             smoothing = "none" if self._timed else self._routes.smoothing
             route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
@@ -144,7 +144,7 @@ class Replanning(OneRoute):
             self.blockage.failed(tick, pose)
             return None
         self.note(now, trigger, wall_s, plan.work, plan.cost, route.xy)
-        self.blockage.found()
+        self.blockage.route_found()
         return self._prepare(route)
 
     def _prepare(self, route: Route) -> TrackedPath:
@@ -187,7 +187,7 @@ class CellByCell(Replanning):
         if self._online.arrived or since < DECISION_PAUSE:
             return ""
         if since >= self.policy.max_wait:  # movers keep the robot from its cell
-            self._note_no_way(tick, pose)
+            self._note_no_path(tick, pose)
         if self.blockage.reason:
             return ""
         return DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
@@ -202,15 +202,15 @@ class CellByCell(Replanning):
         with planner_errors(self._routes.planner):
             here, propagated = self._online.cell, self._online.stats.propagated
             to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
-        self._routes.wrong = self._routes.wrong or check_step(self._query, here, to)
-        if self._routes.wrong:
+        self._routes.plan_error = self._routes.plan_error or check_step(self._query, here, to)
+        if self._routes.plan_error:
             self.note(now, trigger)
             return None
         xy = self._line(pose, here, to, tick)
         if to is not None:
-            self.blockage.found()
+            self.blockage.route_found()
         else:
-            self._note_no_way(tick, pose)
+            self._note_no_path(tick, pose)
         if to is not None and bool(np.ptp(xy, axis=0).any()):
             work = self._online.stats.propagated - propagated
             self.note(now, trigger, time.perf_counter() - started, work, polyline_length(xy), xy)
@@ -220,7 +220,7 @@ class CellByCell(Replanning):
             return self._prepare(Route(np.array(pose[:2]) + 1e-4 * heading))
         return None
 
-    def _note_no_way(self, tick: int, pose: Pose) -> None:
+    def _note_no_path(self, tick: int, pose: Pose) -> None:
         """Take note that the robot does not get on; the attempt at which it gives up is logged."""
         now = tick / self._hz
         if self.blockage.pause(tick, pose[:2]) or now - self._noted_at < self.policy.min_interval:

@@ -66,7 +66,7 @@ class RoutePlanner:
     mapped: bool = True  # whether all plans are made on the grid of the world's map
 
     def __post_init__(self) -> None:
-        self.wrong = ""
+        self.plan_error = ""
         self.restart()
 
     def restart(self) -> None:
@@ -85,7 +85,7 @@ class RoutePlanner:
         timed = bool(self.motions) or start_time
         return dataclasses.replace(query, motions=self.motions, start_time=start_time) if timed else query
 
-    def ask(self, query: Query, rng: np.random.Generator, label: str = "") -> PlanResult:
+    def plan(self, query: Query, rng: np.random.Generator, label: str = "") -> PlanResult:
         """The planner's answer, checked."""
         return self.checked(query, request_plan(self.planner, query, rng, label))
 
@@ -93,7 +93,7 @@ class RoutePlanner:
         """The answer, if it is right; else note what is wrong with it."""
         plan = checked(query, answer)
         if plan.status is PlanStatus.INVALID:
-            self.wrong = self.wrong or plan.reason
+            self.plan_error = self.plan_error or plan.reason
         return plan
 
     def around(self, task: Task, grid: Grid, discs: Sequence[Disc] = (), zone: Zone | None = None) -> PlanResult:
@@ -111,7 +111,7 @@ class RoutePlanner:
         if query.unreachable and not self.mapped:
             return unreachable
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
-            return self.ask(query, self.rng)
+            return self.plan(query, self.rng)
         with planner_errors(self.planner):
             closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
             # Without a map, movers change so many cells that a search is repaired no faster than made anew.
@@ -152,15 +152,15 @@ class OneRoute(RouteGuide):
         self._routes = planner
 
     @property
-    def wrong(self) -> str:
+    def plan_error(self) -> str:
         """What is wrong with a plan that the planner gave; empty if nothing is."""
-        return self._routes.wrong
+        return self._routes.plan_error
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start; without a path if the robot has too little room there to get away along it."""
         routes = self._routes
         grid = grid_of(by_geometry(routes.task.world), routes.cell, routes.inflate)
-        plan = routes.ask(routes.query(grid, routes.task), random_stream(routes.seed, "planner"), routes.planner_label)
+        plan = routes.plan(routes.query(grid, routes.task), random_stream(routes.seed, "planner"), routes.planner_label)
         if plan.status is PlanStatus.NO_PATH:
             return grid, dataclasses.replace(plan, reason=no_path_reason(routes, grid, plan.reason))
         return grid, self._drivable(grid, plan)

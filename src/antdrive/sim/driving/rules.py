@@ -84,7 +84,7 @@ class Pursuit:
         last, before = now.before.command, now.before.pursuit
         if now.clock.turning <= self._full_turn:
             return Step(*self._controller.step(now.path, now.pose, last, before))
-        return Step(*self._controller.step(now.path.without_turning, now.pose, last, before._replace(turning=False)))
+        return Step(*self._controller.step(now.path.preferring_arcs, now.pose, last, before._replace(turning=False)))
 
 
 class TurnToScan:
@@ -161,7 +161,7 @@ class Avoid:
             step.command,
             self._state,
             movers,
-            radii - self._guide.closer(tick, pose[:2]),
+            radii - self._guide.clearance_reduction(tick, pose[:2]),
             speed_limit=step.speed_limit,
             backwards=self._backwards,
         )

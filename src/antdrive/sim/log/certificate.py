@@ -81,7 +81,7 @@ class Certificate:
     moved: float = math.nan
 
     @property
-    def verdict(self) -> str:
+    def statement(self) -> str:
         """Whether the drive is certified, in words."""
         if self.certified and self.moved <= NOWHERE:
             return "certified: touched nothing, went nowhere"
@@ -91,10 +91,10 @@ class Certificate:
     def sentence(self) -> str:
         """The verdict with the distances that it rests on."""
         least, bound = in_metres(self.min_clearance), in_metres(self.bound)
-        return f"{self.verdict}: least clearance {least}, between steps at least {bound}"
+        return f"{self.statement}: least clearance {least}, between steps at least {bound}"
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import card
+        from antdrive.worlds.svg import card
 
         facts: dict[str, object] = {
             "least clearance": in_metres(self.min_clearance),
@@ -103,7 +103,7 @@ class Certificate:
             "moved at most": in_metres(self.moved),
         }
         facts |= {f"problem {i}": problem for i, problem in enumerate(self.problems, 1)}
-        return card("", self.verdict, facts)
+        return card("", self.statement, facts)
 
     def as_dict(self) -> dict[str, Any]:
         """The certificate as plain values, for JSON."""
@@ -141,7 +141,7 @@ def certify(rollout: Rollout) -> Certificate:
     problems = [*_check_digest(rollout), *_check_times(rollout)]
     rollout = dataclasses.replace(rollout, t=_clock(rollout))  # other checks count rows, whatever times were logged
     problems = [
-        *_check_readings(rollout, clearance, bound),
+        *_check_agreement(rollout, clearance, bound),
         *problems,
         *_check_clearances(rollout, clearance),
         *_check_movers(rollout, movers),
@@ -273,7 +273,7 @@ def _clock(rollout: Rollout) -> Floats:
     return np.asarray(np.arange(len(rollout.t)) / rollout.record.physics_hz)
 
 
-def _check_readings(rollout: Rollout, clearance: Floats, bound: float) -> Iterator[str]:
+def _check_agreement(rollout: Rollout, clearance: Floats, bound: float) -> Iterator[str]:
     """Physics, closed form and bound must agree that there is clearance at every moment."""
     touched, least = len(rollout.contacts), float(clearance.min())
     if touched:

@@ -198,7 +198,7 @@ class TimesRecord:
 
 
 #: A key that came later is left out where it says nothing, so that older logs and hashes stay as they are.
-LATER = {"left_out_if_default": True}
+LATER = {"omit_if_default": True}
 
 
 def _to_task(value: Any) -> Task:
@@ -432,7 +432,7 @@ def plain_value(value: Any) -> Any:
 
 
 def _says_nothing(field: dataclasses.Field[Any], value: Any) -> bool:
-    return bool(field.metadata.get("left_out_if_default")) and value == field.default
+    return bool(field.metadata.get("omit_if_default")) and value == field.default
 
 
 def settings_of(values: Any) -> dict[str, Any]:

@@ -366,12 +366,12 @@ class Rollout:
             yield f"movers: the wanderers of record.task take {steps:.3g} steps in this log; at most {most:.3g} are checked"
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import LINE, card, world_svg
+        from antdrive.worlds.svg import LINE, card, world_svg
 
         task, world = self.record.task, self.record.world
         lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
         goal = (*task.goal, task.goal_tolerance)
-        movers = world.ways(task.start[:2], self.record.seed)
+        movers = world.mover_paths(task.start[:2], self.record.seed)
         picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
         facts = {
             "planner": self.record.planner.name,

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import frame_at, laid
+from antdrive.base.plane import relative_frame, transform_points
 from antdrive.base.types import Floats
+from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.lidar import Lidar
-from antdrive.robots.placing import shape_of
 from antdrive.sim.log import _kernels_sights as kernels
 from antdrive.sim.log.record import finite_or_none
 from antdrive.sim.log.rollout import Rollout, ranges_of
@@ -45,7 +45,7 @@ class Sighting(NamedTuple):
     touched: bool  # whether the robot touched it, or a mover touched the robot
     mover: bool = False  # whether it is a mover
     # when the robot first followed a mover, as far as `tracks` tell [s]; infinite if it never did
-    followed_at: float = math.inf
+    tracked_at: float = math.inf
 
     @property
     def passed(self) -> bool:
@@ -63,7 +63,7 @@ class Sighting(NamedTuple):
             "mover" if self.mover else "obstacle": self.obstacle,
             "seen_s": finite_or_none(self.seen_at),
             "seen_from_m": finite_or_none(self.seen_from),
-            **({"followed_s": finite_or_none(self.followed_at)} if self.mover else {}),
+            **({"followed_s": finite_or_none(self.tracked_at)} if self.mover else {}),
             "nearest_s": self.nearest_at,
             "nearest_m": self.nearest,
             "touched": self.touched,
@@ -118,7 +118,7 @@ def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
     return sorted(found, key=lambda sight: (not sight.touched, sight.nearest))
 
 
-def movers_met(rollout: Rollout) -> list[Sighting]:
+def mover_sightings(rollout: Rollout) -> list[Sighting]:
     """First sight and nearest approach of every mover, in the order of the world."""
     record, rows = rollout.record, rollout.scan_rows
     radii = np.array([mover.radius for mover in record.world.movers])
@@ -127,17 +127,17 @@ def movers_met(rollout: Rollout) -> list[Sighting]:
         _meet(rollout, k, np.column_stack((rollout.movers[row], radii)), met)
     touched = set((rollout.contacts[:, 1].astype(int) - len(record.world.obstacles)).tolist())
     found = []
-    for j, (first, followed) in enumerate(zip(met.tolist(), followed_rows(rollout), strict=True)):
+    for j, (first, followed) in enumerate(zip(met.tolist(), tracked_rows(rollout), strict=True)):
         poses, disc = rollout.pose.copy(), np.array([0.0, 0.0, radii[j]])
         poses[:, :2] -= rollout.movers[:, j]  # as the mover sees the robot
         at = float(rollout.t[followed[0]]) if len(followed) else math.inf
-        found.append(_sighting(rollout, j, first, poses, disc, touched=j in touched, mover=True, followed_at=at))
+        found.append(_sighting(rollout, j, first, poses, disc, touched=j in touched, mover=True, tracked_at=at))
     return found
 
 
 def _sighting(rollout: Rollout, j: int, first: float, poses: Floats, disc: Floats, **more: Any) -> Sighting:
     """What is first met at a time [s], if the robot's poses (T, 3) are seen from where a disc (3,) has its place."""
-    shape, row, away = shape_of(rollout.record.robot.footprint), np.zeros(1, dtype=np.int64), np.empty(1)
+    shape, row, away = kernel_shape(rollout.record.robot.footprint), np.zeros(1, dtype=np.int64), np.empty(1)
 
     def approach(some: Floats) -> tuple[int, float]:
         kernels.nearest_approaches(some, *shape, disc[None], row, away)
@@ -151,14 +151,14 @@ def _sighting(rollout: Rollout, j: int, first: float, poses: Floats, disc: Float
     return Sighting(j, first, seen_from, float(rollout.t[nearest_row]), nearest, **more)
 
 
-def followed_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
+def tracked_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
     """The rows in which the middle of a track lay in each mover, in the order of the world.
 
     Tracks lie in the frame of the estimated pose, so they are laid as they lay from the robot.
     """
     rows = rollout.tracks[:, 0].astype(np.int64)
     believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
-    places = laid(rollout.tracks[:, 2:4].astype(np.float64), frame_at(believed, true))
+    places = transform_points(rollout.tracks[:, 2:4].astype(np.float64), relative_frame(believed, true))
     return [
         rows[np.hypot(*(places - rollout.movers[rows, j]).T) <= mover.radius]
         for j, mover in enumerate(rollout.record.world.movers)
@@ -169,7 +169,7 @@ def passed(rollout: Rollout) -> list[Sighting]:
     """What the robot touched or came within 0.5 m of, cylinders and movers, in the order in which it was nearest to them."""
     if not len(rollout.scans):
         return []
-    everything = sightings(rollout, first_meetings(rollout)) + movers_met(rollout)
+    everything = sightings(rollout, first_meetings(rollout)) + mover_sightings(rollout)
     return sorted(
         (sight for sight in everything if sight.passed),
         key=lambda sight: (sight.nearest_at, sight.mover, sight.obstacle),

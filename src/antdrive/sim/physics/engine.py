@@ -20,7 +20,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Floats, Pose
-from antdrive.robots.placing import footprint_clearance
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies

@@ -103,7 +103,7 @@ def insert(
     As a whole, with the free ways of every `turns`-th beam from beam `turn` on; or, where `turn` is less than 0, only where its
     hits lie.
 
-    Hits farther than `horizon` are not entered, nor those of beams in `left_out`; ground is seen free up to `trust`.
+    Hits farther than `horizon` are not entered, nor those of beams in `omitted`; ground is seen free up to `trust`.
     """
     fan, m = Fan((x, y, cos, sin), beams, ranges, closed), MapArrays(*arrays)
     count = enter_hits(fan, turn >= 0, left_out, horizon, scan, m, changed)

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.base.errors import require_positive
+from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.lidar import Lidar
-from antdrive.robots.placing import shape_of
 from antdrive.robots.spec import Footprint
 from antdrive.sim.sensing import _kernels_mapping as kernels
 from antdrive.sim.sensing import _kernels_sight
@@ -130,13 +130,13 @@ class OccupancyMap:
         """The same arrays, for kernels."""
         return self._plain
 
-    def insert(self, pose: Pose, ranges: Floats, left_out: Mask | None = None) -> Cells:
+    def insert(self, pose: Pose, ranges: Floats, omitted: Mask | None = None) -> Cells:
         """Enter a scan, and return the cells that became free, occupied, or free again (K, 2): row, col.
 
         Args:
             pose: the estimated pose of the robot, not of its lidar
             ranges: the scan (beams,) [m]
-            left_out: beams whose hits are not entered, such as those of movers (beams,)
+            omitted: beams whose hits are not entered, such as those of movers (beams,)
         """
         x, y, yaw = self._lidar.pose_on(pose)
         if self._grows:
@@ -147,7 +147,7 @@ class OccupancyMap:
         turn = -1 if rest else number % self.turns
         turns = self.turns if self.scans else 1
         self.scans += 1
-        mask = self._none if left_out is None else np.ascontiguousarray(left_out)
+        mask = self._none if omitted is None else np.ascontiguousarray(omitted)
         count = kernels.insert(
             x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, turn, turns, mask,
             self.horizon, self.trust, self.scans, self._plain, self._changed,
@@ -364,7 +364,7 @@ def clear_distance(
         yaw_rate: counter-clockwise [rad/s]
         footprint: the robot's footprint
         limit: how far is far enough [m]
-        daring: whether ground that was not seen counts as free, so that only hits end the way
+        freespace: whether ground that was not seen counts as free, so that only hits end the way
     """
     if speed == 0.0:
         return 0.0 if yaw_rate else limit
@@ -382,7 +382,7 @@ def clear_turn(
         yaw_rate: counter-clockwise [rad/s]; only its sign counts
         footprint: the robot's footprint
         limit: how far is far enough [rad]
-        daring: whether ground that was not seen counts as free
+        freespace: whether ground that was not seen counts as free
     """
     return _clear(seen, pose, 0.0, yaw_rate, footprint, limit, freespace)
 
@@ -397,4 +397,4 @@ def _clear(
 
 @functools.lru_cache(maxsize=16)
 def _corners(footprint: Footprint) -> Floats:
-    return shape_of(footprint)[1]
+    return kernel_shape(footprint)[1]

@@ -239,7 +239,7 @@ class MoverTracker:
         )
 
     @property
-    def found(self) -> int:
+    def tracks_begun(self) -> int:
         """How many tracks were begun so far."""
         return self._found
 
@@ -250,7 +250,7 @@ class MoverTracker:
     def update(self, ground: Ground, pose: Pose, ranges: Floats, time: float) -> npt.NDArray[np.bool_]:
         """Read a scan; which beams met movers that are followed (beams,).
 
-        Those beams can be left out of a map (`OccupancyMap.insert`, `left_out`).
+        Those beams can be left out of a map (`OccupancyMap.insert`, `omitted`).
 
         Args:
             ground: what stands still, as known before this scan

@@ -15,7 +15,7 @@ import numpy as np
 from antdrive.base.atomic import atomic_folder, atomic_write
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.files import require_new
-from antdrive.base.plane import in_map
+from antdrive.base.plane import world_to_map
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.samples import DriveScans, samples
@@ -104,7 +104,7 @@ def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
     """
     layout: dict[str, Any] = json.loads(Path(__file__).with_name("layout.json").read_text(encoding="utf-8"))
     x0, y0, x1, y1 = rollout.record.world.bounds
-    corners = in_map(rollout.record.task.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    corners = world_to_map(rollout.record.task.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     wide, tall = (high - low).tolist()
     camera = layout["configById"][SCENE]["cameraState"]
@@ -126,17 +126,17 @@ def _drive(rollout: Rollout) -> tuple[list[str], Iterable[Sequence[Any]]]:
     frame = rollout.record.task.frame
     heads = ["t_s", "x_m", "y_m", "yaw_rad", "speed_m_s", "yaw_rate_rad_s"]
     heads += ["command_speed_m_s", "command_yaw_rate_rad_s", "clearance_m", "limiter"]
-    columns = [rollout.t, *in_map(frame, rollout.pose).T, *rollout.twist.T, *rollout.command.T, rollout.clearance]
+    columns = [rollout.t, *world_to_map(frame, rollout.pose).T, *rollout.twist.T, *rollout.command.T, rollout.clearance]
     columns.append(np.array(rollout.record.limiters, dtype=object)[rollout.limiter])
     if len(rollout.estimate):
         heads += ["estimate_x_m", "estimate_y_m", "estimate_yaw_rad"]
-        columns += [*in_map(frame, rollout.estimate).T]
+        columns += [*world_to_map(frame, rollout.estimate).T]
     if len(rollout.actuated):
         heads += ["actuated_speed_m_s", "actuated_yaw_rate_rad_s"]
         columns += [*rollout.actuated.T]
     for i in range(rollout.movers.shape[1]):
         heads += [f"mover_{i}_x_m", f"mover_{i}_y_m"]
-        columns += [*in_map(frame, rollout.movers[:, i]).T]
+        columns += [*world_to_map(frame, rollout.movers[:, i]).T]
     return heads, zip(*(column.tolist() for column in columns), strict=True)
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import frame_at
+from antdrive.base.plane import relative_frame
 from antdrive.base.types import Floats, Ints
 from antdrive.sim.log.rollout import Rollout, ranges_of
 from antdrive.views.export.topics import BASE, ESTIMATE, LIDAR, ODOM, ROBOT_MAP, Topic, mover_frame, nanoseconds
@@ -110,7 +110,7 @@ def scan_topics(rollout: Rollout, scans: DriveScans) -> list[Topic]:
 
 def _own_maps(rollout: Rollout) -> Floats:
     """Where the robot's own map lies in each row, x, y [m] and yaw [rad] (N, 3): so that the robot is where it believes to be."""
-    return frame_at(rollout.estimate, rollout.pose) if len(rollout.estimate) else np.zeros((len(rollout.t), 3))
+    return relative_frame(rollout.estimate, rollout.pose) if len(rollout.estimate) else np.zeros((len(rollout.t), 3))
 
 
 def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], poses: Floats) -> Topic:

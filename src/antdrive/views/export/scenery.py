@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import in_map
+from antdrive.base.plane import world_to_map
 from antdrive.base.types import Floats, Pose
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.rollout import Rollout
@@ -128,24 +128,24 @@ def routes_of(rollout: Rollout) -> Iterator[tuple[float, Floats]]:
     """
     lies = (0.0, 0.0, 0.0) if rollout.record.exploring else rollout.record.task.frame
     for rows, route in rollout.legs():
-        yield float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)]), in_map(lies, route)
+        yield float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)]), world_to_map(lies, route)
 
 
 def _standing(rollout: Rollout) -> list[Any]:
     """Markers for the cylinders, the walls and the goal."""
     scene, frame, at = Scene.of(rollout), rollout.record.task.frame, float(rollout.t[0])
-    centres = in_map(frame, scene.obstacles[:, :2]).tolist()
+    centres = world_to_map(frame, scene.obstacles[:, :2]).tolist()
     markers = [
         _marker(at, MAP, "unseen" if unseen else "cylinders", i, CYLINDER, UNSEEN if unseen else KNOWN, (x, y), size)
         for i, ((x, y), size, unseen) in enumerate(
             zip(centres, _sizes(scene.obstacles[:, 2:]), scene.unseen.tolist(), strict=True)
         )
     ]
-    goal = in_map(frame, [scene.goal])[0].tolist()
+    goal = world_to_map(frame, [scene.goal])[0].tolist()
     width = 2 * scene.goal_tolerance
     markers.append(_marker(at, MAP, "goal", 0, CYLINDER, GOAL, goal, (width, width, FLAT)))
     x0, y0, x1, y1 = scene.bounds
-    corners = in_map(frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]).tolist()
+    corners = world_to_map(frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]).tolist()
     walls = _marker(at, MAP, "walls", 0, LINE_STRIP, WALL, (0.0, 0.0), (LINE, 0.0, 0.0))
     walls.points = [_point(x, y) for x, y in corners]
     walls.pose.position.z = 0.0
@@ -169,7 +169,7 @@ def _contacts(rollout: Rollout) -> list[Topic]:
         things = rollout.contacts[rollout.contacts[:, 0] == row, 1].astype(int)
         points = [contact_point(scene, rollout.pose[row], thing, rollout.movers[row]) for thing in np.unique(things)]
         at = float(rollout.t[row])
-        places: Floats = in_map(rollout.record.task.frame, points)
+        places: Floats = world_to_map(rollout.record.task.frame, points)
         markers = [
             _marker(at, MAP, "contacts", i, SPHERE, TOUCHED, place, (SPOT, SPOT, SPOT))
             for i, place in enumerate(places.tolist())
@@ -285,7 +285,7 @@ def planned_ground(rollout: Rollout) -> GroundGrid:
     record = rollout.record
     free = rasterise(record.task.world, record.cell, record.inflate).free
     x0, y0, _, _ = record.task.world.bounds
-    x, y, yaw = in_map(record.task.frame, [(x0, y0, 0.0)])[0].tolist()
+    x, y, yaw = world_to_map(record.task.frame, [(x0, y0, 0.0)])[0].tolist()
     return GroundGrid(float(rollout.t[0]), record.cell, (x, y, yaw), np.where(free, FREE, OCCUPIED).astype(np.int8))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.base.plane import in_map
+from antdrive.base.plane import world_to_map
 from antdrive.planners import Query, load_planner
 from antdrive.worlds import (
     Grid,
@@ -59,7 +59,7 @@ def file_beside(out: Path) -> Path | None:
 
 def _corner(task: Task) -> list[float]:
     """Where a world's lower left corner, and with it that of its cells, lies in the map that it was made from."""
-    return [float(v) for v in in_map(task.frame, [(*task.world.bounds[:2], 0.0)])[0]]
+    return [float(v) for v in world_to_map(task.frame, [(*task.world.bounds[:2], 0.0)])[0]]
 
 
 def _export_movingai(task: Task, out: Path, resolution: float | None) -> dict[str, str]:

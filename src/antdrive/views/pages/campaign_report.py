@@ -11,7 +11,7 @@ from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.files import known_suffix
 from antdrive.runs.campaigns.results import common_folder, read_runs
-from antdrive.runs.statistics.runs import HASHES, RunTable
+from antdrive.runs.statistics.run_table import HASHES, RunTable
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.views.pages.campaign_summary import CampaignSummary, headline, measure_title, summarise

@@ -24,7 +24,7 @@ from antdrive.runs.statistics.comparison import (
 from antdrive.runs.statistics.intervals import Interval
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.price import prices
-from antdrive.runs.statistics.runs import HASHES, RunTable
+from antdrive.runs.statistics.run_table import HASHES, RunTable
 from antdrive.runs.statistics.significance import FLIPS
 from antdrive.runs.statistics.success import PlannerSuccess, common_medians, success_table
 from antdrive.sim.log.metrics import METRICS
@@ -181,8 +181,8 @@ def _counted(count: int, what: str) -> tuple[str, str]:
 
 def _best(rows: Sequence[PlannerSuccess], paired: PairedRuns) -> tuple[str, str]:
     """The highest share of successes, and all planners that have it."""
-    share = max(row.share for row in rows)
-    best = [row for row in rows if row.share == share]
+    share = max(row.fraction for row in rows)
+    best = [row for row in rows if row.fraction == share]
     if len(best) == len(rows) > 1:
         names = "every planner"
     else:

@@ -187,7 +187,7 @@ class ReportedRun:
         certificate = self.log.certificate
         if not certificate.certified:
             return "Not certified collision-free."
-        verdict = certificate.verdict[:1].upper() + certificate.verdict[1:]
+        verdict = certificate.statement[:1].upper() + certificate.statement[1:]
         return f"{verdict}: at least {certificate.bound:.4f} m of clearance, between logged poses, too."
 
     @property
@@ -356,7 +356,7 @@ def _sight_pairs(sights: Sequence[Sighting]) -> list[tuple[str, str]]:
     found = []
     for sight in sorted(nearest, key=lambda sight: sight.nearest_at):
         seen = f"seen {sight.seen_at:.2f} s, {sight.seen_from:.2f} m" if math.isfinite(sight.seen_at) else "never seen"
-        followed = f"followed {sight.followed_at:.2f} s; " if math.isfinite(sight.followed_at) else ""
+        followed = f"followed {sight.tracked_at:.2f} s; " if math.isfinite(sight.tracked_at) else ""
         came = f"{'touched' if sight.touched else 'nearest'} {sight.nearest_at:.2f} s, {sight.nearest:.2f} m"
         found.append((sight.name, f"{seen}; {followed}{came}"))
     return found

@@ -28,7 +28,7 @@ Triple: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
 Start = Annotated[Triple, Field(description="write [x, y, yaw] in metres and radians")]
 Goal = Annotated[Pair, Field(description="write [x, y] in metres")]
 
-OF_OTHERS = (".sdf", ".world", ".map")  # the suffixes of other programs' worlds, which are imported
+FOREIGN_SUFFIXES = (".sdf", ".world", ".map")  # the suffixes of other programs' worlds, which are imported
 _CATALOG = Path(__file__).parent.with_name("catalog")
 
 
@@ -146,7 +146,7 @@ def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
         path = resolve("world", world, list_worlds())
     except FieldError as error:
         raise input_error(error.problem) from None
-    if path.suffix.lower() in OF_OTHERS:
+    if path.suffix.lower() in FOREIGN_SUFFIXES:
         raise input_error(str(path), f"is no world file; make one of it with antdrive worlds import {path}")
     return _tasks_in(read_yaml(path), os.fspath(path), path.stem)
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.plane import in_map
+from antdrive.base.plane import world_to_map
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import Disc, Task, World
@@ -26,7 +26,7 @@ from antdrive.worlds.world import Disc, Task, World
 MAX_COVERED = 4_000_000  # cells of the part of a map that is covered; keeps the memory below some 300 MB
 MAX_DISCS = 20_000  # as many obstacles as a world file can hold
 
-SHARE_FOUND, SHARE_MEASURED = 0.1, 0.5  # of a conversion's time: free cells are found, distances are known
+REACHABLE_DONE, DISTANCES_DONE = 0.1, 0.5  # of a conversion's time: free cells are found, distances are known
 SLACK = 1e-9  # discs reach this much farther than necessary, against rounding; a smaller overlap does not count [m]
 CORNER = (math.sqrt(2.0) - 1.0) / 2.0  # how far the disc around a cell protrudes, in cells
 CAP = 32  # how deep inside blocked cells centres are at most [half cells]; larger discs hardly save any
@@ -38,7 +38,7 @@ _report: ContextVar[Callable[[float], None]] = ContextVar("report", default=lamb
 
 
 @contextmanager
-def watch_conversion(report: Callable[[float], None]) -> Iterator[None]:
+def conversion_progress(report: Callable[[float], None]) -> Iterator[None]:
     """A context in which the conversion of a map says how far it is."""
     token = _report.set(report)
     try:
@@ -156,14 +156,14 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
     if free.size > MAX_COVERED:
         rows, cols = free.shape
         raise input_error("map", f"has {rows} x {cols} cells that can be reached; the limit is {MAX_COVERED}")
-    _report.get()(SHARE_FOUND)
+    _report.get()(REACHABLE_DONE)
     needed = _beside(free) & ~free
     # The map counts as surrounded by free cells here: discs then do not reach beyond it, where they would do no harm
     # but look as if they did.
     distance2 = np.empty((2 * free.shape[0] + 5, 2 * free.shape[1] + 5), dtype=np.int32)
     kernels.squared_distances(np.pad(free, 1, constant_values=True), CAP, distance2)
     distance2 = np.ascontiguousarray(distance2[2:-2, 2:-2])
-    _report.get()(SHARE_MEASURED)
+    _report.get()(DISTANCES_DONE)
     chosen = np.empty((int(needed.sum()), 4), dtype=np.int64)
     extra = 2 * (CORNER if overhang is None else max(CORNER, overhang / cell))
     i, j, radius2, inside2 = chosen[: kernels.greedy_cover(needed, distance2, extra, chosen)].T
@@ -272,7 +272,7 @@ def _reachable(cells: CellMap, start: Pose, goal: Point) -> tuple[CellMap, bool]
 
 def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
     spot = cells.cell_at(x, y)
-    there_x, there_y = in_map(cells.frame, [(x, y)])[0].tolist()
+    there_x, there_y = world_to_map(cells.frame, [(x, y)])[0].tolist()
     if spot is None:
         raise input_error(key, f"({there_x:g}, {there_y:g}) is not on the map, which spans {_span(cells)}")
     if not cells.free[spot]:
@@ -285,7 +285,7 @@ def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
 def _span(cells: CellMap) -> str:
     """The box around the cells in the map that people know."""
     x0, y0, x1, y1 = cells.bounds
-    corners = in_map(cells.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    corners = world_to_map(cells.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     return f"x {xmin:g} to {xmax:g} and y {ymin:g} to {ymax:g} m"
 

@@ -26,7 +26,7 @@ from antdrive.base.checks import OneLine, check, yaml_number
 from antdrive.base.document import read_document
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.files import require_new
-from antdrive.base.plane import in_map, out_of_map
+from antdrive.base.plane import map_to_world, world_to_map
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats, Point, Pose
 from antdrive.worlds.files.world_file import Goal, Start, Triple, require_no_movers
@@ -141,7 +141,7 @@ def import_map_server(
     if served.unknown:
         source += f" with {served.unknown} unknown cells taken for {'free' if unknown_is_free else 'blocked'}"
     if any(served.frame):
-        start, goal = _out_of_map(served.frame, start), _out_of_map(served.frame, goal)
+        start, goal = _map_to_world(served.frame, start), _map_to_world(served.frame, goal)
     task = file_task(
         file, served.cells, start, goal, source=source, overhang=overhang, cell=cell, goal_tolerance=goal_tolerance
     )
@@ -154,7 +154,7 @@ def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
     entry = check(MapFile, document)
     found = {}
     for i, kept in enumerate(entry.antdrive.tasks if entry.antdrive else ()):
-        start, goal = _out_of_map(task.frame, kept.start), _out_of_map(task.frame, kept.goal)
+        start, goal = _map_to_world(task.frame, kept.start), _map_to_world(task.frame, kept.goal)
         try:
             found[kept.name] = dataclasses.replace(task, start=start, goal=goal, goal_tolerance=kept.goal_tolerance)
         except FieldError as error:
@@ -162,8 +162,8 @@ def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
     return found
 
 
-def _out_of_map(frame: Pose, end: Any) -> Any:
-    return None if end is None else tuple(out_of_map(frame, [end])[0].tolist())
+def _map_to_world(frame: Pose, end: Any) -> Any:
+    return None if end is None else tuple(map_to_world(frame, [end])[0].tolist())
 
 
 def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> ServedMap:
@@ -259,7 +259,7 @@ def export_map_server(
     text = (
         f"image: '{name}'\n"
         f"resolution: {yaml_number(cells.resolution)}\n"
-        f"origin: {_yaml_list(in_map(task.frame, [(*cells.origin, 0.0)])[0].tolist())}\n"
+        f"origin: {_yaml_list(world_to_map(task.frame, [(*cells.origin, 0.0)])[0].tolist())}\n"
         "negate: 0\n"
         "occupied_thresh: 0.65\n"
         "free_thresh: 0.196\n"
@@ -279,8 +279,8 @@ def export_map_server(
 def _ends(task: Task) -> tuple[str, ...]:
     """The start, the goal and the tolerance of a task in its map, as keys and values of YAML."""
     return (
-        f"start: {_yaml_list(in_map(task.frame, [task.start])[0].tolist())}",
-        f"goal: {_yaml_list(in_map(task.frame, [task.goal])[0].tolist())}",
+        f"start: {_yaml_list(world_to_map(task.frame, [task.start])[0].tolist())}",
+        f"goal: {_yaml_list(world_to_map(task.frame, [task.goal])[0].tolist())}",
         f"goal_tolerance: {yaml_number(task.goal_tolerance)}",
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, input_error
-from antdrive.base.plane import out_of_map
+from antdrive.base.plane import map_to_world
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
 from antdrive.worlds.formats.xml import parse_xml, turned
@@ -233,7 +233,7 @@ def import_sdf(
 
 def _in_world(frame: Pose, end: Any) -> Any:
     """A start or a goal in the file's coordinates as it is in the world's frame."""
-    return tuple(out_of_map(frame, [end])[0].tolist()) if end is not None and any(frame) else end
+    return tuple(map_to_world(frame, [end])[0].tolist()) if end is not None and any(frame) else end
 
 
 def _world_element(file: Path) -> ET.Element:

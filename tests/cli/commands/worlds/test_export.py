@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from antdrive.base.plane import in_map
+from antdrive.base.plane import world_to_map
 from antdrive.worlds import load_task, load_tasks
 
 
@@ -45,7 +45,9 @@ def test_a_map_keeps_the_other_tasks_of_its_world_and_other_formats_say_that_the
     assert list(before) == list(after) == [name, "back"]
     for key, task in before.items():
         assert after[key].goal_tolerance == task.goal_tolerance
-        there = [in_map(each.frame, [end]) for each in (task, after[key]) for end in (each.start, (*each.goal, 0.0))]
+        there = [
+            world_to_map(each.frame, [end]) for each in (task, after[key]) for end in (each.start, (*each.goal, 0.0))
+        ]
         assert there[0] == pytest.approx(there[2])
         assert there[1][0][:2] == pytest.approx(there[3][0][:2])
     code, out, _ = antdrive("worlds", "export", "w.yaml", "-o", "w.sdf")
@@ -68,7 +70,7 @@ def test_a_map_without_a_path_gets_no_problem_file_and_a_replaced_one_is_removed
 def test_no_file_is_replaced_or_removed_without_force(antdrive, out, there):
     Path(there).write_text("mine")
     for world in ("slalom", "no-path"):  # the latter has no problem file, which an export removes with --force
-        said = f"antdrive: {there}: exists; name another file, or replace it with --force\n"
+        said = f"antdrive: {there}: exists; choose another file, or replace it with --force\n"
         assert antdrive("worlds", "export", world, "-o", out) == (2, "", said)
         assert [(path.name, path.read_text()) for path in Path().iterdir()] == [(there, "mine")]
     assert antdrive("worlds", "export", "slalom", "-o", out, "--force")[0] == 0
@@ -107,8 +109,8 @@ def test_a_cylinder_that_was_moved_in_gazebo_is_moved_in_the_world(antdrive):
     """A model's own pose, one in the <state>, and a start that is given in the file's coordinates."""
     Path("w.yaml").write_text(IN_MAP)
     antdrive("worlds", "export", "w.yaml", "-o", "w.sdf")
-    (x, y, yaw), text = in_map((12.3, -3.1, 0.7), [(1.0, 0.2, 0.1)])[0].tolist(), Path("w.sdf").read_text()
-    start = ",".join(map(str, in_map((12.3, -3.1, 0.7), [(0.5, 0.7, 0.2)])[0].tolist()))
+    (x, y, yaw), text = world_to_map((12.3, -3.1, 0.7), [(1.0, 0.2, 0.1)])[0].tolist(), Path("w.sdf").read_text()
+    start = ",".join(map(str, world_to_map((12.3, -3.1, 0.7), [(0.5, 0.7, 0.2)])[0].tolist()))
     at = text.index('<model name="obstacle_0">')
     own = text[:at] + text[at:].replace("<pose>12.3 -3.1 0 0 0 0.7</pose>", f"<pose>{x} {y} 0 0 0 {yaw}</pose>", 1)
     state = f'<state><model name="obstacle_0"><pose>{x} {y} 0 0 0 {yaw}</pose></model></state></world>'

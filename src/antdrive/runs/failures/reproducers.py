@@ -11,14 +11,14 @@ from typing import Any
 from antdrive.runs.failures.failure import Attempt
 from antdrive.runs.failures.handover import Handover, renamed, run_elsewhere, suite_elsewhere, write_suite
 from antdrive.runs.failures.hunt import Finding, Hunt
-from antdrive.runs.failures.shrink import Shrunk, shrink
+from antdrive.runs.failures.shrinker import Shrunk, shrink
 from antdrive.runs.suites.demands import Bound
 
 SUITE = "failures.drive.yaml"
 
 
 @dataclass(frozen=True, eq=False)
-class Reported:
+class Reproducer:
     """A failure as it is handed over."""
 
     name: str  # its name in the suite, and of its world
@@ -40,9 +40,9 @@ class Reported:
         }
 
 
-def report(
+def write_reproducers(
     hunt: Hunt, folder: Path, *, seconds: float = 20.0, progress: Callable[[float], None] | None = None
-) -> list[Reported]:
+) -> list[Reproducer]:
     """Shrink the different failures of a search, write them, and run what was written again in another process.
 
     A suite and the worlds are written. Ctrl-C ends the shrinking; what is not shrunk by then is handed over as it was found.
@@ -61,7 +61,7 @@ def report(
     suite = _write(small, hunt.distinct, folder)
     found, written = run_elsewhere([finding.scenario for finding in hunt.distinct]), suite_elsewhere(suite)
     return [
-        Reported(_name(k), finding, done, _repeats(finding, done, found[k], written[k]))
+        Reproducer(_name(k), finding, done, _repeats(finding, done, found[k], written[k]))
         for k, (finding, done) in enumerate(zip(hunt.distinct, small, strict=True))
     ]
 
@@ -76,7 +76,7 @@ def _repeats(finding: Finding, small: Attempt, found_elsewhere: str, small_elsew
     return same and small.failure() == finding.failure
 
 
-def hand_over(
+def write_reproducer(
     shrunk: Shrunk, name: str, folder: Path, *, bound: Bound | None, planner: str | Mapping[str, Any] | None
 ) -> tuple[Attempt, Path, bool]:
     """Write the suite of one small failure; the failure, the suite, and whether that gives the same in another process."""

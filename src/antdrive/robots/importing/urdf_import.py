@@ -17,23 +17,23 @@ import numpy as np
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
-from antdrive.robots.files import footprint_to_dict, robot_from_text
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.model import UrdfModel, read_model
-from antdrive.robots.importing.sensors import found_lidar, lidar_entry
+from antdrive.robots.importing.sensors import import_lidar, lidar_entry
 from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
+from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
 from antdrive.robots.spec import GRAVITY, RobotSpec, yaw_inertia_of
 
 ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # that are assumed where the motors allow them [m/s^2], [rad/s^2]
 SPEED, YAW_RATE = 0.5, 2.0  # that are assumed where the file has no limits [m/s], [rad/s]
-MOST_YAW_RATE = 3.14  # that is taken where only the wheels limit it: half a turn a second [rad/s]
+DEFAULT_YAW_RATE = 3.14  # that is taken where only the wheels limit it: half a turn a second [rad/s]
 SPARE = 0.9  # the share of what the motors could do that is used
 FRICTION = 1.5  # of wheels
 RANGES = ranges_of(RobotSpec)
 NO_LIMIT = "assumed: the file has no limit"
-LEAST_DRIVE = 0.05  # the least acceleration that makes an effort limit a motor's [m/s^2]
+MIN_MOTOR_ACCELERATION = 0.05  # the least acceleration that makes an effort limit a motor's [m/s^2]
 
 Found = dict[str, tuple[float, str]]  # values of a robot's file, and where they come from
 
@@ -89,8 +89,8 @@ def _of_joints(key: str, limit: _Limit, reach: float, most: float, assumed: floa
         return assumed, NO_LIMIT
     if reach > RANGES["max_speed"][1]:
         return assumed, f"assumed: {limit.where} would be {reach:.4g} m/s, {_beyond('max_speed', 'm/s')}"
-    if key == "max_yaw_rate" and most > MOST_YAW_RATE:
-        return MOST_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
+    if key == "max_yaw_rate" and most > DEFAULT_YAW_RATE:
+        return DEFAULT_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
     how = f"computed: {limit.where}, times the wheels' radius"
     return _five(most), how + (" over half the track" if key == "max_yaw_rate" else "")
 
@@ -132,7 +132,7 @@ def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: flo
     tag, told = model.drive_number("max_wheel_torque", "wheelTorque", "torque")
     if told:
         limits.append(_Limit(told, f"<{tag}> of the drive plugin, {told:.7g} N m"))
-    weakest, strongest = mass * LEAST_DRIVE * radius, RANGES["wheel_torque"][1]
+    weakest, strongest = mass * MIN_MOTOR_ACCELERATION * radius, RANGES["wheel_torque"][1]
     limits = sorted(limit for limit in limits if limit.value < math.inf)
     used = next((limit for limit in limits if weakest < limit.value <= strongest), None)
     beside = ""
@@ -197,13 +197,13 @@ class _Value(NamedTuple):
 class ImportedRobot:
     """A robot out of a URDF file."""
 
-    robot: RobotSpec  # the robot
+    spec: RobotSpec
     text: str  # its file, with a comment for each value
     # the collision geometry below the height of the import, from above: points of each piece in the robot's
     # frame (N, 2) [m]
     pieces: tuple[Floats, ...]
     above: tuple[Floats, ...]  # the same of the pieces that lie above that height
-    left_out: tuple[str, ...]  # meshes that were not found
+    missing_meshes: tuple[str, ...]  # meshes that were not found
 
 
 def import_urdf(
@@ -241,13 +241,13 @@ def import_urdf(
     what = f"{kind} around the collision geometry of {_few(names)}, and around the wheels"
     what += "" if math.isinf(below) else f", below {below:g} m"
     values = _values(model, wheels, outline, floor, given)
-    text = _text(model, path, outline, what, values, found_lidar(model.lidars, frame, floor, outline))
+    text = _text(model, path, outline, what, values, import_lidar(model.lidars, frame, floor, outline))
     return ImportedRobot(
         _robot_in(text, path, values),
         text,
         tuple(points),
         tuple(_from_above(piece.points, frame) for piece in high),
-        model.left_out,
+        model.missing_meshes,
     )
 
 
@@ -304,7 +304,7 @@ def _values(
     top = max((float(piece.points[:, 2].max()) for piece in model.pieces), default=0.0) - floor
     xmin, ymin, xmax, ymax = outline.bounds
     apart = f"computed: between the middles of {left.joint.child} and {right.joint.child}"
-    size = f"read: {left.read_from}" + ("" if left.told else _contradiction(model, radius, *RADII))
+    size = f"read: {left.read_from}" + ("" if left.given else _contradiction(model, radius, *RADII))
     found: Found = {
         "height": (max(top, 2 * radius), "computed: top of the collision geometry above the floor"),
         "wheel_radius": (radius, size),
@@ -374,8 +374,8 @@ def _text(
             lines.append(f"{text:30}  # {comment}")
     if lidar is None and seen:
         lines.append(f"# no lidar: {''.join(c if c.isprintable() else '?' for c in seen)}")
-    if model.left_out:
-        left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.left_out)
+    if model.missing_meshes:
+        left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.missing_meshes)
         lines.append(f"# left out, because they were not found: {left}")
     return "\n".join(lines) + "\n"
 

@@ -28,20 +28,20 @@ def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike
     rows = np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3)
     out = np.empty(len(rows))
     bounds = np.asarray(world.bounds, dtype=np.float64)
-    _kernels_footprint.footprint_clearances(rows, *shape_of(footprint), world.discs, bounds, out)
+    _kernels_footprint.footprint_clearances(rows, *kernel_shape(footprint), world.discs, bounds, out)
     return out
 
 
-def shape_of(footprint: Footprint) -> tuple[Floats, Floats]:
+def kernel_shape(footprint: Footprint) -> tuple[Floats, Floats]:
     """A footprint as kernels take it: half length, half width and rounding (3,), and a polygon's corners (K, 2) [m]."""
     shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
     return shape, np.array(footprint.corners, dtype=np.float64).reshape(-1, 2)
 
 
-def gaps(world: World, robot: RobotSpec, poses: npt.ArrayLike) -> Floats:
+def footprint_distances(world: World, spec: RobotSpec, poses: npt.ArrayLike) -> Floats:
     """The distance from the robot's footprint to each obstacle and then each of `WALLS`, negative in it, (P, N + 4) [m]."""
     x, y, yaw = np.asarray(poses, dtype=np.float64).reshape(-1, 3, 1).swapaxes(0, 1)
-    foot, discs = robot.footprint, world.discs
+    foot, discs = spec.footprint, world.discs
     cos, sin = np.cos(yaw), np.sin(yaw)
     dx, dy = discs[:, 0] - x, discs[:, 1] - y
     if foot.corners:
@@ -73,7 +73,7 @@ def _beyond_polygon(footprint: Footprint, x: Floats, y: Floats) -> Floats:
     return np.where(over <= 0, over, apart)
 
 
-def name_of(world: World, index: int, unseen: int = 0) -> str:
+def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
     """What messages call an obstacle or a wall."""
     count = len(world.obstacles)
     if index >= count:
@@ -83,20 +83,20 @@ def name_of(world: World, index: int, unseen: int = 0) -> str:
     return f"{key} at ({disc.x:g}, {disc.y:g}) with radius {disc.radius:g}"
 
 
-def overlap_at(world: World, robot: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
+def overlap_at(world: World, spec: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
     """What the robot's footprint overlaps or touches most at a pose, and by how much; empty where it fits.
 
     Args:
         world: the obstacles and walls; movers do not count
-        robot: the robot
+        spec: the robot
         pose: x, y and yaw of its centre [m, rad]
         unseen: further obstacles
     """
     full = World(world.name, world.bounds, world.obstacles + unseen)
-    gap = gaps(full, robot, [pose])[0]
+    gap = footprint_distances(full, spec, [pose])[0]
     worst = int(gap.argmin())
     if gap[worst] > 0:
         return ""
     depth = -float(gap[worst])
     touches = f"overlaps {{}} by {depth:.3g} m" if depth > 1e-9 else "touches {}"
-    return touches.format(name_of(full, worst, len(unseen)))
+    return touches.format(obstacle_name(full, worst, len(unseen)))

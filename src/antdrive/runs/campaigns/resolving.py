@@ -261,26 +261,26 @@ def _listed(campaign: Campaign, world: NamedTask) -> Iterator[NamedTask]:
 
 
 def _drawn(
-    campaign: Campaign, asked: RandomTasks, world: NamedTask, robots: Sequence[RobotSpec], inflate: float
+    campaign: Campaign, request: RandomTasks, world: NamedTask, robots: Sequence[RobotSpec], inflate: float
 ) -> Iterator[NamedTask]:
     """Random tasks in one world. They depend on it, the seed and what needs room, not on the campaign's other worlds."""
     unseen = tuple(
         dict.fromkeys(Disc(d.x, d.y, d.radius, d.height) for one in campaign.settings for d in one.get("unseen", ()))
     )
     content = int(canonical_hash(world.task)[:16], 16)
-    rng = np.random.default_rng([asked.seed, content])
+    rng = np.random.default_rng([request.seed, content])
     cell = max(entry.get("cell") or world.task.cell for entry in campaign.settings)
     grid = rasterise(world.task.world, cell, inflate)
     free = np.argwhere(grid.moves > 0)
-    for number in range(asked.random):
-        task = _draw(rng, grid, free, asked.min_distance, world.task, robots, unseen) if len(free) else None
+    for number in range(request.random):
+        task = _draw(rng, grid, free, request.min_distance, world.task, robots, unseen) if len(free) else None
         if task is None:
             problem = (
-                f"no start and goal {asked.min_distance:g} m apart with a path between them found in {TRIES} draws in world "
+                f"no start and goal {request.min_distance:g} m apart with a path between them found in {TRIES} draws in world "
                 f"{world.world} for a robot of radius {inflate:.3g} m with its margin; use a smaller min_distance"
             )
             raise campaign.error(("tasks",), problem)
-        yield dataclasses.replace(world, name=f"random-{asked.seed}-{number}", task=task, catalogue=None)
+        yield dataclasses.replace(world, name=f"random-{request.seed}-{number}", task=task, catalogue=None)
 
 
 def _draw(

@@ -15,7 +15,7 @@ from antdrive.runs.failures import passes
 from antdrive.runs.failures.candidates import CandidateRunner, changeable, identity_of, room_in
 from antdrive.runs.failures.ddmin import one_minimal
 from antdrive.runs.failures.failure import Failure, failure_of, parse_bound
-from antdrive.runs.failures.shrink import shrink
+from antdrive.runs.failures.shrinker import shrink
 from antdrive.sim import run
 from antdrive.worlds import Cruising, Disc, Task, World
 

@@ -15,7 +15,7 @@ from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_
 from antdrive.base.document import Document, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.records import STRICT
-from antdrive.robots.outline import MOST_CORNERS
+from antdrive.robots.outline import MAX_CORNERS
 from antdrive.robots.spec import Footprint, RobotSpec, require_feasible
 
 _CATALOG = Path(__file__).with_name("catalog")
@@ -47,7 +47,7 @@ class FootprintEntry(BaseModel):
     polygon: list[_Place] | None = Field(
         None,
         description="corners of a convex outline, in order: x ahead, y to the left of the axle's centre [m]; at most "
-        f"{MOST_CORNERS}",
+        f"{MAX_CORNERS}",
     )
 
     @model_validator(mode="after")
@@ -140,22 +140,22 @@ def robot_schema() -> dict[str, Any]:
 def _to_spec(entry: Any, document: Document) -> RobotSpec:
     values = {field.name: getattr(entry, field.name) for field in dataclasses.fields(RobotSpec)}
     try:
-        robot = RobotSpec(**{**values, "footprint": entry.footprint.footprint()})
-        require_feasible(robot)
+        spec = RobotSpec(**{**values, "footprint": entry.footprint.footprint()})
+        require_feasible(spec)
     except FieldError as error:
         raise document.field_error(error) from None
-    return robot
+    return spec
 
 
-def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:
+def robot_to_dict(spec: RobotSpec) -> dict[str, Any]:
     """A robot as plain data, as it stands in a rollout's record."""
     left_out = {
         field.name
-        for field in dataclasses.fields(robot)
-        if field.metadata.get("left_out_if_default") and getattr(robot, field.name) == field.default
+        for field in dataclasses.fields(spec)
+        if field.metadata.get("omit_if_default") and getattr(spec, field.name) == field.default
     }
-    data = {key: value for key, value in dataclasses.asdict(robot).items() if key not in left_out}
-    if not robot.footprint.corners:
+    data = {key: value for key, value in dataclasses.asdict(spec).items() if key not in left_out}
+    if not spec.footprint.corners:
         del data["footprint"]["corners"]
     return data
 

@@ -11,7 +11,7 @@ import pytest
 
 from antdrive.base.errors import InputError
 from antdrive.planners import load_planner
-from antdrive.runs.barn import by_map, campaign_data, lines, reference_times, score, unpacked
+from antdrive.runs.barn_challenge import by_map, campaign_data, lines, reference_times, score, unpacked
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.sim import Scenario, run

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from antdrive.base import InputError
 from antdrive.robots import Footprint, load_robot
-from antdrive.robots.files import footprint_to_dict as written
 from antdrive.robots.importing.hull import convex_hull, fewer_corners, footprint_around
-from antdrive.robots.importing.urdf import import_urdf
+from antdrive.robots.importing.urdf_import import import_urdf
+from antdrive.robots.robot_file import footprint_to_dict as written
 from benchmarks.robots import SPECIFICATIONS, values_of
 
 FIXTURES = Path(__file__).parent / "urdf"
@@ -61,7 +61,7 @@ def changed(tmp_path, name, *changes):
 @pytest.mark.parametrize("name", KINDS)
 def test_what_is_imported_is_within_a_hundredth_of_all_public_values(name):
     found, specified = imported(name), SPECIFICATIONS[name]
-    robot, values = found.robot, values_of(found.robot)
+    robot, values = found.spec, values_of(found.spec)
     assert {key: values[key] for key in specified} == pytest.approx(specified, rel=0.01)
     assert {"length", "width", "height", "mass", "wheel_radius", "track", "max_speed", "max_yaw_rate"} <= set(specified)
     kind = "disc" if robot.footprint.rounding else "rectangle" if robot.footprint.box else "polygon"
@@ -80,8 +80,8 @@ def test_the_file_says_of_each_value_where_it_comes_from(tmp_path):
     found = imported("pioneer3dx.urdf", given={"mass": 9.5})
     path = tmp_path / "pioneer.yaml"
     path.write_text(found.text)
-    assert load_robot(path) == found.robot
-    assert found.robot.mass == 9.5
+    assert load_robot(path) == found.spec
+    assert found.spec.mass == 9.5
     numbers = [line for line in found.text.splitlines() if re.match(r"\w+: [\d.]+ ", line)]
     assert len(numbers) == 11
     kinds = {line.split(":")[0]: line.split("# ")[1].split(":")[0] for line in numbers}
@@ -95,20 +95,20 @@ def test_the_file_says_of_each_value_where_it_comes_from(tmp_path):
 
 def test_the_noise_is_assumed_as_in_the_catalogue():
     found = imported("burger.urdf")
-    assert found.robot.noise == load_robot("turtlebot3-burger").noise
+    assert found.spec.noise == load_robot("turtlebot3-burger").noise
     assert "# assumed: as in the catalogue; measure the robot's own\nnoise: {pose_xy" in found.text
 
 
 def test_limits_come_from_the_drive_plugin_where_there_is_one():
     found = imported("waffle.urdf")
-    assert (found.robot.max_speed, found.robot.max_yaw_rate) == (0.26, 1.82)
+    assert (found.spec.max_speed, found.spec.max_yaw_rate) == (0.26, 1.82)
     assert comments(found)["max_speed"] == "read: <max_linear_velocity> of the drive plugin"
 
 
 def test_limits_that_contradict_each_other_are_resolved_or_refused(tmp_path):
     slow = ('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><limit effort="2" velocity="5"/>')
     found = import_urdf(changed(tmp_path, "waffle.urdf", slow))
-    assert found.robot.max_speed == pytest.approx(5 * 0.033)
+    assert found.spec.max_speed == pytest.approx(5 * 0.033)
     assert comments(found)["max_speed"] == (
         "computed: the velocity limit of joint wheel_left_joint, 5 rad/s; <max_linear_velocity> of the drive plugin is 0.26"
     )
@@ -149,7 +149,7 @@ def limited(tmp_path, words):
 )  # fmt: skip
 def test_no_limit_of_a_joint_is_left_out_without_a_word(tmp_path, words, key, value, says):
     found = limited(tmp_path, words)
-    assert getattr(found.robot, key) == pytest.approx(value, rel=1e-4)
+    assert getattr(found.spec, key) == pytest.approx(value, rel=1e-4)
     assert comments(found)[key].startswith(says)
 
 
@@ -174,7 +174,7 @@ def test_a_speed_that_stands_for_no_limit_is_not_used_but_named(tmp_path, tag, t
     )
     limit = f'<axis xyz="0 0 1"/><limit {velocity}/>'
     found = import_urdf(changed(tmp_path, "burger.urdf", ("</robot>", plugin), ('<axis xyz="0 0 1"/>', limit)))
-    assert getattr(found.robot, key) == pytest.approx(value)
+    assert getattr(found.spec, key) == pytest.approx(value)
     assert comments(found)[key].startswith(says)
 
 
@@ -212,8 +212,8 @@ def test_ros2_control_names_the_driven_wheels_and_their_limit(tmp_path):
     path = tmp_path / "driven.urdf"
     path.write_text(text.replace("</robot>", control))
     found = import_urdf(path)
-    assert found.robot.footprint.bounds == pytest.approx((-0.239, -0.335, 0.751, 0.335), abs=1e-3)
-    assert (found.robot.max_wheel_speed, found.robot.max_speed) == (5.0, pytest.approx(5 * 0.1651))
+    assert found.spec.footprint.bounds == pytest.approx((-0.239, -0.335, 0.751, 0.335), abs=1e-3)
+    assert (found.spec.max_wheel_speed, found.spec.max_speed) == (5.0, pytest.approx(5 * 0.1651))
     assert comments(found)["max_wheel_speed"] == "read: the limit of joint rear_right_wheel in <ros2_control>, 5 rad/s"
     for joint, limit, says in (
         ("rear_wrong_wheel", most, "<ros2_control> drives joint 'rear_wrong_wheel', which there is not"),
@@ -235,8 +235,8 @@ def test_a_wheel_that_is_a_little_askew_adds_no_corners(tmp_path):
     straight, askew = (
         import_urdf(changed(tmp_path, "burger.urdf", ("-1.5707963", turn))) for turn in ("-1.5707963", "-1.57")
     )
-    assert len(askew.robot.footprint.corners) == len(straight.robot.footprint.corners) == 8
-    assert askew.robot.footprint.bounds == pytest.approx(straight.robot.footprint.bounds, abs=1e-4)
+    assert len(askew.spec.footprint.corners) == len(straight.spec.footprint.corners) == 8
+    assert askew.spec.footprint.bounds == pytest.approx(straight.spec.footprint.bounds, abs=1e-4)
 
 
 def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path):
@@ -261,7 +261,7 @@ def test_the_lowest_torque_that_can_be_used_is_and_the_other_is_named(tmp_path, 
     )
     found = import_urdf(changed(tmp_path, "burger.urdf", ('effort="1.4"', f'effort="{effort}"'), ("</robot>", plugged)))
     how = comments(found)["wheel_torque"]
-    assert found.robot.wheel_torque == torque
+    assert found.spec.wheel_torque == torque
     assert how.startswith("read: ")
     assert beside in how
 
@@ -271,7 +271,7 @@ def test_a_negative_limit_is_refused_with_joint_and_key(tmp_path, key):
     with pytest.raises(InputError, match=rf"joint wheel_\w+_joint: the limit's {key} must be at least 0, got -5$"):
         limited(tmp_path, f'{key}="-5"')
     none = limited(tmp_path, f'{key}="0"')
-    assert none.robot == limited(tmp_path, "").robot  # 0 is how files say that there is none
+    assert none.spec == limited(tmp_path, "").spec  # 0 is how files say that there is none
 
 
 def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_path):
@@ -284,7 +284,7 @@ def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_pat
     says = comments(found)
     assert says["track"].endswith("; <wheel_separation> of the drive plugin is 0.2")
     assert says["wheel_radius"] == "read: cylinder of link wheel_left_link", "it agrees"
-    assert (found.robot.max_acceleration, found.robot.wheel_torque) == (0.4, 0.02)
+    assert (found.spec.max_acceleration, found.spec.wheel_torque) == (0.4, 0.02)
     assert says["max_acceleration"] == "read: <max_linear_acceleration> of the drive plugin"
     assert says["wheel_torque"] == (
         "read: <max_wheel_torque> of the drive plugin, 0.02 N m; the effort limit of joint wheel_left_joint, 1.4 N m is more"
@@ -301,7 +301,7 @@ def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle():
         InputError, match=r"2 pairs of wheels on axles \(front_left_wheel and front_right_wheel; rear_left"
     ):
         imported("husky.urdf")
-    robot = imported("husky.urdf", left="rear_left_wheel", right="rear_right_wheel").robot
+    robot = imported("husky.urdf", left="rear_left_wheel", right="rear_right_wheel").spec
     assert robot.footprint.bounds == pytest.approx((-0.239, -0.335, 0.751, 0.335), abs=1e-3)
     assert (robot.max_speed, robot.max_yaw_rate) == (1.0, 2.0), "as the plugin of all four wheels says"
 
@@ -360,7 +360,7 @@ def test_a_plugin_for_a_vehicle_that_skids_chooses_no_axle(tmp_path):
         import_urdf(path)
     one = re.sub(r"<(left|right)_joint>front.*?</(left|right)_joint>", "", plugin)
     path = changed(tmp_path, "husky.urdf", ("</robot>", one))
-    assert import_urdf(path).robot.footprint.bounds[2] == pytest.approx(0.751, abs=1e-3)
+    assert import_urdf(path).spec.footprint.bounds[2] == pytest.approx(0.751, abs=1e-3)
 
 
 def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path):
@@ -386,13 +386,13 @@ def test_given_values_that_no_robot_has_are_refused(key, value):
 def test_long_numbers_stand_apart_from_their_comments(key, value):
     found = imported("burger.urdf", given={key: value})
     assert yaml.safe_load(found.text)[key] == pytest.approx(value)
-    assert getattr(found.robot, key) == pytest.approx(value)
+    assert getattr(found.spec, key) == pytest.approx(value)
 
 
 def test_wheels_can_be_told_by_joint_or_link():
-    there = imported("burger.urdf").robot
-    assert imported("burger.urdf", left="wheel_left_link", right="wheel_right_joint").robot == there
-    back = imported("burger.urdf", left="wheel_right_link", right="wheel_left_link").robot  # it drives backwards
+    there = imported("burger.urdf").spec
+    assert imported("burger.urdf", left="wheel_left_link", right="wheel_right_joint").spec == there
+    back = imported("burger.urdf", left="wheel_right_link", right="wheel_left_link").spec  # it drives backwards
     assert back.footprint.bounds == pytest.approx((-0.037, -0.089, 0.101, 0.089), abs=1e-4)
     with pytest.raises(
         InputError, match="scan: does not turn freely about a level axis; joints that could drive: wheel_left_joint, wh"
@@ -406,17 +406,17 @@ def test_wheels_can_be_told_by_joint_or_link():
 
 def test_what_lies_higher_is_left_out_and_meshes_too_where_asked(tmp_path):
     wide = changed(tmp_path, "turtlebot4.urdf", ('size="0.1 0.1 0.246"', 'size="0.9 0.1 0.246"'))
-    assert import_urdf(wide).robot.radius > 0.45
+    assert import_urdf(wide).spec.radius > 0.45
     low = import_urdf(wide, below=0.1)
-    assert low.robot.footprint.is_disc
-    assert low.robot.radius == pytest.approx(0.1705, rel=0.01)
+    assert low.spec.footprint.is_disc
+    assert low.spec.radius == pytest.approx(0.1705, rel=0.01)
     assert (len(low.pieces), len(low.above)) == (3, 1)
-    assert low.robot.height == pytest.approx(0.351), "the body is as high as it is"
+    assert low.spec.height == pytest.approx(0.351), "the body is as high as it is"
     mesh = changed(
         tmp_path, "turtlebot4.urdf", ('<box size="0.1 0.1 0.246"/>', '<mesh filename="package://tb/mast.stl"/>')
     )
     found = import_urdf(mesh, without_meshes=True)
-    assert found.left_out == ("mast: package://tb/mast.stl",)
+    assert found.missing_meshes == ("mast: package://tb/mast.stl",)
     assert found.text.endswith("# left out, because they were not found: mast: package://tb/mast.stl\n")
 
 
@@ -431,7 +431,7 @@ def test_a_mesh_is_read_with_its_scale(tmp_path):
         "waffle.urdf",
         ('<box size="0.281 0.306 0.119"/>', '<mesh filename="package://waffle/meshes/body.obj" scale="0.2 0.1 0.05"/>'),
     )
-    assert import_urdf(path).robot.footprint.bounds == pytest.approx((-0.264, -0.2, 0.136, 0.2), abs=1e-4)
+    assert import_urdf(path).spec.footprint.bounds == pytest.approx((-0.264, -0.2, 0.136, 0.2), abs=1e-4)
 
 
 @pytest.mark.parametrize(("unit", "scale"), [('<unit meter="0.001" name="millimetre"/>', 1.0), ("", 0.001)])
@@ -457,13 +457,13 @@ def test_the_unit_of_a_collada_mesh_counts(tmp_path, unit, scale):
     )
     mesh = f'<mesh filename="body.dae" scale="{scale} {scale} {scale}"/>'
     path = changed(tmp_path, "waffle.urdf", ('<box size="0.281 0.306 0.119"/>', mesh))
-    assert import_urdf(path).robot.footprint.bounds == pytest.approx((-0.264, -0.1525, 0.136, 0.1525), abs=1e-3)
+    assert import_urdf(path).spec.footprint.bounds == pytest.approx((-0.264, -0.1525, 0.136, 0.1525), abs=1e-3)
 
 
 def test_masses_and_torques_that_a_file_lacks_are_assumed(tmp_path):
     path = changed(tmp_path, "waffle.urdf", ('<mass value="1.74"/>', ""), ('<mass value="0.03"/>', ""))
     found = import_urdf(path)
-    assert found.robot.mass == pytest.approx(150 * 0.281 * 0.306 * 0.141, rel=1e-3)
+    assert found.spec.mass == pytest.approx(150 * 0.281 * 0.306 * 0.141, rel=1e-3)
     assert "# assumed: 150 kg/m3, as the file has no masses" in found.text
 
 
@@ -485,7 +485,7 @@ def test_any_limits_of_the_joints_give_a_robot_that_reaches_what_it_promises(rad
         path.write_text(text)
         refused, robot = "", None
         try:
-            robot = import_urdf(path).robot
+            robot = import_urdf(path).spec
         except InputError as error:
             refused = str(error)
     assert "reach" not in refused, "only a robot that antdrive is not meant for is refused"
@@ -550,7 +550,7 @@ def test_a_cylinder_is_as_long_and_as_wide_as_its_diameter(tmp_path):
         tmp_path, "burger.urdf", ('<box size="0.138 0.140 0.143"/>', '<cylinder radius="0.2" length="0.143"/>')
     )
     for kind in ("rectangle", "polygon"):
-        bounds = import_urdf(path, footprint=kind).robot.footprint.bounds
+        bounds = import_urdf(path, footprint=kind).spec.footprint.bounds
         assert (bounds[2] - bounds[0], bounds[3] - bounds[1]) == pytest.approx(
             (0.4, 0.4), rel=0.06 if kind == "polygon" else 1e-4
         )
@@ -581,7 +581,7 @@ def test_the_yaw_of_the_axle_is_the_robots(tmp_path):
         text = text.replace(old, new)
     path = tmp_path / "turned.urdf"
     path.write_text(text)
-    robot = import_urdf(path).robot
+    robot = import_urdf(path).spec
     assert robot.footprint.bounds == pytest.approx((-0.101, -0.089, 0.037, 0.089), abs=1e-4)
 
 
@@ -622,11 +622,11 @@ def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path):
     with pytest.raises(InputError, match="Undefined substitution argument name; give it with --arg NAME=VALUE"):
         import_urdf(path)
     found = import_urdf(path, arguments={"name": "two"})
-    assert found.robot.name == "two"
+    assert found.spec.name == "two"
     (tmp_path / "parts").rename(tmp_path / "elsewhere")
     with pytest.raises(InputError, match="Package not found: parts; say where it is with --package NAME=FOLDER"):
         import_urdf(path, arguments={"name": "two"})
-    assert import_urdf(path, arguments={"name": "two"}, packages={"parts": tmp_path / "elsewhere"}).robot == found.robot
+    assert import_urdf(path, arguments={"name": "two"}, packages={"parts": tmp_path / "elsewhere"}).spec == found.spec
     with pytest.raises(InputError, match=r"--arg name: burger\.urdf is no \.xacro, and has no arguments"):
         imported("burger.urdf", arguments={"name": "two"})
 
@@ -640,4 +640,4 @@ def test_meshes_of_a_package_are_found_where_it_is_said_to_be(tmp_path):
     mesh = ('<box size="0.281 0.306 0.119"/>', '<mesh filename="package://waffle/body.obj"/>')
     path = changed(tmp_path, "waffle.urdf", mesh)
     found = import_urdf(path, packages={"waffle": tmp_path / "elsewhere"})
-    assert found.robot.footprint.bounds == pytest.approx((-0.264, -0.2, 0.136, 0.2), abs=1e-4)
+    assert found.spec.footprint.bounds == pytest.approx((-0.264, -0.2, 0.136, 0.2), abs=1e-4)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from antdrive.worlds.drawing import card
+from antdrive.worlds.svg import card
 
 if TYPE_CHECKING:  # a robot draws itself with this module
     from antdrive.robots.lidar import Lidar
@@ -17,12 +17,12 @@ WHEEL_ASPECT = 0.4  # a wheel's drawn thickness as a fraction of its diameter: r
 MM = 1000.0  # the drawing's unit, because browsers render text in units of a metre badly
 
 
-def robot_svg(robot: RobotSpec) -> str:
+def robot_svg(spec: RobotSpec) -> str:
     """A robot from above as SVG, heading right, to scale: footprint, wheels, heading and a ruler.
 
     Its coordinates are millimetres from the axle's centre, y upwards.
     """
-    foot = robot.footprint
+    foot = spec.footprint
     xmin, ymin, xmax, ymax = (MM * value for value in foot.bounds)
     half_x, half_y, middle = (xmax - xmin) / 2, (ymax - ymin) / 2, (xmin + xmax) / 2
     pad = 0.12 * max(half_x, half_y)
@@ -37,8 +37,8 @@ def robot_svg(robot: RobotSpec) -> str:
             f'<rect class="footprint" x="{xmin:.6g}" y="{ymin:.6g}" width="{2 * half_x:.6g}" '
             f'height="{2 * half_y:.6g}" rx="{MM * foot.rounding:.6g}" {paint}'
         ]
-    radius, thickness = MM * robot.wheel_radius, MM * wheel_thickness(robot)
-    for y in (MM * robot.track / 2, -MM * robot.track / 2):
+    radius, thickness = MM * spec.wheel_radius, MM * wheel_thickness(spec)
+    for y in (MM * spec.track / 2, -MM * spec.track / 2):
         parts.append(
             f'<rect class="wheel" x="{-radius:.6g}" y="{y - thickness / 2:.6g}" width="{2 * radius:.6g}" '
             f'height="{thickness:.6g}" rx="{min(radius, thickness) / 4:.3g}" fill="{WHEEL}"/>'
@@ -65,26 +65,26 @@ def robot_svg(robot: RobotSpec) -> str:
     )
 
 
-def robot_card(robot: RobotSpec) -> str:
+def robot_card(spec: RobotSpec) -> str:
     """A robot as HTML: its drawing, then its main values."""
-    return card(robot_svg(robot), robot.name, facts_of(robot))
+    return card(robot_svg(spec), spec.name, facts_of(spec))
 
 
-def facts_of(robot: RobotSpec) -> dict[str, str]:
+def facts_of(spec: RobotSpec) -> dict[str, str]:
     """A robot's main values in words."""
-    noise = robot.noise
+    noise = spec.noise
     noisy = (
         f"pose ±{noise.pose_xy:g} m, ±{noise.pose_yaw:g} rad; encoders ±{100 * noise.encoder:g} %; "
         f"slip ±{100 * noise.slip:g} %; delay {noise.delay:g} s"
     )
     return {
-        "footprint": footprint_text(robot),
-        "body": f"{robot.height:g} m high, {robot.mass:g} kg",
-        "wheels": f"radius {robot.wheel_radius:g} m, {robot.track:g} m apart",
-        "speed": f"up to {robot.max_speed:g} m/s, {robot.max_yaw_rate:g} rad/s",
-        "acceleration": f"up to {robot.max_acceleration:g} m/s², {robot.max_yaw_acceleration:g} rad/s²; "
-        f"lateral {robot.max_lateral_acceleration:g} m/s²",
-        **({} if robot.lidar is None else {"lidar": lidar_text(robot.lidar)}),
+        "footprint": footprint_text(spec),
+        "body": f"{spec.height:g} m high, {spec.mass:g} kg",
+        "wheels": f"radius {spec.wheel_radius:g} m, {spec.track:g} m apart",
+        "speed": f"up to {spec.max_speed:g} m/s, {spec.max_yaw_rate:g} rad/s",
+        "acceleration": f"up to {spec.max_acceleration:g} m/s², {spec.max_yaw_acceleration:g} rad/s²; "
+        f"lateral {spec.max_lateral_acceleration:g} m/s²",
+        **({} if spec.lidar is None else {"lidar": lidar_text(spec.lidar)}),
         "noise": noisy if noise.nonzero else "none",
     }
 
@@ -99,9 +99,9 @@ def lidar_text(lidar: Lidar) -> str:
     )
 
 
-def footprint_text(robot: RobotSpec) -> str:
+def footprint_text(spec: RobotSpec) -> str:
     """A robot's footprint in words: kind, size, and where it is on the axle."""
-    foot = robot.footprint
+    foot = spec.footprint
     xmin, ymin, xmax, ymax = foot.bounds
     size = f"{xmax - xmin:g} × {ymax - ymin:g} m"
     if foot.is_disc or len(foot.corners) == 1:
@@ -116,15 +116,15 @@ def footprint_text(robot: RobotSpec) -> str:
     return text + (off if math.hypot(x, y) > 1e-9 else "")
 
 
-def wheel_thickness(robot: RobotSpec) -> float:
+def wheel_thickness(spec: RobotSpec) -> float:
     """How thick the wheels are drawn, so that they stay within the footprint [m]."""
-    foot = robot.footprint
+    foot = spec.footprint
     if foot.corners:
-        return max(min(2 * robot.wheel_radius * WHEEL_ASPECT, 2 * robot.wheel_room), 0.02 * robot.track)
-    beyond = max(robot.wheel_radius - foot.half_length, 0)
+        return max(min(2 * spec.wheel_radius * WHEEL_ASPECT, 2 * spec.wheel_room), 0.02 * spec.track)
+    beyond = max(spec.wheel_radius - foot.half_length, 0)
     edge = foot.half_width + math.sqrt(max(foot.rounding**2 - beyond**2, 0))
-    room = 2 * (edge - robot.track / 2)
-    return max(min(2 * robot.wheel_radius * WHEEL_ASPECT, room), 0.02 * robot.track)
+    room = 2 * (edge - spec.track / 2)
+    return max(min(2 * spec.wheel_radius * WHEEL_ASPECT, room), 0.02 * spec.track)
 
 
 def _ruler_length(most: float) -> float:

@@ -4,7 +4,7 @@ import json
 import pytest
 
 from antdrive.robots import Footprint, list_robots, load_robot, robot_schema, robot_to_dict
-from antdrive.robots.files import footprint_to_dict
+from antdrive.robots.robot_file import footprint_to_dict
 from antdrive.sim import Engine
 from antdrive.sim.log.record import canonical_hash
 from antdrive.worlds import World
