@@ -64,8 +64,8 @@ class Ends:
         try:
             task = load_task(world, self.task)
             if self.frame == MAP_FRAME:
-                given = {key: tuple(map_to_world(found.frame, [value])[0].tolist()) for key, value in given.items()}
-            return dataclasses.replace(found, **given)
+                given = {key: tuple(map_to_world(task.frame, [value])[0].tolist()) for key, value in given.items()}
+            return dataclasses.replace(task, **given)
         except FieldError as error:
             frame = " (in the world frame)" if self.frame == MAP_FRAME and any(task.frame) else ""
             raise InputError(f"--{error.key}: {error.problem}{frame}") from None

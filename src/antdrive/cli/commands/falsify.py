@@ -80,7 +80,7 @@ def falsify(
 
 
 def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reproducer]":
-    """Shrink, repeat and write every failure that differs from the others, in place of those of an earlier search."""
+    """Shrink, repeat and write each distinct failure, replacing those of an earlier search."""
     from antdrive.runs.failures.reproducers import SUITE, write_reproducers
 
     reported = []

@@ -68,7 +68,7 @@ def show_world(
     json: options.Json = False,
     **asked: Any,
 ) -> None:
-    """Describe a world, and whether a robot can cross it."""
+    """Describe a world and check whether a robot can cross it."""
     from antdrive.base.plane import world_to_map
     from antdrive.planners import Query, load_planner, reachable
     from antdrive.robots import list_robots, load_robot, overlap_at
