@@ -52,7 +52,7 @@ axes = figure.add_subplot(label="profile")
 for planner, curve in zip(planners, performance_profiles(cost), strict=True):
     axes.step(
         [1.0, *curve.x, 1.1],
-        [0.0, *curve.share, curve.at(1.1)],
+        [0.0, *curve.fraction, curve.at(1.1)],
         where="post",
         label=planner,
         lw=2,

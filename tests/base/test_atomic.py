@@ -50,7 +50,7 @@ def test_what_a_killed_process_left_is_removed_by_the_next_attempt(writer, tmp_p
 
 
 def test_a_folder_is_claimed_once_and_a_claim_dies_with_its_process(writer, tmp_path):
-    says = rf"another run \(process {writer.pid}\) is writing into this folder"
+    says = rf"another run \(process {writer.pid}\) is writing to this folder"
     with pytest.raises(InputError, match=says), folder_lock(tmp_path):
         pytest.fail("claimed twice")
     kill(writer)

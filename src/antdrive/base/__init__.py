@@ -1,6 +1,6 @@
-"""Base layer: errors, types, plane geometry, files, documents with lines, optional packages, the kernel cache."""
+"""Base layer: errors, types, plane geometry, files, documents with line numbers, optional packages, caches."""
 
 import lazy_loader
 
-# What this package offers is listed, with its types, in __init__.pyi; each name is imported when first used.
+# __init__.pyi lists the public names and their types. Each name is imported when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, so that nobody ever reads half a file; folders that one process claims."""
+"""Atomic file writes and per-process folder locks."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from pathlib import Path
 from antdrive.base.errors import InputError
 
 LOCK = ".antdrive.lock"
-LONGEST_STEM = 100  # characters of a file's name that its temporary file repeats
+LONGEST_STEM = 100  # characters of the target's name in a temporary file's name
 
 
 @contextmanager
 def atomic_write(path: str | Path) -> Iterator[Path]:
-    """A context with a temporary path, which replaces `path` when the block succeeds and is removed when it fails.
+    """Yield a temporary path that replaces `path` on success and is removed on failure.
 
-    What processes that were killed left of earlier attempts at this file is removed.
+    Temporary files that killed processes left for the same target are removed.
     """
     target = Path(path)
     try:
@@ -49,7 +49,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
-    """Write a text in UTF-8, whole or not at all; its path."""
+    """Write a UTF-8 text file atomically and return its path."""
     with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline=newline)
     return Path(path)
@@ -57,7 +57,7 @@ def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
 
 @contextmanager
 def atomic_folder(path: str | Path) -> Iterator[Path]:
-    """A context with a temporary folder, which becomes `path` when the block succeeds and is removed when it fails."""
+    """Yield a temporary folder that becomes `path` on success and is removed on failure."""
     target = Path(path)
     try:
         if target.is_file() or (target.is_dir() and any(target.iterdir())):
@@ -85,10 +85,10 @@ def _umask() -> int:
 
 @contextmanager
 def folder_lock(folder: str | Path) -> Iterator[None]:
-    """A context in which no other process may claim the folder. A claim ends with its process, however that ends."""
+    """Lock a folder for this process. The lock ends with the process, even if it is killed."""
     try:
         import fcntl
-    except ImportError:  # no such locks on this system
+    except ImportError:  # this system has no file locks
         yield
         return
     path = Path(folder) / LOCK
@@ -102,11 +102,11 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
                 holder = os.read(handle, 20).decode(errors="replace").strip() or "unknown"
                 os.close(handle)
                 raise InputError(
-                    f"{folder}: another run (process {holder}) is writing into this folder; wait for it or name another"
+                    f"{folder}: another run (process {holder}) is writing to this folder; wait for it or choose another folder"
                 ) from None
             if _is_still(path, handle):
                 break
-            os.close(handle)  # its last owner removed it before we got it
+            os.close(handle)  # the previous owner removed the file before we locked it
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
     try:
@@ -119,7 +119,7 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
 
 
 def _is_still(path: Path, handle: int) -> bool:
-    """Whether an open file is the one that the path names."""
+    """Return whether a path still names the open file."""
     try:
         return os.path.samestat(os.stat(path), os.fstat(handle))
     except FileNotFoundError:
@@ -127,16 +127,16 @@ def _is_still(path: Path, handle: int) -> bool:
 
 
 def _prefix(target: Path) -> str:
-    """What the names of temporary files for a target begin with, on this machine; the process follows."""
+    """Return the prefix of a target's temporary files on this machine; the process id follows."""
     return f".{target.stem[:LONGEST_STEM]}-{zlib.crc32(platform.node().encode()):08x}-"
 
 
 def _sweep(target: Path) -> None:
-    """Remove temporary files for a target whose processes on this machine are no more."""
+    """Remove a target's temporary files whose processes on this machine have ended."""
     name = re.compile(re.escape(_prefix(target)) + r"(\d{1,10})-\w+" + re.escape(target.suffix))
     for path in target.parent.iterdir():
-        found = name.fullmatch(path.name)
-        if found and not _is_alive(int(found[1])):
+        match = name.fullmatch(path.name)
+        if match and not _is_alive(int(match[1])):
             path.unlink(missing_ok=True)
 
 
@@ -145,6 +145,6 @@ def _is_alive(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # another user's
+    except (OSError, OverflowError):  # another user's process
         return True
     return True

@@ -1,4 +1,4 @@
-"""Documents checked against records. A fault becomes one line that says what would be right."""
+"""Validation of documents against records; each error is one line with the fix."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Schema: TypeAlias = Mapping[str, Any]
 
 
 def _exactly_one(value: Any) -> Any:
-    # Python, and so pydantic, takes true and 1.0 for 1.
+    # Python, and so pydantic, treats true and 1.0 as 1.
     if type(value) is not int:
         raise ValueError(f"must be 1, got {show(value)}")
     return value
@@ -35,44 +35,48 @@ def _printable(text: str) -> str:
     return text
 
 
-#: The version of the file format; so far there has been one.
+#: Version of the file format; 1 is the only one.
 SchemaVersion = Annotated[Literal[1], BeforeValidator(_exactly_one)]
 OneLine = Annotated[str, AfterValidator(_printable)]
 
 
 def check(kind: type[R], document: Document) -> R:
-    """The document as a record: a dataclass or a pydantic model."""
+    """Return the document as a record: a dataclass or a pydantic model.
+
+    Raises:
+        InputError: the document does not match the record.
+    """
     schema = schema_of(cast(Hashable, kind))
     if not isinstance(document.data, dict):
         raise document.error((), f"must be {_mapping_of(schema)}, got {show(document.data)}")
     try:
-        # As JSON, in which strict rules take lists for tuples and mappings for records.
-        found: R = _adapter(cast(Hashable, kind)).validate_json(json.dumps(document.data, default=_plain))
-        return found
+        # As JSON, where strict mode accepts lists as tuples and mappings as records.
+        record: R = _adapter(cast(Hashable, kind)).validate_json(json.dumps(document.data, default=_plain))
+        return record
     except ValidationError as error:
-        faults = error.errors(include_url=False)
+        errors = error.errors(include_url=False)
     except (TypeError, ValueError, RecursionError):
         raise document.error((), "must be plain data: mappings, lists, numbers and texts") from None
-    if faults[0]["type"] == "json_invalid":
+    if errors[0]["type"] == "json_invalid":
         raise document.error(next(_broken(document.data, ()), ()), "must be text in Unicode")
-    unknown = [f for f in faults if f["type"] in _UNKNOWN]
-    fault = (unknown or faults)[0]
-    location = tuple(fault["loc"])
-    if fault["type"] == "missing" and isinstance(location[-1], int):  # an entry of a list, which is too short
-        location, fault = location[:-1], {**fault, "type": "too_short"}
-    cause = fault.get("ctx", {}).get("error")
+    unknown = [e for e in errors if e["type"] in _UNKNOWN]
+    first = (unknown or errors)[0]
+    location = tuple(first["loc"])
+    if first["type"] == "missing" and isinstance(location[-1], int):  # the list is too short
+        location, first = location[:-1], {**first, "type": "too_short"}
+    cause = first.get("ctx", {}).get("error")
     if isinstance(cause, FieldError):
         raise document.field_error(cause, *location)
-    raise document.error(location, _problem(schema, location, fault))
+    raise document.error(location, _problem(schema, location, first))
 
 
 def _plain(value: Any) -> Any:
-    """What stands in JSON for a value that is not plain data, as those of numpy."""
+    """Return a JSON value for other data, such as numpy's."""
     return int(value) if isinstance(value, numbers.Integral) else repr(value)
 
 
 def _broken(data: Any, location: Location) -> Iterator[Location]:
-    """The places of texts that are no Unicode."""
+    """Yield the locations of texts with lone surrogates."""
     if isinstance(data, str) and not data.isascii() and any("\ud800" <= mark <= "\udfff" for mark in data):
         yield location
     inner = data.items() if isinstance(data, Mapping) else enumerate(data) if isinstance(data, list | tuple) else ()
@@ -83,7 +87,7 @@ def _broken(data: Any, location: Location) -> Iterator[Location]:
 
 @functools.cache
 def schema_of(kind: Hashable) -> Mapping[str, Any]:
-    """The JSON Schema of a record; what docstrings say of a field describes it where nothing else does."""
+    """Return a record's JSON Schema. Fields without a description take it from the docstring's `Attributes`."""
     schema = _adapter(kind).json_schema()
     for part in (schema, *schema.get("$defs", {}).values()):
         text = part.get("description", "")
@@ -100,32 +104,32 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def suggest(word: str, choices: Iterable[str]) -> str:
-    """A hint at what a wrong word should have been: the one choice that is close, or else all choices."""
+    """Return a hint for an invalid word: the closest choice, or all choices."""
     valid = list(choices)
     close = difflib.get_close_matches(word, valid, n=1)
     return f"did you mean {close[0]}?" if close else f"choose from {', '.join(valid)}"
 
 
 def resolve(kind: str, name: str | os.PathLike[str], known: Mapping[str, Path], folder: Path | None = None) -> Path:
-    """The file of a world or a robot: that of the catalogue, or a file; the catalogue's names come first.
+    """Return the file of a world or a robot. Catalogue names take precedence over paths.
 
     Args:
-        kind: what is named, such as "world"
-        name: a name of the catalogue, or a path
-        known: the files of the catalogue by name
-        folder: where relative paths begin; None: in the working directory
+        kind: "world" or "robot", for messages
+        name: a catalogue name or a path
+        known: the catalogue's files by name
+        folder: base of relative paths; None: the working directory
     """
     if isinstance(name, str) and name in known:
         return known[name]
     path = Path(name) if folder is None else folder / name
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)
-        raise FieldError(kind, f"{os.fspath(name)}: no such file, nor a {kind} of the catalogue; {hint}")
+        raise FieldError(kind, f"{os.fspath(name)}: no such file or {kind} in the catalogue; {hint}")
     return path
 
 
 def show(value: Any, limit: int = 40) -> str:
-    """A value as people would write it in a file, shortened to fit into an error message."""
+    """Format a value as in a file, shortened for an error message."""
     if isinstance(value, Mapping):
         return "a mapping"
     if isinstance(value, list) and len(value) > 6:
@@ -140,7 +144,7 @@ def show(value: Any, limit: int = 40) -> str:
 
 
 def yaml_number(value: float) -> str:
-    """The shortest text that YAML 1.1 reads back as this number; it requires a decimal point and the exponent's sign."""
+    """Return the shortest text that YAML 1.1 reads back as this number, with decimal point and signed exponent."""
     if not math.isfinite(value):
         return ".nan" if math.isnan(value) else (".inf" if value > 0 else "-.inf")
     text = repr(float(value))
@@ -154,7 +158,7 @@ def _mapping_of(schema: Schema) -> str:
 
 
 def _at(schema: Schema, location: Location) -> Schema:
-    """The schema of the value at a location; empty where there is none."""
+    """Return the schema of the value at a location; empty if there is none."""
     here = schema
     for part in location:
         here = _one(schema, here)
@@ -167,19 +171,19 @@ def _at(schema: Schema, location: Location) -> Schema:
 
 
 def _one(schema: Schema, part: Schema) -> Schema:
-    """A part itself: a reference is followed, and of alternatives the one that holds others is taken."""
+    """Resolve a schema part: follow references and drop the alternative null."""
     for other in part.get("anyOf", ()):
         if other.get("type") != "null":
             return _one(schema, other)
     if "$ref" in part:
-        found: Schema = schema["$defs"][part["$ref"].rpartition("/")[2]]
-        return found
+        target: Schema = schema["$defs"][part["$ref"].rpartition("/")[2]]
+        return target
     return part
 
 
 def _describe(schema: Schema, location: Location) -> str:
-    """The description of the value at a location; empty where it has none."""
-    while location and isinstance(location[-1], int):  # the description of a list holds for its entries
+    """Return the description of the value at a location; empty if it has none."""
+    while location and isinstance(location[-1], int):  # a list's description applies to its entries
         location = location[:-1]
     return str(_at(schema, location).get("description", ""))
 
@@ -202,14 +206,14 @@ _BOUNDS = {
 }
 
 
-def _problem(schema: Schema, location: Location, fault: Mapping[str, Any]) -> str:
-    """What is wrong and what would be right, for one fault found by pydantic."""
-    kind, value, context = fault["type"], fault["input"], fault.get("ctx", {})
+def _problem(schema: Schema, location: Location, error: Mapping[str, Any]) -> str:
+    """Return the message for one pydantic error."""
+    kind, value, context = error["type"], error["input"], error.get("ctx", {})
     if kind in _UNKNOWN:
         known = _one(schema, _at(schema, location[:-1]))["properties"]
         return f"unknown key; {suggest(str(location[-1]), known)}"
     if kind == "missing":
-        return f"missing; {_describe(schema, location) or 'this key is needed'}"
+        return f"missing; {_describe(schema, location) or 'this key is required'}"
     if kind in _BOUNDS:
         words, bound = _BOUNDS[kind]
         return f"must be {words} {context[bound]:g}, got {show(value)}"
@@ -230,11 +234,11 @@ def _problem(schema: Schema, location: Location, fault: Mapping[str, Any]) -> st
     if kind in _KINDS:
         hint = _as_number(value) if "number" in _KINDS[kind] else ""
         return f"must be {_KINDS[kind]}, got {show(value)}{hint}"
-    return f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {show(value)}"
+    return f"{error['msg'][0].lower()}{error['msg'][1:]}, got {show(value)}"
 
 
 def _as_number(value: Any) -> str:
-    """For a text that people meant as a number: how to write that number in YAML; empty for other texts."""
+    """Return how to write a number given as text in YAML; empty for other texts."""
     if not isinstance(value, str):
         return ""
     try:

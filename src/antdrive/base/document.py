@@ -1,4 +1,4 @@
-"""Files that people write: plain YAML, with the line of each value for error messages."""
+"""Plain YAML and JSON documents, with the line number of each value for error messages."""
 
 from __future__ import annotations
 
@@ -17,64 +17,64 @@ from antdrive.base.files import read_bytes
 
 Location: TypeAlias = tuple[str | int, ...]  # the path to a value: ("obstacles", 0, "radius")
 
-MAX_BYTES = 2_000_000  # a world of 20 000 obstacles; more is a mistake
-MAX_DEPTH = 20  # levels of nesting; no file of ours needs as many, and aliases that contain themselves end here
-MAX_VALUES = 200_000  # values after aliases are followed; small files of nested aliases can stand for gigabytes
+MAX_BYTES = 2_000_000  # a world with 20,000 obstacles
+MAX_DEPTH = 20  # levels of nesting; stops recursive aliases
+MAX_VALUES = 200_000  # values after alias expansion; nested aliases in a small file can expand to gigabytes
 
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d*|(?=\.\d))(\.\d*)?([eE][-+]?\d+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
-# Where texts with these differ between libyaml and PyYAML: faults that one of them lets pass, and lines of empty values.
+# Marks that libyaml and PyYAML treat differently: errors that only one reports, and line numbers of empty values.
 _READ_OTHERWISE = ("\t", "\r", "?", "%", "@", "`", "|", ">", "&", "*", "!", "---", "...")
 _TAG = "tag:yaml.org,2002:"
-_PLAIN_NUMBER = r"-?(?:0|[1-9]\d{0,17})(?:\.\d+(?:e[-+]\d+)?)?"  # in YAML 1.1, too
+_PLAIN_NUMBER = r"-?(?:0|[1-9]\d{0,17})(?:\.\d+(?:e[-+]\d+)?)?"  # a number in YAML 1.1 as well
 _ROWS_BEGIN = re.compile(r"^([a-z]+):\n(  - \{[a-z]+: [^\n]*\}\n)", re.MULTILINE)
-TOO_MUCH = "its aliases stand for too much; write the values out without aliases"
+TOO_MUCH = "its aliases expand to too many values; write the values without aliases"
 
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """Plain data, with the line of each value."""
+    """Plain data with the line number of each value."""
 
-    source: str  # the file's path, or what people call the data
+    source: str  # the file's path, or a name of the data
     data: Any  # mappings, lists, numbers, texts, true, false and null
-    # the line of each value, counted from 1; empty where lines are not known
+    # line of each value, from 1; empty if unknown
     lines: Mapping[Location, int] = field(default_factory=dict)
 
     def error(self, location: Location, problem: str) -> InputError:
-        """The error for a value: source, line where known, key and problem."""
+        """Return the error for a value: source, line if known, key and problem."""
         line = next((self.lines[p] for p in _prefixes(location) if p in self.lines), None)
         place = self.source if line is None else f"{self.source}:{line}"
         return input_error(place, *([_key(location)] if location else []), problem)
 
     def field_error(self, error: FieldError, *above: str | int) -> InputError:
-        """The error for a record's field that was read from this document."""
+        """Return the error for a record's field read from this document."""
         return self.error((*above, *_location(error.key)), error.problem)
 
 
 def count_values(data: Any) -> int:
-    """How many values plain data hold: each mapping, list and scalar, as MAX_VALUES counts them."""
+    """Count the mappings, lists and scalars in plain data."""
     inner = data.values() if isinstance(data, Mapping) else data if isinstance(data, list | tuple) else ()
     return 1 + sum(map(count_values, inner))
 
 
 def read_document(path: str | os.PathLike[str]) -> Document:
-    """The YAML file at `path`."""
+    """Read a YAML file."""
     return parse_document(read_yaml(path), os.fspath(path))
 
 
 def read_yaml(path: str | os.PathLike[str]) -> str:
-    """The text of the YAML file at `path`, for `parse_document`."""
+    """Return a YAML file's text, for `parse_document`."""
     return _read_text(path, "a YAML file")
 
 
 def read_json(path: str | os.PathLike[str]) -> Document:
-    """The JSON file at `path`, without the lines of its values."""
+    """Read a JSON file, without line numbers."""
     source = os.fspath(path)
     text = _read_text(path, "a JSON file")
     try:
         return Document(source, json.loads(text))
     except json.JSONDecodeError as error:
         raise input_error(f"{source}:{error.lineno}", f"not JSON: {error.msg}") from None
-    except (RecursionError, ValueError):  # ValueError: a number of thousands of digits
+    except (RecursionError, ValueError):  # ValueError: a number with thousands of digits
         raise input_error(source, "not JSON: nested too deeply or numbers too long") from None
 
 
@@ -88,7 +88,7 @@ def _read_text(path: str | os.PathLike[str], kind: str) -> str:
 
 
 def parse_document(text: str, source: str) -> Document:
-    """The YAML in a text: mappings, lists, decimal numbers, text, true, false and null, nothing else."""
+    """Parse YAML restricted to mappings, lists, decimal numbers, text, true, false and null."""
     try:
         node, table = _compose_around(text)
     except yaml.MarkedYAMLError as error:
@@ -110,15 +110,15 @@ def parse_document(text: str, source: str) -> Document:
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """A list of mappings from the same words to plain numbers, one on each line, as the obstacles of a world are written.
+    """A block of rows that map the same keys to plain numbers, one row a line, such as a world's obstacles.
 
-    A parser takes 0.1 ms for each line of such a list, and a building has more than 10,000.
+    Parsed without YAML: a YAML parser takes 0.1 ms a line, and a building has over 10,000 lines.
 
     Attributes:
-        key: the key of the list, at the beginning of a line
-        line: the key's line, counted from 0
+        key: the list's key, at the beginning of a line
+        line: the key's line, from 0
         rows: the mappings
-        rest: the text with an empty list and empty lines in its place
+        rest: the text with the rows replaced by an empty list and empty lines
     """
 
     key: str
@@ -127,19 +127,19 @@ class _Table:
     rest: str
 
     def is_in(self, root: yaml.Node | None) -> bool:
-        """Whether the list's key is one of the root's own, and not a part of some text or of another value."""
+        """Return whether the list's key is a key of the root mapping."""
         if not isinstance(root, yaml.MappingNode) or root.flow_style:
             return False
-        found = [(key.start_mark, value) for key, value in root.value if key.value == self.key]
-        if len(found) != 1:
+        matches = [(key.start_mark, value) for key, value in root.value if key.value == self.key]
+        if len(matches) != 1:
             return False
-        (mark, value) = found[0]
+        (mark, value) = matches[0]
         here = (mark.line, mark.column) == (self.line, 0)
         return here and isinstance(value, yaml.SequenceNode) and not value.value
 
 
 class _RowLines(Mapping[Location, int]):
-    """The line of each value in the rows of a table, counted from 1, and in the text around it."""
+    """Line numbers of the values in a table's rows and in the text around it."""
 
     def __init__(self, table: _Table, around: Mapping[Location, int]) -> None:
         self._table, self._around = table, around
@@ -163,13 +163,13 @@ class _RowLines(Mapping[Location, int]):
 
 
 def _compose_around(text: str) -> tuple[yaml.Node | None, _Table | None]:
-    """The root of a YAML text, and the table that it has an empty list in place of."""
+    """Return the root of a YAML text, and the table that an empty list in it replaces."""
     if _is_plain(text):
         for first in _ROWS_BEGIN.finditer(text):
             table = _table_at(text, first)
             if table is None:
                 continue
-            with contextlib.suppress(yaml.YAMLError):  # the fault is found in the whole text as well
+            with contextlib.suppress(yaml.YAMLError):  # parsing the whole text reports the error
                 node = _compose(table.rest)
                 if table.is_in(node):
                     return node, table
@@ -178,12 +178,12 @@ def _compose_around(text: str) -> tuple[yaml.Node | None, _Table | None]:
 
 
 def _table_at(text: str, first: re.Match[str]) -> _Table | None:
-    """The rows that begin with this key and first row; None if not all that follows is rows of the same words."""
+    """Return the table that begins with this key and row; None if the rows below have other keys."""
     keys = re.findall("[a-z]+(?=:)", first[2])
     if len(set(keys)) < len(keys):
         return None
     row = ", ".join(f"{key}: {_PLAIN_NUMBER}" for key in keys)
-    begin = first.end(1) + 2  # behind the colon and the end of its line
+    begin = first.end(1) + 2  # after the colon and the line break
     block = re.compile(rf"(?:  - \{{{row}\}}\n)+(?=[a-z]|\Z)").match(text, begin)
     if block is None:
         return None
@@ -194,7 +194,7 @@ def _table_at(text: str, first: re.Match[str]) -> _Table | None:
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader that stops at a bounded depth; PyYAML would exhaust the interpreter's stack."""
+    """A loader with a depth limit; PyYAML's own recursion exhausts the stack."""
 
     depth = 0
 
@@ -208,23 +208,23 @@ class _Loader(yaml.SafeLoader):
 
 
 def _compose(text: str) -> yaml.Node | None:
-    """The root of a YAML text. Where it is sure to give the same, libyaml reads it, eight times as fast as PyYAML itself."""
+    """Return the root of a YAML text. Uses libyaml, eight times as fast as PyYAML, where both agree."""
     if _is_plain(text):
         try:
             if _is_shallow(text):
                 return _root(yaml.CSafeLoader(text))
         except yaml.YAMLError:
-            pass  # PyYAML finds the fault as well, and words it as ever
+            pass  # PyYAML reports the error, always in the same words
     return _root(_Loader(text))
 
 
 def _is_plain(text: str) -> bool:
-    """Whether libyaml is there and sure to read the text as PyYAML does."""
+    """Return whether libyaml is available and reads this text like PyYAML."""
     return bool(yaml.__with_libyaml__) and text.isascii() and not any(mark in text for mark in _READ_OTHERWISE)
 
 
 def _is_shallow(text: str) -> bool:
-    """Whether collections are nested less deeply than MAX_DEPTH; libyaml composes by recursion, and events without."""
+    """Return whether collections nest less deeply than MAX_DEPTH. Events need no recursion, unlike libyaml's compose."""
     loader = yaml.CSafeLoader(text)
     depth = 0
     try:
@@ -251,11 +251,11 @@ def _root(loader: Any) -> yaml.Node | None:
 
 @dataclass
 class _Builder:
-    """Turns YAML nodes into plain data and remembers the line of each value."""
+    """A converter from YAML nodes to plain data that records line numbers."""
 
-    document: Document  # for its errors and its lines
+    document: Document  # provides errors and line numbers
     count: int = 0
-    table: _Table | None = None  # stands where the document has an empty list
+    table: _Table | None = None  # replaces an empty list of the document
 
     @property
     def lines(self) -> dict[Location, int]:
@@ -307,7 +307,7 @@ class _Builder:
         if kind == "bool":
             return text.lower() in ("true", "yes", "on")
         if kind in ("int", "float"):
-            # YAML 1.1 also reads 010 as 8, 1:30 as 90 and 1_0 as 10, which nobody means who writes a world.
+            # YAML 1.1 reads 010 as 8, 1:30 as 90 and 1_0 as 10: refused as likely mistakes.
             if not _NUMBER.fullmatch(text):
                 raise self.document.error(location, f"must be a plain decimal number, got {text[:40]}")
             if text.lower().lstrip("+-").startswith((".inf", ".nan")):
@@ -319,17 +319,17 @@ class _Builder:
 
 
 def _prefixes(location: Location) -> Iterable[Location]:
-    """The location and those around it, innermost first, without the whole file: its first line helps nobody."""
+    """Return the location and its parents, innermost first, without the root."""
     return (location[:n] for n in range(len(location), 0, -1))
 
 
 def _key(location: Location) -> str:
-    """The path to a value as errors write it: the inverse of `_location`."""
+    """Format a location for errors: the inverse of `_location`."""
     parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
     return "".join(parts).removeprefix(".")
 
 
 def _location(key: str) -> Location:
-    """The path to a value from an error's key, such as "movers[0].walk.start"."""
+    """Parse an error's key, such as "movers[0].walk.start", into a location."""
     parts = re.findall(r"[^.\[\]]+", key)
     return tuple(int(part) if part.isdigit() else part for part in parts)

@@ -1,4 +1,4 @@
-"""The exceptions for wrong values, and the checks that raise them most often."""
+"""Exceptions for invalid input, and the common checks that raise them."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ import math
 
 
 class InputError(ValueError):
-    """Something that a person wrote is wrong; the message is one line that says where, and what would be right."""
+    """Invalid user input. The message is one line: where, what, and how to fix it."""
 
 
 class Terminated(SystemExit):
-    """The process was told to end (SIGTERM) while other people's code ran in it; that code is not to blame."""
+    """SIGTERM received while third-party code ran; not that code's error."""
 
 
 class FieldError(ValueError):
-    """A record's field or a function's argument has a value that it cannot have.
-
-    As text it is "key: problem".
+    """An invalid value of a record's field or a function's argument. As text: "key: problem".
 
     Attributes:
-        key: the field, such as "radius" or "movers[0].walk.start"; empty where the whole value is wrong
-        problem: what is wrong and what would be right
+        key: the field, such as "radius" or "movers[0].walk.start"; empty for the whole value
+        problem: the error and the fix
     """
 
     def __init__(self, key: str, problem: str) -> None:
@@ -32,28 +30,28 @@ class FieldError(ValueError):
         return f"{self.key}: {self.problem}" if self.key else self.problem
 
     def under(self, parent: str) -> FieldError:
-        """The same problem, with the key as seen from outside: "radius" under "robot" is "robot.radius".
+        """Return the error with the key prefixed: "radius" under "robot" is "robot.radius".
 
         Args:
-            parent: the key of the record that holds this field
+            parent: key of the record that contains the field
         """
         dot = "." if parent and self.key and not self.key.startswith("[") else ""
         return FieldError(f"{parent}{dot}{self.key}", self.problem)
 
 
 def input_error(*parts: str) -> InputError:
-    """An InputError on one line of printable characters."""
+    """Return an InputError whose message is one line of printable characters."""
     return InputError("".join(c if c.isprintable() else repr(c)[1:-1] for c in ": ".join(parts)))
 
 
 def require_positive(key: str, value: float) -> None:
-    """Refuse a value that is not a finite number above 0."""
+    """Raise FieldError unless a value is positive and finite."""
     if not 0 < value < math.inf:
         raise FieldError(key, f"must be greater than 0, got {value:g}")
 
 
 def require_finite(key: str, value: float) -> None:
-    """Refuse a value that is infinite or not a number."""
+    """Raise FieldError unless a value is finite."""
     if not math.isfinite(value):
         raise FieldError(key, f"must be a finite number, got {value}")
 
@@ -67,7 +65,7 @@ def require(
     at_most: float = math.inf,
     below: float = math.inf,
 ) -> None:
-    """Refuse a number outside its range."""
+    """Raise FieldError for a number outside its range."""
     bounds = [
         f"{word} {bound:.12g}"
         for word, bound in (("at least", at_least), ("above", above), ("at most", at_most), ("below", below))

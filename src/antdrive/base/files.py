@@ -1,4 +1,4 @@
-"""Files read and written whole, names of files that every system takes, and JSON that every reader accepts."""
+"""Bounded file reads, portable file names and strict JSON."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from antdrive.base.errors import InputError, input_error
 
 
 def file_name(name: str, keep: str = "-_.", *, ascii_only: bool = False) -> str:
-    """A name with letters, digits and the characters of `keep`; an underscore stands for each other one."""
+    """Replace all characters of a name except letters, digits and those in `keep` by underscores."""
     return "".join(c if (c.isalnum() and (c.isascii() or not ascii_only)) or c in keep else "_" for c in name)
 
 
 def as_json(value: Any) -> str:
-    """Indented JSON that every reader accepts: infinities and nan become null."""
+    """Format a value as indented strict JSON: infinities and nan become null."""
     return json.dumps(_json_value(value), indent=2, allow_nan=False)
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as JSON, whole or not at all."""
+    """Write a value as JSON, atomically."""
     write_text(path, as_json(value) + "\n")
 
 
 def known_suffix(path: Path, choices: Collection[str]) -> str:
-    """The suffix of a path in lower case; one that is not among the choices is refused."""
+    """Return a path's suffix in lower case; raise InputError unless it is one of the choices."""
     suffix = path.suffix.lower()
     if suffix not in choices:
         several = f"one of {', '.join(choices)}" if len(choices) > 2 else " or ".join(choices)
@@ -50,7 +50,7 @@ def _json_value(value: Any) -> Any:
 
 
 def read_bytes(path: str | os.PathLike[str], max_bytes: int, kind: str = "a file") -> bytes:
-    """The content of a file that people name."""
+    """Return a file's content; raise InputError if it is unreadable or larger than `max_bytes`."""
     source = os.fspath(path)
     try:
         with Path(path).open("rb") as stream:
@@ -67,7 +67,7 @@ def read_bytes(path: str | os.PathLike[str], max_bytes: int, kind: str = "a file
 
 
 def require_new(files: Iterable[Path], *, replace: bool) -> None:
-    """Refuse to write over files that exist."""
+    """Raise InputError if one of the files exists, unless it is to be replaced."""
     taken = None if replace else next((file for file in files if file.exists()), None)
     if taken is not None:
-        raise input_error(str(taken), "exists; name another file, or replace it with --force")
+        raise input_error(str(taken), "exists; choose another file, or replace it with --force")

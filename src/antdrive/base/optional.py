@@ -1,4 +1,4 @@
-"""Packages that a plain installation does not have: they come with an extra, and are imported when they are first needed."""
+"""Optional packages, installed by extras and imported when first needed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from antdrive.base.errors import InputError
 
 
 def optional(module: str, extra: str, purpose: str) -> Any:
-    """A module of an optional package."""
+    """Import a module of an optional package; raise InputError with the install command if it is missing."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
@@ -18,12 +18,12 @@ def optional(module: str, extra: str, purpose: str) -> Any:
 
 
 def parquet_library() -> Any:
-    """The module `pyarrow`, with `pyarrow.parquet` loaded."""
-    purpose = "a campaign's table is kept as Parquet"
+    """Import `pyarrow` with `pyarrow.parquet`."""
+    purpose = "campaign tables are Parquet files"
     optional("pyarrow.parquet", "campaigns", purpose)
     return optional("pyarrow", "campaigns", purpose)
 
 
 def statistics_library(name: str) -> Any:
-    """A module of scipy or statsmodels."""
-    return optional(name, "campaigns", "statistics of campaigns are computed with it")
+    """Import a module of scipy or statsmodels."""
+    return optional(name, "campaigns", "campaign statistics need it")

@@ -1,4 +1,4 @@
-"""Angles, polylines and frames in the plane. Needs numpy alone: logs are read without the compiler."""
+"""Angles, polylines and frames in the plane, in numpy only, so that logs load without the compiler."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ Angle = TypeVar("Angle", float, Floats)
 
 
 def wrap_angle(angle: Angle) -> Angle:
-    """The same direction as an angle from -pi up to but not including pi.
+    """Wrap an angle into [-pi, pi).
 
     Args:
-        angle: one angle or an array of them [rad]
+        angle: an angle or an array of angles [rad]
     """
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 def segment_lengths(xy: npt.ArrayLike) -> Floats:
-    """The length of each segment of a polyline, shape (N - 1,)."""
+    """Return the length of each segment of a polyline, shape (N - 1,)."""
     steps = np.diff(np.asarray(xy, dtype=np.float64).reshape(-1, 2), axis=0)
     return np.asarray(np.hypot(*steps.T))
 
 
 def arc_lengths(xy: npt.ArrayLike) -> Floats:
-    """The length along a polyline at each of its points, shape (N,), from 0.
+    """Return the arc length at each point of a polyline, shape (N,), from 0.
 
     Args:
         xy: the polyline's points (N, 2)
@@ -38,7 +38,7 @@ def arc_lengths(xy: npt.ArrayLike) -> Floats:
 
 
 def polyline_length(xy: npt.ArrayLike) -> float:
-    """The whole length of a polyline, in the unit of its points.
+    """Return the length of a polyline, in the unit of its points.
 
     Args:
         xy: the polyline's points (N, 2)
@@ -47,27 +47,27 @@ def polyline_length(xy: npt.ArrayLike) -> float:
 
 
 def world_to_map(frame: Pose, points: npt.ArrayLike) -> Floats:
-    """Points (N, 2) or poses (N, 3) of the world in the frame of its map; the same numbers, bit for bit, where the two agree."""
-    found = np.array(points, dtype=np.float64)
+    """Transform points (N, 2) or poses (N, 3) from the world's frame to its map's; bit-identical if the frames agree."""
+    out = np.array(points, dtype=np.float64)
     x, y, yaw = frame
     if (x, y, yaw) == (0.0, 0.0, 0.0):
-        return found
+        return out
     cosine, sine = math.cos(yaw), math.sin(yaw)
-    found[..., :2] = found[..., :2] @ np.array([[cosine, sine], [-sine, cosine]]) + (x, y)
-    if found.shape[-1] > 2:
-        found[..., 2] = wrap_angle(found[..., 2] + yaw)
-    return found
+    out[..., :2] = out[..., :2] @ np.array([[cosine, sine], [-sine, cosine]]) + (x, y)
+    if out.shape[-1] > 2:
+        out[..., 2] = wrap_angle(out[..., 2] + yaw)
+    return out
 
 
 def map_to_world(frame: Pose, points: npt.ArrayLike) -> Floats:
-    """Points (N, 2) or poses (N, 3) of a map in the frame of a world that was made from it: the inverse of `world_to_map`."""
+    """Transform points (N, 2) or poses (N, 3) from the map's frame to the world's: the inverse of `world_to_map`."""
     x, y, yaw = frame
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return world_to_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
 
 
 def format_position(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
-    """A place of a world in words; where the world lies in a map, in the frames of both."""
+    """Format a position of a world; with its map position if the world has a map frame."""
     here = f"({x:{digits}}, {y:{digits}})"
     if not any(frame):
         return here
@@ -76,7 +76,7 @@ def format_position(frame: Pose, x: float, y: float, digits: str = ".2f") -> str
 
 
 def relative_frame(inner: Floats, outer: Floats) -> Floats:
-    """Where a frame lies in another one, if something has a pose in each: x, y and yaw of its origin (N, 3) [m, rad]."""
+    """Return the poses (N, 3) of the inner frame in the outer one, from the poses of one body in both [m, rad]."""
     turn = outer[:, 2] - inner[:, 2]
     cos, sin = np.cos(turn), np.sin(turn)
     x, y = inner[:, 0], inner[:, 1]
@@ -84,7 +84,7 @@ def relative_frame(inner: Floats, outer: Floats) -> Floats:
 
 
 def transform_points(points: Floats, frames: Floats) -> Floats:
-    """Where points of frames lie in the frame around them (N, 2) [m]."""
+    """Transform points (N, 2) [m] from frames (N, 3) to the frame around them."""
     cos, sin = np.cos(frames[:, 2]), np.sin(frames[:, 2])
     x, y = points[:, 0], points[:, 1]
     return frames[:, :2] + np.column_stack([cos * x - sin * y, sin * x + cos * y])

@@ -1,6 +1,6 @@
-"""Records that are declared once: ranges stand in their annotations, meanings in the `Attributes` of their docstrings.
+"""Record declarations: ranges in annotations, descriptions in the docstring's `Attributes`.
 
-`antdrive.base.checks` reads both to check files, and for their JSON Schemas. This module is light: it needs no pydantic.
+`antdrive.base.checks` uses both to validate files and to build JSON Schemas. This module does not import pydantic.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from antdrive.base.errors import FieldError
 if TYPE_CHECKING:
     from pydantic import ConfigDict
 
-#: The rules of records and files: no guessing of types, no unknown keys, no NaN and no infinity, also in nested records.
+#: Rules of records and files, nested ones included: no type coercion, no unknown keys, no NaN or infinity.
 STRICT: ConfigDict = {"strict": True, "extra": "forbid", "allow_inf_nan": False, "frozen": True}
 
 
 def attributes_of(docstring: str | None) -> dict[str, str]:
-    """What the section `Attributes` of a docstring says of each field, on one line each."""
+    """Return the one-line description of each field from a docstring's `Attributes` section."""
     section = inspect.cleandoc(docstring or "").partition("Attributes:\n")[2].split("\n\n")[0]
     entries = re.split(r"^    (\w+): ", section, flags=re.MULTILINE)[1:]
     return {name: " ".join(text.split()) for name, text in zip(entries[::2], entries[1::2], strict=True)}
@@ -31,13 +31,13 @@ def attributes_of(docstring: str | None) -> dict[str, str]:
 
 @functools.cache
 def ranges_of(kind: Hashable) -> Mapping[str, tuple[float, float]]:
-    """The lowest and the highest value of each field of a record whose annotation has both."""
-    found = {}
+    """Return the range of each field of a record whose annotation has both limits."""
+    ranges = {}
     for name, hint in get_type_hints(cast(Any, kind), include_extras=True).items():
         for limits in getattr(hint, "__metadata__", ()):
             if isinstance(limits, Interval):
-                found[name] = (_number(limits.ge), _number(limits.le))
-    return found
+                ranges[name] = (_number(limits.ge), _number(limits.le))
+    return ranges
 
 
 def _number(limit: Any) -> float:
@@ -45,7 +45,7 @@ def _number(limit: Any) -> float:
 
 
 def require_ranges(record: Any) -> None:
-    """Refuse a record with a value outside the range of its field."""
+    """Raise FieldError for the first field outside its range."""
     for key, (low, high) in ranges_of(cast(Hashable, type(record))).items():
         value = getattr(record, key)
         if not low <= value <= high:

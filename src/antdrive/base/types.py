@@ -1,4 +1,4 @@
-"""The arrays and tuples that the whole package speaks in. Lengths are metres and angles are radians."""
+"""Array and tuple types of the package. Lengths are metres, angles radians."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-#: An array of float64; its shape and unit stand where it is described.
+#: An array of float64; each use states shape and unit.
 Floats: TypeAlias = npt.NDArray[np.float64]
-#: An array of truth values.
+#: An array of booleans.
 Flags: TypeAlias = npt.NDArray[np.bool_]
 #: An array of int64, such as indices.
 Ints: TypeAlias = npt.NDArray[np.int64]

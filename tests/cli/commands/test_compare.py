@@ -113,5 +113,5 @@ def test_a_second_comparison_in_the_same_folder_is_told(refused, small):
         says = refused("compare", small, "-p", "astar", "-p", "dijkstra", "--out", "c")
         planning = refused("plan", small, "-p", "astar", "--out", "c")
         other.communicate(b"\n")
-    assert "is writing into this folder" in says
-    assert "is writing into this folder" in planning
+    assert "is writing to this folder" in says
+    assert "is writing to this folder" in planning

@@ -122,7 +122,7 @@ def test_the_command_that_goes_on_does_not_make_runs_a_third_time():
 
 def test_two_commands_on_one_folder_do_not_mix(refused, campaign):
     with folder_lock("out"):
-        assert "is writing into this folder; wait for it" in refused("sweep", campaign, "-o", "out", "--jobs", "1")
+        assert "is writing to this folder; wait for it" in refused("sweep", campaign, "-o", "out", "--jobs", "1")
 
 
 def test_without_parquet_the_extra_is_named(refused, campaign, monkeypatch):

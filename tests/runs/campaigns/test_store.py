@@ -17,7 +17,7 @@ from antdrive.base.errors import InputError
 from antdrive.runs.campaigns import canonical_bytes, read_results, store
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
-from antdrive.runs.campaigns.rows import fault_row, grid_table
+from antdrive.runs.campaigns.rows import failed_row, grid_table
 from antdrive.runs.campaigns.store import parts_in
 from tests.runs.campaigns.parent import go
 
@@ -42,7 +42,7 @@ def test_every_run_stands_once_and_a_crash_only_where_no_attempt_succeeded(tmp_p
     kept = begun(folder)
     wanted = {}
     for seed, outcome, flush in events:
-        kept.add(fault_row(JOBS[seed].key, outcome, ""))
+        kept.add(failed_row(JOBS[seed].key, outcome, ""))
         wanted[seed] = "succeeded" if "succeeded" in (outcome, wanted.get(seed)) else "crashed"
         if flush:
             kept.flush()
@@ -56,7 +56,7 @@ def test_every_run_stands_once_and_a_crash_only_where_no_attempt_succeeded(tmp_p
 def test_merging_between_writing_and_removing_doubles_nothing(tmp_path):
     kept = begun(tmp_path)
     for job in JOBS[:4]:
-        kept.add(fault_row(job.key, "succeeded", ""))
+        kept.add(failed_row(job.key, "succeeded", ""))
         kept.flush()
     old = {path: path.read_bytes() for path in store.parts_in(tmp_path)}
     before = canonical_bytes(tmp_path)
@@ -72,7 +72,7 @@ def test_many_parts_are_merged_while_the_campaign_runs(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "MOST_PARTS", 2)
     kept = begun(tmp_path)
     for job in JOBS:
-        kept.add(fault_row(job.key, "succeeded", ""))
+        kept.add(failed_row(job.key, "succeeded", ""))
         kept.flush()
         assert len(store.parts_in(tmp_path)) <= 2
     assert len(read_results(tmp_path).table) == len(JOBS)
@@ -80,7 +80,7 @@ def test_many_parts_are_merged_while_the_campaign_runs(tmp_path, monkeypatch):
 
 def test_a_part_that_another_version_wrote_is_read_and_lacks_what_it_lacks(tmp_path):
     kept = begun(tmp_path)
-    kept.add(fault_row(JOBS[0].key, "succeeded", ""))
+    kept.add(failed_row(JOBS[0].key, "succeeded", ""))
     kept.flush()
     (path,) = store.parts_in(tmp_path)
     table = pyarrow.parquet.read_table(path)
@@ -93,7 +93,7 @@ def test_a_part_that_another_version_wrote_is_read_and_lacks_what_it_lacks(tmp_p
 def test_results_are_read_while_another_process_merges_them(tmp_path, monkeypatch):
     kept = begun(tmp_path)
     for job in JOBS:
-        kept.add(fault_row(job.key, "succeeded", ""))
+        kept.add(failed_row(job.key, "succeeded", ""))
         kept.flush()
     listed, read = store.parts_in(tmp_path), store._read
     merging = iter([kept.merge])
@@ -111,7 +111,7 @@ def test_results_are_read_while_another_process_merges_them(tmp_path, monkeypatc
 
 def test_the_table_is_there_while_a_command_goes_on(tmp_path):
     kept = begun(tmp_path)
-    kept.add(fault_row(JOBS[0].key, "succeeded", ""))
+    kept.add(failed_row(JOBS[0].key, "succeeded", ""))
     kept.finish()
     store.Store(tmp_path).begin({"size": 3}, grid_table(JOBS[:3]))
     assert pyarrow.parquet.read_table(tmp_path / "runs.parquet")["key"].to_pylist() == [JOBS[0].key]
@@ -170,7 +170,7 @@ def test_a_killed_worker_and_a_killed_parent_change_nothing(tmp_path, undisturbe
 
 def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path, undisturbed):
     process = disturbed(tmp_path)
-    with pytest.raises(InputError, match=r"another run \(process \d+\) is writing into this folder"):
+    with pytest.raises(InputError, match=r"another run \(process \d+\) is writing to this folder"):
         go(str(tmp_path), 0.0, 0)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=240)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from antdrive.base.errors import InputError
-from antdrive.runs.campaigns.rows import fault_row
+from antdrive.runs.campaigns.rows import failed_row
 from antdrive.runs.campaigns.running import Finished
 
 
@@ -26,7 +26,7 @@ class Deadly:
             if self.marks:
                 mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
-        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
+        return Finished(failed_row(job.key, "succeeded", f"seed {job.seed}"))
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Listing:
         time.sleep(0.01)
         with Path(self.path).open("a") as stream:
             stream.write(f"{os.getpid()} {job.case.place.world}\n")
-        return Finished(fault_row(job.key, "succeeded", ""))
+        return Finished(failed_row(job.key, "succeeded", ""))
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Endless:
     def __call__(self, job):
         while job.seed in self.seeds:
             time.sleep(0.1)
-        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
+        return Finished(failed_row(job.key, "succeeded", f"seed {job.seed}"))
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Refusing:
     def __call__(self, job):
         if job.seed == 3:
             raise InputError("rollouts/ab.npz: cannot be written (No space left on device)")
-        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
+        return Finished(failed_row(job.key, "succeeded", f"seed {job.seed}"))
 
 
 class Unloadable:

@@ -35,8 +35,8 @@ def test_shares_are_counted(paired):
             done for label, done in zip(columns["planner"], columns["succeeded"], strict=True) if label == row.planner
         ]
         assert (row.runs, row.counted, row.successes) == (120, 120, sum(of))
-        assert row.interval.low < row.share < row.interval.high
-        assert row.over_worlds.low <= row.share <= row.over_worlds.high
+        assert row.interval.low < row.fraction < row.interval.high
+        assert row.over_worlds.low <= row.fraction <= row.over_worlds.high
         assert sum(row.outcomes.values()) == 120
 
 
@@ -174,11 +174,11 @@ def test_shares_are_over_the_instances_that_every_planner_ran():
     columns["succeeded"] = columns["certified"] = [not one for one in hard]
     easy_only = rows_of({**columns, "hard": hard}, lambda row: row["planner"] == "a" or not row["hard"])
     rows = success_table(PairedRuns.of(easy_only))
-    assert [(row.planner, row.share, row.runs, row.elsewhere, row.counted) for row in rows] == [
+    assert [(row.planner, row.fraction, row.runs, row.elsewhere, row.counted) for row in rows] == [
         ("a", 1.0, 16, 8, 8), ("b", 1.0, 8, 0, 8),
     ]  # fmt: skip
     apart = rows_of({**columns, "hard": hard}, lambda row: (row["planner"] == "a") == row["hard"])
-    assert [(row.share, row.elsewhere, row.counted) for row in success_table(PairedRuns.of(apart))] == [
+    assert [(row.fraction, row.elsewhere, row.counted) for row in success_table(PairedRuns.of(apart))] == [
         (1.0, 0, 8), (0.0, 0, 8),
     ]  # fmt: skip
 

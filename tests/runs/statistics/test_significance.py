@@ -281,8 +281,8 @@ COSTS = arrays(
 def test_a_profile_by_hand():
     first, second = performance_profiles(np.array([[1.0, 2.0], [6.0, 2.0], [1.0, NAN], [NAN, NAN]]))
     assert first.x.tolist() == [1, 3]
-    assert first.share.tolist() == [0.5, 0.75]
-    assert (second.x.tolist(), second.share.tolist()) == ([1, 2], [0.25, 0.5])
+    assert first.fraction.tolist() == [0.5, 0.75]
+    assert (second.x.tolist(), second.fraction.tolist()) == ([1, 2], [0.25, 0.5])
     assert [first.at(x) for x in (0.9, 1, 2.9, 3, 99)] == [0, 0.5, 0.5, 0.75, 0.75]
 
 
@@ -306,4 +306,4 @@ def test_somebody_is_best_wherever_anybody_succeeds(cost):
 def test_distributions_rise_to_the_share_of_successes(values):
     for column, curve in zip(values.T, distributions(values), strict=True):
         assert curve.at(np.inf) == pytest.approx((~np.isnan(column)).mean())
-        assert (np.diff(curve.share) > 0).all()
+        assert (np.diff(curve.fraction) > 0).all()

@@ -77,7 +77,7 @@ def test_a_bag_and_its_layout_are_replaced_only_when_asked(log, tmp_path):
     bag, layout = tmp_path / "drive.mcap", tmp_path / "drive.foxglove.json"
     layout.write_text("mine")
     with pytest.raises(
-        InputError, match=r"drive\.foxglove\.json: exists; name another file, or replace it with --force"
+        InputError, match=r"drive\.foxglove\.json: exists; choose another file, or replace it with --force"
     ):
         export(log[1], "mcap", bag)
     assert not bag.exists()

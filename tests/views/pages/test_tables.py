@@ -29,7 +29,7 @@ def test_csv_holds_the_numbers_as_they_are(summary, tmp_path):
     rows, pairs = (list(csv.DictReader(path.read_text().splitlines())) for path in files)
     assert [row["planner"] for row in rows] == list(PLANNERS)
     for row, known in zip(rows, summary.success, strict=True):
-        assert (int(row["succeeded"]), float(row["share"])) == (known.successes, known.share)
+        assert (int(row["succeeded"]), float(row["share"])) == (known.successes, known.fraction)
         assert (float(row["low"]), float(row["high"])) == known.interval
         assert float(row["duration_s_low"]) <= float(row["duration_s_median"]) <= float(row["duration_s_high"])
     assert [pair["measure"] for pair in pairs] == ["success", "driven_length_m", "duration_s", "plan_s"]

@@ -190,7 +190,7 @@ def test_a_turned_map_becomes_an_upright_world_that_knows_how_it_lies(tmp_path):
 @pytest.mark.parametrize("there", ["w.yaml", "w.pgm"])
 def test_an_export_replaces_no_file_unless_it_is_told_to(tmp_path, there):
     (tmp_path / there).write_text("mine")
-    with pytest.raises(InputError, match=rf"{there}: exists; name another file, or replace it with --force"):
+    with pytest.raises(InputError, match=rf"{there}: exists; choose another file, or replace it with --force"):
         export_map_server(load_task("empty"), tmp_path / "w.yaml")
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(there, "mine")]
     export_map_server(load_task("empty"), tmp_path / "w.yaml", replace=True)

@@ -113,14 +113,14 @@ def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
     }
 
 
-def fault_row(key: str, outcome: str, reason: str) -> dict[str, Any]:
+def failed_row(key: str, outcome: str, reason: str) -> dict[str, Any]:
     """The row of a run that did not end by itself."""
     return _empty(key) | {"outcome": outcome, "succeeded": False, "reason": reason}
 
 
-def slow_row(key: str, limit: float) -> dict[str, Any]:
+def too_slow_row(key: str, limit: float) -> dict[str, Any]:
     """The row of a run that was ended because it took too long."""
-    return fault_row(key, TOO_SLOW, f"took longer than the campaign's run_limit of {limit:g} s")
+    return failed_row(key, TOO_SLOW, f"took longer than the campaign's run_limit of {limit:g} s")
 
 
 def _empty(key: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias
 from antdrive.base.errors import InputError
 from antdrive.planners import PlannerError
 from antdrive.runs.campaigns.job import Job
-from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, fault_row, run_row, slow_row
+from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, failed_row, run_row, too_slow_row
 from antdrive.runs.pool import Done
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, run
@@ -48,9 +48,9 @@ class Driving:
         except InputError:
             raise
         except PlannerError as error:
-            return Finished(fault_row(job.key, PLANNER_FAULT, str(error)))
+            return Finished(failed_row(job.key, PLANNER_FAULT, str(error)))
         except Exception as error:
-            return Finished(fault_row(job.key, CRASHED, f"{type(error).__name__}: {error}"))
+            return Finished(failed_row(job.key, CRASHED, f"{type(error).__name__}: {error}"))
         return self._kept(job, done)
 
     def _kept(self, job: Job, done: Run) -> Finished:
@@ -88,7 +88,7 @@ def finished_of(done: Done[Job, Finished], limit: float | None) -> Finished:
         assert done.result is not None
         row, log = done.result.row, done.result.log
     elif done.slow and limit is not None:
-        row, log = slow_row(done.item.key, limit), None
+        row, log = too_slow_row(done.item.key, limit), None
     else:
-        row, log = fault_row(done.item.key, CRASHED, done.died), None
+        row, log = failed_row(done.item.key, CRASHED, done.died), None
     return Finished({**row, "attempts": done.attempts}, log)

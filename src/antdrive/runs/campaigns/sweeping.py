@@ -38,7 +38,7 @@ class MissingRuns:
     """What is to be done."""
 
     jobs: tuple[Job, ...]  # the runs to make, in the campaign's order
-    forgotten: frozenset[str]  # the keys of those among them whose present results are to be forgotten
+    discarded: frozenset[str]  # the keys of those among them whose present results are to be discarded
 
 
 def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, again: Sequence[str]) -> MissingRuns:
@@ -50,15 +50,15 @@ def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, agai
                 f"--again {word}: no such planner or outcome; choose from {', '.join((*planners, *OUTCOMES))}"
             )
     outcomes, asked = outcomes_in(folder), set(again)
-    wanted, forgotten = [], set()
+    wanted, discarded = [], set()
     for job in jobs:
         outcome = outcomes.get(job.key)
         if outcome is not None and asked & {outcome, job.case.planner.label, job.case.planner.name}:
-            forgotten.add(job.key)
+            discarded.add(job.key)
         elif outcome is not None and not (retry_crashed and outcome == CRASHED):
             continue
         wanted.append(job)
-    return MissingRuns(tuple(wanted), frozenset(forgotten))
+    return MissingRuns(tuple(wanted), frozenset(discarded))
 
 
 def changed_planners(jobs: Sequence[Job], folder: Path) -> Iterator[str]:
@@ -102,7 +102,7 @@ def sweep(
         dask: the cluster that makes the runs instead: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
         keep: which runs' logs are kept: none, failed or all; None: as the campaign says
         retry_crashed: whether runs are made again that crashed
-        again: planners, by label or name, and outcomes whose runs are made again; their present results are forgotten
+        again: planners, by label or name, and outcomes whose runs are made again; their present results are discarded
         progress: is called at first and after each run with the numbers of runs that are done and of all
         work: what is done with each run; None: it is driven
 
@@ -118,8 +118,8 @@ def sweep(
         all_jobs = calibrated(expansion.jobs)
         missing = missing_runs(all_jobs, store.folder, retry_crashed=retry_crashed, again=again)
         notes = tuple(changed_planners(all_jobs, store.folder))
-        if missing.forgotten:
-            store.drop(missing.forgotten)
+        if missing.discarded:
+            store.drop(missing.discarded)
         _begin(store, campaign, expansion, all_jobs)
         made, before, size = 0, len(all_jobs) - len(missing.jobs), len(all_jobs)
         report(before, size)

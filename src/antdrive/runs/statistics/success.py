@@ -37,8 +37,8 @@ class PlannerSuccess:
     outcomes: Mapping[str, int]  # number of all runs by outcome
 
     @property
-    def share(self) -> float:
-        """The share of the counted runs that succeeded."""
+    def fraction(self) -> float:
+        """The fraction of counted runs that succeeded."""
         return self.successes / self.counted
 
     @property
@@ -49,7 +49,12 @@ class PlannerSuccess:
     def as_dict(self) -> dict[str, Any]:
         """All fields as plain values, and the share."""
         fields = dataclasses.asdict(self)
-        return {**fields, "share": self.share, "interval": list(self.interval), "over_worlds": list(self.over_worlds)}
+        return {
+            **fields,
+            "share": self.fraction,
+            "interval": list(self.interval),
+            "over_worlds": list(self.over_worlds),
+        }
 
 
 def success_table(paired: PairedRuns) -> list[PlannerSuccess]:
@@ -110,12 +115,12 @@ class StepCurve(NamedTuple):
     """A curve that rises in steps."""
 
     x: Floats  # where it rises, ascending, (M,)
-    share: Floats  # its value from there on, 0 to 1, (M,)
+    fraction: Floats  # its value from there on, 0 to 1, (M,)
 
     def at(self, x: float) -> float:
         """The curve's value."""
         place = int(np.searchsorted(self.x, x, side="right"))
-        return float(self.share[place - 1]) if place else 0.0
+        return float(self.fraction[place - 1]) if place else 0.0
 
 
 def performance_profiles(cost: Floats) -> list[StepCurve]:

@@ -181,8 +181,8 @@ def _counted(count: int, what: str) -> tuple[str, str]:
 
 def _best(rows: Sequence[PlannerSuccess], paired: PairedRuns) -> tuple[str, str]:
     """The highest share of successes, and all planners that have it."""
-    share = max(row.share for row in rows)
-    best = [row for row in rows if row.share == share]
+    share = max(row.fraction for row in rows)
+    best = [row for row in rows if row.fraction == share]
     if len(best) == len(rows) > 1:
         names = "every planner"
     else:

@@ -95,7 +95,7 @@ def _steps(
 ) -> None:
     for k, (curve, style) in enumerate(zip(curves, styles, strict=True)):
         inside = curve.x <= high
-        x, share = _thinned(curve.x[inside], curve.share[inside], low, high, log)
+        x, share = _thinned(curve.x[inside], curve.fraction[inside], low, high, log)
         x = np.concatenate([[low], x, [high]])
         share = np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]])
         (line,) = axes.step(x, share, where="post", color=style.light, ls=style.dash, lw=1.6)

@@ -37,7 +37,7 @@ def success_cells(summary: CampaignSummary) -> TextTable:
         rows.append(
             (
                 row.planner,
-                percent(row.share),
+                percent(row.fraction),
                 percents(row.interval),
                 *([percents(row.across_worlds)] if over else []),
                 *(str(row.successes), str(row.counted), str(row.runs)),
@@ -138,7 +138,7 @@ def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
         found = [value for name in names for value in (summary.medians[name][k][0], *summary.medians[name][k][1])]
         counted = [row.planner, row.runs, row.elsewhere, row.counted, row.successes]
         ended = [row.outcomes.get(name, 0) for name in outcomes]
-        lines.append([*counted, row.share, *row.interval, *row.over_worlds, *found, *ended])
+        lines.append([*counted, row.fraction, *row.interval, *row.over_worlds, *found, *ended])
     _write_lines(out, lines)
     pairs = [row for comparisons in summary.comparisons.values() for row in comparisons]
     if not pairs:

@@ -70,7 +70,7 @@ def test_a_map_without_a_path_gets_no_problem_file_and_a_replaced_one_is_removed
 def test_no_file_is_replaced_or_removed_without_force(antdrive, out, there):
     Path(there).write_text("mine")
     for world in ("slalom", "no-path"):  # the latter has no problem file, which an export removes with --force
-        said = f"antdrive: {there}: exists; name another file, or replace it with --force\n"
+        said = f"antdrive: {there}: exists; choose another file, or replace it with --force\n"
         assert antdrive("worlds", "export", world, "-o", out) == (2, "", said)
         assert [(path.name, path.read_text()) for path in Path().iterdir()] == [(there, "mine")]
     assert antdrive("worlds", "export", "slalom", "-o", out, "--force")[0] == 0
