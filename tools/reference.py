@@ -220,7 +220,7 @@ def worlds() -> list[str]:
 def robots() -> list[str]:
     """Return each robot of the catalogue with its footprint, limits, lidar and source."""
     from antdrive.robots import list_robots, load_robot
-    from antdrive.robots.drawing import footprint_text
+    from antdrive.robots.card import footprint_text
 
     def row(name: str) -> Row:
         robot = load_robot(name)
