@@ -303,7 +303,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Summarise the drives on the terminal and in the file named by GITHUB_STEP_SUMMARY."""
-    reported, unused = config.stash[_LISTENER].drives, sorted(config.stash[_UNUSED])
+    reported, found = config.stash[_LISTENER].drives, config.stash[_UNUSED]
+    unused = sorted(found)
     if not (reported or unused):
         return
     from antdrive.cli.testing.session_summary import add_to_page, drives_in, lines
