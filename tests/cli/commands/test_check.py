@@ -9,7 +9,7 @@ import pytest
 
 from antdrive import Run, run
 from antdrive.cli.commands import check
-from antdrive.cli.testing import checking
+from antdrive.cli.testing import evaluation
 
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
@@ -50,7 +50,7 @@ def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive, suite):
     suite.write_text(SUITE + HIT)
     code, out, _ = antdrive("accept", "a.drive.yaml", "--only", "hit", "--film", "never", "--results", "first")
     assert code == 1
-    assert "not accepted, because the drive is not what the test expects" in out
+    assert "not accepted, because the drive misses the test's expectations" in out
     assert not (suite.parent / "baselines").exists()
     assert Path("first/a/hit-0/overview.png").is_file()
     code, out, _ = antdrive("check", "a.drive.yaml::hit", "--json", "--film", "never", "--results", "res")
@@ -132,7 +132,7 @@ def test_a_fault_of_the_program_is_told_with_its_traceback(antdrive, suite, monk
     def broken(scenario):
         raise IndexError("of another's replanner")
 
-    monkeypatch.setattr(checking, "drive", broken)
+    monkeypatch.setattr(evaluation, "drive", broken)
     code, out, _ = antdrive("check", "a.drive.yaml::closed", "--results", "res")
     assert (code, out.splitlines()[1]) == (3, "  internal error: IndexError: of another's replanner")
     assert "in broken" in Path("res/a/closed-0/traceback.txt").read_text()
@@ -148,7 +148,7 @@ def test_results_are_printed_as_they_come(antdrive, suite, monkeypatch):
         made.append(run(scenario))
         return made[0]
 
-    monkeypatch.setattr(checking, "drive", interrupted)
+    monkeypatch.setattr(evaluation, "drive", interrupted)
     code, out, _ = antdrive("check", "a.drive.yaml", "--jobs", "1", "--film", "never")
     assert (code, out.splitlines()[0]) == (130, "a.drive.yaml::clear[0]: FAILED")
 

@@ -313,7 +313,7 @@ def test_kernels_are_compiled_before_the_first_drive_with_one_line(project, monk
     for _ in range(2):
         project.runpytest(*PLUGIN, "-k", "closed", "--drive-update-new").assert_outcomes(passed=1, deselected=1)
     assert compiled == [1]
-    assert capfd.readouterr().err.count("antdrive: compiling the planners, once for this installation") == 1
+    assert capfd.readouterr().err.count("antdrive: compiling the planners, once per installation") == 1
 
 
 def test_junit_properties_and_the_summary_of_a_ci_run(accepted, monkeypatch):
@@ -386,7 +386,7 @@ def test_the_summary_says_which_failed_drives_have_no_film(project, monkeypatch)
     assert [path.parent.name for path in (project.path / "results").rglob("film.mp4")] == ["clear-0"]
     done.stdout.fnmatch_lines([
         "film: */results/a/clear-0/film.mp4",
-        "film: none, because this run has made 10; antdrive check 'a.drive.yaml::clear[[]1[]]' makes it",
-        "2 more failed drives have no film; the command that repeats a drive makes it, --drive-film always makes all",
+        "film: omitted after 10 films; make it with antdrive check 'a.drive.yaml::clear[[]1[]]'",
+        "2 more failed drives have no film; repeat a drive to film it, or use --drive-film always to film all",
     ])  # fmt: skip
     assert not list((project.path / "temporary").glob("antdrive-films-*"))

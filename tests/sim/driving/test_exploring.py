@@ -184,7 +184,7 @@ def test_a_drive_that_forgot_its_map_can_be_replayed(jackal, monkeypatch):
     assert len(list(reset_ticks(done.rollout.record))) > 1
     assert done.reason.startswith("no way through what was seen, last at t = ")
     assert replay(done.rollout).problems == ()
-    kept, forgot = MapReconstruction(done.rollout), MapReconstruction(done.rollout, forgetting=True)
+    kept, forgot = MapReconstruction(done.rollout), MapReconstruction(done.rollout, resets=True)
     for reconstruction in (kept, forgot):
         reconstruction.advance(4.0)
     own = cells_of(own_map(done.rollout))
