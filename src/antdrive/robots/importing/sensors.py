@@ -13,7 +13,7 @@ from antdrive.base.types import Floats
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
 from antdrive.robots.spec import require_on_robot
-from antdrive.worlds.formats.xml import turned
+from antdrive.worlds.formats.xml import rotation_matrix
 
 KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")  # of Gazebo's sensors that are lidars
 LEVEL = 0.99  # the least vertical part of a planar lidar's axis
@@ -67,7 +67,7 @@ def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list
     if _number(scan, "scan/vertical/samples", 1.0) > 1:
         raise FieldError("scan", "has several layers")
     x, y, z, *angles = _pose(sensor.element)
-    turn = sensor.place[:3, :3] @ turned(*angles)
+    turn = sensor.place[:3, :3] @ rotation_matrix(*angles)
     if abs(turn[2, 2]) < LEVEL:
         raise FieldError("pose", "its beams are not level")
     spot = sensor.place @ (x, y, z, 1.0)
