@@ -65,7 +65,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"(matplotlib|pyarrow|pandas|pydantic|hypothesis|typer|distributed|dask)(\.[\w.]+)?"),
     (
         "py:.*",
-        r"(antdrive\.(views\.pages\.summary|runs\.campaigns\.running)\.)?(Path|Figure|SearchStrategy|CampaignSummary|Finished|Ants|Ranking)",
+        r"(antdrive\.(views\.pages\.campaign_summary|runs\.campaigns\.running)\.)?(Path|Figure|SearchStrategy|CampaignSummary|Finished|Ants|Ranking)",
     ),
     ("py:.*", r"(typing|collections|pathlib|enum|os|types|abc|contextlib|dataclasses)\.[\w.]+"),
     # Arrays as compiled code takes them; no part of what is offered.

@@ -34,7 +34,7 @@ GOAL: Colour = (0, 138, 92)
 CONTACT: Colour = (214, 34, 44)
 
 # What a robot without a map has seen.
-FOLLOWED: Colour = (176, 36, 148)  # a mover as the robot believes it to be
+TRACKED: Colour = (176, 36, 148)  # a mover as the robot believes it to be
 BEAM: Colour = (20, 140, 214)
 HIT: Colour = (0, 62, 148)
 PALE: Colour = (222, 226, 232)  # ground not known to be free, and obstacles never seen

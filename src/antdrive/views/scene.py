@@ -1,4 +1,4 @@
-"""The scene that films and figures draw: world, start, goal and the robot's shape, read from a run's log."""
+"""Scene of a run for films and figures: world, start, goal, robot shape and movers."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Task, World
 
-MIN_JUMP = 0.05  # the least distance between two rows that counts as a mover's jump [m]
-PLANNED_TRACK = 30.0  # a plan's figure shows the movers' tracks for this long [s]
+MIN_JUMP = 0.05  # least distance between two rows that counts as a jump of a mover [m]
+PLANNED_TRACK = 30.0  # duration of the movers' tracks in a plan's figure [s]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
-    """Everything that stands still during a run, the robot's shape, and the movers' tracks."""
+    """Static content of a run, robot shape and movers' tracks."""
 
     name: str  # the world's name
     bounds: Bounds  # xmin, ymin, xmax, ymax [m]
@@ -31,21 +31,21 @@ class Scene:
     unseen: Flags  # whether each obstacle was placed after planning (N,)
     start: Pose  # x, y [m] and heading [rad]
     goal: Point  # x, y [m]
-    goal_tolerance: float  # how far from the goal the robot may stop [m]
-    inflate: float  # how far the planner kept its path from obstacles: the robot's radius plus the margin [m]
+    goal_tolerance: float  # largest distance from the goal at which the robot may stop [m]
+    inflate: float  # planned distance from obstacles: the robot's radius plus the margin [m]
     margin: float  # the part of `inflate` beyond the robot's radius [m]
-    robot: RobotSpec  # the robot's shape
-    mapped: bool = True  # whether the robot had a map, and kept a distance from all obstacles from the start
+    robot: RobotSpec  # the robot's specification
+    mapped: bool = True  # whether the robot had a map
     mover_radii: tuple[float, ...] = ()  # one per mover [m]
     movers: tuple[
         Point, ...
-    ] = ()  # one position per mover [m]: at the run's end, or at t = 0 for a plan that was not driven
-    movers_at: float = 0.0  # when they are there [s]
-    tracks: tuple[Floats, ...] = ()  # polylines (N, 2) that movers follow [m]; a mover that jumps has several
+    ] = ()  # one position per mover [m]: at the run's end, or at t = 0 for a plan without a drive
+    movers_at: float = 0.0  # time of these positions [s]
+    tracks: tuple[Floats, ...] = ()  # the movers' polylines (N, 2) [m]; a mover that jumps has several
 
     @classmethod
     def of(cls, rollout: Rollout) -> Scene:
-        """The scene of a logged run."""
+        """Return the scene of a logged run."""
         record, world = rollout.record, rollout.record.world
         return cls._in(
             world,
@@ -63,8 +63,8 @@ class Scene:
 
     @classmethod
     def planned(cls, task: Task, robot: RobotSpec, inflate: float, *, mapped: bool = True) -> Scene:
-        """The scene of a plan that was not driven."""
-        # The motion of wandering movers depends on a run's seed.
+        """Return the scene of a plan without a drive."""
+        # The motion of wandering movers depends on the run's seed.
         shown = [mover for mover in task.world.movers if not isinstance(mover, Wandering)]
         trajectories = Trajectories.of(dataclasses.replace(task.world, movers=tuple(shown)), task.start[:2])
         positions = trajectories.positions(np.arange(0.0, PLANNED_TRACK, 0.05))
@@ -90,36 +90,41 @@ class Scene:
 
     @property
     def unseen_label(self) -> str:
-        """What legends call the obstacles of `--unseen`: without a map the planner knew of no obstacle at first."""
+        """Legend of the obstacles of `--unseen`."""
         return "placed after planning" if self.mapped else "not in the world file"
 
     @property
     def route_label(self) -> str:
-        """What legends call the first route."""
-        return "route" if self.mapped else "first route, before the world was seen"
+        """Legend of the initial route."""
+        return "route" if self.mapped else "initial route"
 
     @property
     def movers_label(self) -> str:
-        """What a legend says of movers: a picture shows them at one moment."""
-        return f"moving obstacle, at {self.movers_at:.1f} s"
+        """Legend of the movers, with the time of the shown positions."""
+        return f"mover at {self.movers_at:.1f} s"
+
+    @property
+    def no_go_label(self) -> str:
+        """Legend of the no-go area."""
+        return f"no-go area for the robot's centre\n(radius + margin = {self.inflate:.2f} m)"
 
     @property
     def has_no_go_area(self) -> bool:
-        """Whether there is ground around the obstacles that plans keep off from the start."""
+        """Whether the initial plan had a no-go area around obstacles."""
         return self.mapped and self.inflate > 0
 
-    def map_bounds(self, way: Floats) -> Bounds:
-        """The part of the plane that a map shows [m]: the world, and what a robot without a map planned first."""
-        if self.mapped or not len(way):
+    def map_bounds(self, route: Floats) -> Bounds:
+        """Return the bounds of the map to show [m]: the world and a mapless robot's initial route (N, 2) [m]."""
+        if self.mapped or not len(route):
             return self.bounds
-        (x0, y0), (x1, y1) = way.min(axis=0).tolist(), way.max(axis=0).tolist()
+        (x0, y0), (x1, y1) = route.min(axis=0).tolist(), route.max(axis=0).tolist()
         low_x, low_y, high_x, high_y = self.bounds
         return min(low_x, x0), min(low_y, y0), max(high_x, x1), max(high_y, y1)
 
     def region(self, points: Floats) -> tuple[Floats, Floats]:
-        """The corners (2,), (2,) [m] of the part of the world to show: around start, goal and points (N, 2).
+        """Return the corners (2,), (2,) [m] of the region around start, goal and points (N, 2) [m].
 
-        If this part is more than half of the world, the whole world is shown.
+        A region larger than half of the world is extended to the whole world.
         """
         room = max(0.8, 3 * self.robot.footprint.radius, 1.5 * self.inflate)
         ends = np.array([self.start[:2], self.goal])
@@ -133,7 +138,7 @@ class Scene:
 
 
 def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats) -> tuple[float, float]:
-    """The point [m] on the surface of an obstacle, a mover or a wall that is nearest to the robot."""
+    """Return the point [m] on the surface of an obstacle, mover or wall nearest to the robot."""
     x, y, yaw = (float(value) for value in np.asarray(pose))
     foot = scene.robot.footprint
     discs = np.vstack([scene.obstacles[:, :3], np.column_stack([movers, scene.mover_radii])])
@@ -151,10 +156,9 @@ def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats)
 
 
 def jumps(movers: Floats) -> Flags:
-    """Whether movers at positions (T, M, 2) jump between consecutive rows, shape (T - 1, M).
+    """Return whether movers at positions (T, M, 2) jump between consecutive rows (T - 1, M).
 
-    A jump is a step longer than `MIN_JUMP` that is also more than three times the steps before and after it: a fast
-    mover makes long steps, too, but all alike.
+    A jump is longer than `MIN_JUMP` and more than three times as long as the steps before and after it.
     """
     step = np.hypot(*np.moveaxis(np.diff(movers, axis=0), -1, 0))
     around = np.zeros_like(step)
@@ -165,7 +169,7 @@ def jumps(movers: Floats) -> Flags:
 
 
 def mover_tracks(movers: Floats) -> tuple[Floats, ...]:
-    """The polylines (N, 2) of movers at positions (T, M, 2), cut where they jump."""
+    """Return the polylines (N, 2) of movers at positions (T, M, 2), cut at jumps."""
     cuts = jumps(movers)
     return tuple(
         piece

@@ -143,7 +143,7 @@ def test_the_first_plan_of_a_robot_without_a_map_is_said_to_be_one_and_lies_in_t
     assert blind._supxlabel.get_text().replace("\n", " ") == module.FIRST
     assert known._supxlabel is None
     words = [{text.get_text() for text in panels(one)["map"].get_legend().get_texts()} for one in (blind, known)]
-    assert "obstacle, on no map" in words[0]
+    assert "obstacle, not on a map" in words[0]
     assert "obstacle" in words[1]
 
 
@@ -197,7 +197,7 @@ def test_the_median_of_all_runs_is_drawn_within_its_interval():
     assert {color for band in (first, second) for color in map(tuple, band.get_facecolor()[:, :3])}.__len__() == 2
     corners = first.get_paths()[0].vertices
     assert corners[:, 1].min() <= 5
-    assert line(figure, "in the paper")[1] == [4.5]
+    assert line(figure, "paper")[1] == [4.5]
     low, high = figure.axes[0].get_ylim()
     assert low < 4.0
     assert high > 12.0
@@ -271,7 +271,7 @@ def test_the_legend_says_when_movers_are_where_they_are_drawn(made_up_drive, pla
     moving = changed(task, "world", movers=(mover,))
     for figure, at in ((overview(drive), drive.t[-1]), (plan_figure(moving, grid, plan, ROBOT), 0.0)):
         named = [text.get_text() for text in panels(figure)["map"].get_legend().get_texts()]
-        assert f"moving obstacle, at {at:.1f} s" in named
+        assert f"mover at {at:.1f} s" in named
 
 
 def test_a_run_that_never_drove_has_an_overview(made_up_drive, tmp_path):
@@ -311,7 +311,7 @@ def test_every_figure_gives_its_axes_back_to_be_labelled_and_saved(made_up_drive
     table = {True: np.ones((1, 2)), False: np.full((1, 2), 2.0)}
     figures = [
         (overview(drive), ["map", "clearance", "speed", "limiters"]),
-        (certificate_figure(drive, certify(drive)), ["map", "distance", "readings"]),
+        (certificate_figure(drive, certify(drive)), ["map", "distance", "checks"]),
         (comparison_figure({"astar": drive, "ants": drive}), ["map"]),
         (then_and_now(drive, drive), ["map", "clearance", "distance"]),
         (plan_figure(task, grid, learnt, ROBOT), ["map", "history"]),
@@ -366,13 +366,13 @@ def log(made_up_drive):
 def test_the_figure_shows_the_map_and_the_first_sights(log, tmp_path):
     figure = sight_figure(log, tmp_path / "sight.png", dpi=60)
     named = panels(figure)
-    assert set(named) == {"map", "known ground", "first sights"}
+    assert set(named) == {"map", "explored area", "first detections"}
     seen = MapReconstruction(log)
     seen.advance(log.t[-1])
-    _, explored = named["known ground"].lines[0].get_data()
+    _, explored = named["explored area"].lines[0].get_data()
     assert float(np.asarray(explored)[-1]) == pytest.approx(seen.explored)
-    assert len(named["first sights"].get_yticklabels()) == LISTED
-    listed = {label.get_text() for label in named["first sights"].get_yticklabels()}
+    assert len(named["first detections"].get_yticklabels()) == LISTED
+    listed = {label.get_text() for label in named["first detections"].get_yticklabels()}
     assert listed <= {text.get_text() for text in named["map"].texts}
     assert (tmp_path / "sight.png").stat().st_size < 400_000
 
@@ -382,7 +382,7 @@ def test_an_overview_calls_the_first_route_one_and_shows_all_of_it(log):
     for figure in (overview(away), sight_figure(away)):
         assert panels(figure)["map"].get_ylim()[0] < -1.5
     words = {text.get_text() for text in panels(overview(away))["map"].get_legend().get_texts()}
-    assert {"first route, before the world was seen", "obstacle, on no map"} <= words
+    assert {"initial route", "obstacle, not on a map"} <= words
 
 
 def test_the_words_beside_the_curves_lie_in_the_picture_and_on_nothing_else(log):

@@ -114,8 +114,8 @@ def test_the_legend_names_what_is_painted(log):
     scene = Scene.of(log)
     assert not scene.has_no_go_area
     plain = {entry.text for entry in legend_entries(scene, 0.5, 0.01)}
-    named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, beams=True, sight=True)}
-    assert named - plain == {"beams of the lidar", "hit, on the robot's map", "not known to be free"}
+    named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, beams=True, own_map=True)}
+    assert named - plain == {"lidar beams", "lidar hit on the occupancy map", "unknown ground"}
     assert not any("inflated" in text for text in named)
     hidden = [replace(scene, mapped=mapped, unseen=np.ones_like(scene.unseen)) for mapped in (True, False)]
     given, none = ({entry.text for entry in legend_entries(one, 0.5, 0.01)} for one in hidden)
@@ -127,7 +127,7 @@ def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log):
     shot = Shot(log, camera="top", size=SIZE, bare=True)
     pose, movers = shot.playback.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
     plain = shot._compositor.frame(pose).astype(int)
-    ringed = shot._compositor.frame(pose, followed=movers).astype(int)
+    ringed = shot._compositor.frame(pose, tracked=movers).astype(int)
     x, y = (np.array(shot._compositor.pixel(*at)) for at in ((3.0, 2.0), (3.55, 2.0)))
     rows, cols = np.nonzero(np.abs(ringed - plain).max(axis=-1) > 20)
     away = np.hypot(cols + 0.5 - x[0], rows + 0.5 - x[1])
@@ -136,8 +136,8 @@ def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log):
     assert np.abs(away[ring] - math.dist(x, y)).max() < 4
     red, green, blue = ringed[rows, cols].mean(axis=0)
     assert min(red, blue) > green + 25
-    followed = {entry.text for entry in legend_entries(Scene.of(log), 0.5, 0.01, followed=True)}
-    assert "mover by lidar, 1.5 s ahead" in followed
+    followed = {entry.text for entry in legend_entries(Scene.of(log), 0.5, 0.01, tracked=True)}
+    assert "mover tracked by lidar, next 1.5 s" in followed
 
 
 def test_of_a_robot_with_a_map_only_the_beams_are_painted(log, spots, monkeypatch):

@@ -89,8 +89,8 @@ def test_movers_that_are_followed_are_those_of_the_last_scan(jumped):
     """Turtlebot's lidar scans at 5 Hz: after two periods without a mover, none is followed."""
     rows = [(0, 0, 1.0, 0.5, 0.5, 0, 0.2), (48, 0, 1.1, 0.5, 0.5, 0, 0.2), (48, 1, 3.0, 2.0, 0, 0.1, 0.3)]
     playback = Playback(replace(jumped, tracks=np.array(rows, dtype=np.float32)))
-    assert np.allclose(playback.followed(0.1), [[1.0, 0.5, 0.5, 0.0, 0.2]])
-    assert np.allclose(playback.followed(0.2), [[1.1, 0.5, 0.5, 0, 0.2], [3.0, 2.0, 0, 0.1, 0.3]])
-    assert len(playback.followed(0.39)) == 2
-    assert playback.followed(0.5).shape == (0, 5)
-    assert Playback(jumped).followed(0.1).shape == (0, 5)
+    assert np.allclose(playback.tracked(0.1), [[1.0, 0.5, 0.5, 0.0, 0.2]])
+    assert np.allclose(playback.tracked(0.2), [[1.1, 0.5, 0.5, 0, 0.2], [3.0, 2.0, 0, 0.1, 0.3]])
+    assert len(playback.tracked(0.39)) == 2
+    assert playback.tracked(0.5).shape == (0, 5)
+    assert Playback(jumped).tracked(0.1).shape == (0, 5)

@@ -158,7 +158,7 @@ def test_the_sentence_at_the_end_names_the_reason_and_does_not_contradict_it(mon
 
 @pytest.mark.parametrize("size", [(480, 360), (640, 480), (1280, 720), (320, 240), (160, 160)])
 def test_a_legend_stays_within_its_rows(drive, size):
-    entries = legend_entries(Scene.of(drive), 0.5, 0.02, replans=True, sight=True, followed=True)
+    entries = legend_entries(Scene.of(drive), 0.5, 0.02, replans=True, own_map=True, tracked=True)
     whole = False
     for rows in range(1, 5):
         layout = Layout.of(size, rows)

@@ -1,1 +1,1 @@
-"""Figures as PNG, PDF or SVG: of runs, of plans, and of the kinds that papers print."""
+"""Figures of runs, plans and papers as PNG, PDF or SVG."""

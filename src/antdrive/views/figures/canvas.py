@@ -1,6 +1,6 @@
-"""The canvas of all figures: one look, no screen needed, and the same file, byte for byte, for the same data.
+"""Common style and reproducible output of all figures.
 
-A file's suffix chooses PNG, PDF or SVG. No dates or versions are written into files.
+The file's suffix selects PNG, PDF or SVG. Equal data gives equal bytes: files contain no dates or versions.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ _STYLE: Any = {
 
 
 def styled() -> Any:
-    """A context in which figures have the common look; matplotlib's settings outside it stay as they are."""
+    """Return a context manager that applies the common style."""
     return matplotlib.rc_context(_STYLE)
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of a width and height [inches]; it needs no screen."""
+    """Return an empty figure of a width and height [inches]; no display is needed."""
     figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
@@ -64,7 +64,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 @contextmanager
 def sheet(path: str | Path | None, size: tuple[float, float], dpi: float = 160) -> Iterator[Figure]:
-    """Draw on an empty figure of a size [inches]; where there is a path, it is written when the block ends."""
+    """Yield an empty figure of a size [inches] and write it to `path`, if given, at the end of the block."""
     target = checked(path)
     with styled():
         figure = new_figure(*size)
@@ -75,7 +75,7 @@ def sheet(path: str | Path | None, size: tuple[float, float], dpi: float = 160) 
 
 
 def draw_title(figure: Figure, title: str, outcome: Outcome | None = None) -> None:
-    """Write a figure's title and, to the right, how a drive ended."""
+    """Draw a figure's title and, on the right, the drive's outcome."""
     figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
     if outcome is not None:
         name, colour = OUTCOME_LABELS[outcome]
@@ -83,29 +83,29 @@ def draw_title(figure: Figure, title: str, outcome: Outcome | None = None) -> No
 
 
 def legend_above(axes: Any, handles: Sequence[Any] | None = None, **place: Any) -> None:
-    """Put a legend above the upper left corner of axes."""
+    """Draw a legend above the upper left corner of axes."""
     common = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3, "borderaxespad": 0.2, "columnspacing": 1.2}
     axes.legend(**({} if handles is None else {"handles": handles}), **(common | place))
 
 
 def colour_bar(figure: Any, drawn: Any, axes: Any, label: str, **place: Any) -> None:
-    """Draw the scale of a collection's or a picture's colours beside axes."""
+    """Draw the colour bar of a collection or image beside axes."""
     bar = figure.colorbar(drawn, ax=axes, **({"shrink": 0.7, "aspect": 30, "pad": 0.02} | place))
     bar.set_label(label)
     bar.outline.set_visible(False)
 
 
-#: A colour bar below a map.
+#: Placement of a colour bar below a map.
 BELOW: Any = {"orientation": "horizontal", "shrink": 0.6, "aspect": 34}
 
 
 def thinned(count: int, most: int = 1500) -> npt.NDArray[np.intp]:
-    """Return which of so many rows are drawn: at most `most`, the first and the last among them."""
+    """Return at most `most` evenly spaced row indices, including the first and the last."""
     return np.unique(np.linspace(0, count - 1, most).astype(int))
 
 
 def map_size(scene: Scene, shown: Bounds | None = None) -> tuple[float, float]:
-    """The width and height of a scene's map in a figure [inches]."""
+    """Return the width and height of a scene's map in a figure [inches]."""
     x0, y0, x1, y1 = shown or scene.bounds
     shape = (y1 - y0) / (x1 - x0)
     high = float(np.clip(5.6 * shape, 3.9, 6.4))
@@ -113,23 +113,23 @@ def map_size(scene: Scene, shown: Bounds | None = None) -> tuple[float, float]:
 
 
 def frame_map(axes: Any, shown: Bounds) -> None:
-    """Show a part of the plane, with some room around it."""
+    """Set the limits of axes to bounds [m] with a border of 2 %."""
     x0, y0, x1, y1 = shown
     room = 0.02 * max(x1 - x0, y1 - y0)
     axes.set(xlim=(x0 - room, x1 + room), ylim=(y0 - room, y1 + room))
 
 
 def checked(path: str | Path | None) -> Path | None:
-    """The path of a figure, checked before any work; None stays None."""
+    """Return a figure's path after checking its suffix; None stays None."""
     if path is not None:
         known_suffix(Path(path), SUFFIXES)
     return None if path is None else Path(path)
 
 
 def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
-    """Write a figure in the format of its suffix, whole or not at all; returns its path."""
+    """Write a figure atomically in the format of its suffix and return its path."""
     kind = target.suffix.lower()[1:]
-    # Without these entries, matplotlib writes its version or the date.
+    # By default, matplotlib writes its version or the date.
     empty: dict[str, Any] = {
         "png": {"Software": None},
         "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
@@ -141,23 +141,23 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
 
 
 def endings(suffixes: Sequence[str]) -> list[tuple[str, str]]:
-    """Each suffix that a figure is written with, and what the name of its file ends with: nothing for the first."""
+    """Return pairs of suffix and ending of the figure's key: empty for the first suffix."""
     return [(suffix, "" if k == 0 else f" {suffix[1:]}") for k, suffix in enumerate(suffixes)]
 
 
 def save_figure(figure: Figure, path: str | Path, *, dpi: float | None = None) -> Path:
-    """Write a figure after it was labelled or changed: the same file, byte for byte, for the same figure.
+    """Write a figure reproducibly: equal figures give equal bytes.
 
     Args:
-        figure: what a figure function returned
-        path: the file to write; its suffix chooses PNG, PDF or SVG
-        dpi: pixels per inch; None: what the figure was drawn for
+        figure: result of a figure function
+        path: the file to write; its suffix selects PNG, PDF or SVG
+        dpi: pixels per inch; None: the figure's own value
 
     Returns:
         The file's path.
 
     Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
+        InputError: a suffix other than .png, .pdf and .svg.
     """
     target = checked(path)
     assert target is not None
@@ -166,16 +166,16 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: float | None = None) -
 
 
 def panels(figure: Figure) -> dict[str, Axes]:
-    """The axes of a figure by name, such as `map` and `clearance`; colour bars have none and are left out.
+    """Return the axes of a figure by name, such as `map` and `clearance`, without colour bars.
 
     Args:
-        figure: what a figure function returned
+        figure: result of a figure function
     """
     return {str(axes.get_label()): axes for axes in figure.axes if axes.get_label() in PANELS}
 
 
-#: The names that the axes of figures have.
+#: Names of axes.
 PANELS = (
-    *("map", "clearance", "speed", "limiters", "distance", "readings"),
-    *("known ground", "first sights", "history", "field", "lengths", "with elitism", "without elitism"),
+    *("map", "clearance", "speed", "limiters", "distance", "checks"),
+    *("explored area", "first detections", "history", "field", "lengths", "with elitism", "without elitism"),
 )

@@ -1,4 +1,4 @@
-"""The map of a world drawn into axes, with the driven path or a planner's field on it, and its legend."""
+"""Map of a world with driven path, planner's field and legend."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in colours.FIELD_STOPS])
-MANY = 1000  # cylinders
+MANY = 1000  # cylinders: above, they have no edges
 SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in colours.SPEED_STOPS])
 
 
 def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
-    """Draw walls, obstacles, inflated zones, movers with their tracks, start and goal."""
+    """Draw walls, obstacles, no-go area, movers with their tracks, start and goal."""
     x0, y0, x1, y1 = scene.bounds
     frame_map(axes, scene.bounds)
     axes.set(xlabel="x [m]", ylabel="y [m]")
@@ -38,7 +38,7 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
     axes.add_patch(inside)
     known = scene.obstacles[~scene.unseen]
     if scene.has_no_go_area:
-        # One opaque layer: where zones overlap, transparent ones would look darker.
+        # One opaque layer: overlaps of transparent zones would look darker.
         zones = _circles(known[:, :2], known[:, 2] + scene.inflate)
         i = scene.inflate
         zones_walls = [
@@ -52,7 +52,7 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
         axes.add_collection(layer)
         layer.set_clip_path(inside)
     for chosen, colour in ((known, colours.OBSTACLE), (scene.obstacles[scene.unseen], colours.UNSEEN)):
-        edge = 0.4 if len(chosen) <= MANY else 0.0  # white edges of thousands would leave nothing else to see
+        edge = 0.4 if len(chosen) <= MANY else 0.0  # thousands of white edges would hide the obstacles
         circles = _circles(chosen[:, :2], chosen[:, 2])
         bodies = PathCollection(circles, facecolor=hexed(colour), edgecolor="white", linewidth=edge, zorder=3)
         axes.add_collection(bodies)
@@ -70,14 +70,14 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
 
 
 def _circles(centres: Floats, radii: Floats) -> list[Path]:
-    """Circles as paths; matplotlib's own circles take ten times as long, which counts in worlds of thousands."""
+    """Return circles as paths, ten times as fast as matplotlib's own circles."""
     unit = Path.unit_circle()
     points, codes = np.asarray(unit.vertices), unit.codes
     return [Path(points * r + centre, codes) for centre, r in zip(centres, radii.tolist(), strict=True)]
 
 
 def _corners(x0: float, y0: float, x1: float, y1: float) -> Path:
-    """A rectangle as a path."""
+    """Return a rectangle as a path."""
     return Path([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], closed=True)
 
 
@@ -96,7 +96,7 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
 
 
 def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: Floats | None) -> None:
-    """Draw the route, the driven path coloured by speed, the robot at the end, and the first contact."""
+    """Draw the route, the driven path coloured by speed, the robot's final pose and the first contact."""
     handles: list[Any] = []
     if cells is not None and len(cells):
         handles += axes.plot(*cells.T, ".", ms=2.6, color=hexed(colours.MUTED), label="planned cells", zorder=4.6)
@@ -117,7 +117,7 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
 
 
 def draw_along(axes: Any, points: Floats, values: Floats, **style: Any) -> LineCollection:
-    """Draw a polyline (N, 2) whose colour follows the values (N - 1,) of its segments."""
+    """Draw a polyline (N, 2) coloured by the values (N - 1,) of its segments."""
     lines = LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), zorder=5, **style)
     lines.set_array(values)
     axes.add_collection(lines)
@@ -125,7 +125,7 @@ def draw_along(axes: Any, points: Floats, values: Floats, **style: Any) -> LineC
 
 
 def draw_contact(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
-    """Draw a cross at the first contact; what the legend says of it."""
+    """Draw a cross at the first contact and return its legend handles."""
     if not len(rollout.contacts):
         return []
     row = min(int(rollout.contacts[0, 0]), len(rollout.t) - 1)
@@ -137,20 +137,20 @@ def draw_contact(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
 
 
 def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
-    """Draw the map's legend above its upper left corner: `handles`, then obstacles, movers and zones."""
-    known = [Patch(fc=hexed(colours.OBSTACLE), label="obstacle" if scene.mapped else "obstacle, on no map")]
+    """Draw the map's legend above its upper left corner: `handles`, obstacles, movers and no-go area."""
+    known = [Patch(fc=hexed(colours.OBSTACLE), label="obstacle" if scene.mapped else "obstacle, not on a map")]
     if scene.unseen.any():
         known.append(Patch(fc=hexed(colours.UNSEEN), label=scene.unseen_label))
     if scene.mover_radii:
         known.append(Patch(fc=hexed(colours.MOVER), label=scene.movers_label))
     if scene.has_no_go_area:
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in colours.ZONE)
-        known.append(Patch(fc=pale, ec=hexed(colours.ZONE), lw=0.5, label=f"inflated by {scene.inflate:.2f} m"))
+        known.append(Patch(fc=pale, ec=hexed(colours.ZONE), lw=0.5, label=scene.no_go_label))
     legend_above(axes, [*handles, *known], handlelength=1.6)
 
 
 def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:
-    """Draw a planner's field (R, C), such as pheromone or a potential, below the map, a colour per cell."""
+    """Draw a planner's field (R, C), such as pheromone or a potential, as coloured cells below the map."""
     values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
     finite = values[np.isfinite(values)]
     if not len(finite):
@@ -160,4 +160,4 @@ def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:
     low, high = np.quantile(finite, (0.02, 0.995))
     scale: dict[str, Any] = {"cmap": FIELD, "vmin": low, "vmax": max(high, low + 1e-12)}
     image = axes.imshow(values, origin="lower", extent=extent, zorder=0.5, interpolation="nearest", **scale)
-    colour_bar(figure, image, axes, "planner's field at the end of planning")
+    colour_bar(figure, image, axes, "planner's final field")

@@ -1,4 +1,4 @@
-"""Figures as papers print them: path length by iteration, by number of ants, and over a sweep of parameters."""
+"""Figures in the style of papers: path length by iteration, number of ants and parameters."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from antdrive.planners.plan import History, PlanResult, Query
 
 POINTS = 80  # of a curve
-RESAMPLES = 500  # for the intervals
-NO_PATH = 1e9  # stands for infinity where medians are taken
-HIGHEST = 6.0  # lengths above so many times the shortest are cut off
-TWICE = 0.35  # how far a colour goes towards ink where a planner has two curves in a panel
+RESAMPLES = 500  # bootstrap resamples for the intervals
+NO_PATH = 1e9  # represents infinity in medians
+HIGHEST = 6.0  # upper end of the length axis, as a multiple of the optimum
+TWICE = 0.35  # fraction of ink in the colour of a planner's second curve in a panel
 
 
 def history_figure(
@@ -34,7 +34,7 @@ def history_figure(
     optimum: float | None = None,
     dpi: float = 160,
 ) -> Figure:
-    """Draw the best path length so far by iteration for one or more planners."""
+    """Draw the best path length so far by iteration for each planner: the median of its runs and their range."""
     with sheet(path, (6.4, 4.0), dpi) as figure:
         axes: Any = figure.add_subplot(label="history")
         for name, runs in histories.items():
@@ -50,7 +50,7 @@ def history_figure(
                 band: dict[str, Any] = {"step": "post", "color": hexed(colour), "alpha": 0.15, "lw": 0}
                 axes.fill_between(iterations, best.min(axis=0), best.max(axis=0), **band)
         if optimum is not None:
-            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest with these moves")
+            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="optimum on this grid")
         axes.set(xlabel="iteration", ylabel="best path so far [m]")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper right")
@@ -58,12 +58,12 @@ def history_figure(
 
 
 def maps_figure(paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], path: str | Path | None = None) -> Figure:
-    """Draw paths on maps as the papers do: blocked cells black, the start a red square, the goal a blue one."""
+    """Draw paths on maps in the papers' style: blocked cells black, start a red square, goal a blue square."""
     across = min(len(paths), 3)
     down = -(-len(paths) // across)
     with sheet(path, (3.3 * across, 4.1 * down)) as figure:
         layout: Any = figure.get_layout_engine()
-        layout.set(h_pad=0.16, hspace=0.06)  # room for titles above and legends below the maps
+        layout.set(h_pad=0.16, hspace=0.06)  # space for titles and legends
         for k, (title, (query, plans)) in enumerate(paths.items()):
             axes: Any = figure.add_subplot(down, across, k + 1, label=title)
             axes.imshow(query.grid.free, cmap="gray", origin="lower", vmin=0, vmax=1, interpolation="nearest")
@@ -94,7 +94,7 @@ def ants_figure(
     unit: str = "m",
     dpi: float = 160,
 ) -> Figure:
-    """Draw path length by number of ants: every seed, the mean, and the values that a paper prints."""
+    """Draw path length by number of ants: every seed, the mean and the paper's values."""
     colour = hexed(planner_style(planner)[0])
     with sheet(path, (5.6, 4.0), dpi) as figure:
         axes: Any = figure.add_subplot(label="lengths")
@@ -107,8 +107,8 @@ def ants_figure(
         if printed:
             known = sorted(printed)
             values = [printed[count] for count in known]
-            axes.plot(known, values, "s--", color=hexed(INK), mfc="white", label="in the paper")
-        axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest with these moves")
+            axes.plot(known, values, "s--", color=hexed(INK), mfc="white", label="paper")
+        axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="optimum on this grid")
         axes.set(xscale="log", xlabel="number of ants", ylabel=f"path length [{unit}]")
         axes.set_xticks(counts, [str(count) for count in counts])
         axes.minorticks_off()
@@ -119,7 +119,7 @@ def ants_figure(
 def sweep_figure(
     pc: Sequence[float], pm: Sequence[float], lengths: Mapping[bool, Floats], path: str | Path | None = None
 ) -> Figure:
-    """Draw the mean path length by crossover and mutation probability, with and without elitism side by side."""
+    """Draw the mean path length by crossover and mutation probability, with and without elitism."""
     both = np.concatenate([np.ravel(values) for values in lengths.values()])
     finite = both[np.isfinite(both)]
     with sheet(path, (9.4, 3.9)) as figure:
@@ -144,22 +144,22 @@ def sweep_figure(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ConvergenceCurve:
-    """The runs of one planner on the maps of one panel."""
+    """Runs of one planner on the maps of one panel."""
 
     name: str  # the planner with its setting
     planner: str  # the planner's name, for its style
-    best: Sequence[Floats]  # for each run, the best length so far by iteration [cells]; inf while there is none
-    maps: Ints  # the number of each run's map (N,)
-    # how many ant steps each run took (N,), every iteration counting the same; None: iterations are shown
+    best: Sequence[Floats]  # best length so far by iteration, for each run [cells]; inf before the first path
+    maps: Ints  # index of each run's map (N,)
+    # ant steps of each run (N,), spread evenly over its iterations; None: the axis counts iterations
     steps: Floats | None
-    optimum: float  # the shortest length [cells]
-    printed: float | None  # the length that the paper prints [cells]; None: it prints none
+    optimum: float  # shortest length [cells]
+    printed: float | None  # the paper's length [cells], if any
 
 
 def convergence_figure(
     curves: Mapping[str, Sequence[ConvergenceCurve]], path: str | Path | None = None, *, single: bool = False
 ) -> Figure:
-    """Draw the best length so far while planners iterate, a panel for each map."""
+    """Draw the best length so far by iteration or ant steps, one panel per map."""
     across = 2 if len(curves) == 4 else min(len(curves), 3)
     with sheet(path, (3.9 * across, 3.2 * -(-len(curves) // across))) as figure:
         for k, (title, on_map) in enumerate(curves.items()):
@@ -182,7 +182,7 @@ def convergence_figure(
 def _draw(
     axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool
 ) -> tuple[float, float]:
-    """Draw a curve; the least and the largest length that should be seen."""
+    """Draw a curve and return the least and the largest length to show."""
     colour, dash = _style(curve, number, among, single)
     scale = 1.0 if curve.steps is None else 1e-6
     if single:
@@ -205,7 +205,7 @@ def _draw(
         ceiling = np.minimum(high, HIGHEST * 2 * curve.optimum)
         axes.fill_between(x[known], low[known], ceiling[known], step="post", color=colour, alpha=0.22, lw=0)
     if curve.printed is not None and len(x):
-        label = "in the paper" if all(other.printed is None for other in among[:number]) else None
+        label = "paper" if all(other.printed is None for other in among[:number]) else None
         axes.plot(x[-1], curve.printed, "s", ms=5, color=colour, mfc="white", clip_on=False, zorder=4, label=label)
     shown = [*middle[known], *high[known][-1:], *low[known][-1:], *([] if curve.printed is None else [curve.printed])]
     finite = [float(value) for value in shown if value < NO_PATH / 10] or [curve.optimum]
@@ -213,27 +213,27 @@ def _draw(
 
 
 def _style(curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool) -> tuple[str, Any]:
-    """Colour and dashes: a paper's red and blue for a single run; a planner's second curve is darker and dotted."""
+    """Return colour and dashes: red and blue for single runs; a planner's second curve is darker and dotted."""
     if single:
         return ("#1f4fd8", "#d81f1f", "#222222")[min(number, 2)], "-"
     colour, dash = planner_style(curve.planner)
     if any(other.planner == curve.planner for other in among[:number]):
-        share = TWICE * sum(other.planner == curve.planner for other in among[:number])
-        red, green, blue = (round((1 - share) * part + share * ink) for part, ink in zip(colour, INK, strict=True))
+        dark = TWICE * sum(other.planner == curve.planner for other in among[:number])
+        red, green, blue = (round((1 - dark) * part + dark * ink) for part, ink in zip(colour, INK, strict=True))
         colour = (red, green, blue)
         dash = (":", "-.")[number % 2]
     return hexed(colour), dash
 
 
 def _typical(curve: ConvergenceCurve) -> int:
-    """The run on the first map whose path is the median one."""
+    """Return the run with the median path length on the first map."""
     on_first = [k for k in range(len(curve.best)) if curve.maps[k] == curve.maps[0]]
     ends = sorted(on_first, key=lambda k: float(curve.best[k][-1]) if len(curve.best[k]) else math.inf)
     return ends[(len(ends) - 1) // 2]
 
 
 def _grid(best: Sequence[Floats], steps: Floats | None) -> Floats:
-    """Where the curves of some runs are sampled (K,): iterations, or ant steps."""
+    """Return the sample positions (K,) of the runs' curves: iterations or ant steps."""
     if steps is None:
         longest = max(len(run) for run in best)
         return np.unique(np.linspace(1, longest, min(longest, POINTS)).round())
@@ -242,7 +242,7 @@ def _grid(best: Sequence[Floats], steps: Floats | None) -> Floats:
 
 
 def _sampled(best: Sequence[Floats], steps: Floats | None, x: Floats) -> Floats:
-    """The best length of each run at `x` (N, K); inf before the first path."""
+    """Return the best length of each run at `x` (N, K); inf before the first path."""
     rows = []
     for k, run in enumerate(best):
         each = 1.0 if steps is None else float(steps[k]) / max(1, len(run))

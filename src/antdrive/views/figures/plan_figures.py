@@ -1,4 +1,4 @@
-"""Figures of a plan: its path on the map, the planner's field, and path lengths by iteration."""
+"""Figures of a plan: path on the map, planner's field and path length by iteration."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from antdrive.worlds.world import Task
 
 
-#: The stems of the files that `plan_figures` writes, by the name of the figure.
+#: File stems of `plan_figures`, by figure.
 FILES = {"plan": "plan", "tour": "tour", "history": "history", "bars": "field-bars", "contours": "field-contours"}
-#: Bars per side. In a larger field each bar stands for several cells and is as high as the highest of them.
+#: Bars per side. In a larger field each bar shows the maximum of several cells.
 MAX_BARS = 40
-#: Letters of a reason per inch, and the height of its lines [inches].
+#: Characters of a reason per inch, and the height of its lines [inches].
 LETTERS, LINE = 13.0, 0.165
-#: What is said of a plan that was made without a map.
-FIRST = "First plan of a robot without a map, from its first scan: what it has not seen counts as free."
+#: Note below the initial plan of a mapless robot.
+FIRST = "Initial plan of a mapless robot, from its first scan: unknown ground counts as free."
 
 
 def plan_figure(
@@ -46,22 +46,22 @@ def plan_figure(
     mapped: bool = True,
     dpi: float = 160,
 ) -> Figure:
-    """Draw a plan on the map, over the planner's field; an iterative planner gets path lengths by iteration, too.
+    """Draw a plan on the map, over the planner's field, with path lengths by iteration of an iterative planner.
 
     Args:
         task: the world with start and goal
-        grid: the grid that was planned on
-        plan: the planner's result, with a path or the reason why there is none
+        grid: the planner's grid
+        plan: the planner's result: a path, or the reason for having none
         robot: the robot to draw at the start
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
-        mapped: whether the robot has a map; the first plan of one without is made before it has seen the world
+        path: the file to write; its suffix selects PNG, PDF or SVG; None: no file
+        mapped: whether the robot has a map
         dpi: pixels per inch
 
     Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
+        The figure; `panels` returns its axes by name.
 
     Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
+        InputError: a suffix other than .png, .pdf and .svg.
     """
     scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
     cells, line = (grid.xy(plan.cells), grid.xy(plan.line)) if len(plan.cells) else (np.empty((0, 2)),) * 2
@@ -70,8 +70,8 @@ def plan_figure(
     wide, high = map_size(scene, shown)
     wide += 0.9 if plan.field is not None else 0.0
     wide_all = wide + (4.6 if iterations else 0.6)
-    said = _said_below(plan, mapped=mapped)
-    below = textwrap.wrap(said, round(LETTERS * wide_all)) if said else []
+    note = _note_below(plan, mapped=mapped)
+    below = textwrap.wrap(note, round(LETTERS * wide_all)) if note else []
     with sheet(path, (wide_all, high + 0.9 + (0.4 + LINE * len(below) if below else 0.0)), dpi) as figure:
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0], label="map")
@@ -83,7 +83,7 @@ def plan_figure(
             handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
             handles += chart.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
         frame_map(chart, shown)
-        if below:  # the map, where it covers nothing of what it speaks of
+        if below:
             colour = hexed(MUTED if len(plan.cells) else BAD)
             figure.supxlabel("\n".join(below), x=0.012, ha="left", fontsize=9, weight="bold", color=colour)
         draw_legend(chart, handles, scene)
@@ -101,8 +101,8 @@ def _draw_history(axes: Any, history: History) -> None:
     axes.set_title("path length [m]", pad=22)
     iterations = np.arange(1, len(history) + 1)
     for values, style in (
-        (history.iteration_mean, {"color": "#9aa5b5", "lw": 1.1, "label": "iteration's mean"}),
-        (history.iteration_best, {"color": hexed(START), "lw": 1.1, "label": "iteration's best"}),
+        (history.iteration_mean, {"color": "#9aa5b5", "lw": 1.1, "label": "iteration mean"}),
+        (history.iteration_best, {"color": hexed(START), "lw": 1.1, "label": "iteration best"}),
         (history.best, {"color": hexed(SHELL), "lw": 2.2, "label": "best so far", "drawstyle": "steps-post"}),
     ):
         shown = np.where(np.isfinite(values), values, np.nan)
@@ -112,8 +112,8 @@ def _draw_history(axes: Any, history: History) -> None:
     axes.set_xlim(1, max(2, len(history)))
 
 
-def _said_below(plan: PlanResult, *, mapped: bool) -> str:
-    """What is said below the map: why there is no path, or that the robot had not seen the world when it planned."""
+def _note_below(plan: PlanResult, *, mapped: bool) -> str:
+    """Return the note below the map: the reason for having no path, or the initial plan's assumption."""
     if not len(plan.cells):
         return plan.reason or plan.status.value
     return "" if mapped else FIRST
@@ -130,8 +130,8 @@ def plan_figures(
     suffixes: Sequence[str],
     mapped: bool = True,
 ) -> dict[str, Path]:
-    """Draw every figure of a plan: with the field, alone, by iteration, and its field as bars and as contours."""
-    found: dict[str, Path] = {}
+    """Draw every figure of a plan: path, path over the field, history, field as bars and field as contours."""
+    paths: dict[str, Path] = {}
     bare = dataclasses.replace(plan, field=None, history=type(plan.history)())
     for suffix, end in endings(suffixes):
         files = {key: folder / f"{stem}{suffix}" for key, stem in FILES.items()}
@@ -145,8 +145,8 @@ def plan_figures(
             bars_figure(grid, plan.field, files["bars"])
             contours_figure(task, grid, plan, robot, files["contours"], mapped=mapped)
             drawn += ["bars", "contours"]
-        found |= {key + end: files[key] for key in drawn}
-    return found
+        paths |= {key + end: files[key] for key in drawn}
+    return paths
 
 
 def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
@@ -160,13 +160,13 @@ def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dp
     r, c = np.nonzero(np.isfinite(high))
     heights = np.minimum(high[r, c], np.quantile(high[r, c], 0.998)) if len(r) else np.empty(0)
     base = min(0.0, float(heights.min(initial=0.0)))
-    share = (heights - base) / max(float(heights.max(initial=0.0)) - base, 1e-300)
+    level = (heights - base) / max(float(heights.max(initial=0.0)) - base, 1e-300)
     side = step * grid.cell
     with sheet(path, (7.2, 5.6), dpi) as figure:
         axes: Any = figure.add_subplot(projection="3d", label="field")
         x, y = grid.origin[0] + c * side - grid.cell / 2, grid.origin[1] + r * side - grid.cell / 2
         wide, tall = 0.92 * side, np.maximum(heights - base, 1e-12)
-        axes.bar3d(x, y, base, wide, wide, tall, color=FIELD(0.25 + 0.75 * share), shade=True, lw=0)
+        axes.bar3d(x, y, base, wide, wide, tall, color=FIELD(0.25 + 0.75 * level), shade=True, lw=0)
         axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="planner's field")
         axes.view_init(elev=38, azim=-62)
         axes.set_box_aspect((cols, rows, 0.55 * max(rows, cols)))
@@ -178,7 +178,7 @@ def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dp
 def contours_figure(
     task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path | None = None, *, mapped: bool = True
 ) -> Figure:
-    """Draw a planner's field as contours on the map, with the planned path."""
+    """Draw the contours of a planner's field on the map, with the planned path."""
     scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
     assert plan.field is not None
     values = np.where(grid.free, np.asarray(plan.field, dtype=np.float64), np.nan)

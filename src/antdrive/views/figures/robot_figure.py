@@ -1,4 +1,4 @@
-"""A robot from above: its footprint, over the collision geometry that it was computed from."""
+"""Top view of a robot: footprint and collision geometry."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ WIDTH = 5.6  # of the figure [inches]
 def robot_figure(
     robot: RobotSpec, path: str | Path | None = None, *, pieces: Sequence[Floats] = (), above: Sequence[Floats] = ()
 ) -> Figure:
-    """Draw a robot from above, heading right, in metres from the axle's centre."""
+    """Draw a robot from above, heading right; coordinates are relative to the axle's centre [m].
+
+    `pieces` holds the points (N, 2) [m] of the collision geometry in the footprint, `above` those beyond its height limit.
+    """
     outline = np.array(robot.footprint.outline(48))
     everything = np.vstack([outline, *pieces, *above])
     low, high = everything.min(axis=0) - 0.15 * robot.radius, everything.max(axis=0) + 0.15 * robot.radius
@@ -33,7 +36,7 @@ def robot_figure(
         axes = figure.add_subplot(label="map")
         handles = _draw_pieces(axes, pieces, above)
         handles.append(axes.add_patch(Polygon(outline, fill=False, ec=hexed(ROUTE), lw=2.0, label="footprint")))
-        around = Circle((0, 0), robot.radius, fill=False, ec=hexed(MUTED), lw=1.0, ls="--", label="disc of the plans")
+        around = Circle((0, 0), robot.radius, fill=False, ec=hexed(MUTED), lw=1.0, ls="--", label="planning disc")
         handles.append(axes.add_patch(around))
         thick = wheel_thickness(robot)
         for side in (1, -1):
@@ -52,7 +55,7 @@ def robot_figure(
 
 
 def _draw_pieces(axes: Any, pieces: Sequence[Floats], above: Sequence[Floats]) -> list[Patch]:
-    """Draw the outline of each piece; one patch of each kind for the legend."""
+    """Draw the outline of each piece and return one patch per kind for the legend."""
     handles: list[Patch] = []
     kinds: tuple[tuple[Sequence[Floats], dict[str, Any], str], ...] = (
         (above, {"fc": "none", "ec": hexed(MUTED), "ls": ":", "lw": 1.0}, "collision geometry above"),

@@ -1,4 +1,4 @@
-"""Figures of driven runs: one at a glance, what its certificate rests on, and several runs on one map."""
+"""Figures of runs: overview, certificate and comparisons."""
 
 from __future__ import annotations
 
@@ -35,32 +35,32 @@ if TYPE_CHECKING:
 
 ERROR = LinearSegmentedColormap.from_list("error", ["#ffd9a0", "#ff7a0e", "#7a1f00"])
 
-#: One colour per rule that limits the speed; most are Okabe and Ito's, safe for any colour vision.
+#: One colour per speed-limiting rule; most are Okabe and Ito's, safe for any colour vision.
 LIMITER_COLOURS = (
     *("#c9ced6", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#cc79a7"),
     *("#d55e00", "#5b6576", "#f0e442", "#7a4b9e", "#1b2333", "#a3d9c9"),
 )
 
-MOST_LIMITERS = 6  # in a row of the legend
+MOST_LIMITERS = 6  # per row of the legend
 THEN, NOW = hexed(START), hexed(SHELL)
 
 
 def overview(
     rollout: Rollout, path: str | Path | None = None, *, cells: Floats | None = None, dpi: float = 160
 ) -> Figure:
-    """Draw a run at a glance: the map to scale, and clearance, speed and the rule that limited it over time.
+    """Draw a run's overview: the map to scale, and clearance, speed and limiting rule over time.
 
     Args:
         rollout: the run's log
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
-        cells: the centres of the planned cells (N, 2) [m], to be drawn as dots
+        path: the file to write; its suffix selects PNG, PDF or SVG; None: no file
+        cells: centres of the planned cells (N, 2) [m], drawn as dots
         dpi: pixels per inch
 
     Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
+        The figure; `panels` returns its axes by name.
 
     Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
+        InputError: a suffix other than .png, .pdf and .svg.
     """
     scene = Scene.of(rollout)
     shown = scene.map_bounds(rollout.route)
@@ -81,7 +81,7 @@ def overview(
 
 
 def _draw_clearance(axes: Any, scene: Scene, rollout: Rollout) -> None:
-    """Draw clearance over time, with the planned margin, the minimum, and the first contact."""
+    """Draw clearance over time with margin, minimum and first contact."""
     axes.set(title="clearance [m]")
     if not len(rollout.t):
         return
@@ -113,7 +113,7 @@ def _draw_speed(axes: Any, scene: Scene, rollout: Rollout) -> None:
 
 
 def _draw_limiters(axes: Any, rollout: Rollout) -> None:
-    """Draw a strip that shows which rule limited the speed over time."""
+    """Draw the speed-limiting rule over time as a coloured strip."""
     names = rollout.record.limiters
     axes.set(xlabel="time [s]", yticks=[])
     axes.grid(False)
@@ -135,7 +135,7 @@ def _draw_limiters(axes: Any, rollout: Rollout) -> None:
 
 
 def draw_run(run: Run, path: str | Path) -> None:
-    """Write the overview of a run, or its plan where it did not drive."""
+    """Write the overview of a run, or its plan if it has no drive."""
     from antdrive.views.figures.plan_figures import plan_figure
 
     s = run.scenario
@@ -148,19 +148,19 @@ def draw_run(run: Run, path: str | Path) -> None:
 def certificate_figure(
     rollout: Rollout, certificate: Certificate, path: str | Path | None = None, *, dpi: float = 160
 ) -> Figure:
-    """Draw the driven path over the route, their distance over time, and the readings of the certificate.
+    """Draw the driven path over the route, the tracking error over time and the certificate's checks.
 
     Args:
         rollout: the run's log
-        certificate: as `certify` gives it
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
+        certificate: result of `certify`
+        path: the file to write; its suffix selects PNG, PDF or SVG; None: no file
         dpi: pixels per inch
 
     Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
+        The figure; `panels` returns its axes by name.
 
     Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
+        InputError: a suffix other than .png, .pdf and .svg.
     """
     scene = Scene.of(rollout)
     error = tracking_error(rollout) if len(rollout.route) > 1 else np.zeros(len(rollout.t))
@@ -176,25 +176,26 @@ def certificate_figure(
         curve: Any = figure.add_subplot(areas[0, 1], label="distance")
         curve.plot(rollout.t[keep], 1000 * error[keep], color=hexed(SHELL), lw=1.4)
         curve.set(title="distance from the route [mm]", xlabel="time [s]", ylim=(0, None))
-        _draw_readings(figure.add_subplot(areas[1, 1], label="readings"), certificate, rollout)
+        _draw_checks(figure.add_subplot(areas[1, 1], label="checks"), certificate, rollout)
     return figure
 
 
-def _draw_readings(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
-    """Write the verdict and the three readings, a line each, and the first problems."""
+def _draw_checks(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
+    """Draw the certificate's result, its three checks and the first three problems."""
     axes.axis("off")
     contacts = f"physics: {certificate.contacts} contacts in {len(rollout.t) - 1:,} steps"
     closest = f"geometry: min clearance {in_metres(certificate.min_clearance)} at the logged poses"
-    bound = f"bound: at least {in_metres(certificate.bound)} between logged poses, too"
-    readings = (
+    bound = f"bound: at least {in_metres(certificate.bound)} between logged poses"
+    checks = (
         (certificate.contacts == 0, contacts),
         (certificate.min_clearance > 0, closest),
         (certificate.bound > 0, bound),
     )
-    lines = [*readings, *((False, problem) for problem in certificate.problems[:3])]
-    verdict = certificate.statement
+    lines = [*checks, *((False, problem) for problem in certificate.problems[:3])]
     colour = hexed(GOOD if certificate.certified else BAD)
-    axes.text(0, 0.97, verdict, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes)
+    axes.text(
+        0, 0.97, certificate.statement, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes
+    )
     for k, (fine, words) in enumerate(lines):
         place: dict[str, Any] = {"y": 0.78 - 0.13 * k, "va": "top", "transform": axes.transAxes}
         axes.text(x=0, s="✓" if fine else "✕", color=hexed(GOOD if fine else BAD), weight="bold", **place)
@@ -205,15 +206,15 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
     """Draw the driven paths of several planners on one map, each in its planner's colour.
 
     Args:
-        rollouts: the logs of the runs, by planner
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
+        rollouts: the runs' logs, by planner
+        path: the file to write; its suffix selects PNG, PDF or SVG; None: no file
         dpi: pixels per inch
 
     Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
+        The figure; `panels` returns its axes by name.
 
     Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
+        InputError: a suffix other than .png, .pdf and .svg.
     """
     scene = Scene.of(next(iter(rollouts.values())))
     xmin, ymin, xmax, ymax = scene.bounds
@@ -224,7 +225,7 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
         for over, (name, rollout) in zip(reversed(range(len(rollouts))), rollouts.items(), strict=True):
             colour, dash = planner_style(name)
             label = f"{name}, {float(rollout.t[-1]):.1f} s"
-            width = 2.2 + 1.4 * over  # the first are the widest, to stay visible below the later ones
+            width = 2.2 + 1.4 * over  # earlier lines are wider to stay visible below later ones
             handles += axes.plot(
                 *rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=width, label=label, zorder=6
             )
@@ -240,7 +241,10 @@ def then_and_now(
     divergence: tuple[float, float, float] | None = None,
     dpi: float = 130,
 ) -> Figure:
-    """Draw two drives of the same scenario on one map, with their clearances and their distance over time."""
+    """Draw two drives of one scenario on one map, with both clearances and the robots' distance over time.
+
+    `divergence` is the time [s] and the place x, y [m] at which the drives first differ.
+    """
     scene = Scene.of(now)
     wide, high = map_size(scene)
     with sheet(path, (wide + 5.2, high + 0.9), dpi) as figure:
@@ -261,7 +265,7 @@ def then_and_now(
             chart.plot(*log.pose[-1, :2], "o", color=colour, ms=5, mec="white", zorder=6)
         if divergence is not None:
             style: dict[str, Any] = {"ms": 13, "mfc": "none", "mec": hexed(CONTACT), "mew": 2.0, "ls": "none"}
-            handles += chart.plot(*divergence[1:], "o", label=f"they part at {divergence[0]:.1f} s", zorder=8, **style)
+            handles += chart.plot(*divergence[1:], "o", label=f"divergence at {divergence[0]:.1f} s", zorder=8, **style)
         draw_legend(chart, [*handles, *draw_contact(chart, scene, now)], scene)
         above: Any = figure.add_subplot(areas[0, 1], label="clearance")
         below: Any = figure.add_subplot(areas[1, 1], sharex=above, label="distance")
@@ -271,14 +275,14 @@ def then_and_now(
 
 
 def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, divergence: float | None) -> None:
-    """Draw both clearances, and the distance between the two robots; `divergence` is when the drives part [s]."""
+    """Draw both clearances, the distance between the robots and the time of the divergence [s]."""
     above.set(title="clearance [m]")
     above.axhline(0, color=hexed(BAD), lw=1.0)
     for log, colour in ((then, THEN), (now, NOW)):
         above.plot(log.t, log.clearance, color=colour, lw=1.4)
     above.tick_params(labelbottom=False)
-    below.set(title="distance between the two [m]", xlabel="time [s]")
-    moments, apart = _apart(then, now)
+    below.set(title="distance between the drives [m]", xlabel="time [s]")
+    moments, apart = _distances(then, now)
     below.plot(moments, apart, color=hexed(MUTED), lw=1.4)
     below.set_ylim(0, None)
     for axes in (above, below):
@@ -287,8 +291,8 @@ def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, diverge
         axes.set_xlim(0, moments[-1])
 
 
-def _apart(then: Rollout, now: Rollout) -> tuple[Floats, Floats]:
-    """Moments (N,) [s], and how far the two robots are apart then (N,) [m]."""
+def _distances(then: Rollout, now: Rollout) -> tuple[Floats, Floats]:
+    """Return times (N,) [s] and the distances between the robots (N,) [m]."""
     moments = np.linspace(0.0, max(float(then.t[-1]), float(now.t[-1])), 600)
     x, y = (np.interp(moments, now.t, now.pose[:, k]) - np.interp(moments, then.t, then.pose[:, k]) for k in (0, 1))
     return moments, np.hypot(x, y)

@@ -1,4 +1,4 @@
-"""What a robot without a map knew: the ground it had seen, its hits, and when it first saw what it came near."""
+"""Figure of a mapless robot's occupancy map, explored area and first detections."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from antdrive.views.figures.map_chart import draw_map
 from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders
 from antdrive.views.scene import Scene
 
-LISTED = 14  # obstacles whose first sight is drawn: those that the robot came nearest to
-CURVE = 160  # points of the curve of explored ground
+LISTED = 14  # obstacles with the closest approaches, whose first detections are drawn
+CURVE = 160  # points of the curve of explored area
 
 
 def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
-    """Draw what a robot without a map knew: the ground on its map and hits, route and drive, and its first sights of obstacles.
+    """Draw a mapless robot's occupancy map with routes and driven path, its explored area and its first detections.
 
-    The map is the robot's own, in the frame of its estimated poses, over the world as it was: where hits lie beside obstacles,
-    the estimate had drifted.
+    The occupancy map is in the frame of the estimated poses and lies over the true world: an offset between hits and obstacles
+    shows the drift of the estimate.
 
     Args:
         rollout: the run's log, with scans
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
+        path: the file to write; its suffix selects PNG, PDF or SVG; None: no file
         dpi: pixels per inch
 
     Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
+        The figure; `panels` returns its axes by name.
 
     Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
+        InputError: a suffix other than .png, .pdf and .svg.
         ValueError: the log has no scans.
     """
     scene, seen = Scene.of(rollout), MapReconstruction(rollout)
@@ -55,17 +55,17 @@ def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float
         chart: Any = figure.add_subplot(areas[:, 0], label="map")
         _draw_known(chart, scene, rollout, seen, listed)
         frame_map(chart, shown)
-        curve: Any = figure.add_subplot(areas[0, 1], label="known ground")
+        curve: Any = figure.add_subplot(areas[0, 1], label="explored area")
         curve.plot(moments, explored, color=hexed(BEAM), lw=1.8)
-        curve.set(title="ground on the robot's map [m²]", ylim=(0, None), xlim=(0, max(float(rollout.t[-1]), 1e-3)))
+        curve.set(title="explored area [m²]", ylim=(0, None), xlim=(0, max(float(rollout.t[-1]), 1e-3)))
         curve.set_title(f"{explored[-1]:.1f} m² at the end", loc="right", fontsize=9, weight="normal")
-        _draw_sights(figure.add_subplot(areas[1, 1], sharex=curve, label="first sights"), rollout, listed)
-        draw_title(figure, f"{scene.name}   ·   what {scene.robot.name} knew", rollout.outcome)
+        _draw_detections(figure.add_subplot(areas[1, 1], sharex=curve, label="first detections"), rollout, listed)
+        draw_title(figure, f"{scene.name}   ·   occupancy map of {scene.robot.name}", rollout.outcome)
     return figure
 
 
 def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: MapReconstruction, listed: list[Sighting]) -> None:
-    """Draw the robot's map over the world, the route and the drive, and the numbers of the listed obstacles."""
+    """Draw the occupancy map over the world, routes and driven path, and the numbers of the listed obstacles."""
     draw_map(axes, scene, floor=False)
     x0, y0, x1, y1 = scene.bounds
     high, wide = seen.seen.shape
@@ -93,29 +93,29 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: MapReconstructi
         axes.text(x, y, sight.obstacle, color=colour, ha="center", va="center", fontsize=7, weight="bold", zorder=7)
     axes.set(xlim=limits[0], ylim=limits[1])
     known = [
-        Patch(fc=hexed(OBSTACLE), label="obstacle, seen"),
-        Patch(fc=hexed(PALE), ec=hexed(OBSTACLE), label="obstacle, never seen"),
-        Patch(fc=hexed(HIT), label="hits on its map"),
-        Patch(fc=hexed(PALE), ec=hexed(HATCH), hatch="////", lw=0, label="ground not known to be free"),
+        Patch(fc=hexed(OBSTACLE), label="detected obstacle"),
+        Patch(fc=hexed(PALE), ec=hexed(OBSTACLE), label="undetected obstacle"),
+        Patch(fc=hexed(HIT), label="hits on the map"),
+        Patch(fc=hexed(PALE), ec=hexed(HATCH), hatch="////", lw=0, label="unknown ground"),
     ]
     if scene.mover_radii:
         known.append(Patch(fc=hexed(MOVER), label=scene.movers_label))
     legend_above(axes, [*handles, *known], handlelength=1.6)
 
 
-def _draw_sights(axes: Any, rollout: Rollout, listed: list[Sighting]) -> None:
-    """Draw a bar for each listed obstacle, from its first sight to the moment when the robot was nearest."""
-    axes.set(title="from first sight to nearest, obstacle by obstacle", xlabel="time [s]")
+def _draw_detections(axes: Any, rollout: Rollout, listed: list[Sighting]) -> None:
+    """Draw a bar for each listed obstacle, from its first detection to the robot's closest approach."""
+    axes.set(title="first detection to closest approach, by obstacle", xlabel="time [s]")
     for row, sight in enumerate(listed):
         colour = hexed(BAD if sight.touched else GOOD if np.isfinite(sight.seen_at) else MUTED)
         start = min(sight.seen_at, sight.nearest_at)
         axes.plot([start, sight.nearest_at], [row, row], color=hexed(BEAM), lw=3.0, alpha=0.55, solid_capstyle="butt")
         axes.plot(sight.nearest_at, row, "X" if sight.touched else "o", ms=6 if sight.touched else 4, color=colour)
-        words = "never seen" if np.isinf(sight.seen_at) else f"first seen {sight.seen_from:.1f} m away"
-        words += ", touched" if sight.touched else f", nearest {sight.nearest:.2f} m"
+        words = "never detected" if np.isinf(sight.seen_at) else f"detected at {sight.seen_from:.1f} m"
+        words += ", contact" if sight.touched else f", closest {sight.nearest:.2f} m"
         axes.text(sight.nearest_at, row, f"  {words}", va="center", fontsize=7, color=hexed(INK))
     axes.set_yticks(range(len(listed)), [str(sight.obstacle) for sight in listed], fontsize=7)
     axes.set_ylim(len(listed) - 0.4, -0.6)
     end = max(float(rollout.t[-1]), 1e-3)
     axes.set_xticks([tick for tick in axes.get_xticks() if 0 <= tick <= end])
-    axes.set_xlim(0, 1.6 * end)  # room for the words
+    axes.set_xlim(0, 1.6 * end)  # space for the words

@@ -1,1 +1,1 @@
-"""Films and stills of runs, rendered from their logs."""
+"""Films and stills of runs, rendered from logs."""

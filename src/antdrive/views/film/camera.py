@@ -1,4 +1,4 @@
-"""Cameras: framing a part of the world, projecting points to pixels, and cropping a picture."""
+"""Pinhole cameras: framing, projection and visibility."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Picture: TypeAlias = npt.NDArray[np.uint8]  # (H, W, 3), red, green, blue
 CAMERAS: tuple[str, ...] = ("oblique", "top", "follow")
 
 _TILT = {"oblique": 52.0, "top": 90.0, "follow": 46.0}  # above the horizon [degrees]
-PAD = 0.04  # free at each edge of a picture, as a share of its side
+PAD = 0.04  # free border of a picture, as a fraction of its side
 _FOV = {"oblique": 30.0, "top": 6.0, "follow": 34.0}  # vertical [degrees]
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pinhole camera. Pixels count from the upper left corner, x to the right and y down."""
+    """Pinhole camera. Pixels count from the upper left corner, x to the right and y down."""
 
     view: Floats  # world to camera (4, 4)
     projection: Floats  # camera to clip space (4, 4)
@@ -30,7 +30,7 @@ class Camera:
 
     @classmethod
     def framing(cls, points: Floats, size: tuple[int, int], *, tilt: float, fov: float, turned: bool = False) -> Camera:
-        """The nearest camera that sees all points (N, 3) [m]."""
+        """Return the nearest camera that shows all points (N, 3) [m]."""
         right, up, back = _axes(math.radians(tilt), turned)
         basis = np.array([right, up, back])
         seen = points @ basis.T
@@ -38,7 +38,7 @@ class Camera:
         tan_y = math.tan(math.radians(fov) / 2)
         tan_x = tan_y * size[0] / size[1]
         # A point is right of the left edge if x - cx >= left (depth - cz): linear in the camera's position cx, cz.
-        # The same holds for the other edges, so the nearest position follows from the extreme points alone.
+        # The same holds for the other edges: the nearest position follows from the extreme points.
         left, right_edge = -tan_x * (1 - 2 * PAD), tan_x * (1 - 2 * PAD)
         top, bottom = tan_y * (1 - 2 * PAD), -tan_y * (1 - 2 * PAD)
         ax, bx = float((x - left * depth).min()), float((x - right_edge * depth).max())
@@ -59,11 +59,11 @@ class Camera:
 
     @property
     def ground(self) -> Floats:
-        """The homogeneous map (3, 3) from points (x, y, 1) on the ground to pixels."""
+        """Homography (3, 3) from points (x, y, 1) on the ground to pixels."""
         return self.plane(0.0)
 
     def plane(self, height: float) -> Floats:
-        """The homogeneous map (3, 3) from points (x, y, 1) at a height [m] above the ground to pixels."""
+        """Return the homography (3, 3) from points (x, y, 1) at a height [m] to pixels."""
         clip = self.full[:, [0, 1, 3]]
         if height:
             clip = clip + np.outer(self.full[:, 2], [0.0, 0.0, height])
@@ -72,14 +72,14 @@ class Camera:
 
     @property
     def pixel(self) -> float:
-        """The width of a pixel on the ground in the middle of the picture [m]."""
+        """Width of a pixel on the ground in the middle of the picture [m]."""
         width, height = self.size
         back = np.linalg.inv(self.ground)
         ends = np.array([(width / 2 + k, height / 2, 1.0) for k in (-0.5, 0.5)]) @ back.T
         return float(np.hypot(*(ends[1, :2] / ends[1, 2] - ends[0, :2] / ends[0, 2])))
 
     def pixels(self, points: npt.ArrayLike) -> Floats:
-        """Where points (N, 3) [m] appear, (N, 2) [px]."""
+        """Project points (N, 3) [m] to pixels (N, 2) [px]."""
         xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         clip = np.column_stack([xyz, np.ones(len(xyz))]) @ self.full.T
         width, height = self.size
@@ -87,7 +87,7 @@ class Camera:
         return np.column_stack([(1 + ndc[:, 0]) * width / 2, (1 - ndc[:, 1]) * height / 2])
 
     def sees(self, centres: Floats, radii: Floats) -> Flags:
-        """Which balls at centres (N, 3) with radii (N,) [m] may be in sight; none that reaches behind the camera."""
+        """Return which balls at centres (N, 3) with radii (N,) [m] may be visible, without those behind the camera."""
         x, y, z = (centres @ self.view[:3, :3].T + self.view[:3, 3]).T
         depth = -z
         inside: Flags = depth > radii
@@ -96,14 +96,14 @@ class Camera:
         return inside
 
     def moved(self, x: float, y: float) -> Camera:
-        """The same camera, shifted along the ground [m]."""
+        """Return the camera shifted along the ground [m]."""
         shift = np.eye(4)
         shift[:2, 3] = -x, -y
         return Camera(self.view @ shift, self.projection, self.size)
 
 
 def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int]) -> Camera:
-    """The camera of a name that sees a rectangle of the ground and the bodies on it."""
+    """Return the named camera that shows a ground rectangle and the bodies on it."""
     (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     corners = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (0.0, height)])
     tilt, fov = _TILT[name], _FOV[name]
@@ -112,17 +112,17 @@ def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float
 
 
 def turns(shape: float, size: tuple[int, int]) -> bool:
-    """Whether cameras of a wide picture look along -x: at ground that is long in y."""
+    """Return whether a wide picture shows ground of this width over height turned, along -x."""
     return shape < 0.75 and size[0] > size[1]
 
 
 def _axes(tilt: float, turned: bool) -> tuple[Floats, Floats, Floats]:
-    """The camera's right, up and back directions."""
+    """Return the camera's right, up and back directions."""
     ahead = np.array([-1.0, 0.0, 0.0]) if turned else np.array([0.0, 1.0, 0.0])
     right = np.array([0.0, 1.0, 0.0]) if turned else np.array([1.0, 0.0, 0.0])
     sky = np.array([0.0, 0.0, 1.0])
-    look = math.cos(tilt) * ahead - math.sin(tilt) * sky
-    return right, np.cross(right, look), -look
+    forward = math.cos(tilt) * ahead - math.sin(tilt) * sky
+    return right, np.cross(right, forward), -forward
 
 
 def _perspective(tan_x: float, tan_y: float, near: float, far: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Films of several runs side by side, each in its own tile, all at the same moment."""
+"""Side-by-side films of several runs, each in its own tile, at the same time."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from antdrive.views.film.video import HOLD, encoded, frame_times
 from antdrive.views.scene import Scene
 
 MAX_RUNS = 6
-FULL = (1280, 720)  # of a film whose size nobody chose [px]
-LEAST_TILE = 360  # its least width, for the words in its head [px]
-FILLED = 0.92  # the part of a picture's sides that the world takes, seen from above
+FULL = (1280, 720)  # default size [px]
+LEAST_TILE = 360  # least width of a tile, for the text in its header [px]
+FILLED = 0.92  # fraction of a picture's sides that the world fills, in top view
 
 
 def compare_film(
@@ -41,7 +41,10 @@ def compare_film(
     mark: Mark | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FilmInfo:
-    """Film two to six runs side by side. A run that ends before the others keeps its last picture."""
+    """Film two to six runs side by side. A run that ends before the others keeps its last picture.
+
+    The arguments are those of `film`, with a title per run and a mark at a place.
+    """
     target = Path(path)
     known_suffix(target, ENCODERS)
     options = FilmOptions(camera, size or FULL, fps, speed).checked()
@@ -55,16 +58,16 @@ def compare_film(
 
 
 class Mark(NamedTuple):
-    """A place that is marked in a film."""
+    """Labelled place in a film."""
 
-    t: float  # from when on [s]
-    x: float  # where [m]
-    y: float  # where [m]
-    text: str  # what is written there
+    t: float  # time of its appearance [s]
+    x: float  # place [m]
+    y: float  # place [m]
+    text: str  # label
 
 
 class SplitScreen:
-    """The frames of several runs, each in a tile."""
+    """Frames of several runs, each in a tile."""
 
     def __init__(
         self,
@@ -84,7 +87,7 @@ class SplitScreen:
         self._tiles = [Tile(log, camera, room, name, mark) for log, name in zip(rollouts, names, strict=True)]
 
     def frame(self, at: float) -> Picture:
-        """The frame (H, W, 3) at a moment of all runs [s]."""
+        """Return the frame (H, W, 3) at a time of all runs [s]."""
         frame = np.full((*self._size[::-1], 3), (210, 216, 225), dtype=np.uint8)
         for (x, y), tile in zip(self._corners, self._tiles, strict=True):
             part = tile.frame(at)
@@ -93,7 +96,7 @@ class SplitScreen:
 
 
 class Tile:
-    """One run among several: a head with its name and the run's numbers, and the picture below."""
+    """Tile of one run: a header with its name and numbers, and the picture below."""
 
     def __init__(
         self, rollout: Rollout, camera: str, size: tuple[int, int], name: str, mark: Mark | None = None
@@ -107,7 +110,7 @@ class Tile:
         self._last: Picture | None = None  # the tile once the run is over
 
     def frame(self, at: float) -> Picture:
-        """The tile (h, w, 3) at a moment [s]; after the run's end, the last one."""
+        """Return the tile (h, w, 3) at a time [s]; after the run's end, the last one."""
         end = self.shot.playback.duration
         if at < end:
             return self._with_head(self._marked(self.shot.view(at), at), at, False)
@@ -116,7 +119,7 @@ class Tile:
         return self._last
 
     def _marked(self, view: Picture, at: float) -> Picture:
-        """The picture with the mark, from its moment on."""
+        """Draw the mark from its time on and return the picture."""
         if self._mark is not None and at >= self._mark.t:
             self.shot.put_label(view, self._mark.text, self._mark.x, self._mark.y)
         return view
@@ -127,18 +130,18 @@ class Tile:
         draw = ImageDraw.Draw(image)
         draw.rectangle((0, 0, round(0.5 * unit), self._head), fill=self._colour)
         words, colour = OUTCOME_LABELS[self._outcome] if over else (f"{at:.1f} s", CALM)
-        verdict = pill(words, round(0.85 * unit), colour)
-        room = wide - verdict.shape[1] - round(2.2 * unit)
+        status = pill(words, round(0.85 * unit), colour)
+        room = wide - status.shape[1] - round(2.2 * unit)
         large, small = round(1.15 * unit), round(0.8 * unit)
         name = fitted(self._name, room, large, True)
         draw.text((1.2 * unit, 0.3 * unit), name, font=font(large, True), fill=INK)
         facts = [f"path {self._length:.2f} m", f"min clearance {self.shot.playback.min_clearance(at):.3f} m"]
-        facts = [*facts, f"took {at:.1f} s"] if over else facts
+        facts = [*facts, f"time {at:.1f} s"] if over else facts
         while len(facts) > 1 and text_width("  ·  ".join(facts), small) > wide - 2 * unit:
             facts.pop(0)
         draw.text((1.2 * unit, 1.9 * unit), "  ·  ".join(facts), font=font(small), fill=MUTED)
         head = np.array(image)
-        put(head, verdict, wide - verdict.shape[1] - round(0.5 * unit), 0.25 * unit)
+        put(head, status, wide - status.shape[1] - round(0.5 * unit), 0.25 * unit)
         return np.vstack([head, view])
 
 
@@ -148,7 +151,7 @@ def _title(log: Rollout, one_world: bool) -> str:
 
 
 def fitting_size(rollouts: Sequence[Rollout], camera: str) -> tuple[int, int]:
-    """The size of a film that shows the worlds as large as `FULL` does; from above it has no empty ground beside them."""
+    """Return the film size that shows the worlds at the scale of `FULL`, without empty ground around them in top view."""
     if camera != "top":
         return FULL
     extents = [_extent(log) for log in rollouts]
@@ -162,18 +165,18 @@ def fitting_size(rollouts: Sequence[Rollout], camera: str) -> tuple[int, int]:
 
 
 def _even(length: float, most: int) -> int:
-    """The next even number, from 160 to `most`."""
+    """Return the next even number, from 160 to `most`."""
     return min(max(2 * math.ceil(length / 2), 160), most)
 
 
 def _head_of(tile: tuple[int, int]) -> tuple[int, int]:
-    """The height of small text in a tile of this size, and of its head [px]."""
+    """Return the height of small text in a tile of this size, and of its header [px]."""
     unit = max(11, round(min(tile[0] / 30, tile[1] / 22)))
     return unit, 2 * round(1.55 * unit)
 
 
 def _tiling(rollouts: Sequence[Rollout], camera: str, size: tuple[int, int]) -> tuple[int, int]:
-    """Columns and rows of tiles."""
+    """Return the columns and rows of tiles."""
     count = len(rollouts)
     if camera != "top":
         return _arrangement(count, size, _proportion(rollouts) if camera == "oblique" else 1.0)
@@ -187,14 +190,14 @@ def _tiling(rollouts: Sequence[Rollout], camera: str, size: tuple[int, int]) -> 
 
 
 def _extent(log: Rollout) -> tuple[float, float]:
-    """Width and height of the ground that a camera from above shows of a run [m]."""
+    """Return width and height of the ground that a top view of a run shows [m]."""
     low, high = Scene.of(log).region(np.vstack([log.pose[:, :2], log.route]))
     wide, tall = (high - low).tolist()
     return wide, tall
 
 
 def _scale(extents: Sequence[tuple[float, float]], tile: tuple[int, int]) -> float:
-    """How large a tile shows the largest of the worlds [px/m]."""
+    """Return the scale at which a tile shows the largest of the worlds [px/m]."""
     view = (tile[0], tile[1] - _head_of(tile)[1])
 
     def of(extent: tuple[float, float]) -> float:
@@ -205,13 +208,13 @@ def _scale(extents: Sequence[tuple[float, float]], tile: tuple[int, int]) -> flo
 
 
 def _proportion(rollouts: Sequence[Rollout]) -> float:
-    """Width over height of the widest world, at least 1."""
+    """Return width over height of the widest world, at least 1."""
     bounds = [log.record.task.world.bounds for log in rollouts]
     return max(1.0, *((xmax - xmin) / (ymax - ymin) for xmin, ymin, xmax, ymax in bounds))
 
 
 def _arrangement(count: int, size: tuple[int, int], proportion: float) -> tuple[int, int]:
-    """Columns and rows of tiles, with few empty ones, whose pictures suit a world of this width over height."""
+    """Return columns and rows of tiles that suit a world of this width over height, with few empty tiles."""
 
     def cost(cols: int) -> float:
         rows = -(-count // cols)

@@ -1,8 +1,7 @@
-"""Compose the pictures of a film: everything that stands still is rendered once; each frame adds robot and movers.
+"""Compositor of film frames: a static backdrop, rendered once, plus robot and movers in each frame.
 
-Ray casting draws the bodies that stand still. This backdrop keeps its depth, so a frame costs only the pixels around
-the robot and the movers: their meshes are drawn, and blended in where they are nearer than the backdrop. A camera that
-moves needs a new backdrop in every frame.
+Ray casting draws the static bodies. The backdrop keeps its depth, so a frame costs only the pixels around robot and movers:
+their meshes are drawn and blended in where they are nearer. A moving camera needs a new backdrop for every frame.
 """
 
 from __future__ import annotations
@@ -31,42 +30,42 @@ if TYPE_CHECKING:
     from antdrive.worlds import Grid
 
 
-HIDDEN_OPACITY = 0.16  # of a robot behind a cylinder, so that it is never lost
+HIDDEN_OPACITY = 0.16  # of a robot behind a cylinder
 SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
-RING_SIDES, RING_OFF = 32, 0.05  # of the ring around a mover that is followed, and how far off its surface [m]
-FORECAST = 1.5  # how far ahead the motion of movers is drawn [s]
+RING_SIDES, RING_OFF = 32, 0.05  # ring around a tracked mover: sides, distance from its surface [m]
+FORECAST = 1.5  # horizon of the movers' drawn motion [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """What a camera sees of everything that stands still."""
+    """Picture of all static bodies by one camera."""
 
-    camera: Camera  # the camera
+    camera: Camera
     pixels: Picture  # the picture (H, W, 3)
-    visible: npt.NDArray[np.float32]  # the fraction of each pixel that shows ground (H, W)
-    # depth of the bodies in clip space, 1 where there is none, at the resolution they were rendered in
+    visible: npt.NDArray[np.float32]  # fraction of each pixel that shows ground (H, W)
+    # depth of the bodies in clip space at the rendered resolution, 1 for ground
     depth: npt.NDArray[np.float32]
-    bodies: npt.NDArray[np.int32]  # at the same resolution the number of the obstacle in sight, -1 for ground
+    bodies: npt.NDArray[np.int32]  # index of the visible obstacle at the rendered resolution, -1 for ground
 
     @cached_property
     def forward(self) -> Floats:
-        """The homogeneous map (3, 3) from the ground to pixels."""
+        """Homography (3, 3) from the ground to pixels."""
         return self.camera.ground
 
     @cached_property
     def inverse(self) -> Floats:
-        """The homogeneous map (3, 3) from pixels to the ground."""
+        """Homography (3, 3) from pixels to the ground."""
         return np.asarray(np.linalg.inv(self.forward))
 
     def blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float, *, over: bool = False) -> None:
-        """Blend capsules (N, 5) of one colour into the ground of a frame, or over everything."""
+        """Blend capsules (N, 5) of one colour into the ground of a frame, or over all bodies."""
         visible = np.ones_like(self.visible) if over else self.visible
         tint = np.array(colour, dtype=np.float64)
         kernels.blend_capsules(frame, visible, self.forward, self.inverse, rows, tint, strength)
 
 
 class Compositor:
-    """Draws frames of one scene for one camera.
+    """Compositor of the frames of one scene for one camera.
 
     >>> compositor = Compositor(scene, camera, route=rollout.route)
     >>> compositor.extend_trail(points, speeds)
@@ -74,12 +73,12 @@ class Compositor:
     """
 
     def __init__(
-        self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, sight: BeamPainter | None = None
+        self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, lidar_view: BeamPainter | None = None
     ) -> None:
         self.scene = scene
         self.camera = camera
         self.fine = fine
-        self._lidar_view = sight
+        self._lidar_view = lidar_view
         self.tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
         self._route = np.ascontiguousarray(route, dtype=np.float64).reshape(-1, 2)
         self._sun, self._light = _sun(camera)
@@ -108,15 +107,15 @@ class Compositor:
             self._paint_trail(rows[seen], tints[seen])
 
     def extend_trail(self, points: Floats, speeds: npt.ArrayLike) -> None:
-        """Continue the driven path along points (N, 2) [m], N >= 2, coloured by the speeds (N,) there [m/s]."""
-        share = np.abs(np.asarray(speeds, dtype=np.float64)) / self.scene.robot.max_speed
+        """Extend the driven path along points (N, 2) [m], N >= 2, coloured by the speeds (N,) there [m/s]."""
+        fraction = np.abs(np.asarray(speeds, dtype=np.float64)) / self.scene.robot.max_speed
         rows = capsules(points[:-1], points[1:], self._trail_width / 2)
-        tints = colours.speed_colours((share[:-1] + share[1:]) / 2)
+        tints = colours.speed_colours((fraction[:-1] + fraction[1:]) / 2)
         self._trail.append((rows, tints))
         self._paint_trail(rows, tints)
 
     def show_route(self, route: Floats, replanned_at: Floats) -> None:
-        """Replace the route that later frames show."""
+        """Replace the route of later frames."""
         width = 1.5 * self.camera.pixel
         self._changing_route = (dashes(route, width), capsules(replanned_at, replanned_at, 2.4 * width))
 
@@ -126,9 +125,9 @@ class Compositor:
         wheels: tuple[float, float] = (0.0, 0.0),
         movers: npt.ArrayLike = (),
         velocities: npt.ArrayLike | None = None,
-        followed: Floats | None = None,
+        tracked: Floats | None = None,
     ) -> Picture:
-        """The picture (H, W, 3) with robot and movers."""
+        """Return the picture (H, W, 3) with robot and movers."""
         x, y, yaw = (float(value) for value in np.asarray(pose))
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
         frame = self._canvas.copy()
@@ -150,12 +149,12 @@ class Compositor:
             self._put_bodies(frame, box, [solid for body in inside for solid in body])
         if isinstance(self._lidar_view, OwnMapPainter):
             self._lidar_view.draw_hits(frame, self.backdrop)
-        if followed is not None:
-            self._draw_followed(frame, followed)
+        if tracked is not None:
+            self._draw_tracked(frame, tracked)
         return frame
 
     def field_frame(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
-        """The picture (H, W, 3) without a robot, with a planner's field on the ground and a path over it."""
+        """Return the picture (H, W, 3) without a robot, with a planner's field on the ground and a path over it."""
         frame = self.backdrop.pixels.copy()
         tints = colours.field_colours(np.linspace(0, 1, 256))
         back, (x, y) = self.backdrop, grid.origin
@@ -169,7 +168,7 @@ class Compositor:
         return frame
 
     def add_label(self, sprite: Picture, x: float, y: float, reach: float) -> None:
-        """Put an RGBA picture on the ground for good, below (or above) the disc of radius `reach` at x, y [m]."""
+        """Add an RGBA picture on the ground, below (or above) the disc of radius `reach` at x, y [m], to all frames."""
         self._labels.append((sprite, x, y, reach))
         self._put_on_ground(sprite, x, y, reach)
 
@@ -210,27 +209,27 @@ class Compositor:
         )
 
     def _draw_forecast(self, frame: Picture, places: Floats, velocities: Floats) -> None:
-        """Draw a line from each mover to where it will be at constant velocity, with a dot at each half second."""
+        """Draw each mover's path at constant velocity as a line with a dot every 0.5 s."""
         half = 1.1 * self.camera.pixel
         ahead = places + FORECAST * velocities
         moving = np.hypot(*velocities.T) > 0.01
         self.backdrop.blend(frame, capsules(places, ahead, half)[moving], colours.MOVER, 0.45)
-        stops = [places + share * (ahead - places) for share in (1 / 3, 2 / 3, 1.0)]
+        stops = [places + part * (ahead - places) for part in (1 / 3, 2 / 3, 1.0)]
         dots = np.vstack([capsules(stop, stop, 2.2 * half)[moving] for stop in stops])
         self.backdrop.blend(frame, dots, colours.MOVER, 0.75)
 
-    def _draw_followed(self, frame: Picture, followed: Floats) -> None:
-        """Draw a ring where the robot believes a mover to be, and a line to where it will be at the estimated velocity."""
+    def _draw_tracked(self, frame: Picture, tracked: Floats) -> None:
+        """Draw a ring at each mover's estimated position, and its path at the estimated velocity."""
         turn = np.linspace(0, 2 * math.pi, RING_SIDES + 1)
         half = 1.2 * self.camera.pixel
         circle = np.column_stack([np.cos(turn), np.sin(turn)])
-        rims = [np.array([x, y]) + (radius + RING_OFF) * circle for x, y, _, _, radius in followed]
-        places, ahead = followed[:, :2], followed[:, :2] + FORECAST * followed[:, 2:4]
+        rims = [np.array([x, y]) + (radius + RING_OFF) * circle for x, y, _, _, radius in tracked]
+        places, ahead = tracked[:, :2], tracked[:, :2] + FORECAST * tracked[:, 2:4]
         rows = [*(capsules(rim[:-1], rim[1:], half) for rim in rims), capsules(places, ahead, half)]
-        self.backdrop.blend(frame, np.concatenate(rows), colours.FOLLOWED, 0.8, over=True)
+        self.backdrop.blend(frame, np.concatenate(rows), colours.TRACKED, 0.8, over=True)
 
     def _draw_shadows(self, frame: Picture, pose: Floats, movers: Floats) -> None:
-        """Draw the soft shadows of robot and movers, and a glow under a robot that is small in the picture."""
+        """Draw the soft shadows of robot and movers, and a glow around a robot that is small in the picture."""
         tall, foot = robot_height(self.scene.robot), self.scene.robot.footprint
         shape, place = np.array([foot.half_length, foot.half_width, foot.rounding]), pose
         if foot.corners:  # the shadow of the rectangle around it
@@ -250,7 +249,7 @@ class Compositor:
             self._draw_shadow(frame, np.array([x, y, 0.0]), disc, drawn_height(self.scene))
 
     def _draw_shadow(self, frame: Picture, pose: Floats, shape: Floats, tall: float) -> None:
-        """Darken the ground beside a body, where it keeps off the sun, and below it, where it keeps off the sky."""
+        """Darken the ground beside a body, in its sun shadow, and below it, where it blocks the sky."""
         sun, soft, back = np.array(self._sun) * tall, SHADOW_BLUR + 0.3 * tall, self.backdrop
         for reach, blur, strength in ((sun, soft, 0.30), (np.zeros(2), float(0.5 * shape.sum()), 0.22)):
             kernels.shade_body(frame, back.visible, back.forward, back.inverse, pose, shape, reach, blur, strength)
@@ -267,7 +266,7 @@ class Compositor:
         ]
 
     def _boxes(self, x: float, y: float, movers: Floats) -> list[Box | None]:
-        """The pixels that the robot and each mover may cover; None for one that is out of sight."""
+        """Return the pixel boxes of the robot and each mover; None outside the picture."""
         tall = drawn_height(self.scene)
         robot = self.scene.robot
         bodies = [(x, y, 1.05 * robot.footprint.radius, 1.2 * max(robot_height(robot), 2.2 * robot.wheel_radius))]
@@ -291,17 +290,17 @@ class Compositor:
 
 
 def drawn_height(scene: Scene) -> float:
-    """The tallest that cylinders are drawn [m]: taller ones would hide the robot."""
+    """Return the largest drawn height of cylinders [m]: taller ones would hide the robot."""
     return max(0.3, 2.0 * robot_height(scene.robot))
 
 
 def trail_width(scene: Scene, camera: Camera) -> float:
-    """The width of the driven path [m]: a fraction of the robot's, and at least four pixels."""
+    """Return the width of the driven path [m]: a fraction of the robot's, at least four pixels."""
     return max(0.32 * scene.robot.footprint.radius, 4.0 * camera.pixel)
 
 
 def still_solids(scene: Scene, tall: Floats) -> Solids:
-    """Everything that stands still: the kerb in pieces, and cylinders of heights `tall` (N,) [m]."""
+    """Return all static bodies: the kerb in pieces, and cylinders of heights `tall` (N,) [m]."""
     width = kerb_width(scene)
     kerbs = [mesh.vertices for mesh in kerb(scene.bounds, width, 0.8 * width)]
     boxes = np.array([np.concatenate([corners.min(axis=0), corners.max(axis=0)]) for corners in kerbs])
@@ -313,7 +312,7 @@ def still_solids(scene: Scene, tall: Floats) -> Solids:
 def part_pose(
     part: Part, x: float, y: float, yaw: float, wheels: tuple[float, float]
 ) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    """Position [m] and orientation (quaternion) of a part of the robot at a pose with its wheels turned [rad]."""
+    """Return position [m] and quaternion of a part of the robot at a pose with wheel angles [rad]."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     ax, ay, az = part.axle
     angle = 0.0 if part.wheel == 0 else wheels[0] if part.wheel > 0 else wheels[1]
@@ -323,7 +322,7 @@ def part_pose(
 
 
 def _sun(camera: Camera) -> tuple[tuple[float, float], tuple[float, float, float]]:
-    """How far shadows reach per metre of height, and the direction to the lamp: left of the camera, in front."""
+    """Return the shadow's extent per metre of height and the direction to the lamp, left of the camera, in front."""
     right = camera.view[0, :3]
     ahead = np.array([-right[1], right[0], 0.0])
     reach = 0.55 * right + 0.28 * ahead

@@ -1,4 +1,4 @@
-"""The options of a film: what may be asked of `film`, `still` and `compare_film`, and facts about the film that was made."""
+"""Options of films and stills, and facts about written films."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from antdrive.base.errors import InputError
 from antdrive.views.film.camera import CAMERAS
 
-#: The file suffixes of films, each with ffmpeg's options for its format.
+#: ffmpeg's options by file suffix.
 ENCODERS: dict[str, tuple[str, ...]] = {
     ".mp4": (
         *("-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
@@ -17,27 +17,30 @@ ENCODERS: dict[str, tuple[str, ...]] = {
         *("-color_primaries", "bt709", "-color_trc", "bt709"),
     ),
     ".gif": (
-        # A palette per frame: for one palette, ffmpeg would have to hold the whole film in memory.
+        # A palette per frame: a common palette would hold the whole film in memory.
         *("-vf", "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"),
         *("-c:v", "gif", "-loop", "0"),
     ),
     ".webp": ("-c:v", "libwebp_anim", "-pix_fmt", "yuv420p", "-quality", "70", "-compression_level", "2", "-loop", "0"),
 }
-STILLS: dict[str, dict[str, Any]] = {".png": {}, ".webp": {"quality": 82, "method": 4}}  # how pictures are written
+STILLS: dict[str, dict[str, Any]] = {
+    ".png": {},
+    ".webp": {"quality": 82, "method": 4},
+}  # Pillow's options by file suffix
 
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """How a run is filmed. A new option is a field here and an argument of `film`; its colours stand in `views/colours.py`."""
+    """Options of a film."""
 
     camera: str = "oblique"  # the camera's name
     size: tuple[int, int] = (1280, 720)  # width and height [px]
     fps: float = 30.0  # frames per second
     speed: float = 1.0  # of the film, relative to the run
-    note: str | None = None  # a line for the band below the picture
+    note: str | None = None  # line in the band below the picture
 
     def checked(self) -> FilmOptions:
-        """The same options; wrong ones are refused before any work."""
+        """Return the options; raise `InputError` if one is invalid."""
         if self.camera not in CAMERAS:
             raise InputError(f"camera: unknown camera {self.camera!r}; choose one of {', '.join(CAMERAS)}")
         if len(self.size) != 2 or any(side % 2 or not 160 <= side <= 4096 for side in self.size):
@@ -50,7 +53,7 @@ class FilmOptions:
 
 @dataclass(frozen=True)
 class FilmInfo:
-    """Facts about a film that was written.
+    """Facts about a written film.
 
     Attributes:
         path: the file
@@ -58,7 +61,7 @@ class FilmInfo:
         size: width and height [px]
         fps: frames per second
         camera: the camera's name
-        wall_s: how long rendering and encoding took [s]
+        wall_s: wall time of rendering and encoding [s]
     """
 
     path: Path

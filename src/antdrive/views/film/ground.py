@@ -1,4 +1,4 @@
-"""Paint the ground of a film: floor, grid, inflated zones, soft shadows, planned route, start and goal."""
+"""Ground of a film: floor, grid, no-go area, soft shadows, planned route, start and goal."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from antdrive.views.scene import Scene
 
 Mask = npt.NDArray[np.bool_]
 
-SHADOW_DEPTH = 0.30  # how much light the deepest shadow takes away
+SHADOW_DEPTH = 0.30  # fraction of the light that the deepest shadow removes
 
 
 def paint_ground(
     camera: Camera, scene: Scene, route: Floats, ground: Mask, tall: Floats, sun: tuple[float, float]
 ) -> npt.NDArray[np.float32]:
-    """The ground (H, W, 3) as a camera sees it."""
+    """Paint the ground (H, W, 3) for a camera."""
     width, height = camera.size
     brush = _Brush(camera, ground)
-    under = kerb_width(scene) / 2  # the floor continues under the kerb, so that its edge is hidden
+    under = kerb_width(scene) / 2  # the kerb hides the floor's edge
     bounds = np.array(scene.bounds) + np.array([-under, -under, under, under])
     step = grid_step(camera)
     tints = np.array([GROUND, PAPER, GRID], dtype=np.float64)
@@ -46,13 +46,13 @@ def paint_ground(
 
 
 def kerb_width(scene: Scene) -> float:
-    """The width of the kerb around the world [m]."""
+    """Return the width of the kerb around the world [m]."""
     x0, y0, x1, y1 = scene.bounds
     return min(0.12, 0.02 * min(x1 - x0, y1 - y0))
 
 
 def grid_step(camera: Camera) -> float:
-    """The distance between grid lines [m]: the smallest of 0.1, 0.25, 0.5, 1, 2, 5, ... that is not too fine."""
+    """Return the distance between grid lines [m]: the smallest of 0.1, 0.25, 0.5, 1, 2, 5, ... that is legible."""
     least = max(34.0, camera.size[0] / 24)  # [px]
     for step in (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0):
         if step / camera.pixel >= least:
@@ -61,12 +61,12 @@ def grid_step(camera: Camera) -> float:
 
 
 def capsules(starts: Floats, ends: Floats, half: float | Floats) -> Floats:
-    """Capsules (N, 5) from points (N, 2) to others: ax, ay, bx, by, half width [m]."""
+    """Return capsules (N, 5) from `starts` (N, 2) to `ends` (N, 2): ax, ay, bx, by, half width [m]."""
     return np.ascontiguousarray(np.column_stack([starts, ends, np.full(len(starts), half)]))
 
 
 def dashes(line: Floats, width: float) -> Floats:
-    """Capsules (M, 5) that draw a polyline (N, 2) dashed, for lines of a width [m]."""
+    """Return capsules (M, 5) that draw a polyline (N, 2) dashed with a line width [m]."""
     on, off = 7 * width, 5 * width
     steps = segment_lengths(line)
     arc = np.concatenate([[0.0], np.cumsum(steps)])
@@ -78,7 +78,7 @@ def dashes(line: Floats, width: float) -> Floats:
 
 
 class _Brush:
-    """The colours of the ground, and a coverage mask through which shapes are painted."""
+    """Colours of the ground, and a coverage mask through which shapes are painted."""
 
     def __init__(self, camera: Camera, ground: Mask) -> None:
         width, height = camera.size
@@ -103,7 +103,7 @@ class _Brush:
         self.blend(colour, strength)
 
     def zones(self, scene: Scene, line: float) -> None:
-        """Tint the zones that planned paths avoid, and draw one outline around all of them."""
+        """Tint the no-go area and draw its outline."""
         kernels.cover_capsules(self.cover, self.forward, self.inverse, _zone_rows(scene, 0.0))
         outer = self.cover.copy()
         self.blend(ZONE, 0.20)
@@ -112,7 +112,7 @@ class _Brush:
         self.blend(ZONE, 0.38)
 
     def start(self, scene: Scene, line: float) -> None:
-        """Mark the start by a ring as wide as the robot, with a tick along its heading."""
+        """Mark the start with a ring of the robot's size and a tick along its heading."""
         x, y, yaw = scene.start
         radius = scene.robot.footprint.radius + line
         self.rings([(x, y, radius, 0.8 * line)], START, 0.9)
@@ -121,7 +121,7 @@ class _Brush:
         self.capsules(np.array(tick), START, 0.9)
 
     def goal(self, scene: Scene, line: float) -> None:
-        """Mark the disc in which the robot must stop, and its centre."""
+        """Mark the goal's tolerance disc and its centre."""
         (x, y), radius = scene.goal, scene.goal_tolerance
         self.capsules(np.array([(x, y, x, y, radius)]), GOAL, 0.22)
         self.rings([(x, y, radius, 0.9 * line)], GOAL, 0.95)
@@ -130,7 +130,7 @@ class _Brush:
 
 
 def _zone_rows(scene: Scene, shrink: float) -> Floats:
-    """The inflated obstacles and walls as capsules (N, 5), `shrink` metres smaller."""
+    """Return the no-go area as capsules (N, 5), shrunk by `shrink` [m]."""
     x, y, radius, _ = scene.obstacles[~scene.unseen].T
     reach = scene.inflate - shrink
     discs = np.column_stack([x, y, x, y, radius + reach])

@@ -1,4 +1,4 @@
-"""What a robot's lidar sees, in a film: beams, and without a map hits, ground not known to be free, obstacles never seen."""
+"""Lidar in films: beams, and a mapless robot's hits, unknown ground and undetected obstacles."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from antdrive.views.film.compositor import Backdrop
 
 
-VEIL, LINES = 0.62, 0.75  # how much of ground not known to be free is covered by the veil, and by its hatching
-PALENESS = 0.80  # of obstacles that were never seen
-TINT, BEAMS = 0.13, 0.30  # strength of the fan of beams and of its lines
+VEIL, LINES = 0.62, 0.75  # opacity of the veil over unknown ground and of its hatching
+PALENESS = 0.80  # of undetected obstacles
+TINT, BEAMS = 0.13, 0.30  # opacity of the scanned area and of the beams
 DRAWN_BEAMS = 90  # in a full circle, at most
-HATCHING = 9.0  # distance between the lines of the hatching [px]
+HATCHING = 9.0  # spacing of the hatching [px]
 
 
 class BeamPainter:
-    """Paints the beams of the last scan into frames."""
+    """Painter of the last scan's beams."""
 
     def __init__(self, rollout: Rollout) -> None:
         self._rollout, self._lidar = rollout, lidar_of(rollout)
@@ -37,11 +37,11 @@ class BeamPainter:
         self._last = 0
 
     def advance(self, at: float) -> None:
-        """Go on to a moment [s]."""
+        """Advance to a time [s]."""
         self._last = max(0, int(np.searchsorted(self._times, at + 1e-9, side="right")) - 1)
 
     def draw_beams(self, frame: Picture, backdrop: Backdrop) -> None:
-        """Lay the beams of the last scan on the ground."""
+        """Draw the beams of the last scan on the ground."""
         lidar, (eye, first, reaches) = self._lidar, beams_of(self._rollout, self._last)
         every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
         style, colour = np.array([TINT, BEAMS, backdrop.camera.pixel]), np.array(BEAM, dtype=np.float64)
@@ -50,7 +50,7 @@ class BeamPainter:
 
 
 class OwnMapPainter(BeamPainter):
-    """Paints what a robot without a map had seen into frames. Moments are asked for in increasing order."""
+    """Painter of a mapless robot's occupancy map. Times must be requested in increasing order."""
 
     def __init__(self, rollout: Rollout, scene: Scene) -> None:
         super().__init__(rollout)
@@ -60,7 +60,7 @@ class OwnMapPainter(BeamPainter):
         self._around = enclosing_cylinders(scene.obstacles)
 
     def advance(self, at: float) -> None:
-        """Go on to a moment [s]."""
+        """Advance to a time [s]."""
         super().advance(at)
         reconstruction = self._reconstruction
         reconstruction.advance(at)
@@ -69,11 +69,11 @@ class OwnMapPainter(BeamPainter):
         self._discs = np.column_stack([world_points(discs[:, :2], self._drift), discs[:, 2]])
 
     def to_world(self, points: Floats) -> Floats:
-        """Where places (N, 2) on the robot's map lie in the world now [m]."""
+        """Transform points (N, 2) [m] from the robot's map to the world."""
         return world_points(points, self._drift)
 
     def hatch_unknown(self, frame: Picture, backdrop: Backdrop, fine: int) -> None:
-        """Hatch the ground that is not known to be free, and pale the obstacles that no beam has met."""
+        """Hatch unknown ground and fade undetected obstacles."""
         seen, pixel = self._reconstruction.map, backdrop.camera.pixel
         style = np.array([VEIL, LINES, HATCHING * pixel, pixel])
         tints = np.array([PALE, HATCH], dtype=np.float64)
@@ -85,7 +85,7 @@ class OwnMapPainter(BeamPainter):
             kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
 
     def draw_hits(self, frame: Picture, backdrop: Backdrop) -> None:
-        """Put the hits on the robot's map over everything, at the height of the beams."""
+        """Draw the hits of the occupancy map over all bodies, at the height of the beams."""
         camera = backdrop.camera
         plane = camera.plane(min(self._reconstruction.lidar.height, 0.3))
         places, radii = self._discs[:, :2], np.maximum(self._discs[:, 2], 1.1 * camera.pixel)

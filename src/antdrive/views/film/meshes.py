@@ -1,4 +1,4 @@
-"""Meshes for films: cylinders, the kerb around the world, and a robot whose wheels visibly turn."""
+"""Meshes for films: cylinders, the kerb around the world, and a robot with turning wheels."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from antdrive.views.colours import SHELL, TURRET, WHITE, Colour
 class Mesh:
     """Triangles with a normal per vertex."""
 
-    vertices: Floats  # points (V, 3) [m]; those on a sharp edge occur once for each face
-    normals: Floats  # a unit vector per vertex (V, 3)
-    triangles: Ints  # vertex numbers (T, 3), counter-clockwise as seen from outside
+    vertices: Floats  # points (V, 3) [m]; those on a sharp edge occur once per face
+    normals: Floats  # unit vectors (V, 3)
+    triangles: Ints  # vertex indices (T, 3), counter-clockwise from outside
 
     def turned(self, turn: Floats) -> Mesh:
-        """The mesh turned by a matrix (3, 3)."""
+        """Return the mesh turned by a matrix (3, 3)."""
         return Mesh(self.vertices @ turn, self.normals @ turn, self.triangles)
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of the robot, of one colour, that moves as a whole."""
+    """Rigid part of the robot in one colour."""
 
-    mesh: Mesh  # its shape
-    colour: Colour  # its colour
-    wheel: int = 0  # 0 if it is fixed to the chassis, 1 if it turns with the left wheel, -1 with the right wheel
-    axle: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where its origin is on the chassis [m]
+    mesh: Mesh
+    colour: Colour
+    wheel: int = 0  # 1: turns with the left wheel; -1: with the right wheel; 0: fixed to the chassis
+    axle: tuple[float, float, float] = (0.0, 0.0, 0.0)  # origin on the chassis [m]
 
 
 def join(*meshes: Mesh) -> Mesh:
-    """Several meshes as one."""
+    """Join meshes into one."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     return Mesh(
         np.vstack([mesh.vertices for mesh in meshes]),
@@ -48,7 +48,7 @@ def join(*meshes: Mesh) -> Mesh:
 
 
 def cylinder(radius: float, low: float, high: float, *, sides: int = 48, x: float = 0.0, y: float = 0.0) -> Mesh:
-    """An upright cylinder with a smooth side, a sharp rim and no bottom."""
+    """Return an upright cylinder with a smooth side, a sharp rim and no bottom."""
     angle = np.arange(sides) * (2 * math.pi / sides)
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     rim = np.column_stack([x + radius * ring[:, 0], y + radius * ring[:, 1]])
@@ -63,7 +63,7 @@ def cylinder(radius: float, low: float, high: float, *, sides: int = 48, x: floa
 
 
 def prism(outline: Floats, low: float, high: float, *, chamfer: float = 0.0) -> Mesh:
-    """A convex counter-clockwise outline (K, 2) extruded from `low` to `high`, with a chamfered upper edge."""
+    """Extrude a convex counter-clockwise outline (K, 2) from `low` to `high`, with a chamfered upper edge."""
     count = len(outline)
     centre = outline.mean(axis=0)
     reach = np.hypot(*(outline - centre).T).max()
@@ -76,12 +76,12 @@ def prism(outline: Floats, low: float, high: float, *, chamfer: float = 0.0) -> 
 
 
 def box(x0: float, y0: float, x1: float, y1: float, low: float, high: float) -> Mesh:
-    """A box along the axes, without a bottom."""
+    """Return an axis-aligned box without a bottom."""
     return prism(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), low, high)
 
 
 def kerb(bounds: tuple[float, float, float, float], width: float, height: float) -> list[Mesh]:
-    """A low wall around the world, in short pieces; its inner faces stand on the bounds."""
+    """Return a low wall around the world in short pieces, with its inner faces on the bounds."""
     x0, y0, x1, y1 = bounds
     pieces = []
     for low, high in pairwise(_cuts(x0 - width, x1 + width)):
@@ -92,18 +92,18 @@ def kerb(bounds: tuple[float, float, float, float], width: float, height: float)
 
 
 def _cuts(low: float, high: float) -> list[float]:
-    """Ends of about equal pieces, at most 24."""
+    """Return the ends of at most 24 equal pieces."""
     cuts: list[float] = np.linspace(low, high, min(24, math.ceil(high - low)) + 1).tolist()
     return cuts
 
 
 def robot_height(body: RobotSpec) -> float:
-    """The height that the robot is drawn with [m]; a tall mast is left out, as it would hide the path."""
+    """Return the robot's drawn height [m], without a tall mast, which would hide the path."""
     return min(body.height, max(1.1 * body.footprint.radius, 2.4 * body.wheel_radius))
 
 
 def robot_parts(body: RobotSpec) -> tuple[Part, ...]:
-    """The robot's parts. The origin is on the ground below the axle's centre, and the robot heads along +x.
+    """Return the robot's parts, relative to the ground below the axle's centre, heading along +x.
 
     The deck has the footprint's exact outline. On it are a turret, a white arrow and two lamps in front; the wheels
     turn in wells.
@@ -141,7 +141,7 @@ def robot_parts(body: RobotSpec) -> tuple[Part, ...]:
 
 
 def _lamps(foot: Footprint, middle: Point, half: Point, deck: float) -> list[Mesh]:
-    """Two lamps on the deck in front, closer together or farther back where the front is narrow; none where it is pointed."""
+    """Return two lamps at the front of the deck: closer or farther back on a narrow front, none on a pointed one."""
     (x, y), (length, width), size = middle, half, min(half)
     for ahead, apart in itertools.product((0.90, 0.75, 0.6), (0.26, 0.18, 0.1)):
         front, aside, wide = ahead * length, apart * width, 0.08 * size
@@ -154,7 +154,7 @@ def _lamps(foot: Footprint, middle: Point, half: Point, deck: float) -> list[Mes
 
 
 def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
-    """A tyre about the y axis, and the light lugs and spokes that make its rotation visible."""
+    """Return a tyre about the y axis, and light lugs and spokes that show its rotation."""
     tyre = _about_y(_drum(radius, tread))
     lugs = []
     for k in range(5):
@@ -177,18 +177,18 @@ def _drum(radius: float, tread: float) -> Mesh:
 
 
 def _about_y(mesh: Mesh) -> Mesh:
-    """The mesh turned so that its z axis becomes the y axis."""
+    """Turn a mesh's z axis to the y axis."""
     return mesh.turned(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]))
 
 
 def _turned(mesh: Mesh, angle: float) -> Mesh:
-    """The mesh turned about the y axis by an angle [rad]."""
+    """Turn a mesh about the y axis by an angle [rad]."""
     c, s = math.cos(angle), math.sin(angle)
     return mesh.turned(np.array([[c, 0, -s], [0, 1.0, 0], [s, 0, c]]))
 
 
 def _arrow(x: float, reach: float, low: float, thin: float) -> list[Mesh]:
-    """A chevron that points along +x."""
+    """Return a chevron that points along +x."""
     tip, tail, wide, notch = x + 0.95 * reach, x - 0.75 * reach, 0.72 * reach, x - 0.30 * reach
     return [
         prism(np.array([(tip, 0.0), (tail, wide), (notch, 0.0)]), low, low + thin),
@@ -197,7 +197,7 @@ def _arrow(x: float, reach: float, low: float, thin: float) -> list[Mesh]:
 
 
 def _outline(foot: Footprint) -> Floats:
-    """A footprint's outline (K, 2), counter-clockwise."""
+    """Return a footprint's outline (K, 2), counter-clockwise."""
     steps = 16  # of each corner
     if foot.corners:
         return np.array(foot.outline(steps))
@@ -211,7 +211,7 @@ def _outline(foot: Footprint) -> Floats:
 
 
 def _cut(outline: Floats, axis: int, at: float, *, keep_low: bool = False) -> Floats:
-    """The part of a convex outline (K, 2) whose coordinate `axis` is above `at`, or below it with `keep_low`."""
+    """Return the part of a convex outline (K, 2) with coordinate `axis` above `at`, or below it with `keep_low`."""
     sign = -1.0 if keep_low else 1.0
     inside = sign * (outline[:, axis] - at) >= 0
     points = []
@@ -220,13 +220,13 @@ def _cut(outline: Floats, axis: int, at: float, *, keep_low: bool = False) -> Fl
         if inside[i]:
             points.append(point)
         if inside[i] != inside[(i + 1) % len(outline)]:
-            share = (at - point[axis]) / (following[axis] - point[axis])
-            points.append(point + share * (following - point))
+            part = (at - point[axis]) / (following[axis] - point[axis])
+            points.append(point + part * (following - point))
     return np.array(points)
 
 
 def _band(low: tuple[Floats, float], high: tuple[Floats, float]) -> Mesh:
-    """The flat faces between two outlines with the same number of points, each at its height."""
+    """Return the flat faces between two outlines of the same number of points, each at its height."""
     (a, za), (b, zb) = low, high
     count = len(a)
     following = (np.arange(count) + 1) % count

@@ -19,25 +19,25 @@ DRIVING = ("DRIVING", colours.CALM)
 PLANNING = ("PLANNING", colours.CALM)
 SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", colours.BAD)
 
-#: The names of the band's four numbers during the drive and during planning.
+#: Names of the band's four numbers during drive and planning.
 DRIVE_FIELDS = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
 PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN PATH", "ARRIVED")
 
-#: The heights of a row of the legend in the band, and of its edge [units].
+#: Heights of a legend row in the band and of its edge [units].
 LEGEND_ROW, LEGEND_EDGE = 1.5, 0.4
 
-#: The height of a line of a note that has no room beside the numbers [units], how many it has at most, and its font [units].
+#: Notes below the numbers: line height [units], largest number of lines, font size [units].
 NOTE_LINE, MOST_NOTES, NOTE_FONT = 1.2, 3, 0.86
-#: The most of a picture's height that the band takes, for a legend of several rows or a long note.
+#: Largest fraction of a picture's height that the band takes.
 MOST_BAND = 0.34
-#: The same of the lines of a reason below the outcome.
+#: Reasons below the outcome: largest number of lines, font size [units].
 MOST_REASONS, REASON_FONT = 4, 1.05
 
-Values: TypeAlias = list[tuple[str, bool]]  # each number as text, and whether it is shown in red
+Values: TypeAlias = list[tuple[str, bool]]  # numbers as text, each with a flag for red
 
 
 def drive_values(time: float, speed: float, clearance: float, least: float) -> Values:
-    """The numbers of one frame of a drive [s, m/s, m, m], as the band shows them."""
+    """Format the band's numbers for one frame of a drive [s, m/s, m, m]."""
     return [
         (f"{time:.1f} s", False),
         (f"{max(speed, 0.0):.2f} m/s", False),
@@ -48,18 +48,18 @@ def drive_values(time: float, speed: float, clearance: float, least: float) -> V
 
 @dataclass(frozen=True)
 class Layout:
-    """The sizes of text and band in a frame."""
+    """Sizes of text and band in a frame."""
 
     width: int  # of the frame [px]
     unit: int  # height of small text [px]
-    wide: bool  # names, numbers and outcome stand beside each other in the band
-    rows: int  # how many rows of the band the legend has; 0: it is a card in the picture's corner
+    wide: bool  # whether names, numbers and outcome stand side by side
+    rows: int  # legend rows in the band; 0: the legend is a card in the picture's corner
     height: int  # of the band [px]
-    note: tuple[str, ...] = ()  # the lines of a note that has no room beside the numbers
+    note: tuple[str, ...] = ()  # lines of a note too long for the space beside the numbers
 
     @classmethod
     def of(cls, size: tuple[int, int], rows: int, note: str = "") -> Layout:
-        """The layout for a frame of a size (width, height) [px] with a legend of so many rows and a note."""
+        """Return the layout of a frame of a size (width, height) [px] with legend rows and a note."""
         width, height = size
         wide = width >= 1.5 * height and width >= 900
         unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
@@ -73,29 +73,29 @@ class Layout:
 
     @property
     def numbers_units(self) -> float:
-        """The height of names and numbers [units]."""
+        """Height of names and numbers [units]."""
         return 4.7 if self.wide else 7.8
 
     @property
     def small(self) -> int:
-        """The size of a note's font [px]."""
+        """Font size of a note [px]."""
         return round(NOTE_FONT * self.unit)
 
     @property
     def fields(self) -> tuple[int, int]:
-        """Where the first of the four numbers stands, and how far it is to the next one [px]."""
+        """Left edge of the first of the four numbers, and spacing of the numbers [px]."""
         pad = self.unit
         return (round(0.36 * self.width), 8 * self.unit) if self.wide else (pad, (self.width - pad) // 4)
 
     @property
     def note_room(self) -> int:
-        """The room for a note beside the numbers [px]."""
+        """Space for a note beside the numbers [px]."""
         first, column = self.fields
         return self.width - first - 4 * column - self.unit if self.wide else self.width // 2
 
 
 class Band:
-    """The band below the picture. Everything that stays the same is drawn once."""
+    """Band below the picture. Its constant content is drawn once."""
 
     def __init__(
         self,
@@ -115,7 +115,7 @@ class Band:
         numbers, column = layout.fields
         self._fields = [(numbers + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(4)]
         shown = "" if layout.note else fitted(note or "", layout.note_room, small, True)
-        room = numbers - 2 * pad if wide else width - _widest_verdict(unit) - 3 * pad
+        room = numbers - 2 * pad if wide else width - _widest_status(unit) - 3 * pad
         subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
         draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=colours.INK)
         draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=colours.MUTED)
@@ -130,8 +130,8 @@ class Band:
         if layout.rows:
             _draw_rows(draw, legend, layout)
 
-    def draw(self, values: Values, verdict: tuple[str, colours.Colour]) -> Picture:
-        """The band (h, W, 3) of one frame, with its four numbers and a label."""
+    def draw(self, values: Values, status: tuple[str, colours.Colour]) -> Picture:
+        """Draw the band (h, W, 3) of one frame, with its four numbers and its status."""
         unit = self.layout.unit
         image = self._blank.copy()
         draw = ImageDraw.Draw(image)
@@ -140,12 +140,12 @@ class Band:
                 (x, y + 1.15 * unit), text, font=font(round(1.4 * unit), True), fill=colours.BAD if bad else colours.INK
             )
         band = np.array(image)
-        plate_ = pill(verdict[0], round(1.08 * unit), verdict[1])
+        plate_ = pill(status[0], round(1.08 * unit), status[1])
         put(band, plate_, self.layout.width - unit - plate_.shape[1], 0.5 * unit)
         return band
 
 
-def _widest_verdict(unit: int) -> int:
+def _widest_status(unit: int) -> int:
     size = round(1.08 * unit)
     widest = max(
         text_width(text, size, True) for text, _ in (*colours.OUTCOME_LABELS.values(), DRIVING, PLANNING, SLOWED)
@@ -159,13 +159,16 @@ def _metres(value: float) -> str:
     return f"{value + 0.0 if abs(value) >= 5e-4 else 0.0:.3f} m"
 
 
+#: Legend of the grey band around obstacles.
+NO_GO = "no-go area for the robot's centre (radius + margin)"
+
 _WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
 
 
 class LegendEntry(NamedTuple):
-    """A line of the legend."""
+    """Line of the legend."""
 
-    kind: str  # how its sample is drawn: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot` or `scale`
+    kind: str  # of the sample: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot` or `scale`
     colour: colours.Colour  # of the sample
     text: str  # its meaning
     width: float = 0.0  # of a scale bar [px]
@@ -179,42 +182,40 @@ def legend_entries(
     planning: bool = False,
     replans: bool = False,
     beams: bool = False,
-    sight: bool = False,
-    followed: bool = False,
+    own_map: bool = False,
+    tracked: bool = False,
 ) -> list[LegendEntry]:
-    """The legend's lines: one for each kind of thing in the picture."""
+    """Return the legend's entries, one for each kind of object in the picture."""
     if planning:
-        found = [
+        entries = [
             LegendEntry("field", colours.INK, "planner's field"),
             LegendEntry("line", colours.SHELL, "best path so far"),
         ]
     else:
         speeds = f"speed, 0 to {scene.robot.max_speed:.3g} m/s"
-        found = [LegendEntry("ramp", colours.INK, speeds), LegendEntry("dash", colours.ROUTE, "planned route")]
+        entries = [LegendEntry("ramp", colours.INK, speeds), LegendEntry("dash", colours.ROUTE, "planned route")]
     if replans:
-        found.append(LegendEntry("dot", colours.ROUTE, "new route"))
+        entries.append(LegendEntry("dot", colours.ROUTE, "replan"))
     if scene.has_no_go_area:
-        found.append(LegendEntry("zone", colours.ZONE, f"inflated by {scene.inflate:.2f} m"))
+        entries.append(LegendEntry("zone", colours.ZONE, NO_GO))
     if scene.unseen.any():
-        found.append(LegendEntry("dot", colours.UNSEEN, scene.unseen_label))
+        entries.append(LegendEntry("dot", colours.UNSEEN, scene.unseen_label))
     if beams:
-        found.append(LegendEntry("zone", colours.BEAM, "beams of the lidar"))
-    if sight:
-        found += [
-            LegendEntry("dot", colours.HIT, "hit, on the robot's map"),
-            LegendEntry("hatch", colours.HATCH, "not known to be free"),
+        entries.append(LegendEntry("zone", colours.BEAM, "lidar beams"))
+    if own_map:
+        entries += [
+            LegendEntry("dot", colours.HIT, "lidar hit on the occupancy map"),
+            LegendEntry("hatch", colours.HATCH, "unknown ground"),
         ]
     if scene.mover_radii:
-        found.append(
-            LegendEntry("dot", colours.MOVER, "moving obstacle" if followed else "moving obstacle, 1.5 s ahead")
-        )
-    if followed:
-        found.append(LegendEntry("line", colours.FOLLOWED, "mover by lidar, 1.5 s ahead"))
-    return [*found, LegendEntry("scale", colours.INK, f"{step:g} m (grid)", step / pixel)]
+        entries.append(LegendEntry("dot", colours.MOVER, "mover" if tracked else "mover, next 1.5 s"))
+    if tracked:
+        entries.append(LegendEntry("line", colours.TRACKED, "mover tracked by lidar, next 1.5 s"))
+    return [*entries, LegendEntry("scale", colours.INK, f"{step:g} m (grid)", step / pixel)]
 
 
 def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
-    """The legend as a card for the picture's corner."""
+    """Draw the legend as a card for the picture's corner."""
     size = max(8, round(0.9 * layout.unit))
     line, pad = round(1.55 * size), round(0.8 * size)
     key = round(max(2.6 * size, *(entry.width for entry in entries)))
@@ -229,19 +230,19 @@ def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
 
 
 class LegendRows(NamedTuple):
-    """The legend's entries in rows of the band."""
+    """Legend entries in rows of the band."""
 
     size: int  # of the text [px]
     rows: list[list[LegendEntry]]  # the entries of each row, from the left
-    whole: bool  # whether every entry has a place
+    whole: bool  # whether every entry fits
 
 
 def legend_rows(entries: list[LegendEntry], layout: Layout) -> LegendRows:
-    """The entries in the rows that a layout has, in the largest text with which they fit.
+    """Arrange the entries in the layout's rows, in the largest text that fits.
 
-    In a picture too small for all of them the last ones are left out.
+    In a picture too small for all entries the last ones are omitted.
     """
-    found = LegendRows(0, [], False)
+    legend = LegendRows(0, [], False)
     for size in range(max(8, round(0.9 * layout.unit)), max(7, round(0.75 * layout.unit)) - 1, -1):
         room = float(layout.width - 2 * layout.unit)
         rows: list[list[LegendEntry]] = [[]] if layout.rows else []
@@ -254,14 +255,14 @@ def legend_rows(entries: list[LegendEntry], layout: Layout) -> LegendRows:
             if rows:
                 rows[-1].append(entry)
             left -= wide + size
-        found = LegendRows(size, rows[: layout.rows], len(rows) <= layout.rows)
-        if found.whole:
+        legend = LegendRows(size, rows[: layout.rows], len(rows) <= layout.rows)
+        if legend.whole:
             break
-    return found
+    return legend
 
 
 def _entry_width(entry: LegendEntry, size: int) -> tuple[float, float]:
-    """How wide an entry's sample and its text with the space before it are, for text of a size [px]."""
+    """Return the widths of an entry's sample and of its text with leading space, for a text size [px]."""
     sample = round(entry.width or (2.2 if entry.kind in _WIDE_KINDS else 1.0) * size)
     return sample, 0.5 * size + text_width(entry.text, size)
 
@@ -282,7 +283,7 @@ def _draw_rows(draw: ImageDraw.ImageDraw, legend: LegendRows, layout: Layout) ->
 
 
 def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float, wide: int, size: int) -> None:
-    """Draw the sample of a line of the legend, `wide` pixels wide, beside text of height `size`."""
+    """Draw the sample of a legend entry, `wide` pixels wide, beside text of height `size`."""
     kind, colour = entry.kind, entry.colour
     r = 0.42 * size
     if kind in ("ramp", "field"):
@@ -312,9 +313,9 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
 
 
 def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "") -> Sprite:
-    """The outcome as a sentence and its reason, for the end of a film, at most 0.86 of `room` wide [px].
+    """Draw the outcome as a sentence with its reason, for the end of a film, at most 0.86 of `room` wide [px].
 
-    A robot is stuck for one of several reasons: where one is given, it stands for the general sentence.
+    The reason of a stuck robot replaces the general sentence.
     """
     name, colour = colours.OUTCOME_LABELS[outcome]
     sentence = "stuck" if reason and outcome is Outcome.STUCK else outcome.value

@@ -1,4 +1,4 @@
-"""Read a log at any moment: poses between its rows, wheel angles, the driven path, contacts."""
+"""Playback of a log at any time: interpolated poses, wheel angles, driven path and contacts."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.scene import Scene, contact_point, jumps
 
-CAMERA_WINDOW = 0.6  # a following camera looks at the robot's mean position over this time before and after [s]
+CAMERA_WINDOW = 0.6  # half the averaging window of a following camera's target [s]
 
-SLOW_MOTION = 4.0  # a film is this many times slower around a contact
-SLOW_BEFORE, SLOW_AFTER = 0.3, 0.1  # slow motion starts and ends this long before and after a contact [s]
+SLOW_MOTION = 4.0  # slow-down factor around a contact
+SLOW_BEFORE, SLOW_AFTER = 0.3, 0.1  # slow motion before and after a contact [s]
 
 
 class ReplanEvent(NamedTuple):
-    """A replan during the run."""
+    """Replan during the run."""
 
-    t: float  # when [s]
-    trigger: str  # why the robot replanned
-    solved: bool  # whether it found a new route
-    route: Floats  # the polyline followed from then on (N, 2) [m]
+    t: float  # time [s]
+    trigger: str  # cause
+    solved: bool  # whether a new route was found
+    route: Floats  # route from then on (N, 2) [m]
 
     @property
     def caption(self) -> str:
-        """The replan in a few words; empty for the steps of a robot that plans anew at every cell."""
+        """Caption of the replan; empty for a robot that re-plans at every cell."""
         if self.trigger == DECISION:
             return ""
         return f"{'new route' if self.solved else 'no new route'}: {self.trigger}"
 
 
 class Playback:
-    """A run as functions of time [s], interpolated between the rows of its log."""
+    """Run as functions of time [s], interpolated between the rows of its log."""
 
     def __init__(self, rollout: Rollout) -> None:
         scene = Scene.of(rollout)
@@ -73,51 +73,51 @@ class Playback:
 
     @property
     def duration(self) -> float:
-        """How long the run took [s]."""
+        """Duration of the run [s]."""
         return float(self.t[-1] - self.t[0])
 
     def slow_motion(self, speed: float) -> tuple[float, float] | None:
-        """When slow motion around the first contact starts and ends [s]; None without a contact."""
+        """Return start and end of the slow motion around the first contact [s]; None without a contact."""
         if not len(self._contact_times):
             return None
         first = float(self._contact_times[0])
         return max(0.0, first - SLOW_BEFORE * speed), min(self.duration, first + SLOW_AFTER * speed)
 
     def pose(self, at: float) -> tuple[float, float, float]:
-        """The robot's x, y [m] and heading [rad], which has no jumps at ±pi."""
+        """Return the robot's x, y [m] and unwrapped heading [rad]."""
         x, y, yaw = (float(np.interp(at, self.t, column)) for column in self._pose.T)
         return x, y, yaw
 
     def camera_target(self, at: float) -> tuple[float, float]:
-        """Where a following camera looks [m]: the robot's mean position around a moment."""
+        """Return the target of a following camera [m]: the robot's mean position around a time."""
         moments = at + CAMERA_WINDOW * np.linspace(-1, 1, 25)
         x, y = (float(np.interp(moments, self.t, self._pose[:, axis]).mean()) for axis in (0, 1))
         return x, y
 
     def wheels(self, at: float) -> tuple[float, float]:
-        """How far the left and the right wheel have turned [rad]."""
+        """Return the angles of the left and the right wheel [rad]."""
         left, right = (float(np.interp(at, self.t, angle)) for angle in self._angles)
         return left, right
 
     def movers(self, at: float) -> Floats:
-        """The movers' positions (M, 2) [m]; a mover that jumps stays in place until the row after the jump."""
-        row, share = self._between(at)
+        """Return the movers' positions (M, 2) [m]; a mover that jumps keeps its position until the row after the jump."""
+        row, fraction = self._between(at)
         here = self._movers[row]
-        if share == 0.0:
+        if fraction == 0.0:
             return np.asarray(here)
         step = np.where(self._jumps[row, :, None], 0.0, self._movers[row + 1] - here)
-        return np.asarray(here + share * step)
+        return np.asarray(here + fraction * step)
 
     def mover_velocities(self, at: float) -> Floats:
-        """The movers' velocities (M, 2) [m/s]; 0 during a jump and in a log of one row."""
+        """Return the movers' velocities (M, 2) [m/s]; 0 during a jump and in a log of one row."""
         if len(self.t) < 2:
             return np.zeros((self._movers.shape[1], 2))
         row = min(self._row(at), len(self.t) - 2)
         step = np.where(self._jumps[row, :, None], 0.0, self._movers[row + 1] - self._movers[row])
         return np.asarray(step / (self.t[row + 1] - self.t[row]))
 
-    def followed(self, at: float) -> Floats:
-        """The movers that the robot follows with its lidar (N, 5): x, y [m], velocity [m/s] and radius [m], at the last scan."""
+    def tracked(self, at: float) -> Floats:
+        """Return the movers tracked by lidar at the last scan (N, 5): x, y [m], velocity [m/s] and radius [m]."""
         end = int(np.searchsorted(self._tracks[:, 0], self._row(at), side="right"))
         if not end or self._tracks[end - 1, 0] < self._row(at) - self._scan_rows:
             return np.empty((0, 5))
@@ -125,37 +125,37 @@ class Playback:
         return self._tracks[begin:end, 2:].copy()
 
     def _between(self, at: float) -> tuple[int, float]:
-        """The last row at or before a moment, and the fraction of the time to the next row that is over."""
+        """Return the last row at or before a time, and the elapsed fraction of the interval to the next row."""
         row = self._row(at)
         if row + 1 >= len(self.t) or at <= self.t[row]:
             return row, 0.0
         return row, float((at - self.t[row]) / (self.t[row + 1] - self.t[row]))
 
     def replan_count(self, at: float) -> int:
-        """The number of replans up to a moment."""
+        """Return the number of replans up to a time."""
         return sum(event.t <= at + 1e-9 for event in self.replans)
 
     def speed(self, at: float) -> float:
-        """The measured forward speed [m/s]."""
-        return float(np.interp(at, self.t, self._twist[:, 0])) + 0.0  # never -0.0, which would be shown as such
+        """Return the measured forward speed [m/s]."""
+        return float(np.interp(at, self.t, self._twist[:, 0])) + 0.0  # never -0.0
 
     def clearance(self, at: float) -> float:
-        """The distance from the robot to the nearest obstacle, mover or wall [m]."""
+        """Return the distance from the robot to the nearest obstacle, mover or wall [m]."""
         return float(np.interp(at, self.t, self._clearance))
 
     def min_clearance(self, at: float) -> float:
-        """The smallest clearance of all rows up to a moment [m]."""
+        """Return the smallest clearance of all rows up to a time [m]."""
         return float(self._least[self._row(at)])
 
     def trail(self, since: float, until: float) -> tuple[Floats, Floats]:
-        """The points (N, 2) [m] of the path driven between two moments, and the speeds (N,) there [m/s]."""
+        """Return points (N, 2) [m] of the path driven between two times, and the speeds (N,) there [m/s]."""
         count = max(2, math.ceil((until - since) * 60) + 1)
         moments = np.linspace(since, until, count)
         points = np.column_stack([np.interp(moments, self.t, self._pose[:, axis]) for axis in (0, 1)])
         return points, np.interp(moments, self.t, self._twist[:, 0])
 
     def contact(self, at: float) -> tuple[float, float, float] | None:
-        """The point x, y of the first contact [m], and the time since the latest one [s]; None before any."""
+        """Return the point x, y of the first contact [m] and the time since the latest one [s]; None before any."""
         past = self._contact_times[self._contact_times <= at + 1e-9]
         if not len(past):
             return None

@@ -1,6 +1,6 @@
-"""The part of a film before the drive: how the path was planned, with the planner's field and best path so far.
+"""Introduction of a film: planning with the planner's field and best path so far.
 
-A log holds no field. The path is planned again from the log's seed, which gives the same iterations.
+A log holds no field. Planning again from the log's seed repeats the same iterations.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from antdrive.worlds import Grid, rasterise
 
 
 def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
-    """Repeat a run's planning: its grid, the number of iterations allowed, and the iterations one at a time."""
+    """Repeat a run's planning and return its grid, the maximum number of iterations, and the iterations lazily."""
     record = rollout.record
     name = record.planner.name
     planner = as_iterative(load_planner(name, **record.planner.settings))
     if planner is None:
-        raise InputError(f"prelude: {name} does not plan in iterations; there is no field to show")
+        raise InputError(f"prelude: {name} does not plan in iterations and has no field")
     if planner.time_budget is not None:
-        raise InputError("prelude: the plan was made under a time budget and cannot be repeated")
+        raise InputError("prelude: a plan under a time budget cannot be repeated")
     grid = rasterise(record.task.world, record.cell, record.inflate)
     rng = np.random.default_rng([record.seed, zlib.crc32(b"planner")])  # as Scenario.rng
     states = itertools.islice(planner.iterate(Query.between(grid, record.task), rng), planner.iterations)
@@ -39,13 +39,13 @@ def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
 
 
 def check_field(rollout: Rollout) -> None:
-    """Check, before anything is drawn, that a run's planner has a field."""
+    """Raise `InputError` unless a run's planner has a field."""
     if next(plan_again(rollout)[2]).field is None:
-        raise InputError(f"prelude: {rollout.record.planner.name} keeps no field")
+        raise InputError(f"prelude: {rollout.record.planner.name} has no field")
 
 
 def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
-    """Frames (H, W, 3) of a run's planning, from the first to the last iteration."""
+    """Yield frames (H, W, 3) of a run's planning, from the first to the last iteration."""
     grid, total, states = plan_again(rollout)
     still = {**setting, "camera": "oblique" if setting["camera"] == "follow" else setting["camera"]}
     shot = Shot(rollout, **still, planning=True)
@@ -59,13 +59,13 @@ def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> It
         path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
         yield shot.planning_frame(_values(number, total, state), grid, levels, path)
     if not np.array_equal(state.cells, rollout.cells):
-        raise InputError("prelude: planning again led to another path; the log is of another version or machine")
+        raise InputError("prelude: planning again gave another path; the log is from another version or machine")
 
 
 def field_levels(grid: Grid, field: Floats) -> Floats:
-    """A planner's field (R, C) scaled to 0 to 1 from its low to its high values; NaN where a cell is blocked.
+    """Scale a planner's field (R, C) to 0 to 1, NaN for blocked cells.
 
-    The scale is a square root, so that weak trails stay visible beside strong ones.
+    The square root keeps weak trails visible beside strong ones.
     """
     values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
     finite = values[np.isfinite(values)]
@@ -76,7 +76,7 @@ def field_levels(grid: Grid, field: Floats) -> Floats:
 
 
 def _values(number: int, total: int, state: Iteration) -> Values:
-    """The numbers of the band, named `PLAN_FIELDS`."""
+    """Format the band's numbers, named by `PLAN_FIELDS`."""
 
     def metres(value: float) -> str:
         return f"{value:.2f} m" if math.isfinite(value) else "—"

@@ -1,4 +1,4 @@
-"""One run in front of one camera: the frames of a film with trail, route, labels, legend and band of numbers."""
+"""Frames of one run by one camera, with trail, route, labels, legend and band."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from antdrive.views.film.text import Sprite, burst, label, put
 from antdrive.views.scene import Scene
 from antdrive.worlds import Grid
 
-FLASH = 0.45  # the picture's border flashes this long after a contact [s]
+FLASH = 0.45  # duration of the border's flash after a contact [s]
 MOST_LEGEND_ROWS = 4
-REPLAN_CAPTION = 1.5  # the cause of a replan is shown this long [s]
+REPLAN_CAPTION = 1.5  # duration of the caption of a replan [s]
 
 
 class Shot:
-    """The frames of a run as one camera sees it, with the options of a film. Ask for moments in increasing order."""
+    """Frames of a run by one camera. Times must be requested in increasing order."""
 
     def __init__(self, rollout: Rollout, *, planning: bool = False, bare: bool = False, **options: Any) -> None:
         self.options = FilmOptions(**options)
@@ -39,7 +39,7 @@ class Shot:
         self.scene = scene = Scene.of(rollout)
         self.outcome = rollout.outcome
         self._follows = self.options.camera == "follow"
-        self._follows_movers = not planning and len(rollout.tracks) > 0
+        self._tracks_movers = not planning and len(rollout.tracks) > 0
         self._own_map = (
             OwnMapPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
         )
@@ -51,22 +51,22 @@ class Shot:
         fields = overlay.PLAN_FIELDS if planning else overlay.DRIVE_FIELDS
         self._band = overlay.Band(self._layout, scene.name, subtitle, None if planning else note, legend, fields)
         fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
-        fixed = not (planning or self.playback.replans or self._fan)  # a route that changes is drawn in every frame
+        fixed = not (planning or self.playback.replans or self._fan)  # a changing route is drawn in every frame
         route = rollout.route[: None if fixed else 0]
-        self._compositor = Compositor(scene, self._camera, route=route, fine=fine, sight=self._fan)
+        self._compositor = Compositor(scene, self._camera, route=route, fine=fine, lidar_view=self._fan)
         self._replan_caption = REPLAN_CAPTION * speed
         self._route, self._replans_shown = rollout.route, 0
         self._legend_width = 0 if self._legend is None else self._legend.shape[1] + 2 * self._layout.unit  # [px]
         room = max(size[0] - self._legend_width, size[0] // 2)
         self._banner = overlay.banner(self.outcome, self._layout, room, rollout.record.reason)
-        self.shown = 0.0  # the trail reaches to this moment [s]
+        self.shown = 0.0  # end of the trail [s]
         self._add_labels()
         if self.playback.replans or self._fan:
             self._show_route(0)
 
     def _lay_out(self, rollout: Rollout, *, planning: bool, replans: bool, bare: bool) -> overlay.LegendRows:
-        """Choose layout, camera and legend: a card in a corner or, if it would cover the world, rows of the band."""
-        shows = {"beams": self._fan is not None, "sight": self._own_map is not None, "followed": self._follows_movers}
+        """Choose layout, camera and legend: a card in a corner, or rows of the band if the card would cover the world."""
+        shows = {"beams": self._fan is not None, "own_map": self._own_map is not None, "tracked": self._tracks_movers}
         size = self.options.size
         for rows in range(1 + MOST_LEGEND_ROWS):
             layout = overlay.Layout.of(size, rows, self.options.note or "")
@@ -83,12 +83,12 @@ class Shot:
         return legend
 
     def frame(self, at: float) -> Picture:
-        """The frame (H, W, 3) at a moment of the run [s]."""
+        """Return the frame (H, W, 3) at a time of the run [s]."""
         slow = self.slow_motion is not None and self.slow_motion[0] <= at < self.slow_motion[1]
         return self._with_band(self.view(at), at, overlay.SLOWED if slow else overlay.DRIVING)
 
     def last_frame(self) -> Picture:
-        """The frame (H, W, 3) at the run's end, with the outcome as a sentence."""
+        """Return the frame (H, W, 3) at the run's end, with the outcome as a sentence."""
         at = self.playback.duration
         view = self.view(at, last=True)
         unit = self._layout.unit
@@ -100,19 +100,19 @@ class Shot:
         return self._with_band(view, at, OUTCOME_LABELS[self.outcome])
 
     def planning_frame(self, values: overlay.Values, grid: Grid, levels: Floats, path: Floats) -> Picture:
-        """A frame (H, W, 3) of planning: a planner's field, and its best path (N, 2) [m] so far."""
+        """Return a frame (H, W, 3) of planning: the planner's field and its best path (N, 2) [m] so far."""
         view = self._compositor.field_frame(grid, levels, path)
         self._put_legend(view)
         return np.vstack([view, self._band.draw(values, overlay.PLANNING)])
 
     def extend_trail(self, at: float) -> None:
-        """Continue the driven path to a moment [s]."""
+        """Extend the driven path to a time [s]."""
         if at > self.shown:
             self._compositor.extend_trail(*self.playback.trail(self.shown, at))
             self.shown = at
 
     def view(self, at: float, *, last: bool = False) -> Picture:
-        """The frame at a moment [s] without the band; `last` keeps the flash of a contact."""
+        """Return the frame at a time [s] without the band; `last` keeps the flash of a contact."""
         playback, compositor = self.playback, self._compositor
         if self._follows:
             compositor.set_camera(self._camera.moved(*playback.camera_target(at)))
@@ -122,41 +122,41 @@ class Shot:
             self._fan.advance(at)
         if count != self._replans_shown or self._own_map is not None:
             self._show_route(count)
-        followed = self._followed(at) if self._follows_movers else None
-        velocities = None if self._follows_movers else playback.mover_velocities(at)
-        view = compositor.frame(playback.pose(at), playback.wheels(at), playback.movers(at), velocities, followed)
+        tracked = self._tracked_movers(at) if self._tracks_movers else None
+        velocities = None if self._tracks_movers else playback.mover_velocities(at)
+        view = compositor.frame(playback.pose(at), playback.wheels(at), playback.movers(at), velocities, tracked)
         if count:
             self._put_replan_caption(view, at, playback.replans[count - 1])
         self._mark_contact(view, at, self._flash, last)
         self._put_legend(view)
         return view
 
-    def _followed(self, at: float) -> Floats:
-        """The movers that the robot follows, where they lie in the world; without a map the robot's own frame drifts."""
-        found = self.playback.followed(at)
+    def _tracked_movers(self, at: float) -> Floats:
+        """Return the tracked movers (N, 5) in the world's frame; a mapless robot's own frame drifts."""
+        tracked = self.playback.tracked(at)
         if self._own_map is not None:
-            found[:, :2] = self._own_map.to_world(found[:, :2])
-            found[:, 2:4] = self._own_map.to_world(found[:, 2:4]) - self._own_map.to_world(np.zeros((1, 2)))
-        return found
+            tracked[:, :2] = self._own_map.to_world(tracked[:, :2])
+            tracked[:, 2:4] = self._own_map.to_world(tracked[:, 2:4]) - self._own_map.to_world(np.zeros((1, 2)))
+        return tracked
 
     def put_label(self, view: Picture, text: str, x: float, y: float) -> None:
-        """Mark a place on the ground in a picture, with a text above it."""
+        """Mark a point x, y [m] on the ground, with a text above it."""
         size = 2 * round(1.1 * self._layout.unit)
         px, py = self._compositor.pixel(x, y)
         put(view, burst(size, CONTACT), px - size / 2, py - size / 2)
         _put_above(view, label(text, round(0.95 * self._layout.unit), CONTACT), px, py - size)
 
-    def _with_band(self, view: Picture, at: float, verdict: tuple[str, Colour]) -> Picture:
+    def _with_band(self, view: Picture, at: float, status: tuple[str, Colour]) -> Picture:
         playback = self.playback
         values = overlay.drive_values(at, playback.speed(at), playback.clearance(at), playback.min_clearance(at))
-        return np.vstack([view, self._band.draw(values, verdict)])
+        return np.vstack([view, self._band.draw(values, status)])
 
     def _put_legend(self, view: Picture) -> None:
         if self._legend is not None:
             put(view, self._legend, self._layout.unit, self._layout.unit)
 
     def _aim(self, rollout: Rollout, size: tuple[int, int]) -> Camera:
-        """The camera: it sees the whole run or, if it follows, the robot's surroundings."""
+        """Return a camera that shows the whole run or, when following, the robot's surroundings."""
         low, high = self.scene.region(np.vstack([rollout.pose[:, :2], rollout.route]))
         if self._follows:
             reach = max(1.2, 7 * self.scene.robot.footprint.radius)
@@ -164,7 +164,7 @@ class Shot:
         return camera_for(self.options.camera, low, high, drawn_height(self.scene), size)
 
     def _fits_beside_world(self, card: Sprite) -> bool:
-        """Whether a card in the upper left corner covers no part of the world."""
+        """Return whether a card in the upper left corner leaves the world uncovered."""
         if self._follows:
             return True
         x0, y0, x1, y1 = self.scene.bounds
@@ -183,7 +183,7 @@ class Shot:
         self._compositor.add_label(label("GOAL", text, GOAL), *scene.goal, scene.goal_tolerance)
 
     def _show_route(self, count: int) -> None:
-        """Show the route after `count` replans, and where the robot replanned."""
+        """Show the route after `count` replans and the places of these replans."""
         playback = self.playback
         route = playback.replans[count - 1].route if count else self._route
         if self._own_map is not None:  # planned on the robot's own map
@@ -193,7 +193,7 @@ class Shot:
         self._replans_shown = count
 
     def _put_replan_caption(self, view: Picture, at: float, event: ReplanEvent) -> None:
-        """Write the cause of a recent replan above the robot."""
+        """Draw the cause of a recent replan above the robot."""
         if not event.caption or at - event.t > self._replan_caption:
             return
         sprite = label(event.caption, self._layout.unit, ROUTE)
@@ -202,7 +202,7 @@ class Shot:
         _put_above(view, sprite, px, py - 2.2 * self._layout.unit)
 
     def _mark_contact(self, view: Picture, at: float, flash: float, last: bool) -> None:
-        """Mark the point of the first contact; let the picture's border flash while a contact is recent."""
+        """Mark the point of the first contact and flash the picture's border after recent contacts."""
         contact = self.playback.contact(at)
         if contact is None:
             return
@@ -217,6 +217,6 @@ class Shot:
 
 
 def _put_above(view: Picture, sprite: Sprite, x: float, bottom: float) -> None:
-    """Put a small picture above a point of a picture, all of it in sight."""
+    """Draw a sprite above a point of a picture, within its borders."""
     left = min(max(x - sprite.shape[1] / 2, 0), view.shape[1] - sprite.shape[1])
     put(view, sprite, left, max(bottom - sprite.shape[0], 0))

@@ -1,4 +1,4 @@
-"""Draw bodies: ray casting of the cylinders and boxes that stand still, and meshes of what moves, in boxes of the picture."""
+"""Drawing of bodies: ray casting of static cylinders and boxes, rasterisation of moving meshes."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from antdrive.views.film.meshes import Mesh
 
 Box: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]; x1 and y1 are excluded
 
-AMBIENT, DIFFUSE = 0.62, 0.46  # strength of the light from all sides and from the lamp
+AMBIENT, DIFFUSE = 0.62, 0.46  # strength of ambient light and of the lamp
 
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """Cylinders that stand on the ground, and boxes along the axes."""
+    """Cylinders on the ground and axis-aligned boxes."""
 
     cylinders: Floats  # x, y, radius and height of each (N, 4) [m]
     cylinder_colours: Floats  # red, green, blue of each (N, 3), 0 to 255
@@ -30,13 +30,13 @@ class Solids:
 
     @classmethod
     def of(cls, cylinders: Floats, colours: list[Colour], boxes: Floats, box_colour: Colour) -> Solids:
-        """Cylinders (N, 4) with a colour each, and boxes (M, 6) of one colour."""
+        """Build from cylinders (N, 4) with a colour each and boxes (M, 6) of one colour."""
         tints = np.array(colours, dtype=np.float64).reshape(-1, 3)
         box_tints = np.tile(np.array(box_colour, dtype=np.float64), (len(boxes), 1))
         return cls(np.ascontiguousarray(cylinders), tints, boxes, box_tints)
 
     def render(self, camera: Camera, fine: int, light: tuple[float, float, float]) -> tuple[Any, Any, Any]:
-        """Picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none."""
+        """Render picture (h, w, 4), depth (h, w) and body indices (h, w), -1 for none."""
         width, height = camera.size
         image, depth, seg = _blank(width * fine, height * fine, 4)
         turn, projection = camera.view[:3, :3], camera.projection
@@ -55,19 +55,19 @@ class Solids:
 
 
 def _blank(wide: int, high: int, channels: int) -> tuple[Any, Any, Any]:
-    """An empty picture, its depth 1 and its body numbers -1 everywhere."""
+    """Return an empty picture with depth 1 and body indices -1."""
     image = np.zeros((high, wide, channels), dtype=np.uint8)
     return image, np.ones((high, wide), dtype=np.float32), np.full((high, wide), -1, dtype=np.int32)
 
 
 def _depth_and_light(camera: Camera) -> Floats:
-    """What gives the depth in clip space, and the strengths of the light (4,)."""
+    """Return the coefficients of the depth in clip space and the strengths of the light (4,)."""
     projection = camera.projection
     return np.array([(1 - projection[2, 2]) / 2, projection[2, 3] / 2, AMBIENT, DIFFUSE])
 
 
 def _spans(camera: Camera, boxes: Floats) -> Ints:
-    """The pixels x0, y0, x1, y1 (N, 4) that each box may cover; empty where the box is out of sight."""
+    """Return the pixel bounds x0, y0, x1, y1 (N, 4) of each box; empty outside the picture."""
     points = boxes[:, [(i, 1 + j, 2 + k) for i in (0, 3) for j in (0, 3) for k in (0, 3)]]  # (N, 8, 3)
     clip = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=2) @ camera.full.T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -84,15 +84,15 @@ def _spans(camera: Camera, boxes: Floats) -> Ints:
 
 
 class Solid(NamedTuple):
-    """A mesh of one colour at a place."""
+    """Mesh of one colour at a pose."""
 
-    mesh: Mesh  # its shape
-    colour: Colour  # its colour
-    place: Floats  # the rotation and, in the last column, the position of the mesh (3, 4) [m]
+    mesh: Mesh
+    colour: Colour
+    place: Floats  # rotation and, in the last column, position (3, 4) [m]
 
 
 def placed(at: tuple[float, float, float], quaternion: tuple[float, float, float, float]) -> Floats:
-    """The place (3, 4) of a mesh that is turned, then moved."""
+    """Return the transform (3, 4) of a rotation followed by a translation."""
     x, y, z, w = quaternion
     return np.array(
         [
@@ -106,9 +106,9 @@ def placed(at: tuple[float, float, float], quaternion: tuple[float, float, float
 def draw_solids(
     solids: list[Solid], camera: Camera, box: Box, fine: int, light: tuple[float, float, float]
 ) -> tuple[Any, Any, Any]:
-    """Picture (h, w, 3), depth (h, w) and 0 where there is a body, else -1 (h, w)."""
+    """Draw picture (h, w, 3), depth (h, w) and body mask (h, w): 0 for a body, -1 for none."""
     x0, y0, x1, y1 = box
-    found = _blank((x1 - x0) * fine, (y1 - y0) * fine, 3)
+    target = _blank((x1 - x0) * fine, (y1 - y0) * fine, 3)
     (width, height), full = camera.size, camera.full
     ahead = full[3]
     lens = np.array(
@@ -121,17 +121,17 @@ def draw_solids(
     common = (lens, _depth_and_light(camera), np.array(light))
     for mesh, colour, place in solids:
         tint = np.array(colour, dtype=np.float64)
-        triangles.draw_mesh(*found, *common, place, mesh.vertices, mesh.normals, mesh.triangles, tint)
-    return found
+        triangles.draw_mesh(*target, *common, place, mesh.vertices, mesh.normals, mesh.triangles, tint)
+    return target
 
 
 def overlap(a: Box, b: Box) -> bool:
-    """Whether two boxes share a pixel."""
+    """Return whether two boxes share a pixel."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def merged(boxes: list[Box]) -> list[Box]:
-    """The boxes, overlapping ones joined: bodies that may hide each other are drawn together, and no pixel twice."""
+    """Join overlapping boxes: bodies that may hide each other are drawn together, every pixel once."""
     done: list[Box] = []
     for box in boxes:
         while True:

@@ -1,4 +1,4 @@
-"""Text and other small pictures. The font is the one inside matplotlib, so no system font is needed."""
+"""Sprites for films: text in matplotlib's font, plates and marks."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ Sprite: TypeAlias = npt.NDArray[np.uint8]  # (h, w, 4) RGBA
 
 @functools.cache
 def font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans at a size in pixels."""
+    """Return DejaVu Sans at a size [px]."""
     spec = find_spec("matplotlib")
     if spec is None or not spec.submodule_search_locations:
-        raise RuntimeError("matplotlib, whose font is used, is not installed")
+        raise RuntimeError("matplotlib is not installed; films use its font")
     folder = Path(next(iter(spec.submodule_search_locations))) / "mpl-data" / "fonts" / "ttf"
     return ImageFont.truetype(str(folder / f"DejaVuSans{'-Bold' if bold else ''}.ttf"), size)
 
 
 def text_width(text: str, size: int, bold: bool = False) -> int:
-    """The width of a text [px]."""
+    """Return the width of a text [px]."""
     return int(np.ceil(font(size, bold).getlength(text)))
 
 
 def fitted(text: str, width: int, size: int, bold: bool = False) -> str:
-    """The text, shortened with an ellipsis if it is wider than `width` [px]."""
+    """Shorten a text to `width` [px] with an ellipsis."""
     if text_width(text, size, bold) <= width:
         return text
     while text and text_width(text + "…", size, bold) > width:
@@ -44,7 +44,7 @@ def fitted(text: str, width: int, size: int, bold: bool = False) -> str:
 
 
 def wrapped(text: str, width: int, size: int, bold: bool = False, *, most: int) -> list[str]:
-    """The text in lines no wider than `width` [px], broken between words; what is left over is cut off with an ellipsis."""
+    """Wrap a text between words into at most `most` lines of `width` [px]; an ellipsis ends a text cut short."""
     lines: list[str] = []
     words = text.split()
     while words and len(lines) < most:
@@ -58,7 +58,7 @@ def wrapped(text: str, width: int, size: int, bold: bool = False, *, most: int) 
 
 
 def label(text: str, size: int, colour: Colour) -> Sprite:
-    """A text with a soft white rim, readable on any background."""
+    """Return a text with a soft white rim, legible on any background."""
     rim = max(2, size // 7)
     wide, high = text_width(text, size, True) + 2 * rim, round(1.25 * size) + 2 * rim
     image = Image.new("RGBA", (wide, high), (255, 255, 255, 0))
@@ -71,12 +71,12 @@ def label(text: str, size: int, colour: Colour) -> Sprite:
 
 
 def put(frame: Picture, sprite: Sprite, left: float, top: float) -> None:
-    """Blend a small picture into a frame, with its upper left corner at a pixel; parts outside are cut off."""
+    """Blend a sprite into a frame, with its upper left corner at a pixel; parts outside are cut off."""
     kernels.put_sprite(frame, sprite, round(left), round(top), 1.0)
 
 
 def pill(text: str, size: int, colour: Colour, more: Sequence[str] = (), small: int = 0) -> Sprite:
-    """White text on a coloured plate with round ends."""
+    """Return white text on a coloured plate with round ends."""
     pad_x, pad_y, line = round(0.75 * size), round(0.36 * size), round(1.35 * small)
     wide = max(text_width(text, size, True), *(text_width(row, small) for row in more), 0) + 2 * pad_x
     head = round(1.2 * size) + 2 * pad_y
@@ -90,7 +90,7 @@ def pill(text: str, size: int, colour: Colour, more: Sequence[str] = (), small: 
 
 
 def plate(width: int, height: int, colour: Colour, alpha: int, *, radius: int) -> Image.Image:
-    """A rectangle with smooth round corners on a transparent background."""
+    """Return a rectangle with smooth round corners on a transparent background."""
     fine = 4
     mask = Image.new("L", (width * fine, height * fine), 0)
     box = (0, 0, width * fine - 1, height * fine - 1)
@@ -101,7 +101,7 @@ def plate(width: int, height: int, colour: Colour, alpha: int, *, radius: int) -
 
 
 def burst(size: int, colour: Colour) -> Sprite:
-    """The mark of a contact: a ring with rays."""
+    """Return the mark of a contact: a ring with rays."""
     fine = 4
     wide = size * fine
     image = Image.new("RGBA", (wide, wide), (*colour, 0))
@@ -110,8 +110,8 @@ def burst(size: int, colour: Colour) -> Sprite:
     for rim, fill in ((0.20, (255, 255, 255, 235)), (0.12, (*colour, 255))):
         for k in range(8):
             angle = (k + 0.5) * np.pi / 4
-            way = np.array([np.cos(angle), np.sin(angle)])
-            a, b = middle + 0.66 * reach * way, middle + (0.99 if rim < 0.2 else 1.0) * reach * way
+            ray = np.array([np.cos(angle), np.sin(angle)])
+            a, b = middle + 0.66 * reach * ray, middle + (0.99 if rim < 0.2 else 1.0) * reach * ray
             draw.line([tuple(a), tuple(b)], fill=fill, width=max(1, round(rim * reach)))
         r, line = 0.52 * reach + rim * reach / 2, max(1, round(rim * reach))
         draw.ellipse((middle - r, middle - r, middle + r, middle + r), outline=fill, width=line)
@@ -120,7 +120,7 @@ def burst(size: int, colour: Colour) -> Sprite:
 
 @functools.cache
 def glow(size: int, colour: Colour) -> Sprite:
-    """A soft disc with a thin rim."""
+    """Return a soft disc with a thin rim."""
     along = (np.arange(size) + 0.5) / size * 2 - 1
     away = np.hypot(along[:, None], along)
     rim = np.clip(1 - np.abs(away - 0.9) * size / 3, 0, 1)

@@ -1,7 +1,6 @@
-"""Films and stills of a run, rendered from its log after the drive, so that an old run can be filmed again.
+"""Films and stills of a run, rendered from its log.
 
-Frames go straight to the encoder, one at a time, so a long film needs no more memory than a short one. A file appears
-when it is complete.
+Frames go to the encoder one at a time: memory does not grow with the film's length. Files are written atomically.
 """
 
 from __future__ import annotations
@@ -33,12 +32,12 @@ from antdrive.views.film.playback import SLOW_MOTION, Playback
 from antdrive.views.film.prelude import check_field, planning_frames
 from antdrive.views.film.shot import Shot
 
-HOLD = 1.0  # the last picture stays this long [s]
-CHUNK = 16  # frames that a process renders before it hands them over
+HOLD = 1.0  # duration of the last picture [s]
+CHUNK = 16  # frames per task of a process
 MIN_FRAMES = 300  # starting processes takes as long as rendering this many frames
-MAX_PROCESSES = 8  # each takes some 150 MB
+MAX_PROCESSES = 8  # each takes about 150 MB
 FAILURE_SIZE = (960, 540)  # of films of a campaign's failures [px]
-LONGEST_FAILURE = 30.0  # a longer drive is shown faster, in this time [s]
+LONGEST_FAILURE = 30.0  # films of longer drives are sped up to this length [s]
 
 
 def film(
@@ -54,24 +53,24 @@ def film(
     jobs: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FilmInfo:
-    """Film a run. Around a contact the film goes into slow motion, four times slower.
+    """Film a run, four times slower around a contact.
 
     Args:
         rollout: the run's log
-        path: the file to write; its suffix chooses the format: .mp4 (H.264), .gif or .webp
+        path: the file to write; its suffix selects the format: .mp4 (H.264), .gif or .webp
         camera: `oblique`, `top` or `follow`
         size: width and height, even numbers from 160 to 4096 [px]
         fps: frames per second, at most 240
         speed: the film's speed relative to the run; 2 is twice as fast
-        note: a line for the band below the picture, for example the certificate's verdict
-        prelude: the length of an introduction that shows how the path was planned [s]: the field of an iterative
-            planner on the ground, and its best path so far; the path is planned again from the run's seed
-        jobs: how many processes render for the camera `follow`, by default one per core; the film does not depend on it
-        progress: called after each frame with the fraction that is done
+        note: a line in the band below the picture, such as the certificate's result
+        prelude: length of an introduction with the planning [s]: the field of an iterative planner and its best path
+            so far, planned again from the run's seed
+        jobs: number of rendering processes for the camera `follow`, by default one per core; it does not change the film
+        progress: called after each frame with the completed fraction
 
     Raises:
-        InputError: an unknown camera or suffix, a size, rate or speed that is out of range, or a prelude for a
-            planner without a field.
+        InputError: an unknown camera or suffix; a size, rate or speed out of range; a prelude for a planner without a
+            field.
         OSError: the encoder could not write the film.
     """
     target = Path(path)
@@ -89,14 +88,14 @@ def film(
 def _frames(
     rollout: Rollout, setting: dict[str, Any], before: int, times: Floats, hold: int, jobs: int | None
 ) -> Iterator[Picture]:
-    """Every frame in turn: `before` frames of planning, the drive at `times`, `hold` frames of its end."""
+    """Yield all frames: `before` frames of planning, the drive at `times`, `hold` frames of its end."""
     if before:
         yield from planning_frames(rollout, setting, before)
     shot = Shot(rollout, **setting)
     jobs = process_count() if jobs is None else jobs
     if setting["camera"] == "follow" and jobs > 1 and len(times) > MIN_FRAMES:
         yield from render_frames(rollout, setting, times, jobs)
-        for at in times:  # the trail is painted step by step, as in the other processes
+        for at in times:  # in the same steps as in the rendering processes
             shot.extend_trail(at)
     else:
         for at in times:
@@ -118,16 +117,16 @@ def still(
     Args:
         rollout: the run's log
         path: the file to write, with the suffix .png or .webp
-        t: the moment to show [s]; None for the end, with the outcome as a sentence
+        t: the time to show [s]; None: the end, with the outcome as a sentence
         camera: `oblique`, `top` or `follow`
         size: width and height, even numbers from 160 to 4096 [px]
-        note: a line for the band below the picture
+        note: a line in the band below the picture
 
     Returns:
         The file's path.
 
     Raises:
-        InputError: an unknown camera, a suffix other than .png and .webp, or a size that is out of range.
+        InputError: an unknown camera, a suffix other than .png and .webp, or a size out of range.
     """
     target = Path(path)
     kind = known_suffix(target, STILLS)
@@ -139,7 +138,7 @@ def still(
 
 
 def frame_times(duration: float, fps: float, speed: float, slow: tuple[float, float] | None = None) -> Floats:
-    """The moments of the run that frames show [s]; the first is 0, the last less than a frame before the end."""
+    """Return the times of the frames [s]: the first is 0, the last less than one frame before the end."""
     if slow is None:
         return np.arange(int(duration * fps / speed + 1e-9) + 1, dtype=np.float64) * (speed / fps)
     run = np.array([0.0, *slow, duration])
@@ -154,7 +153,7 @@ def encoded(
     frames: Iterable[Picture],
     progress: Callable[[float], None] | None = None,
 ) -> FilmInfo:
-    """Render and encode the frames of a film, whole or not at all; facts about it."""
+    """Render and encode a film atomically and return facts about it."""
     started = time.perf_counter()
     with atomic_write(target) as temporary, encoding(temporary, options.size, options.fps) as send:
         for k, picture in enumerate(frames):
@@ -167,10 +166,7 @@ def encoded(
 
 @contextmanager
 def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
-    """A function that appends a frame (H, W, 3) to a film, which is complete when the `with` block ends.
-
-    Ffmpeg runs in its own process and is fed through a pipe.
-    """
+    """Yield a function that appends a frame (H, W, 3) to a film through a pipe to ffmpeg; the block's end completes the film."""
     import imageio_ffmpeg
 
     rate = str(Fraction(fps).limit_denominator(100_000))
@@ -179,7 +175,7 @@ def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable
         *("-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-", "-an", *ENCODERS[path.suffix.lower()], str(path)),
     ]
     with tempfile.TemporaryFile() as messages:
-        # In its own session: Ctrl-C then reaches only this process, which stops ffmpeg and removes the file.
+        # In its own session: Ctrl-C reaches only this process, which stops ffmpeg and removes the file.
         process = subprocess.Popen(  # noqa: S603
             command,
             stdin=subprocess.PIPE,
@@ -214,14 +210,14 @@ def _write_all(pipe: IO[bytes], picture: Picture) -> None:
 
 
 def process_count() -> int:
-    """How many processes render at once by default: one per available core, at most `MAX_PROCESSES`."""
+    """Return the default number of rendering processes: one per available core, at most `MAX_PROCESSES`."""
     return min(MAX_PROCESSES, cores())
 
 
 def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs: int) -> Iterator[Picture]:
-    """The frames (H, W, 3) in order, rendered in several processes: with a moving camera each needs a backdrop of its own.
+    """Yield frames (H, W, 3) in order, rendered in several processes, for cameras that need a backdrop per frame.
 
-    They are the same for any number of processes; `jobs` x `CHUNK` are held at once.
+    Frames do not depend on the number of processes; `jobs` x `CHUNK` frames are held at once.
     """
     chunks = [(first, min(first + CHUNK, len(times))) for first in range(0, len(times), CHUNK)]
     render = functools.partial(_render, uuid.uuid4().hex, rollout, setting, times)
@@ -231,7 +227,7 @@ def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs
                 yield from rendered
 
 
-#: The shot of the film that a worker process renders, under the film's id.
+#: Shot of the film that a worker process renders, by the film's id.
 _shots: dict[str, Shot] = {}
 
 
@@ -256,10 +252,10 @@ def film_failures(
     size: tuple[int, int] = FAILURE_SIZE,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Path]:
-    """Film every run of a campaign that did not arrive and whose log is there; the films, earlier ones too, by the runs' keys.
+    """Film every failed run of a campaign that has a log, and return all films by the runs' keys.
 
-    The line below the picture names the run, how it ended, and why. A drive longer than 30 s is shown in
-    30 s. A film that is newer than its log, or whose log is gone, is not made again.
+    The note names seed, outcome and reason. Films of drives longer than 30 s are sped up to 30 s. A film newer than its
+    log, or without a log, is kept.
     """
     failed = [row for row in rows if not row["succeeded"] and row["rollout"]]
     films = {}
