@@ -203,7 +203,7 @@ def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingP
             os.fspath(path),
             f"not written: {len(task.world.obstacles)} obstacles and {len(task.world.movers)} movers make "
             f"{size / 1e6:.1f} MB and {values} values; the limits are {MAX_BYTES / 1e6:g} MB and {MAX_VALUES} values; "
-            f" use fewer, larger cylinders (for maps, a larger overhang)",
+            f"use fewer, larger cylinders (for maps, a larger overhang)",
         )
     write_text(path, text)
 
