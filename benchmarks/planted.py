@@ -291,7 +291,7 @@ def in_fork(folder: Path, patch: Callable[[], None] | None) -> Tests:
 
 def logs_only() -> None:
     """Write the logs of failed drives and no pictures, which would take longer than the drives."""
-    from antdrive.cli.testing import checking
+    from antdrive.cli.testing import evaluation
 
     def write(run: Any, folder: Path, *_: Any, **__: Any) -> dict[str, str]:
         if run.rollout is None:
@@ -300,7 +300,7 @@ def logs_only() -> None:
         run.rollout.save(folder / "rollout.npz")
         return {"rollout": str(folder / "rollout.npz")}
 
-    checking.write_artefacts = write  # type: ignore[attr-defined]
+    evaluation.write_artefacts = write  # type: ignore[attr-defined]
 
 
 def things(log: Any) -> dict[str, Any]:

@@ -32,9 +32,9 @@ def exit_code(words, monkeypatch):
     return int(ended.value.code or 0)
 
 
-def test_the_python_block_is_ten_lines_that_run(home, capsys):
+def test_the_python_block_is_six_lines_that_run(home, capsys):
     (code,) = blocks("python")
-    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    assert len([line for line in code.splitlines() if line.strip()]) == 6
     exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
     assert capsys.readouterr().out.splitlines()[0] == "stopped at the goal without contact"
     assert (home / "forest.npz").exists()

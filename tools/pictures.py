@@ -15,18 +15,25 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from antdrive.views.film.options import FilmOptions
+
+from antdrive.robots import list_robots
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.film.comparison_film import SplitScreen
 from antdrive.views.film.prelude import planning_frames
-from antdrive.views.film.video import STILLS, still
+from antdrive.views.film.shot import Shot
+from antdrive.views.film.video import STILLS, film, still
 from antdrive.views.pages.run_report import write_report
 from antdrive.views.run_folder import caption
+from antdrive.worlds import list_worlds, load_task
+from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
@@ -50,10 +57,41 @@ def saved(picture: Any, path: Path) -> None:
     Image.fromarray(picture).save(path, format="webp", **STILLS[".webp"])
 
 
-def film(path: Path) -> None:
-    """A frame of the film of `make demo`."""
-    log = drive("forest", "ants")
-    still(log, path, 15.6, size=(1280, 720), note=caption(log))
+def hero(path: Path) -> None:
+    """Film a mapless drive among movers."""
+    settings = {"map": "none", "localisation": "matching", "noise": 1.0, "seed": 1}
+    log = drive("plaza-moving", "dstar-lite", robot="jackal", **settings)
+    film(log, path, camera="follow", size=(800, 450), fps=10, speed=1.2, note=caption(log))
+
+
+def worlds(path: Path) -> None:
+    """Draw every world of the catalogue from above, a file each."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Circle
+
+    for name in list_worlds():
+        task = load_task(name)
+        (x0, y0, x1, y1), (width, height) = task.world.bounds, task.world.size
+        figure = Figure(figsize=(1.6, 1.6 * height / width), dpi=100)
+        axes = figure.add_axes((0.01, 0.01, 0.98, 0.98), xlim=(x0, x1), ylim=(y0, y1), xticks=[], yticks=[])
+        discs = [Circle((disc.x, disc.y), disc.radius) for disc in task.world.obstacles]
+        axes.add_collection(PatchCollection(discs, facecolor="#5a6577"))
+        movers = Trajectories.of(task.world, task.start[:2])
+        for place, radius in zip(movers.positions(0.0)[0], movers.radii, strict=True):
+            axes.add_patch(Circle(place, radius, facecolor="#d9a128"))
+        axes.plot(*task.start[:2], "o", color="#f26b0f", ms=4)
+        axes.plot(*task.goal, "*", color="#0b8a6a", ms=6)
+        path.with_suffix("").mkdir(exist_ok=True)
+        figure.savefig(path.with_suffix("") / f"{name}.webp", facecolor="white")
+
+
+def robots(path: Path) -> None:
+    """Film a frame of every robot of the catalogue, a file each."""
+    path.with_suffix("").mkdir(exist_ok=True)
+    for name in list_robots():
+        shot = Shot(drive("empty", "astar", robot=name), **asdict(FilmOptions("follow", (640, 480)).checked()))
+        saved(shot.frame(0.0)[110:290, 210:430], path.with_suffix("") / f"{name}.webp")
 
 
 def plaza(path: Path) -> None:
@@ -110,7 +148,7 @@ def report(path: Path) -> None:
 
 #: What makes each picture, by the name of its file.
 MADE: Mapping[str, Callable[[Path], None]] = MappingProxyType(
-    {made.__name__: made for made in (film, plaza, unknown, pheromone, comparison, report)}
+    {made.__name__: made for made in (hero, worlds, robots, plaza, unknown, pheromone, comparison, report)}
 )
 
 

@@ -1,7 +1,7 @@
-"""What the site adds to Sphinx's own: tables from the code, drawn pictures, films, adapted pages, MathML.
+"""Sphinx extension of the site: drawn figures, films, adapted pages, MathML.
 
-`.. known:: NAME` shows a table of `antdrive_tables`. `{drawn} TEXT` runs its content, which leaves a matplotlib figure in
-`figure`, and shows the figure, described by TEXT, above the lines that made it.
+`{drawn} TEXT` runs its content, which leaves a matplotlib figure in `figure`, and shows the figure with the caption TEXT
+above the code.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from typing import Any
 import imageio.v3 as imageio
 import imageio_ffmpeg
 from antdrive_links import adapted
-from antdrive_tables import KNOWN
 from docutils import nodes
 from docutils.utils.math import latex2mathml
 from matplotlib.figure import Figure
@@ -30,19 +29,6 @@ from sphinx.util.docutils import SphinxDirective
 FILMS = "_films"  # where films are in the site
 HEAVIEST = 1_000_000  # what a film may weigh [B]
 _drawn: weakref.WeakSet[Figure] = weakref.WeakSet()
-
-
-class Known(SphinxDirective):
-    """`.. known:: NAME ...`: what the code knows. The page is read again by every build."""
-
-    required_arguments = 1
-    final_argument_whitespace = True
-
-    def run(self) -> list[nodes.Node]:
-        """The lines, parsed."""
-        self.env.note_reread()
-        name, *words = self.arguments[0].split()
-        return self.parse_text_to_nodes("\n".join(KNOWN[name](*words)), allow_section_headings=True)
 
 
 class Drawn(SphinxDirective):
@@ -129,7 +115,6 @@ def block(self: Any, node: nodes.math_block) -> None:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register all of it."""
-    app.add_directive("known", Known)
     app.add_directive("drawn", Drawn)
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
     app.connect("source-read", page_read)

@@ -207,5 +207,5 @@ def test_a_wrong_plan_is_an_outcome_and_is_not_driven(antdrive, small, faulty):
 
 def test_the_help_explains_the_exit_codes(antdrive):
     words = " ".join(antdrive("--help")[1].split())
-    for code in ("0: success", "1: the drive", "2: wrong input", "3: a fault", "--debug"):
+    for code in ("0: success", "1: failed drive", "2: invalid input", "3: planner error", "--debug"):
         assert code in words

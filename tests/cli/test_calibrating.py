@@ -38,7 +38,7 @@ def test_a_drive_with_a_chosen_margin_says_how_it_was_chosen(antdrive, small):
     keep(0.047)
     code, out, err = antdrive("run", small, "-p", "astar", "--margin", "auto", "--no-figures", "--out", "r")
     assert (code, err) == (0, "")
-    assert "margin 0.047 m, chosen: a loss of 0.036 m is predicted from 80 drives, at least 0.010 m are left" in out
+    assert "calibrated margin 0.047 m: predicted loss 0.036 m from 80 drives, reserve at least 0.010 m" in out
     record = Rollout.load(Path("r/rollout.npz")).record
     assert record.margin == 0.047
     assert record.margin_choice is not None
@@ -49,14 +49,14 @@ def test_a_drive_with_a_chosen_margin_says_how_it_was_chosen(antdrive, small):
     bound = json.loads(Path("r/result.json").read_text())["certificate"]["bound_m"]
     assert told["footprint_loss_m"] == pytest.approx(0.047 - bound)
     assert told["loss_m"] == pytest.approx(0.036)
-    assert "auto for a predicted loss of 0.0360 m; the footprint lost" in antdrive("margin", "r/rollout.npz")[1]
+    assert "auto: predicted loss 0.0360 m, actual loss" in antdrive("margin", "r/rollout.npz")[1]
 
 
 def test_movers_and_unseen_obstacles_are_no_part_of_the_prediction(antdrive, small):
     keep(0.047)
     antdrive("run", small, "-p", "astar", "--margin", "auto", "--unseen", "2.0,2.7,0.1", "--no-figures", "--out", "r")
     assert json.loads(antdrive("margin", "r/rollout.npz", "--json")[1])["prediction"]["footprint_loss_m"] is None
-    assert "this drive had movers or unseen obstacles" in antdrive("margin", "r/rollout.npz")[1]
+    assert "actual loss not measured (movers or unseen obstacles)" in antdrive("margin", "r/rollout.npz")[1]
 
 
 def test_a_margin_given_as_a_number_leaves_no_trace(antdrive, small):
@@ -98,7 +98,9 @@ def test_a_calibration_that_is_due_is_announced(antdrive, small, monkeypatch):
     monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [Loss(0.012, 0.012)] * choice.DRIVES)
     code, _, err = antdrive("plan", small, "-p", "astar", "--margin", "auto")
     assert (code, err.count("\n")) == (0, 1)
-    assert err.startswith("antdrive: calibrating turtlebot, noise 0, smoothing clearance: about 320 short drives, once")
+    assert err.startswith(
+        "antdrive: calibrating turtlebot, noise 0, smoothing clearance: about 320 short drives, result cached"
+    )
     assert antdrive("plan", small, "-p", "astar", "--margin", "auto")[::2] == (0, "")
 
 

@@ -27,7 +27,7 @@ def test_without_a_terminal_a_line_says_why_it_takes_a_while(compiled, capsys):
     assert compiled == ["all"]
     said = capsys.readouterr()
     assert said.out == ""
-    assert said.err.count("compiling the planners, once for this installation") == 1
+    assert said.err.count("compiling the planners, once per installation") == 1
 
 
 @pytest.mark.usefixtures("terminal")
@@ -59,8 +59,8 @@ def test_commands_that_only_look_do_not_compile(antdrive, compiled, words):
 
 
 def test_warm_compiles_on_request_and_once(antdrive, compiled):
-    assert antdrive("warm") == (0, "every planner is compiled\n", "")
-    assert antdrive("warm") == (0, "every planner is compiled already\n", "")
+    assert antdrive("warm") == (0, "all planners are compiled\n", "")
+    assert antdrive("warm") == (0, "all planners are already compiled\n", "")
     assert compiled == ["all"]
 
 

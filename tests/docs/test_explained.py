@@ -1,6 +1,5 @@
 """Every planner of the registry has a page that explains it: idea, equations, picture, options, weaknesses, when to choose it."""
 
-import importlib
 import inspect
 import re
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.planners import PLANNERS
+from tools.reference import described, weaknesses_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "explanation" / "planners"
@@ -15,15 +15,9 @@ PAGES = ROOT / "docs" / "explanation" / "planners"
 EXPLAINED = {
     name: page
     for page in sorted(PAGES.glob("*.md"))
-    for names in re.findall(r"^\.\. known:: planner (.+)$", page.read_text(), re.MULTILINE)
+    for names in re.findall(r"^<!-- generated: planner (.+) -->$", page.read_text(), re.MULTILINE)
     for name in names.split()
 }
-
-
-@pytest.fixture
-def tables(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
-    return importlib.import_module("antdrive_tables")
 
 
 def attributes(text):
@@ -38,7 +32,7 @@ def attributes(text):
 
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_planner_is_explained(name):
-    assert name in EXPLAINED, f"add `.. known:: planner {name}` to a page in docs/explanation/planners"
+    assert name in EXPLAINED, f"add `<!-- generated: planner {name} -->` to a page in docs/explanation/planners"
     page = EXPLAINED[name]
     text = page.read_text()
     heads = re.findall(r"^## (.+)$", text, re.MULTILINE)
@@ -57,13 +51,13 @@ def test_a_planner_has_a_row_in_the_table(name):
 
 
 @pytest.mark.parametrize("kind", dict.fromkeys(map(type, PLANNERS.values())), ids=lambda kind: kind.__name__)
-def test_a_planner_knows_its_weaknesses_and_every_option_is_described(kind, tables):
+def test_a_planner_knows_its_weaknesses_and_every_option_is_described(kind):
     assert "Known weakness" in (kind.__doc__ or "")
-    assert tables.weaknesses_of(kind)
+    assert weaknesses_of(kind)
     wanted = {}
     for base in reversed(kind.__mro__):
         wanted |= attributes(inspect.getsource(base).split('"""')[1] if base.__module__.startswith("antdrive") else "")
-    assert tables.described(kind) == wanted
+    assert described(kind) == wanted
 
 
 def test_the_lines_that_draw_pictures_are_python():

@@ -1,7 +1,6 @@
 """Tables, files and measurements on pages: those that people write name what the code has and work, the others are made."""
 
 import dataclasses
-import importlib
 import json
 import re
 import subprocess
@@ -23,6 +22,7 @@ from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.record import MarginRecord, SensingRecord
 from antdrive.sim.log.rollout import ARRAYS, SENSED
 from tests.records import made_up_record
+from tools.reference import GENERATED, pages, written
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -50,27 +50,28 @@ def test_every_variable_that_the_code_reads_is_explained():
     assert sorted(read) == sorted(first_cells("reference/environment.md", "## Variables of the environment"))
 
 
-@pytest.fixture
-def known(monkeypatch):
-    monkeypatch.syspath_prepend(str(DOCS / "_ext"))
-    return importlib.import_module("antdrive_tables").KNOWN
+def test_generated_parts_of_pages_are_up_to_date():
+    stale = [page.name for page in pages() if written(page.read_text()) != page.read_text()]
+    assert stale == [], "run `python -m tools.reference`"
 
 
-def test_every_table_that_a_page_asks_for_is_made(known):
-    pages = "".join(path.read_text() for path in DOCS.rglob("*.md") if not {"_build", "_gallery"} & set(path.parts))
-    asked = {tuple(words.split()) for words in re.findall(r"^\.\. known:: (.+)$", pages, re.MULTILINE)}
-    assert {name for name, *_ in asked} == set(known)
-    for name, *words in asked:
-        assert len(known[name](*words)) > 2, name
+def test_every_generated_part_stands_on_a_page():
+    marks = [mark for page in pages() for mark in re.findall("<!-- generated: ([a-z-]+)", page.read_text())]
+    assert set(marks) == set(GENERATED)
 
 
-def test_every_array_and_every_key_of_a_log_is_explained(known):
+def test_a_stale_part_is_noticed():
+    page = DOCS / "reference" / "exit-codes.md"
+    assert written(page.read_text().replace("| `succeeded` |", "| `arrived` |")) == page.read_text()
+
+
+def test_every_array_and_every_key_of_a_log_is_explained():
     choice = MarginRecord(loss_m=0.03, reserve_m=0.01, probability=1e-3, drives=80)
     sensing = SensingRecord(map="none", localisation="odometry", odometry=1.0)
     written = json.loads(made_up_record(margin_choice=choice, sensing=sensing).to_json())
-    table = "\n".join([*known["arrays"](), *known["record"]()])
+    table = "\n".join([*GENERATED["arrays"](), *GENERATED["record"]()])
     for name in (*ARRAYS, *SENSED, *written, *(f"plan.{key}" for key in written["plan"]), "margin_choice.loss_m"):
-        assert f" - ``{name}``" in table, name
+        assert f"\n| `{name}` |" in table, name
 
 
 CAMPAIGNS = (DOCS / "how-to" / "campaigns.md").read_text()

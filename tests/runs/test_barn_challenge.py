@@ -96,7 +96,7 @@ def test_reference_paths_are_measured_in_the_challenges_cells(tmp_path):
 
 def test_a_folder_without_worlds_is_refused(tmp_path):
     (tmp_path / "broken.tar.xz").write_bytes(b"nothing")
-    with pytest.raises(InputError, match=r"no archive that can be read \(.+\)$") as caught:
+    with pytest.raises(InputError, match=r"not a readable archive \(.+\)$") as caught:
         unpacked(tmp_path, tmp_path / "out")
     assert "\n" not in str(caught.value)
     assert "\\n" not in str(caught.value)

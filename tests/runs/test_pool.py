@@ -37,9 +37,7 @@ def test_a_run_that_kills_its_process_twice_is_recorded_and_no_other_is_lost():
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs())
     crashed = {row["key"]: row for row in rows if row["outcome"] == "crashed"}
     assert set(crashed) == {job.key for job in jobs() if job.seed == 3}
-    assert {(row["reason"], row["attempts"]) for row in crashed.values()} == {
-        ("the process that made it ended by SIGKILL", 2)
-    }
+    assert {(row["reason"], row["attempts"]) for row in crashed.values()} == {("its process ended by SIGKILL", 2)}
 
 
 def test_a_run_whose_process_dies_once_is_tried_again(tmp_path):
@@ -74,7 +72,7 @@ def test_somebody_else_has_a_turn_while_a_run_takes_long(monkeypatch):
 
 
 def test_workers_that_end_before_they_begin_end_the_campaign():
-    with pytest.raises(InputError, match=r"^--jobs: worker processes end before they begin"):
+    with pytest.raises(InputError, match=r"^--jobs: worker processes die while starting"):
         made(Unloadable(), 1)
 
 
@@ -131,7 +129,7 @@ def test_what_cannot_be_sent_is_named():
 
 
 def test_an_item_without_a_result_is_named():
-    with Pool(1) as workers, pytest.raises(WorkerDied, match=r"^7: the process that made it ended with exit code 7$"):
+    with Pool(1) as workers, pytest.raises(WorkerDied, match=r"^7: its process ended with exit code 7$"):
         list(workers.results(os._exit, [7]))
 
 

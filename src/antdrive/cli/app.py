@@ -1,4 +1,4 @@
-"""The command `antdrive`, from its words to its exit code. The list of commands is printed without loading any."""
+"""Entry point of the command line. `antdrive --help` imports no command."""
 
 from __future__ import annotations
 
@@ -14,14 +14,13 @@ from antdrive.cli.exits import BROKEN_PIPE, INTERNAL_ERROR, INVALID_INPUT, SUCCE
 
 OPTIONS = """Options:
   --version   Show the version and exit.
-  --debug     Show the traceback of a fault, with exit code 3; may stand
-              anywhere.
+  --debug     Show the traceback of an error (exit code 3); allowed anywhere.
   -h, --help  Show this message and exit.
 """
 
 
 def main() -> None:
-    """Run the command line; the exit code says how it ended."""
+    """Run the command line and exit with its code."""
     signal.signal(signal.SIGTERM, _terminate)
     words = [word for word in sys.argv[1:] if word != DEBUG]
     try:
@@ -32,25 +31,25 @@ def main() -> None:
 
             code = exit_code_of(words)
     except BrokenPipeError as error:
-        unread = [stream for stream in (sys.__stdout__, sys.__stderr__) if stream is not None and _is_closed(stream)]
-        for stream in unread:  # what it still holds goes nowhere, or Python would try again at its end
+        closed = [stream for stream in (sys.__stdout__, sys.__stderr__) if stream is not None and _is_closed(stream)]
+        for stream in closed:  # discard the buffered rest, which Python would otherwise flush at exit
             with open(os.devnull, "wb") as nowhere:
                 os.dup2(nowhere.fileno(), stream.fileno())
-        if not unread:  # another pipe, such as that to a process of the program's own
+        if not closed:  # another pipe, such as one to a worker process
             from antdrive.cli.groups import print_exception
 
             print_exception(error)
-        code = BROKEN_PIPE if unread else INTERNAL_ERROR
+        code = BROKEN_PIPE if closed else INTERNAL_ERROR
     sys.exit(code)
 
 
 def _terminate(*_: object) -> None:
-    """End as by Ctrl-C, so that temporary files are removed."""
+    """Raise `Terminated`, so that temporary files are removed as after Ctrl-C."""
     raise Terminated(TERMINATED)
 
 
 def _show_help(words: list[str]) -> int:
-    """Print the list of commands; the exit code, which is that of wrong input where nobody asked for help."""
+    """Print the list of commands. Return the exit code: invalid input unless help was requested."""
     summaries = {name: command.summary for name, command in COMMANDS.items()} | dict(GROUPS)
     width = max(map(len, summaries)) + 2
     about = "".join(f"  {line}" if line.strip() else line for line in ABOUT.splitlines(keepends=True))
@@ -61,7 +60,7 @@ def _show_help(words: list[str]) -> int:
 
 
 def _is_closed(stream: TextIO) -> bool:
-    """Whether a stream is a pipe whose other end is closed."""
+    """Return whether a stream is a pipe whose reading end is closed."""
     poll = select.poll()
-    poll.register(stream.fileno(), 0)  # errors are always told
+    poll.register(stream.fileno(), 0)  # errors are always reported
     return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))

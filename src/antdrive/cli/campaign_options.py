@@ -1,4 +1,4 @@
-"""From the words of `antdrive sweep` to a campaign, and to the command that goes on with it."""
+"""Options of `antdrive sweep`: parsing a campaign and resuming it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from antdrive.sim.settings import SETTINGS
 if TYPE_CHECKING:
     from antdrive.runs.campaigns.campaign import Campaign
 
-#: The options that a campaign's keys come from, in errors.
+#: Option of each campaign key, for error messages.
 OPTIONS = {one.key: one.flag for one in SETTINGS.values() if one.flag} | {"robots": "--robot", "seeds": "--seeds"}
-SOURCE = "the options"  # what errors call a campaign that no file describes
+SOURCE = "the options"  # name of a campaign without a file in error messages
 
 
 def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) -> Campaign:
-    """The campaign in a file, with the keys that options give in place of the file's."""
+    """Load a campaign from a file, from options, or from a file with options that override its keys."""
     from antdrive.runs.campaigns.campaign import load_campaign, make_campaign
 
     given = _keys(words, settings)
@@ -31,10 +31,10 @@ def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) 
     if path is None:
         for key, option in (("worlds", "--world"), ("planners", "--planner")):
             if key not in given:
-                raise InputError(f"{option}: missing; name a campaign file, or at least one world and one planner")
+                raise InputError(f"{option}: missing; name a campaign file, or a world and a planner")
         return make_campaign(given, ".", SOURCE, OPTIONS)
     file = load_campaign(path)
-    # Paths in options begin where the command runs, those in the file beside the file.
+    # Paths in options are relative to the working directory, those in the file to the file.
     if "planners" in given:
         given["planners"] = [_absolute_planner(one) for one in given["planners"]]
     for key in ("worlds", "robots"):
@@ -47,10 +47,10 @@ def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) 
 
 
 def _keys(words: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The campaign's keys that options give."""
+    """Return the campaign keys given by options."""
     axes = {one.key for one in SETTINGS.values() if one.setting.axis}
-    found = {key: value for key, value in settings.items() if key in axes}
-    found |= {
+    keys = {key: value for key, value in settings.items() if key in axes}
+    keys |= {
         "robots": words["robots"],
         "worlds": [*(words["worlds"] or ()), *(_generated(text) for text in words["generate"] or ())],
         "planners": [_planner(text) for text in words["planners"] or ()],
@@ -59,16 +59,16 @@ def _keys(words: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
         "run_limit": words["run_limit"],
         "tasks": None if words["tasks"] is None else _tasks(words["tasks"]),
     }
-    return {key: value for key, value in found.items() if value not in (None, [], {})}
+    return {key: value for key, value in keys.items() if value not in (None, [], {})}
 
 
 def _tasks(text: str) -> Any:
-    """The value of a campaign's key `tasks` from NUMBER, NUMBER:METRES, own or named."""
+    """Parse the campaign key `tasks` from NUMBER, NUMBER:METRES, own or named."""
     if text in ("own", "named"):
         return text
     number, mark, metres = text.partition(":")
     if not (number.isascii() and number.isdigit() and int(number) and bool(mark) == bool(metres)):
-        raise InputError(f"--tasks {text}: write NUMBER or NUMBER:METRES, such as 30:5, or own or named")
+        raise InputError(f"--tasks {text}: must be NUMBER or NUMBER:METRES, such as 30:5, or own or named")
     return {"random": int(number), **({"min_distance": _number(f"--tasks {text}", metres)} if mark else {})}
 
 
@@ -81,7 +81,7 @@ def _absolute(worlds: list[Any]) -> list[Any]:
 
 
 def _absolute_planner(entry: Any) -> Any:
-    """A planner whose file, if it is in one, is found from any folder."""
+    """Return a planner with its file's path, if any, made absolute."""
     if isinstance(entry, dict):
         return {**entry, "name": _absolute_planner(entry["name"])}
     file, mark, word = entry.rpartition(":")
@@ -89,7 +89,7 @@ def _absolute_planner(entry: Any) -> Any:
 
 
 def _seeds(text: str) -> Any:
-    """The value of a campaign's key `seeds`."""
+    """Parse the campaign key `seeds`."""
     if text.isascii() and text.isdigit():
         return int(text)
     if "-" in text:
@@ -98,13 +98,13 @@ def _seeds(text: str) -> Any:
 
 
 def _generated(text: str) -> dict[str, Any]:
-    """{generate: KIND, seeds: SEEDS} from KIND:SEEDS."""
+    """Parse KIND:SEEDS into {generate: KIND, seeds: SEEDS}."""
     kind, _, seeds = text.partition(":")
     return {"generate": kind, "seeds": _seeds(seeds) if seeds else 1}
 
 
 def _planner(text: str) -> Any:
-    """A planner from NAME or NAME:KEY=VALUES:KEY=VALUES, where VALUES are 10,50 or 10..50..20.
+    """Parse NAME or NAME:KEY=VALUES:KEY=VALUES, where VALUES are 10,50 or 10..50..20.
 
     NAME may be FILE.py:CLASS or MODULE:CLASS.
     """
@@ -115,7 +115,7 @@ def _planner(text: str) -> Any:
     for option in options:
         key, mark, values = option.partition("=")
         if not mark or not key:
-            raise InputError(f"--planner {text}: write NAME:KEY=VALUE, such as aco-han:ants=10,50")
+            raise InputError(f"--planner {text}: must be NAME:KEY=VALUE, such as aco-han:ants=10,50")
         ends = values.split("..")
         if len(ends) == 3:
             entry[key] = dict(zip(("from", "to", "step"), (_number("--planner", end) for end in ends), strict=True))
@@ -133,17 +133,17 @@ def _number(option: str, text: str, *, whole: bool = False) -> float | int:
 
 @contextmanager
 def resumable(folder: Path) -> Iterator[None]:
-    """A context that says, when it is interrupted, how the campaign in a folder goes on."""
+    """Print the command that resumes a campaign if the block is interrupted."""
     try:
         yield
     except KeyboardInterrupt:
         command = shlex.join(["antdrive", *_without_again(sys.argv[1:])])
-        print_error(f"{folder}: what is done is kept; go on with: {command}")
+        print_error(f"{folder}: completed runs are kept; resume with: {command}")
         raise
 
 
 def _without_again(words: list[str]) -> Iterator[str]:
-    """The words of a command without --again: what it made again is not to be made a third time."""
+    """Return a command without --again, so that resuming does not repeat those runs twice."""
     rest = iter(words)
     for word in rest:
         if word == "--again":

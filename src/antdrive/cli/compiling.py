@@ -1,7 +1,7 @@
-"""Compile every kernel once, into the cache that `antdrive.base.kernel_cache` describes.
+"""Ahead-of-time compilation of every kernel into the cache of `antdrive.base.kernel_cache`.
 
-Compiling takes about half a minute on two idle cores. The command line does it before the first command that plans, drives or
-films (`compile_once`), and `antdrive warm` does it on request.
+Compiling takes about half a minute on two idle cores. It runs before the first command that plans, drives or films
+(`compile_once`), or on request (`antdrive warm`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from antdrive.base import kernel_cache
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
 
-# Planners that share kernels are compiled by one process; the groups that take longest come first.
+# Planners that share kernels are compiled by one process; the slowest groups come first.
 TOGETHER = (
     ("tangent",),
     ("aco-han", "as", "pfaco"),
@@ -33,19 +33,19 @@ TOGETHER = (
     ("apf", "mmas-dstar"),
 )
 LOCK = "antdrive-compiling.lock"
-COMPILING = "compiling the planners, once for this installation; this takes a minute or two"
+COMPILING = "compiling the planners, once per installation; this takes a minute or two"
 
 
 def compile_once(say: Callable[[str], None] | None = None) -> None:
-    """Compile every kernel if this installation has not done so yet; processes that come at the same time wait for one of them.
+    """Compile every kernel unless the cache is complete. Concurrent processes wait for the first one.
 
-    A bar shows it on a terminal, a line elsewhere; `say` prints the line in any case. Nothing is done where no cache can be
-    kept. Each kernel is then compiled when it is first called, which for a single command is quicker than compiling all.
+    Progress is shown as a bar on a terminal, otherwise as one line; `say` always prints the line. Without a writable cache
+    nothing is compiled here: each kernel compiles on its first call, which is faster for a single command.
     """
     folder = kernel_cache.cache_folder()
     if is_warm() or folder is None:
         return
-    with _turn(folder):
+    with _lock(folder):
         if is_warm():
             return
         if say is not None:
@@ -61,8 +61,8 @@ def compile_once(say: Callable[[str], None] | None = None) -> None:
 
 
 @contextlib.contextmanager
-def _turn(folder: Path) -> Iterator[None]:
-    """A context that one process is in at a time; any number of them where the system or the folder has no locks."""
+def _lock(folder: Path) -> Iterator[None]:
+    """Hold a lock on a folder, where the system and the file system support locks."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(ImportError, OSError):
             import fcntl
@@ -73,17 +73,17 @@ def _turn(folder: Path) -> Iterator[None]:
 
 
 def is_warm() -> bool:
-    """Whether `warm` has run for these sources, this Python, this numba and this processor."""
+    """Return whether the cache is complete for these sources, Python, numba and processor."""
     marker = _marker()
     return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") or (marker is not None and marker.exists())
 
 
 def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
-    """Plan with every planner, drive once and film it, so that every kernel is in the cache."""
+    """Compile every kernel into the cache: plan with every planner, drive and film."""
     from antdrive.planners import PLANNERS
     from antdrive.runs.pool import Pool, cores
 
-    # The second round reads the cache, and compiles what two processes wrote at the same moment and one of them lost.
+    # The second round reads the cache and compiles kernels lost to concurrent writes.
     first = [TOGETHER[0], None, *TOGETHER[1:]]
     second = [tuple(PLANNERS), None]
     done = 0
@@ -101,7 +101,7 @@ def warm(jobs: int | None = None, progress: Callable[[float], None] | None = Non
 
 
 def _scenario() -> Scenario:
-    """A scenario in a world so small that compiling is nearly all it costs."""
+    """Return a scenario in a tiny world, which takes little time beyond compiling."""
     from antdrive.planners import PLANNERS
     from antdrive.robots import load_robot
     from antdrive.sim.scenario import Scenario
@@ -114,7 +114,7 @@ def _scenario() -> Scenario:
 
 
 def _compile(planners: Sequence[str] | None) -> None:
-    """Plan with planners; None: drive and film."""
+    """Plan with the given planners; None: drive and film."""
     _drive_and_film() if planners is None else _plan_with(planners)
 
 
@@ -135,7 +135,7 @@ def _drive_and_film() -> None:
     _sense()
     log = run(_scenario()).rollout
     task = _scenario().task
-    comes = Cruising(radius=0.2, position=(2.5, 0.75), velocity=(-2.0, 0.0))  # the robot has to escape from it
+    comes = Cruising(radius=0.2, position=(2.5, 0.75), velocity=(-2.0, 0.0))  # forces an evasive manoeuvre
     run(replace(_scenario(), task=replace(task, world=replace(task.world, movers=(comes,)))))
     ants = run(replace(_scenario(), planner=PLANNERS["as"], planner_name="as")).rollout
     assert log is not None
@@ -173,7 +173,7 @@ def _sense() -> None:
 
 
 def _marker() -> Path | None:
-    """The file whose presence says that the kernels are compiled; None where nothing can be kept."""
+    """Return the file that marks a complete cache; None without a writable cache folder."""
     folder = kernel_cache.cache_folder()
     if folder is None:
         return None

@@ -1,4 +1,4 @@
-"""How the command line prints: progress bars and errors on stderr, text, tables and JSON on stdout."""
+"""Console output: progress bars and errors on stderr; text, tables and JSON on stdout."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from antdrive.base.files import as_json
 def _progress(
     label: str, *columns: Any, total: float | None = None, **settings: Any
 ) -> Iterator[Callable[..., None] | None]:
-    """A transient bar on stderr with a label, a bar and more columns; None where stderr is no terminal.
+    """Show a transient progress bar on stderr with a label and further columns.
 
-    Yields a function that the block calls with what changes: `completed`, `total`, or a column's field.
+    Yields a function that updates `completed`, `total` or a column's field; None if stderr is not a terminal.
     """
     if not sys.stderr.isatty():
         yield None
@@ -41,8 +41,8 @@ def _progress(
 
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar; yields a function that the block calls with the fraction that is done."""
-    on_top = sys.stdout.isatty()  # else what is printed meanwhile would not reach the file that stdout is
+    """Show a progress bar. Yields a function that takes the completed fraction."""
+    on_top = sys.stdout.isatty()  # a redirected stdout must keep its own output
     columns = ("{task.percentage:>3.0f} %", "TimeRemainingColumn")
     with _progress(label, *columns, total=1.0, redirect_stdout=on_top) as show:
         yield lambda fraction: show(completed=fraction) if show else None
@@ -50,16 +50,16 @@ def bar(label: str) -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def working(label: str) -> Iterator[Callable[[str, int], None]]:
-    """A bar for work of unknown length; yields a function that takes what is being done and the steps that are done."""
+    """Show a bar for work of unknown length. Yields a function that takes the current stage and the number of runs."""
     with _progress(label, "{task.fields[note]}", "TimeElapsedColumn") as show:
         yield lambda stage, done: show(note=f"{stage}, {done} runs") if show else None
 
 
 @contextmanager
 def campaign_bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar for many runs, with their rate and the time left; yields a function that takes the runs done and all runs.
+    """Show a bar for many runs, with rate and time left. Yields a function that takes completed and total runs.
 
-    What is done at the first call does not count for the rate.
+    The rate excludes runs completed before the first call.
     """
     columns = ("MofNCompleteColumn", "{task.fields[note]}", "TimeElapsedColumn")
     with _progress(label, *columns, refresh_per_second=4) as show:
@@ -78,7 +78,7 @@ def campaign_bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def planning(label: str) -> Iterator[None]:
-    """A bar over the iterations of planners that run in the block, with the best length so far."""
+    """Show a bar over planners' iterations, with the best length so far."""
     with _progress(label, "{task.fields[note]}") as show:
         if show is None:
             yield
@@ -94,7 +94,7 @@ def planning(label: str) -> Iterator[None]:
 
 
 def duration(seconds: float) -> str:
-    """A time in words of a length that suits it: 45 s, 12 min, 3 h 20 min, 2 d 4 h."""
+    """Format a duration: 45 s, 12 min, 3 h 20 min, 2 d 4 h."""
     minutes = round(seconds / 60)
     if seconds < 90:
         return f"{seconds:.0f} s"
@@ -120,7 +120,7 @@ def print_json(value: Any) -> None:
 
 
 def show(json: bool, facts: Any, lines: Iterable[str]) -> None:
-    """Print facts as one JSON object, or lines for people, on stdout."""
+    """Print facts as one JSON object, or lines of text, on stdout."""
     if json:
         print_json(facts)
     else:
@@ -129,7 +129,7 @@ def show(json: bool, facts: Any, lines: Iterable[str]) -> None:
 
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Lines of aligned columns. On a terminal, they are cut at its width; elsewhere they are complete."""
+    """Yield lines of aligned columns, truncated at the terminal's width, complete elsewhere."""
     lines = [tuple(headers), *(tuple(row) for row in rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(headers) - 1)]
     columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
@@ -140,11 +140,11 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str
 
 
 def file_lines(files: Mapping[str, object]) -> Iterator[str]:
-    """A line for each written file: what it is, and its path."""
+    """Return one line per written file: name and path."""
     width = max([8, *map(len, files)])
     return (f"  {name:{width}} {path}" for name, path in files.items())
 
 
 def this_command() -> str:
-    """The command that is running, as one would type it."""
+    """Return the running command as typed in a shell."""
     return shlex.join(["antdrive", *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""The planners of `antdrive compare`, from words to what each is driven with."""
+"""Planners to compare, parsed from options of `antdrive compare`."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ MAX_PLANNERS = 6
 
 @dataclass(frozen=True)
 class Entrant:
-    """A planner with its options, as the command line names it."""
+    """A labelled planner with its options."""
 
-    label: str  # what it is called in tables, folders and `--set`
+    label: str  # in tables, folders and `--set`
     name: str  # the planner's name
-    settings: tuple[str, ...] = ()  # its own `--set` in the words of `antdrive run`
+    settings: tuple[str, ...] = ()  # its `--set` values for `antdrive run`
 
 
 def check_worlds(words: Sequence[str]) -> None:
-    """Check that there are worlds of these names, before anything is said about planners, which a campaign needs none of."""
+    """Raise an error about unknown worlds before errors about planners, which campaigns do not need."""
     from antdrive.base.checks import resolve
     from antdrive.worlds.files.world_file import list_worlds
 
@@ -35,26 +35,25 @@ def check_worlds(words: Sequence[str]) -> None:
     for word in words:
         try:
             if resolve("world", word, known).is_dir():
-                problem = "neither a world file nor the folder of a campaign, as antdrive sweep writes it"
-                raise InputError(f"{word}: {problem}")
+                raise InputError(f"{word}: is neither a world file nor a campaign folder of antdrive sweep")
         except FieldError as error:
             raise InputError(error.problem) from None
 
 
 def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:
-    """The planners of `--planner NAME` or `--planner LABEL=NAME`, with the options of `--set GROUP.KEY=VALUE`."""
+    """Parse `--planner NAME` and `--planner LABEL=NAME` with their `--set GROUP.KEY=VALUE`."""
     words, labels = planners or (), dict[str, str]()
     for word in words:
         label, mark, name = word.partition("=")
         if not label or (mark and not name) or label in GROUPS or (mark and not re.fullmatch(r"[\w-]{1,40}", label)):
             raise InputError(
-                f"--planner {word}: write NAME or LABEL=NAME, such as few=aco-han, with a label of letters, digits, - and _"
+                f"--planner {word}: must be NAME or LABEL=NAME, such as few=aco-han; labels use letters, digits, - and _"
             )
         labels[label] = name if mark else label
     if len(labels) < len(words) or not 2 <= len(labels) <= MAX_PLANNERS:
         raise InputError(
-            f"{' '.join(['--planner', *words])}: name two to six different planners; "
-            "one planner with other options gets a label, such as --planner few=aco-han --set few.ants=10"
+            f"{' '.join(['--planner', *words])}: give two to six different planners; "
+            "label one to compare its options, such as --planner few=aco-han --set few.ants=10"
         )
     own: dict[str, list[str]] = {label: [] for label in labels}
     for text in settings or ():
@@ -65,7 +64,7 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
 
 
 def repeat_command(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
-    """The `antdrive run` that repeats one of the compared runs."""
+    """Return the `antdrive run` command that repeats a compared run."""
     from antdrive.sim.forms import setting_words, written
 
     given = written(lambda name: getattr(scenario, name))

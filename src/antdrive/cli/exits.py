@@ -1,11 +1,11 @@
-"""What the command's exit code means to the shell and to scripts."""
+"""Exit codes of the command line."""
 
 from __future__ import annotations
 
-SUCCEEDED = 0  # the command did what was asked, and its verdict is yes
-FAILED = 1  # the command ran, and its verdict is no: no path, a wrong plan, a contact, not certified
-INVALID_INPUT = 2  # something that a person wrote is wrong, or an output cannot be written
-INTERNAL_ERROR = 3  # a planner or antdrive itself did something that it must not do
+SUCCEEDED = 0  # success
+FAILED = 1  # the command ran with a negative result: no path, invalid plan, contact, not certified
+INVALID_INPUT = 2  # invalid user input, or an output that cannot be written
+INTERNAL_ERROR = 3  # error of a planner or of antdrive itself
 INTERRUPTED = 130  # Ctrl-C
-BROKEN_PIPE = 141  # nobody reads any more what is printed, as in `antdrive ... | head`
+BROKEN_PIPE = 141  # output pipe closed, as in `antdrive ... | head`
 TERMINATED = 143  # SIGTERM

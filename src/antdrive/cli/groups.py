@@ -1,4 +1,4 @@
-"""Commands as typer runs them: groups that import a command when it is called, and exit codes for what can end one."""
+"""The typer application: groups that import commands on demand, and exit codes for exceptions."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from antdrive.sim.settings import PANELS
 
 SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
 
-#: Letters that stand for the same option in every command.
+#: Short forms of options, the same in every command.
 SHORT = {"out": "-o", "planner": "-p", "robot": "-r", "world": "-w", "jobs": "-j"}
 
-# typer exports only descendants of the error that it raises for every wrong word.
+# Base class of typer's usage errors, which typer does not export.
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 
 
 def exit_code_of(words: list[str]) -> int:
-    """Run the command that words name; its exit code."""
+    """Run a command line and return its exit code."""
     try:
         code = _code_of(application()(args=words, prog_name="antdrive", standalone_mode=False))
     except (InputError, FieldError) as error:
@@ -48,55 +48,55 @@ def exit_code_of(words: list[str]) -> int:
     except Terminated:
         raise
     except SystemExit as error:
-        if isinstance(error.__context__, BrokenPipeError):  # typer ends the program for it
+        if isinstance(error.__context__, BrokenPipeError):  # typer turns it into SystemExit
             raise error.__context__ from None
-        print_error("internal error: what was called ended the program; a planner must not call exit()")
+        print_error("internal error: SystemExit was raised; planners must not call exit()")
         code = INTERNAL_ERROR
     except Exception as error:
         print_exception(error)
         code = INTERNAL_ERROR
-    if code == INTERRUPTED:  # typer turns Ctrl-C within a command into this code
+    if code == INTERRUPTED:  # typer's code for Ctrl-C within a command
         print_error("interrupted")
     return code
 
 
-def _code_of(verdict: bool | int | None) -> int:
-    """The exit code for what a command returns: its verdict, nothing where it has none, or the code itself."""
-    if isinstance(verdict, bool):
-        return SUCCEEDED if verdict else FAILED
-    return verdict or SUCCEEDED
+def _code_of(result: bool | int | None) -> int:
+    """Return the exit code for a command's return value: success or failure, None, or the code itself."""
+    if isinstance(result, bool):
+        return SUCCEEDED if result else FAILED
+    return result or SUCCEEDED
 
 
 class _Commands(UserDict[str, Any]):
-    """The commands of a table by name; each is imported when it is first asked for."""
+    """Commands by name, imported on first access."""
 
     def __init__(self, table: Mapping[str, Command]) -> None:
         super().__init__()
         self.data.update(table)
 
     def __getitem__(self, name: str) -> Any:
-        found = self.data[name]
-        if isinstance(found, Command):
-            module = importlib.import_module(f"antdrive.cli.commands.{found.module}")
+        command = self.data[name]
+        if isinstance(command, Command):
+            module = importlib.import_module(f"antdrive.cli.commands.{command.module}")
             alone = typer.Typer(**SETTINGS)
-            alone.command(name, cls=_Panelled)(getattr(module, found.function))
-            found = self.data[name] = typer.main.get_command(alone)
-            for one in found.params:
+            alone.command(name, cls=_Panelled)(getattr(module, command.function))
+            command = self.data[name] = typer.main.get_command(alone)
+            for one in command.params:
                 if one.param_type_name == "option" and one.name in SHORT:
                     one.opts.append(SHORT[one.name])
-        return found
+        return command
 
 
 class _Panelled(typer.core.TyperCommand):
-    """A command whose options `--help` lists in panels."""
+    """A command whose `--help` groups options in panels."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write the arguments, then the options by panel."""
+        """Write the arguments, then the options of each panel."""
         panels: dict[str, list[tuple[str, str]]] = {name: [] for name in ("Arguments", *PANELS, "Options")}
         for one in self.get_params(ctx):
             panel = "Arguments" if one.param_type_name == "argument" else getattr(one, "rich_help_panel", None)
             if record := one.get_help_record(ctx):
-                panels[panel or "Options"].append(record)
+                panels[panel or "Options"].append((record[0].partition(" <")[0], record[1]))  # without a Python type
         for name, records in panels.items():
             if records:
                 with formatter.section(name):
@@ -104,19 +104,19 @@ class _Panelled(typer.core.TyperCommand):
 
 
 class _Group(typer.core.TyperGroup):
-    """Commands that are listed without being imported."""
+    """A group that lists its commands without importing them."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the table's summaries."""
+        """Write the summaries of the table."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, command.summary) for name, command in TABLES[self.name or ""].items()])
 
 
 class _RobotsGroup(_Group):
-    """`antdrive robots` with the command that is meant where none is named."""
+    """`antdrive robots` with `list` and `print` as default commands."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put the command's name before words that begin with none."""
+        """Insert the default command if the arguments name none."""
         first = next((word for word in args if not word.startswith("-")), None)
         if first not in self.commands and not {"-h", "--help"} & set(args):
             args = ["list" if first is None else "print", *args]
@@ -127,7 +127,7 @@ TABLES: Mapping[str, Mapping[str, Command]] = {"worlds": WORLDS, "robots": ROBOT
 
 
 def application() -> Any:
-    """The command line as typer runs it."""
+    """Build the typer application."""
     app = typer.Typer(
         name="antdrive",
         help=ABOUT,
@@ -140,13 +140,13 @@ def application() -> Any:
         group.callback()(lambda: None)  # makes it a group before it has commands
         app.add_typer(group, name=name)
     app.callback()(_global_options)
-    found: Any = typer.main.get_command(app)
-    groups = dict(found.commands)
+    main: Any = typer.main.get_command(app)
+    groups = dict(main.commands)
     for name, group in groups.items():
         group.commands = _Commands(TABLES[name])
-    found.commands = _Commands(COMMANDS)
-    found.commands.data.update(groups)
-    return found
+    main.commands = _Commands(COMMANDS)
+    main.commands.data.update(groups)
+    return main
 
 
 def _print_version(wanted: bool) -> None:
@@ -162,25 +162,24 @@ def _global_options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
     debug: Annotated[
-        bool, typer.Option(DEBUG, help="Show the traceback of a fault, with exit code 3; may stand anywhere.")
+        bool, typer.Option(DEBUG, help="Show the traceback of an error (exit code 3); allowed anywhere.")
     ] = False,
 ) -> None:
     pass
 
 
 def print_exception(error: Exception) -> None:
-    """Print one line about a fault of a planner or of antdrive itself; with `--debug`, the traceback before it."""
-
+    """Print one line about a planner error or internal error, after the traceback if `--debug` is given."""
     from antdrive.planners import PlannerError
 
     debug = DEBUG in sys.argv[1:]
     if debug:
         traceback.print_exception(error)
     if isinstance(error, PlannerError):
-        says = str(error)
+        message = str(error)
     else:
-        says = str(input_error("internal error", type(error).__name__, *filter(None, [str(error)])))
-    print_error(says if debug else f"{says} (run again with {DEBUG} for the traceback)")
+        message = str(input_error("internal error", type(error).__name__, *filter(None, [str(error)])))
+    print_error(message if debug else f"{message} (run again with {DEBUG} for the traceback)")
 
 
 def _print_usage_error(error: Any) -> None:

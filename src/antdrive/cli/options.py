@@ -1,6 +1,6 @@
-"""The arguments and options that several commands share, and an option for each setting of a scenario.
+"""Shared arguments and options of commands, and options generated from scenario settings.
 
-Each help text states the unit, and the default where typer cannot show it.
+Help texts state units, and defaults that typer cannot show.
 """
 
 import dataclasses
@@ -20,29 +20,30 @@ Command = Callable[..., Any]
 
 
 def argument(metavar: str, text: str) -> Any:
-    """A command's argument: what `--help` calls it and says of it."""
+    """Declare a command's argument with its name and text in `--help`."""
     return typer.Argument(metavar=metavar, help=text)
 
 
 def option(metavar: str, text: str, *flags: str, panel: str | None = None, **rest: Any) -> Any:
-    """A command's option: what `--help` calls its value, says of it and where; its flags, where its name gives others."""
+    """Declare a command's option: name of its value, text and panel in `--help`, and flags unless its name implies them."""
     return typer.Option(*flags, metavar=metavar or None, help=text, rich_help_panel=panel, **rest)
 
 
 def flag(text: str, *flags: str, panel: str | None = None) -> Any:
-    """An option without a value."""
+    """Declare an option without a value."""
     return option("", text, *flags, panel=panel)
 
 
 def with_settings(names: Iterable[str] = (), *, many: bool = False, **defaults: Any) -> Callable[[Command], Command]:
-    """Give a command an option for each of these settings, whose values it takes by key, as files write them.
+    """Return a decorator that adds scenario settings to a command as options.
 
-    A parameter whose type is a record stands for an option for each of its fields.
+    The command receives the settings by key, in the form of files. A parameter whose type is a record becomes one option per
+    field.
 
     Args:
-        names: fields of a scenario
-        many: whether the options may be repeated; the command takes lists, and none of what is not given
-        defaults: by name, where they are not those of a scenario
+        names: scenario fields
+        many: whether options may be repeated; the command then receives lists, and only options that were given
+        defaults: by field name, where they differ from the scenario's
     """
     chosen = {SETTINGS[name].key: SETTINGS[name] for name in names}
 
@@ -71,7 +72,7 @@ def with_settings(names: Iterable[str] = (), *, many: bool = False, **defaults: 
 
 
 def _fields(record: inspect.Parameter) -> list[inspect.Parameter]:
-    """A parameter for each field of a record; what the record is by default gives their defaults."""
+    """Return one parameter per field of a record, with the record's default values."""
     usual = record.annotation() if record.default is record.empty else record.default
     return [
         record.replace(name=one.name, annotation=one.type, default=getattr(usual, one.name))
@@ -80,7 +81,7 @@ def _fields(record: inspect.Parameter) -> list[inspect.Parameter]:
 
 
 def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> inspect.Parameter:
-    """The parameter of a command that typer makes a setting's option of."""
+    """Return the typer parameter of a setting's option."""
     setting = one.setting
     text = setting.help[0].upper() + setting.help[1:]
     kind: Any = one.kind
@@ -96,7 +97,7 @@ def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> in
         kind = list[str] if setting.form == "discs" else str
     if many:
         kind, default = list[kind], None
-    repeated = " May be repeated." if many or setting.form == "discs" else ""
+    repeated = " Repeatable." if many or setting.form == "discs" else ""
     usual = f"  [default: {setting.usual}]" if setting.usual and not many else ""
     made = option(setting.metavar, f"{text}.{repeated}{usual}", flags, panel=setting.group)
     annotation: Any = Annotated[kind | None if default is None else kind, made]
@@ -104,7 +105,7 @@ def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> in
 
 
 def _value(one: DeclaredSetting, value: Any, many: bool) -> Any:
-    """A setting as files write it, from what an option gives."""
+    """Convert an option's value to a setting's value as in files."""
     if one.setting.form == "discs":
         return [disc(text) for text in value or ()]
     values = value if many else [value]
@@ -123,30 +124,26 @@ def _margin(text: str) -> float | str:
     try:
         return text if text == "auto" else float(text)
     except ValueError:
-        raise InputError(f"--margin: write a number of metres, or auto; got {text}") from None
+        raise InputError(f"--margin {text}: must be a number of metres or auto") from None
 
 
-World = Annotated[str, argument("WORLD", "Name of a world in the catalogue, or a world file.")]
-Log = Annotated[Path, argument("ROLLOUT", "Log of a drive, or the folder of a run.")]
-Robot = Annotated[str, option("NAME", "Name of a robot in the catalogue, or a robot file.", panel="Robot")]
-Planner = Annotated[str, option("NAME", "Planner, or FILE.py:CLASS; `antdrive planners` lists names.", panel="Planner")]
-Out = Annotated[
-    Path | None, option("FOLDER", "Folder for the results.  [default: a folder below out/]", panel="Output")
-]
+World = Annotated[str, argument("WORLD", "World name or file.")]
+Log = Annotated[Path, argument("ROLLOUT", "Log of a drive, or folder of a run.")]
+Robot = Annotated[str, option("NAME", "Robot name or file.", panel="Robot")]
+Planner = Annotated[str, option("NAME", "Planner name or FILE.py:CLASS.", panel="Planner")]
+Out = Annotated[Path | None, option("FOLDER", "Output folder.  [default: a folder in out/]", panel="Output")]
 Prelude = Annotated[
     float,
     option(
         "SECONDS",
-        "Begin the film with this many seconds of planning [s]; needs a planner with iterations.",
+        "Planning shown at the start of the film [s]; needs an iterative planner.",
         panel="Output",
         min=0.0,
         max=60.0,
     ),
 ]
-Speed = Annotated[
-    float, option("FACTOR", "Speed of the film; 2 is twice as fast as real time.", panel="Output", min=0.01, max=100)
-]
-Vector = Annotated[bool, flag("Write figures as PDF too.", "--vector", panel="Output")]
+Speed = Annotated[float, option("FACTOR", "Playback speed of the film.", panel="Output", min=0.01, max=100)]
+Vector = Annotated[bool, flag("Also write figures as PDF.", "--vector", panel="Output")]
 Figures = Annotated[bool, flag("Write figures.", "--figures/--no-figures", panel="Output")]
 Jobs = Annotated[int | None, option("NUMBER", "Processes.  [default: one per core]", min=1, max=256)]
-Json = Annotated[bool, flag("Print one JSON object on stdout and nothing else.", "--json", panel="Output")]
+Json = Annotated[bool, flag("Print a single JSON object on stdout.", "--json", panel="Output")]

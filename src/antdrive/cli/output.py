@@ -1,4 +1,4 @@
-"""What commands write and print about runs, planners and margins."""
+"""Output of commands: folders, films, and text about runs and margins."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
 
 @contextmanager
 def results_folder(
-    out: Path | None, usual: Path, manifest: str, mark: str, *, told: bool = True
+    out: Path | None, usual: Path, manifest: str, mark: str, *, write_manifest: bool = True
 ) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """A context in which this command alone writes into a folder of results: the folder, and what its manifest begins with.
+    """Claim a results folder for this command. Yields the folder and the first entries of its manifest.
 
-    The folder is tried, and the kernels are compiled, before any work. Where no folder is named, it is the usual one, or one
-    beside it if that is of something else. `told`: the manifest is written at once, else later by the caller.
+    The folder is checked and the kernels are compiled before any work. Without `out`, it is `usual`, or a folder beside that if
+    `usual` holds other results. `write_manifest`: write the manifest now; otherwise the caller does.
     """
     folder, facts = out or free_folder(usual, manifest, mark), {"fingerprint": mark, "command": this_command()}
     check_folder(folder)
     compile_once()
-    with opened(folder, manifest, facts if told else None):
+    with opened(folder, manifest, facts if write_manifest else None):
         yield folder, facts
 
 
 def film_drives(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
-    """Film a drive, or several side by side, with a progress bar; facts about the film."""
+    """Film one drive, or several side by side, with a progress bar. Return facts about the film."""
     from antdrive.views.run_folder import write_film
 
     with bar("filming") as progress:
@@ -43,11 +43,11 @@ def film_drives(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str
 
 
 def run_lines(run: Run, files: Mapping[str, str]) -> Iterator[str]:
-    """How a run ended, what it measured, its certificate, and the files it wrote."""
+    """Yield a run's outcome, metrics, certificate and files as lines."""
     s = run.scenario
     yield f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}{in_brackets(run.reason)}"
     if s.noise and not s.robot.noise.nonzero and s.map == "given" and s.known_perception.kind != "lidar":
-        yield f"  noise {s.noise:g} changes nothing: the file of {s.robot.name} has no noise section"
+        yield f"  --noise {s.noise:g} has no effect: the robot file of {s.robot.name} has no noise section"
     if s.chosen is not None:
         yield f"  {chosen_margin(s.chosen)}"
     if run.rollout is not None and run.certificate is not None:
@@ -71,30 +71,30 @@ def run_lines(run: Run, files: Mapping[str, str]) -> Iterator[str]:
 
 
 def _discovery(sight: dict[str, Any]) -> str:
-    """When the robot first saw an obstacle of `--unseen`, and how near it came to it."""
-    seen = (
-        "never seen"
+    """Return when the robot detected an obstacle of `--unseen`, and its smallest distance to it."""
+    detected = (
+        "never detected"
         if sight["seen_s"] is None
-        else (f"first seen at t = {sight['seen_s']:.1f} s, {sight['seen_from_m']:.2f} m away")
+        else f"detected at t = {sight['seen_s']:.1f} s from {sight['seen_from_m']:.2f} m"
     )
-    near = f"nearest {sight['nearest_m']:.2f} m, at t = {sight['nearest_s']:.1f} s"
-    return f"obstacle {sight['obstacle']}, not in the world file: {seen}; {near}"
+    nearest = f"nearest at t = {sight['nearest_s']:.1f} s: {sight['nearest_m']:.2f} m"
+    return f"unseen obstacle {sight['obstacle']}: {detected}; {nearest}"
 
 
 def chosen_margin(chosen: MarginChoice) -> str:
-    """A margin that was chosen by calibration, with what it rests on."""
+    """Return a line about a calibrated margin and its evidence."""
     record = chosen.record
     return (
-        f"margin {chosen.margin:.3f} m, chosen: a loss of {record.loss_m:.3f} m is predicted from {record.drives} drives, "
-        f"at least {record.reserve_m:.3f} m are left"
+        f"calibrated margin {chosen.margin:.3f} m: predicted loss {record.loss_m:.3f} m from {record.drives} drives, "
+        f"reserve at least {record.reserve_m:.3f} m"
     )
 
 
 def in_brackets(reason: str) -> str:
-    """The reason behind a sentence, if there is one."""
+    """Return the reason in brackets, or nothing."""
     return f" ({reason})" if reason else ""
 
 
 def plain(value: Any) -> Any:
-    """A planner's option as JSON can hold it."""
+    """Convert a planner's option to a JSON value."""
     return value if isinstance(value, bool | int | float | str | None) else str(value)

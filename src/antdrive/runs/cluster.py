@@ -1,4 +1,4 @@
-"""Workers on this or other machines through dask's `distributed`, in chunks of runs that may safely be made twice."""
+"""Workers on this or other machines through dask's `distributed`. They run chunks of runs, each safe to repeat."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from antdrive.base.errors import input_error
 from antdrive.base.optional import optional
 from antdrive.runs.pool import ATTEMPTS, Done, Item, Result, Ticket, Waiting
 
-CHUNKS_EACH = 3  # chunks that are at a worker or on their way to it
-PATIENCE = 10.0  # how long a scheduler may be away before the campaign ends [s]
-WORKERS_EVERY = 2.0  # how often the number of workers is asked for [s]
-TICK = 0.005  # between looks at the tasks [s]
+CHUNKS_EACH = 3  # chunks at a worker or on their way to it
+PATIENCE = 10.0  # longest absence of the scheduler before the campaign ends [s]
+WORKERS_EVERY = 2.0  # period of the query for the number of workers [s]
+TICK = 0.005  # polling period of the tasks [s]
 _LOCAL = re.compile(r"local:([1-9]\d{0,3})")
 
 
@@ -34,19 +34,19 @@ def run_on_cluster(
     limit: float | None = None,
     tick: Callable[[], None] = lambda: None,
 ) -> Generator[Done[Item, Result], None, None]:
-    """Do the work for each item on a cluster; what comes of it, in order of arrival."""
-    distributed = optional("distributed", "cluster", "--dask spreads runs over machines with it")
+    """Run the work for each item on a cluster; yield the results in order of arrival."""
+    distributed = optional("distributed", "cluster", "--dask spreads runs over machines")
     with _client(distributed, address) as client:
         waiting, at_work, asked = Waiting(items, 1), dict[Any, list[Ticket[Item]]](), -math.inf
         suspects: list[Ticket[Item]] = []
         tried: Ticket[Item] | None = None
-        since = math.inf  # when the run began that is tried alone
+        since = math.inf  # start of the run that is retried alone
         while waiting or at_work or suspects:
             if time.monotonic() - asked > WORKERS_EVERY:
                 waiting.processes, asked = _workers(client, address), time.monotonic()
             while waiting and len(at_work) < CHUNKS_EACH * waiting.processes:
                 _submit(client, work, waiting.chunk(), at_work, limit)
-            # Workers that die are held against all runs that they were handed: each is tried with nothing beside it.
+            # A dead worker leaves all runs of its chunk under suspicion: each is retried alone.
             if not at_work:
                 tried, since = suspects.pop(), time.monotonic()
                 _submit(client, work, [tried], at_work, limit)
@@ -73,7 +73,7 @@ def _submit(
     at_work: dict[Any, list[Ticket[Item]]],
     limit: float | None,
 ) -> None:
-    # As part of the function the runs are not searched for results of other tasks, which takes long.
+    # As part of the function, the runs are not searched for results of other tasks, which is slow.
     made = functools.partial(run_chunk, work, [ticket.item for ticket in chunk], limit)
     at_work[client.submit(made, pure=False)] = chunk
 
@@ -81,7 +81,7 @@ def _submit(
 def run_chunk(
     work: Callable[[Item], Result], items: Sequence[Item], limit: float | None = None
 ) -> tuple[list[Result], float]:
-    """Make runs one after the other; their results, and the time that they took [s]."""
+    """Make runs in sequence; return their results and the time taken [s]."""
     started, results = time.monotonic(), []
     for item in items:
         with _ended_after(limit):
@@ -91,7 +91,7 @@ def run_chunk(
 
 @contextmanager
 def _ended_after(limit: float | None) -> Iterator[None]:
-    """A context that ends this process if it lasts too long: no other end reaches whatever a planner does."""
+    """Kill this process after `limit` seconds: nothing else stops a planner."""
     if limit is None:
         yield
         return
@@ -105,7 +105,7 @@ def _ended_after(limit: float | None) -> Iterator[None]:
 
 
 def _received(future: Any, chunk: list[Ticket[Item]], waiting: Waiting[Item], slow: bool) -> Iterator[Done[Item, Any]]:
-    """The results of a chunk. Where it killed its workers while it was alone, it may have been too slow."""
+    """Yield the results of a chunk. A chunk that killed its workers while alone may have been too slow."""
     if future.status == "finished":
         results, seconds = future.result()
         waiting.measured(seconds, len(chunk))
@@ -113,26 +113,26 @@ def _received(future: Any, chunk: list[Ticket[Item]], waiting: Waiting[Item], sl
             yield Done(ticket.item, ticket.number, result)
     elif _killed(future):
         for ticket in chunk:
-            died = "the processes that made it ended"
+            died = "its worker processes died"
             yield Done(ticket.item, ticket.number, died=died, slow=slow, attempts=ATTEMPTS)
     elif future.status == "error":
         raise future.exception()
-    else:  # cancelled: the connection was lost for a while
+    else:  # cancelled: the connection was lost temporarily
         waiting.put_back(chunk)
 
 
 def _killed(future: Any) -> bool:
-    """Whether a task ended because the workers died that it was handed to."""
+    """Return whether a task ended because its workers died."""
     return future.status == "error" and type(future.exception()).__name__ == "KilledWorker"
 
 
 @contextmanager
 def _client(distributed: Any, address: str) -> Iterator[Any]:
-    """A context with a client of the cluster at an address."""
+    """Open a client of the cluster at an address."""
     match = _LOCAL.fullmatch(address)
     if match is None and not re.match(r"(tcp|tls|ucx|ws|wss)://.", address):
         raise input_error(
-            "--dask", address, "write local:N with a number of processes above 0, or tcp://HOST:PORT of a scheduler"
+            "--dask", address, "write local:N with N processes, at least 1, or tcp://HOST:PORT of a scheduler"
         )
     with contextlib.ExitStack() as stack:
         target: Any = address
@@ -157,7 +157,7 @@ def _client(distributed: Any, address: str) -> Iterator[Any]:
 
 
 def _workers(client: Any, address: str) -> int:
-    """How many workers a cluster has; 1 if it has none yet."""
+    """Return the number of workers, at least 1."""
     _require_scheduler(client, address)
     try:
         return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
@@ -167,9 +167,9 @@ def _workers(client: Any, address: str) -> int:
 
 
 def _require_scheduler(client: Any, address: str) -> None:
-    """Wait for a connection that was lost."""
+    """Wait for a lost connection to return, else raise."""
     deadline = time.monotonic() + PATIENCE
     while client.status == "connecting" and time.monotonic() < deadline:
         time.sleep(TICK)
     if client.status != "running":
-        raise input_error("--dask", address, "the scheduler is gone; the same command goes on with what is missing")
+        raise input_error("--dask", address, "the scheduler is gone; repeat the command to resume")

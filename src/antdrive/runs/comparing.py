@@ -21,27 +21,27 @@ COMPARED = {
 
 
 def mark_of(scenarios: Mapping[str, Scenario], cases: Sequence[tuple[str, int]]) -> str:
-    """Eight hexadecimal digits that differ between comparisons."""
+    """Return eight hexadecimal digits that identify a comparison."""
     facts = [f"{key} {scenario.identity()[:8]}" for key, scenario in scenarios.items()]
     return hashlib.sha256(repr((facts, list(cases))).encode()).hexdigest()[:8]
 
 
 @dataclass(frozen=True)
 class Compared:
-    """One run of a comparison, without its log."""
+    """A run of a comparison, without its log."""
 
-    label: str  # of the planner
+    label: str  # the planner's label
     world: str  # the world's name
     seed: int  # the random seed
-    facts: Mapping[str, Any]  # what `Run.as_dict` says
-    drive: str  # a SHA-256 of what was driven, whatever was planned; empty if the robot did not drive
+    facts: Mapping[str, Any]  # `Run.as_dict`
+    drive: str  # SHA-256 of the drive, whatever the plan; empty without a drive
     plan: bytes  # the planned line as bytes
 
     @classmethod
     def of(cls, label: str, run: Run, folder: str) -> Compared:
-        """What a comparison keeps of a run whose results are in a folder."""
+        """Return a run without its log."""
         s, log = run.scenario, run.rollout
-        # `drive_digest` covers the planned cells, too, which smoothing may make one route of.
+        # `drive_digest` also covers the planned cells, which smoothing may turn into the same route.
         driven = () if log is None else (log.pose, log.twist, log.command, log.contacts, log.route)
         drive = hashlib.sha256(b"".join(array.tobytes() for array in driven)).hexdigest() if driven else ""
         facts = {**run.as_dict(), "folder": folder}
@@ -56,9 +56,9 @@ class Compared:
 
 
 def differences(runs: Sequence[Compared]) -> list[dict[str, Any]]:
-    """For each planner but the first, how its drives differ from the first one's with the same world and seed.
+    """Compare each planner's drives with the first planner's in the same world and with the same seed.
 
-    Only pairs in which both succeeded are compared; of each metric the median difference, the least and the most.
+    Pairs count if both succeeded. Each metric has its median, least and largest difference.
     """
     first = runs[0].label
     reference = {(run.world, run.seed): run for run in runs if run.label == first}
@@ -81,7 +81,7 @@ def differences(runs: Sequence[Compared]) -> list[dict[str, Any]]:
 
 
 def difference_cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
-    """One entry of `differences` as a row of a table."""
+    """Return one entry of `differences` as a row of a table."""
     share = f"{entry['succeeded']}/{entry['runs']}"
     values = [entry[name] for name in COMPARED]
     texts = ["-" if v is None else f"{v[0]:+.3f} ({v[1]:+.3f} to {v[2]:+.3f})" for v in values]
@@ -89,7 +89,7 @@ def difference_cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def same_drives(runs: Sequence[Compared], smoothing: str) -> list[str]:
-    """A sentence for every group of planners whose drives are the same, bit for bit."""
+    """Return a sentence for every group of planners with bitwise identical drives."""
     groups: dict[tuple[str, bool], list[str]] = {}
     cases: dict[tuple[str, int], dict[str, list[Compared]]] = {}
     for run in runs:
@@ -104,6 +104,6 @@ def same_drives(runs: Sequence[Compared], smoothing: str) -> list[str]:
     for (names, planned_alike), where in groups.items():
         place = f"in all {len(cases)} cases" if len(where) == len(cases) > 1 else "; ".join(where[:5])
         more = f" and {len(where) - 5} more" if len(where) > 5 and not place.startswith("in all") else ""
-        why = "the same plan" if planned_alike else f"other plans, but --smoothing {smoothing} makes one route of them"
+        why = "the same plan" if planned_alike else f"different plans, but the same route after --smoothing {smoothing}"
         told.append(f"{names}: the same drive ({why}): {place}{more}")
     return told

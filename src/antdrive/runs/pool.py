@@ -1,8 +1,8 @@
-"""The pool in which many runs are made: worker processes of this machine, or this process.
+"""Pool of worker processes on this machine for many runs.
 
-A worker that dies costs the run that it was making, and that run is tried once more. A worker is handed a chunk of runs and
-hands back each result as soon as it has it, so that it is always known which run it was making. Workers end by themselves
-when their parent does, however that ends. `antdrive.runs.cluster` has the same pool on a dask cluster.
+If a worker dies, only its current run is lost, and that run is tried once more. A worker takes a chunk of runs and
+returns each result at once, so the current run is always known. Workers end when their parent does.
+`antdrive.runs.cluster` is the same pool on a dask cluster.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from antdrive.base.errors import InputError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-ATTEMPTS = 2  # of a run that kills its process
-STILLBORN = 3  # workers in a row that end before they are ready, after which none is started
-POLL_INTERVAL = 1.0  # how long to wait for a result before something else is done [s]
-GRACE = 1.0  # how long workers may take to end by themselves [s]
-CHUNK_SECONDS = 2.0  # how long a chunk should take [s]
+ATTEMPTS = 2  # for a run that kills its process
+STILLBORN = 3  # consecutive workers that die before they are ready; then the pool gives up
+POLL_INTERVAL = 1.0  # longest wait for a result before other duties [s]
+GRACE = 1.0  # time for workers to end by themselves [s]
+CHUNK_SECONDS = 2.0  # target duration of a chunk [s]
 LONGEST_CHUNK = 256  # runs
-WEIGHT = 0.1  # of the latest run in the mean time of a run
+WEIGHT = 0.1  # of the latest run in the moving average of run times
 
 
 @dataclass(eq=False)
 class Ticket(Generic[Item]):
-    """A run in the queue: its place among the items, and how often a process has died of it."""
+    """A run in the queue, with its index and the number of processes it has killed."""
 
     number: int
     item: Item
@@ -47,13 +47,13 @@ class Ticket(Generic[Item]):
 
 
 class Waiting(Generic[Item]):
-    """Runs that wait, by group.
+    """Queue of runs, by group.
 
-    A process goes on with the group of its last run, then takes one that no process has begun, and at last helps with the
-    one of which most is left. Chunks take about two seconds by the mean time of recent runs, and less near the end.
+    A process stays with the group of its last run, then takes an untouched one, then helps with the largest. Chunks take
+    about two seconds by the mean time of recent runs, and less near the end.
 
     Attributes:
-        processes: how many processes there are
+        processes: number of processes
     """
 
     def __init__(
@@ -74,24 +74,24 @@ class Waiting(Generic[Item]):
         return self._length
 
     def measured(self, seconds: float, runs: int = 1) -> None:
-        """Take note of how long runs took."""
+        """Record how long runs took."""
         weight = 1 - (1 - WEIGHT) ** runs
         each = seconds / runs
         self._mean = each if self._mean is None else (1 - weight) * self._mean + weight * each
 
     def put_back(self, tickets: Iterable[Ticket[Item]]) -> None:
-        """Put runs in front of all others."""
+        """Return runs to the front of the queue."""
         returned = list(tickets)
         self._first.extend(returned)
         self._length += len(returned)
 
     def chunk(self, group: Hashable = None) -> list[Ticket[Item]]:
-        """The next runs for a process; none if no run waits."""
+        """Take the next runs for a process; empty if none is left."""
         found: list[Ticket[Item]] = []
         most = self._chunk_length()
         while self._length and len(found) < most:
             if self._first:
-                # One by one: where one of these kills its process, no other is in doubt.
+                # One by one: if one of these kills its process, only that one is under suspicion.
                 found, most = [self._first.popleft()], 1
                 self._length -= 1
             else:
@@ -127,14 +127,14 @@ class WorkerDied(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class Done(Generic[Item, Result]):
-    """What came of one item."""
+    """The result of one item."""
 
     item: Item  # the item
-    number: int  # its place among the items
-    result: Result | None = None  # what the work returned; None where its process died
-    died: str = ""  # how its process ended, in words; empty where it did not die
-    slow: bool = False  # whether the process was ended because the run took longer than the limit
-    attempts: int = 1  # how often the run was tried
+    number: int  # its index among the items
+    result: Result | None = None  # return value of the work; None if the process died
+    died: str = ""  # how the process died, in words; empty if it did not
+    slow: bool = False  # whether the process was killed because the run exceeded the limit
+    attempts: int = 1  # number of attempts
 
     @property
     def value(self) -> Result:
@@ -145,46 +145,46 @@ class Done(Generic[Item, Result]):
 
 
 def cores() -> int:
-    """The number of processor cores: of a container, not of its host."""
+    """Return the number of processor cores of this container or host."""
     import joblib
 
     return int(joblib.cpu_count())
 
 
 def processes_for(jobs: int | None) -> int:
-    """The processes of a pool for `jobs` (None: one per core). 0, this process, for one, and in a worker of any pool."""
+    """Return the number of processes for `jobs` (None: one per core); 0, this process, for one or in a worker."""
     jobs = cores() if jobs is None else jobs
     return 0 if jobs == 1 or multiprocessing.parent_process() is not None else jobs
 
 
 @dataclass(eq=False)
 class _Worker:
-    """A worker process, as its parent sees it."""
+    """A worker process, as seen by its parent."""
 
     process: Any
     pipe: Connection
     work: Callable[[Any], Any]
     ready: bool = False
-    handed: deque[Ticket[Any]] = field(default_factory=deque)  # the first is the one that is being made
+    handed: deque[Ticket[Any]] = field(default_factory=deque)  # the first is the current run
     group: Hashable = None
-    since: float = 0.0  # when the run began that is being made
-    slow: bool = False  # whether it was ended because that run took too long
+    since: float = 0.0  # start of the current run
+    slow: bool = False  # whether it was killed because that run exceeded the limit
 
 
 @dataclass(frozen=True)
 class _Raised:
-    """What a worker hands back where its work raised something."""
+    """An exception of the work, returned by a worker."""
 
     error: Exception
 
 
 class Pool:
-    """Processes for many runs; they serve one call after the other until the pool is closed.
+    """Processes for many runs; they serve successive calls until the pool is closed.
 
     Args:
-        processes: their number; 0: this process, without protection from runs that kill it
-        limit: wall-clock time after which a run is ended [s]
-        tick: called once a second, at least, while results are waited for
+        processes: number of processes; 0: this process, without protection from runs that kill it
+        limit: wall-clock limit of a run [s]
+        tick: called at least once a second while waiting for results
     """
 
     def __init__(self, processes: int, *, limit: float | None = None, tick: Callable[[], None] = lambda: None) -> None:
@@ -204,7 +204,7 @@ class Pool:
         *,
         group: Callable[[Item], Hashable] = lambda item: None,
     ) -> Generator[Done[Item, Result], None, None]:
-        """Do the work for each item; what comes of it, in order of arrival. A worker keeps to a group of items while it can."""
+        """Run the work for each item; yield results in order of arrival. Workers keep to a group of items while they can."""
         if not self._processes:
             for number, item in enumerate(items):
                 yield Done(item, number, work(item))
@@ -224,14 +224,14 @@ class Pool:
                     except (EOFError, OSError):
                         stillborn = 0 if worker.ready else stillborn + 1
                         if stillborn >= STILLBORN:
-                            problem = "worker processes end before they begin; is there memory for them?"
+                            problem = "worker processes die while starting; check the free memory"
                             raise InputError(f"--jobs: {problem}") from None
-                        yield from self._buried(worker, waiting)
+                        yield from self._reap(worker, waiting)
                         continue
                     if isinstance(answer, _Raised):
                         raise answer.error
                     if worker.ready:
-                        yield _credited(worker, answer, waiting)
+                        yield _take_result(worker, answer, waiting)
                     worker.ready, stillborn = True, 0
         finally:
             if any(worker.handed or not worker.ready for worker in self._workers):
@@ -240,7 +240,7 @@ class Pool:
     def in_order(
         self, work: Callable[[Item], Result], items: Iterable[Item]
     ) -> Generator[Done[Item, Result], None, None]:
-        """Do the work for each item; what comes of it in the order of the items, as soon as those before it are there."""
+        """Run the work for each item; yield results in the order of the items."""
         early: dict[int, Done[Item, Result]] = {}
         following = 0
         with contextlib.closing(self.each(work, items)) as arriving:
@@ -253,13 +253,13 @@ class Pool:
     def results(
         self, work: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
     ) -> Generator[Result, None, None]:
-        """Do the work for each item; the results, in the order of the items or as they are made."""
+        """Run the work for each item; yield the results, in the order of the items or of arrival."""
         with contextlib.closing((self.in_order if in_order else self.each)(work, items)) as arriving:
             for done in arriving:
                 yield done.value
 
     def close(self) -> None:
-        """End the workers: those that wait for work at once, the others when they have had time for their present run."""
+        """End the workers: idle ones at once, busy ones after a grace period."""
         for worker in self._workers:
             worker.pipe.close()
         deadline = time.monotonic() + GRACE
@@ -272,7 +272,7 @@ class Pool:
                 process.join()
 
     def _staff(self, work: Callable[[Any], Any], waiting: Waiting[Any]) -> None:
-        """Hand chunks to idle workers, and start those that are missing."""
+        """Hand chunks to idle workers and start missing ones."""
         for worker in self._workers:
             if worker.ready and not worker.handed:
                 _hand(worker, work, waiting)
@@ -281,7 +281,7 @@ class Pool:
             self._workers.append(_start(work))
 
     def _patience(self) -> float:
-        """How long to wait for a result: a second at most, and no longer than until a run takes too long [s]."""
+        """Return how long to wait for a result: until a run exceeds the limit, at most a second [s]."""
         if self._limit is None:
             return POLL_INTERVAL
         now = time.monotonic()
@@ -289,7 +289,7 @@ class Pool:
         return max(0.0, min([POLL_INTERVAL, *left]))
 
     def _end_slow(self) -> None:
-        """End workers whose run takes too long; that they have ended shows when their pipe is read."""
+        """Kill workers whose run exceeds the limit; their closed pipe shows it."""
         for worker in self._workers:
             at_work = worker.ready and worker.handed and not worker.pipe.poll()
             if self._limit is not None and at_work and time.monotonic() - worker.since > self._limit:
@@ -297,8 +297,8 @@ class Pool:
                 with contextlib.suppress(OSError):
                     os.kill(worker.process.pid, signal.SIGKILL)
 
-    def _buried(self, worker: _Worker, waiting: Waiting[Any]) -> Iterator[Done[Any, Any]]:
-        """Give back what a dead worker was handed; the run that it was making is a result if it was its last attempt."""
+    def _reap(self, worker: _Worker, waiting: Waiting[Any]) -> Iterator[Done[Any, Any]]:
+        """Return a dead worker's runs to the queue; yield its current run if that was the last attempt."""
         self._workers.remove(worker)
         worker.pipe.close()
         worker.process.join()
@@ -307,7 +307,7 @@ class Pool:
         ticket = worker.handed.popleft()
         ticket.attempts += 1
         if worker.slow or ticket.attempts == ATTEMPTS:
-            died = f"the process that made it ended {_how(worker.process.exitcode)}"
+            died = f"its process ended {_how(worker.process.exitcode)}"
             yield Done(ticket.item, ticket.number, died=died, slow=worker.slow, attempts=ticket.attempts)
         else:
             worker.handed.appendleft(ticket)
@@ -315,13 +315,13 @@ class Pool:
 
 
 def call_all(calls: Iterable[Callable[[], Result]], jobs: int | None = None) -> list[Result]:
-    """What calls without arguments return, made in processes (None: one per core)."""
+    """Return the results of calls without arguments, run in processes (None: one per core)."""
     with Pool(processes_for(jobs)) as pool:
         return list(pool.results(operator.call, calls))
 
 
-def _credited(worker: _Worker, result: Any, waiting: Waiting[Any]) -> Done[Any, Any]:
-    """The result of the run that a worker was making; the worker is making the next one now."""
+def _take_result(worker: _Worker, result: Any, waiting: Waiting[Any]) -> Done[Any, Any]:
+    """Return the result of a worker's current run and advance to its next."""
     ticket, now = worker.handed.popleft(), time.monotonic()
     waiting.measured(now - worker.since)
     worker.group, worker.since, worker.slow = ticket.group, now, False
@@ -329,13 +329,13 @@ def _credited(worker: _Worker, result: Any, waiting: Waiting[Any]) -> Done[Any, 
 
 
 def _hand(worker: _Worker, work: Callable[[Any], Any], waiting: Waiting[Any]) -> None:
-    """Hand the next chunk to a worker that has nothing to do."""
+    """Hand the next chunk to an idle worker."""
     chunk = waiting.chunk(worker.group)
     if chunk:
         changed = None if worker.work is work else work
         worker.work, worker.since = work, time.monotonic()
         worker.handed.extend(chunk)
-        with contextlib.suppress(OSError):  # it has died, which shows when its pipe is read
+        with contextlib.suppress(OSError):  # dead; its pipe will show it
             worker.pipe.send_bytes(_packed((changed, [ticket.item for ticket in chunk])))
 
 
@@ -349,7 +349,7 @@ def _how(code: int) -> str:
 
 
 def _start(work: Callable[[Any], Any]) -> _Worker:
-    # loky's processes, unlike those of multiprocessing, do not import the caller's script again.
+    # Unlike those of multiprocessing, loky's processes do not import the caller's script again.
     from joblib.externals.loky.backend import get_context
 
     context = get_context("loky")
@@ -363,9 +363,9 @@ def _start(work: Callable[[Any], Any]) -> _Worker:
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """A context in which processes start that Ctrl-C does not reach; for this process it is only put off.
+    """Shield processes started in this context from Ctrl-C; for this process it is only delayed.
 
-    A terminal sends Ctrl-C to every process. What becomes of the workers is for the parent to decide.
+    A terminal sends Ctrl-C to every process, but the parent decides when its workers end.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -378,21 +378,21 @@ def _undisturbed() -> Iterator[None]:
 
 
 def serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
-    """What a worker does: make the runs that it is handed until there is nobody to hand them."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked
-    with contextlib.suppress(EOFError, OSError):  # the parent has closed the pipe, or is dead
+    """Make the runs received through a pipe until the parent closes it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # in case it could not be blocked
+    with contextlib.suppress(EOFError, OSError):  # the parent closed the pipe, or died
         pipe.send(None)
         while True:
             changed, items = pipe.recv()
             work = changed or work
             for item in items:
-                if pipe.poll():  # while it is at work, a worker is sent nothing: the pipe was closed
+                if pipe.poll():  # a busy worker receives nothing, so the pipe is closed
                     return
                 pipe.send_bytes(_answer(work, item))
 
 
 def _answer(work: Callable[[Any], Any], item: Any) -> bytes:
-    """What came of an item, as bytes for the parent."""
+    """Return an item's result as bytes for the parent."""
     try:
         return _packed(work(item))
     except Exception as error:
@@ -405,7 +405,7 @@ def _answer(work: Callable[[Any], Any], item: Any) -> bytes:
 
 
 def _packed(message: Any) -> bytes:
-    """A message as bytes; functions and classes of a script go by value."""
+    """Pickle a message; functions and classes of a script go by value."""
     from joblib.externals.loky.backend.reduction import dumps
 
     return bytes(dumps(message))

@@ -1,4 +1,4 @@
-"""A folder of results: its manifest says what they are of, one process at a time writes, and the same command resumes."""
+"""Results folder: a manifest identifies its contents, one process writes at a time, the same command resumes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from antdrive.base.files import write_json
 
 
 def free_folder(folder: Path, manifest: str, own: str) -> Path:
-    """The folder itself, unless its manifest shows results of something else; then one with the fingerprint in its name."""
+    """Return the folder; if its manifest has another fingerprint, one with ours in its name."""
     try:
         found = json.loads((folder / manifest).read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -27,13 +27,13 @@ def free_folder(folder: Path, manifest: str, own: str) -> Path:
 
 @contextmanager
 def opened(folder: Path, manifest: str, facts: Mapping[str, Any] | None = None, *, kind: str = "") -> Iterator[Path]:
-    """A context in which this process alone writes into a folder of results.
+    """Open a results folder for this process alone.
 
     Args:
-        folder: the folder, which is made where it is missing
-        manifest: the name of its manifest
-        facts: what the manifest says; None: it is written later
-        kind: what it is a folder of; a folder of other files is refused then
+        folder: the folder; created if missing
+        manifest: name of its manifest
+        facts: the manifest's data; None: written later
+        kind: contents of the folder; a folder of other files is refused
     """
     if (
         kind
@@ -41,7 +41,7 @@ def opened(folder: Path, manifest: str, facts: Mapping[str, Any] | None = None, 
         and not (folder / manifest).exists()
         and any(p.name[0] != "." for p in folder.iterdir())
     ):
-        raise input_error(str(folder), f"holds other files and no {manifest}; name a new folder, or that of {kind}")
+        raise input_error(str(folder), f"contains other files but no {manifest}; use a new folder or one of {kind}")
     with folder_lock(folder):
         if facts is not None:
             write_json(folder / manifest, facts)

@@ -1,4 +1,4 @@
-"""One run: scenario, physics, sensing, driving, log and certificate."""
+"""Simulation of a run: scenario, physics, sensing, driving, log and certificate."""
 
 import lazy_loader
 

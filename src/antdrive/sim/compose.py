@@ -1,4 +1,4 @@
-"""Compose the parts of a scenario's drive. Only this module chooses parts by map, localisation, perception and replanning.
+"""Composition of a scenario's drive: selects parts by map, localisation, perception and replanning.
 
 | run | localiser | scans | guide | others | rules, in order |
 |---|---|---|---|---|---|
@@ -35,29 +35,29 @@ from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
 from antdrive.worlds import Cruising, Disc, Task, World
 
-DRIFTING_SHARE = 0.6  # of the goal's tolerance, as `GOAL_SHARE`, of a robot that finds movers and its way by its lidar
-BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
+DRIFTING_SHARE = 0.6  # `GOAL_SHARE` of a robot without a map that tracks movers by lidar
+BLIND_SHARE = 0.3  # such a robot backs into its blind sector at this fraction of its top speed, unless a mover is met
 
-_rehearsed: set[str] = set()  # how replanning has been rehearsed in this process
+_rehearsed: set[str] = set()  # keys of the replanning warm-ups in this process
 
 
 class Parts(NamedTuple):
-    """The parts of one drive, and what its record says of them; None: the robot has no use for it."""
+    """Parts of a drive, with what its record says of them; None: unused."""
 
     localiser: Localiser
     scan: Scanning
     guide: RouteGuide
-    rules: tuple[Rule, ...]  # in the order in which they apply
+    rules: tuple[Rule, ...]  # in order of application
     logs: tuple[Logs, ...]
-    perception: Perception | None  # what the robot perceives of movers
-    avoidance: Avoidance | None  # how it avoids them
-    replanning: ReplanPolicy | None  # when it looks for a new route
-    limiters: tuple[str, ...]  # the names of the rules that limit its speed
-    mapped: bool  # whether its plans are those of the world's map
+    perception: Perception | None  # perception of movers
+    avoidance: Avoidance | None  # avoidance of movers
+    replanning: ReplanPolicy | None  # when to re-plan
+    limiters: tuple[str, ...]  # names of the rules that limit the speed
+    mapped: bool  # whether plans use the given map
 
 
 def compose(s: Scenario) -> Parts:
-    """The parts of a scenario's drive."""
+    """Select the parts of a scenario's drive."""
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
     tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
     moving = tracks_movers or bool(s.driven_world.movers)
@@ -84,7 +84,7 @@ def compose(s: Scenario) -> Parts:
         backwards = BLIND_SHARE * s.robot.max_speed if blind else math.inf
         rules.append(Avoid(avoidance, movers, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards))
     if survey:
-        # One scan may be as old as their period, and commands are late.
+        # A scan may be one scan period old, and commands are delayed.
         reaction = 1 / hz + 1 / survey.lidar.rate + s.robot.noise.scaled(s.noise).delay
         rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_held))
     return Parts(
@@ -102,12 +102,12 @@ def compose(s: Scenario) -> Parts:
 
 
 def perception_of(s: Scenario) -> Perception:
-    """What the robot perceives of movers: their motions, if the planner is given them."""
+    """Return the robot's perception of movers: their motions, if the planner needs them."""
     return Perception(kind="motions") if s.timed else s.known_perception
 
 
 def route_planner(s: Scenario) -> RoutePlanner:
-    """What plans the routes of a scenario."""
+    """Create the route planner of a scenario."""
     return RoutePlanner(
         planner=s.planner,
         planner_label=s.planner_label,
@@ -125,17 +125,17 @@ def route_planner(s: Scenario) -> RoutePlanner:
 
 
 def mapless_task(task: Task) -> Task:
-    """All that a robot without a map is given of a task: its first pose, where the goal is from there, and the tolerance."""
+    """Return the task as a robot without a map knows it: its first pose, the relative goal and the tolerance."""
     (x0, y0), (x1, y1) = task.start[:2], task.goal
     empty = World("unknown", (min(x0, x1) - 1.0, min(y0, y1) - 1.0, max(x0, x1) + 1.0, max(y0, y1) + 1.0))
     return Task(empty, task.start, task.goal, task.goal_tolerance)
 
 
 def avoidance_of(s: Scenario) -> Avoidance | None:
-    """How the robot avoids movers, given what it knows of them.
+    """Return the avoidance settings, adapted to what the robot knows of movers.
 
-    Movers whose motions are known do not reverse unexpectedly, so reversals are not considered. A plan in
-    space and time avoids the movers already, so the horizon is short.
+    Movers with known motions do not reverse unexpectedly, so reversals are ignored. Plans in space and time already avoid
+    movers, so the horizon is short.
     """
     if s.avoidance is None or perception_of(s).kind != "motions":
         return s.avoidance
@@ -144,7 +144,7 @@ def avoidance_of(s: Scenario) -> Avoidance | None:
 
 
 def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
-    """What plans the routes of a robot with a map."""
+    """Create the guide of a robot with a map."""
     policy, avoidance = s.replanning, avoidance_of(s)
     if policy is None or not moving:
         return OneRoute(route_planner(s))
@@ -153,7 +153,7 @@ def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
 
 
 def _exploration(s: Scenario, survey: Survey) -> Exploration:
-    """What finds the routes of a robot without a map; around the movers that it tracks, if it is to."""
+    """Create the guide of a robot without a map, around tracked movers if the policy says so."""
     policy, ahead = s.replanning or ReplanPolicy(), None
     if survey.tracking is not None and s.replanning is not None and policy.around_movers:
         tracked = Tracked(survey.tracking, perception_of(s), s.control_hz)
@@ -162,13 +162,13 @@ def _exploration(s: Scenario, survey: Survey) -> Exploration:
 
 
 def _survey(s: Scenario, tracks_movers: bool) -> Survey:
-    """What a robot without a map knows of the world."""
+    """Create the mapping of a robot without a map."""
     tracking = MoverTracking(_lidar(s), s.control_hz) if tracks_movers else None
     return Survey.of(s.robot, s.task, _sensor(s), matching=s.localisation == "matching", tracking=tracking)
 
 
 def _mover_detector(s: Scenario) -> MoverDetector:
-    """What looks for movers, and for obstacles that are not on the given map."""
+    """Create the detection of movers and unknown obstacles for a robot with a map."""
     noise, lidar = s.robot.noise.scaled(s.noise), _lidar(s)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
     ground = KnownGround(lidar, s.task.world, math.inf, *errors)
@@ -181,12 +181,12 @@ def _lidar(s: Scenario) -> Lidar:
 
 
 def _sensor(s: Scenario) -> SimulatedLidar:
-    """The lidar in the world that the robot drives in."""
+    """Simulate the lidar in the driven world."""
     return SimulatedLidar.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)
 
 
 def warm_up_replanning(s: Scenario) -> None:
-    """Replan twice in a tiny world, once per process and planner, so that the times of replans hold no loading of kernels."""
+    """Replan twice in a tiny world, once per process and planner, so that replan times exclude the loading of kernels."""
     if not s.driven_world.movers or s.replanning is None or not isinstance(s.planner, GridPlanner):
         return
     planner = s.planner.for_warmup()

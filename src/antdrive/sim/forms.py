@@ -1,4 +1,4 @@
-"""How people write the settings of a scenario: as values of files, options of commands, and columns of tables."""
+"""Forms of scenario settings: values in files, command options, and table columns."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from antdrive.sim.policy import Perception, PerceptionKind, ReplanPolicy
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
 from antdrive.worlds import Disc
 
-MAX_SEEDS = 100_000  # of one range
+MAX_SEEDS = 100_000  # in one range
 _SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
 
 
@@ -40,7 +40,7 @@ def _switch(value: Any) -> Any:
 
 
 def seed_list(value: Any) -> list[int]:
-    """The seeds that people write as [0, 1, 2] or 0-9."""
+    """Return the seeds written as [0, 1, 2] or 0-9."""
     if isinstance(value, str) and (match := _SEEDS.fullmatch(value)):
         first, last = int(match[1]), int(match[2])
         if first <= last < first + MAX_SEEDS:
@@ -72,25 +72,25 @@ MarginValue = Annotated[Any, PlainValidator(_margin), WithJsonSchema(_MARGIN_SCH
 
 @dataclasses.dataclass(frozen=True)
 class Form:
-    """Numbers and words, which are written as they are."""
+    """Form of numbers and words, written as they are."""
 
-    written: Any = None  # what a file may hold, for pydantic; None: the field's own type and bounds
-    usual: Any = None  # the value in a file that means the default; None: the default itself
+    written: Any = None  # pydantic type of a file's value; None: the field's own type and bounds
+    usual: Any = None  # the file's value for the default; None: the default itself
 
     def read(self, key: str, value: Any) -> Any:
-        """The field's value that a file's value means."""
+        """Return the field's value for a file's value."""
         return value
 
     def write(self, value: Any) -> Any:
-        """The value of a file that means the field's value."""
+        """Return the file's value for the field's value."""
         return plain_value(value)
 
     def column(self, value: Any) -> Any:
-        """What a table says."""
+        """Return the table's value."""
         return value
 
     def words(self, flag: str, value: Any) -> list[str] | None:
-        """The options of `antdrive run` for a file's value; None where there are none."""
+        """Return the options of `antdrive run` for a file's value; None where there are none."""
         return [] if value is None else [flag, option_text(value)] if flag else None
 
 
@@ -140,13 +140,13 @@ class _Discs(Form):
 
 @dataclasses.dataclass(frozen=True)
 class _Record(Form):
-    """A record of settings: what differs from the defaults."""
+    """Form of a settings record: the differences from its defaults."""
 
     name: str = ""
 
     @property
     def default(self) -> Any:
-        """The record of a scenario that does not say; made when it is asked for, because it may load a compiler."""
+        """The default record, created on request because it may load a compiler."""
         return SETTINGS[self.name].default
 
     def read(self, key: str, value: Any) -> Any:
@@ -181,7 +181,7 @@ class _Record(Form):
 
 @dataclasses.dataclass(frozen=True)
 class _Switched(_Record):
-    """A record of settings that can be switched off: none or false, or a record `off` where false is another thing."""
+    """Form of a settings record that can be switched off: by none or false, or by a record `off` for false."""
 
     off: Any = None
 
@@ -197,7 +197,7 @@ class _Switched(_Record):
         return [] if value is True else [f"--no-{flag.removeprefix('--')}"]
 
 
-#: The forms by the name that a setting calls them.
+#: Forms by name.
 FORMS: Mapping[str, Form] = {
     "plain": Form(),
     "margin": _Margin(MarginValue),
@@ -210,24 +210,24 @@ FORMS: Mapping[str, Form] = {
 
 
 def form_of(one: DeclaredSetting) -> Form:
-    """How a setting is written."""
+    """Return the form of a setting."""
     return FORMS[one.setting.form]
 
 
 def option_text(value: Any) -> str:
-    """A value as the command line takes it."""
+    """Format a value for the command line."""
     if isinstance(value, list):
         return ",".join(map(option_text, value))
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def file_fields(settings: Iterable[DeclaredSetting]) -> dict[str, Any]:
-    """The fields of a pydantic model of a file that holds settings, by key."""
+    """Return the fields of a pydantic model for a file with settings, by key."""
     return {one.key: (written_kind(one), written_default(one)) for one in settings}
 
 
 def written_kind(one: DeclaredSetting) -> Any:
-    """What a file may hold for a setting, for pydantic."""
+    """Return the pydantic type of a setting in a file."""
     form = form_of(one)
     if form.written is not None:
         return form.written
@@ -236,7 +236,7 @@ def written_kind(one: DeclaredSetting) -> Any:
 
 
 def written_default(one: DeclaredSetting) -> Any:
-    """The default of a setting in a file, with its description."""
+    """Return the default of a setting in a file, with its description."""
     usual = form_of(one).usual
     default = one.default if usual is None else usual
     text = one.setting.help + (f"; by default {one.setting.usual}" if one.setting.usual else "")
@@ -244,7 +244,7 @@ def written_default(one: DeclaredSetting) -> Any:
 
 
 def scenario_fields(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a scenario that values of files mean, by name; defaults for what is not given."""
+    """Return a scenario's fields for the values of a file, by name; defaults for the rest."""
     return {
         one.name: form_of(one).read(one.key, given[one.key]) if one.key in given else one.default
         for one in SETTINGS.values()
@@ -252,30 +252,30 @@ def scenario_fields(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def given_settings(entry: BaseModel) -> dict[str, Any]:
-    """The values of a file's settings that are written there, by key."""
+    """Return the settings that a file gives, by key."""
     keys = {one.key for one in SETTINGS.values()} & entry.model_fields_set
     return {one.key: getattr(entry, one.key) for one in SETTINGS.values() if one.key in keys}
 
 
 def setting_words(given: Mapping[str, Any]) -> list[str] | None:
-    """The words of `antdrive run` for values of files; None where it has no options for all of them."""
+    """Return the words of `antdrive run` for values of files; None where it lacks options for them."""
     words: list[str] = []
     for one in SETTINGS.values():
         if one.key not in given or (not one.flag and given[one.key] == one.default):
             continue
-        found = form_of(one).words(one.flag, given[one.key])
-        if found is None:
+        more = form_of(one).words(one.flag, given[one.key])
+        if more is None:
             return None
-        words += found
+        words += more
     return words
 
 
 def written(values: Callable[[str], Any]) -> dict[str, Any]:
-    """The settings that differ from their defaults as files write them, by key; from a function of the values by field."""
+    """Return the settings that differ from their defaults, as files write them, by key; `values` maps fields to values."""
     differing = (one for one in SETTINGS.values() if values(one.name) != one.default)
     return {one.key: form_of(one).write(values(one.name)) for one in differing}
 
 
 def columns_of(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """What tables say of the fields of a scenario, by column."""
+    """Return the table's values of a scenario's fields, by column."""
     return {one.column: form_of(one).column(fields[one.name]) for one in SETTINGS.values() if one.name in fields}

@@ -1,4 +1,4 @@
-"""Plan and drive one scenario: every step from the grid to the certificate."""
+"""Pipeline from a scenario to a certified rollout."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ ENDED_BY = {
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The result of a scenario: a plan and, if the planner found a path, a rollout with its certificate.
+    """Result of a scenario: a plan and, if the planner found a path, a rollout with its certificate.
 
     Attributes:
-        scenario: what was planned and driven
-        grid: the grid that was planned on
+        scenario: the scenario
+        grid: the planning grid
         plan: the planner's answer
         rollout: the log of the drive; None if planning found no path
-        certificate: whether the log proves that nothing was touched; None without a rollout
+        certificate: the collision certificate of the log; None without a rollout
     """
 
     scenario: Scenario
@@ -59,17 +59,17 @@ class Run:
 
     @property
     def reason(self) -> str:
-        """Details that the outcome's sentence leaves out; may be empty."""
+        """Details beyond the outcome's sentence; may be empty."""
         return self.rollout.record.reason if self.rollout is not None else self.plan.reason
 
     @property
     def succeeded(self) -> bool:
-        """Whether the robot stopped at the goal in time and its log proves that nothing was touched."""
+        """Whether the robot stopped at the goal in time, certified free of contact."""
         return self.outcome is Outcome.SUCCEEDED and self.certificate is not None and self.certificate.certified
 
     @property
     def metrics(self) -> dict[str, float]:
-        """Every metric of the drive by name; `METRICS` defines them.
+        """Metrics of the drive by name, as defined in `METRICS`.
 
         Raises:
             ValueError: the run has no rollout, because planning found no path.
@@ -77,10 +77,10 @@ class Run:
         return measure(self._driven())
 
     def metric(self, name: str) -> float:
-        """One metric of the drive, such as `run.metric("spl")`.
+        """Return one metric of the drive, such as `run.metric("spl")`.
 
         Raises:
-            ValueError: the run has no rollout, because planning found no path; or there is no such metric.
+            ValueError: the run has no rollout, because planning found no path; or the metric is unknown.
         """
         rollout = self._driven()
         if name not in METRICS:
@@ -94,7 +94,7 @@ class Run:
         return self.rollout
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON; `docs/reference/rollout-format.md` lists the keys."""
+        """Return plain values, for JSON; `docs/reference/rollout-format.md` lists the keys."""
         log = self.rollout
         options = settings_of(self.plan.options) if log is None else log.record.planner.settings
         return {
@@ -125,15 +125,14 @@ class Run:
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
-    """Plan a scenario's first route; the grid and the planner's answer, checked.
+    """Plan a scenario's first route; return the grid and the planner's checked answer.
 
-    Movers are not on the grid. A planner in space and time is given their motions. A wrong answer is replaced by one
-    without a path, whose status is `INVALID` and whose reason says what is wrong. If the robot has too little room at the
-    start to get away along the path, the answer is `NO_PATH` with the reason. A robot without a map plans through what its
-    first scan shows.
+    Movers are not on the grid; planners in space and time get their motions. An invalid answer becomes one without a path,
+    with status `INVALID` and the error as reason. If the start is too narrow to follow the path, the answer is `NO_PATH` with
+    the reason. Without a map, the plan uses the first scan.
 
     Raises:
-        PlannerError: the planner raised something, or returned something that is no `PlanResult`.
+        PlannerError: the planner raised an exception, or its answer is no `PlanResult`.
     """
     return compose(s).guide.first()
 
@@ -148,12 +147,12 @@ def run(
 
     Args:
         s: the scenario
-        planned: what `plan` returned for the scenario, or a plan of one's own on that grid, which is checked; None: plan
-            first
-        progress: is called with the fraction of the route that is done
+        planned: the result of `plan` for the scenario, or an own plan on that grid, which is checked; None: plan first
+            -
+        progress: called with the completed fraction of the route
 
     Raises:
-        PlannerError: the planner raised something, or returned something that is no `PlanResult`.
+        PlannerError: the planner raised an exception, or its answer is no `PlanResult`.
     """
     parts = compose(s)
     grid, answer = parts.guide.first() if planned is None else parts.guide.accept(*planned)

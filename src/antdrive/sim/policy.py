@@ -1,4 +1,4 @@
-"""How a robot deals with movers: what it perceives of them, and when it replans."""
+"""Policies for movers: perception and replanning."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias, get_args
 
 from antdrive.base.errors import FieldError
 
-# Why a new route was planned, as the log records it.
+# Replan triggers, as the log records them.
 STRAYED = "strayed"
 LATE = "late"
 WAITED = "waited"
@@ -30,17 +30,17 @@ PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions", "lidar
 
 @dataclass(frozen=True, kw_only=True)
 class Perception:
-    """What the robot perceives of movers in every control period: without error, or what its lidar shows.
+    """Perception of movers in every control period: exact, or by lidar.
 
     Attributes:
-        kind: `positions`: where movers are; the robot predicts that they stay there. `velocities`: their
-            velocities too; the robot predicts constant velocity. `motions`: their positions at any time,
-            turns and teleports included; the prediction is exact. `lidar`: what is found in the scans of the robot's
-            lidar, see `antdrive.sim.sensing.MoverTracker`; the robot predicts constant velocity.
+        kind: `positions`: exact positions; movers are predicted to stay. `velocities`: exact velocities too; constant
+            velocity is predicted. `motions`: exact positions at any time, with turns and teleports; the prediction is
+            exact. `lidar`: tracks from the robot's scans, see `antdrive.sim.sensing.MoverTracker`; constant velocity is
+            predicted.
         range: movers are perceived if their surface is within this distance of the robot's centre [m]
 
     Raises:
-        ValueError: an unknown kind, or a range that is not positive.
+        ValueError: the kind is unknown, or the range is not positive.
     """
 
     kind: PerceptionKind = "velocities"
@@ -54,28 +54,28 @@ class Perception:
 
 
 def usual_perception(map: str, movers: bool) -> Perception:
-    """What a robot perceives of movers where nobody says it by name: without a map nothing but what its lidar finds."""
+    """Return the default perception: lidar without a map, else velocities."""
     return Perception(kind="lidar") if map == "none" and movers else Perception()
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplanPolicy:
-    """When the robot looks for a new route.
+    """Replanning policy.
 
     Attributes:
-        around_movers: whether predicted movers count as obstacles; if not, the robot replans only after it has
-            strayed from its route
+        around_movers: whether predicted movers count as obstacles; if not, the robot replans only after a deviation
+                from its route
         obstruction_range: replan when a mover is predicted on the route within this distance ahead [m]
         max_wait: replan when the robot has waited for movers for this long [s]
         max_deviation: replan when the robot is farther off its route than this [m]
         max_shortfall: replan when the straight-line distance to the route's end exceeds the remaining route
             by this much [m]
-        min_interval: the shortest time between two replans [s]
-        prediction_time: whatever movers are predicted to cover within this time is blocked [s]
-        patience: the drive ends as blocked when movers that stand still have closed every way for this long [s]
-        max_traffic: where more movers a second than this would meet a standing robot, routes lead round the ground that
-            movers roam [1/s]
-        max_detour: how many times as long as the straight line to the goal such a route may be
+        min_interval: shortest time between two replans [s]
+        prediction_time: ground that movers are predicted to cover within this time is blocked [s]
+        patience: the drive ends as blocked when standing movers have closed every route for this long [s]
+        max_traffic: if more movers per second would meet a standing robot, routes lead around the zones that movers
+            roam [1/s]
+        max_detour: longest such route, as a multiple of the straight line to the goal
 
     Raises:
         ValueError: a setting is out of range.

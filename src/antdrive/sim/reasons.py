@@ -1,4 +1,4 @@
-"""Why there is no path, with the sizes that matter and what would help."""
+"""Reasons for missing paths, with the decisive sizes and remedies."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from antdrive.sim.driving.routes import RoutePlanner
 
 FINER = (2, 4, 8)  # cells are tried this many times smaller
-HALVINGS = 7  # of the radius that passes in a world of very many obstacles
-MOST_CELLS = 2_000_000  # of a grid that is made only to see whether it has a path
+HALVINGS = 7  # bisection steps for the passable radius in a world of very many obstacles
+MOST_CELLS = 2_000_000  # largest grid that is made only to test whether it has a path
 
 
 def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
-    """What the planner said about a world that it could not cross, for whom, and what would help."""
+    """Explain why a planner found no path: what it said, for which disc, and what would help."""
     robot = s.robot
     disc = f"a disc of {s.inflate:.3g} m (radius {robot.radius:.3g} + margin {s.margin:.3g})"
     says = f": {said}" if said else ""
@@ -38,7 +38,7 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
 
 
 def _narrowest_place(s: RoutePlanner) -> str:
-    """How wide a disc passes, where that is decided, and whether a smaller margin would help."""
+    """Describe the widest passable disc, its bottleneck, and whether a smaller margin would help."""
     task = s.task
     passage = widest_passage(task, s.inflate)
     if passage is None:
@@ -54,7 +54,7 @@ def _narrowest_place(s: RoutePlanner) -> str:
 
 
 def _what_it_takes(s: RoutePlanner, passes: float) -> str:
-    """What the robot needs where no disc of more than a radius passes [m], and what would help."""
+    """Describe what the robot needs where only discs of a radius `passes` fit [m], and what would help."""
     robot, foot = s.robot, s.robot.footprint
     fits = passes - robot.radius
     helps = f"a margin below {fits:.3g} m leaves a way, on cells that are fine enough" if fits > 0 else ""
@@ -71,7 +71,7 @@ def _what_it_takes(s: RoutePlanner, passes: float) -> str:
 
 
 def _narrowest_cell(s: RoutePlanner, grid: Grid) -> str:
-    """The same in a world of so many obstacles that its gaps are too many to try: found on the cells of the plan."""
+    """Describe the widest passable disc on the plan's cells, for worlds with too many gaps to try each."""
     low, high = 0.0, s.inflate
     for _ in range(HALVINGS):
         middle = (low + high) / 2

@@ -1,4 +1,4 @@
-"""The rollout of a drive: its arrays, and the record of the scenario and of the parts that drove it."""
+"""Recording: the rollout of a drive from its arrays, scenario and parts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 def rollout_of(
     s: Scenario, parts: Parts, grid: Grid, answer: PlanResult, route: Route, log: Drive, limit: float, wall: float
 ) -> Rollout:
-    """The log of a scenario's drive, with its time limit [s] and the wall time that it took [s]."""
+    """Assemble the log of a scenario's drive, with its time limit [s] and its wall time [s]."""
     perception, avoidance, replanning = parts.perception, parts.avoidance, parts.replanning
     record = DriveRecord(
         task=s.task,
@@ -75,7 +75,7 @@ def rollout_of(
 
 
 def _plan_record(s: Scenario, grid: Grid, answer: PlanResult, mapped: bool) -> PlanRecord:
-    if not mapped:  # the shortest ways are those of the world as it is
+    if not mapped:  # the optima are those of the true world
         grid = grid_of(by_geometry(s.task.world), grid.cell, s.inflate)
     grid_optimum, euclidean_optimum = _optima(by_contents(grid, s.task))
     return PlanRecord(
@@ -90,14 +90,14 @@ def _plan_record(s: Scenario, grid: Grid, answer: PlanResult, mapped: bool) -> P
 
 @cached(64)
 def _optima(asked: Keyed[tuple[Grid, Task]]) -> tuple[float | None, float | None]:
-    """The lengths of the shortest path on the grid and of that among the inflated discs [m]; both searches draw nothing."""
+    """Return the lengths of the shortest path on the grid and among the inflated discs [m]; both searches are deterministic."""
     query, rng = Query.between(*asked.value), random_stream(0, "optimum")
     on_grid, free = AStar().plan(query, rng), Tangent().plan(query, rng)
     return finite_or_none(on_grid.cost), finite_or_none(free.line_length)
 
 
 def versions() -> dict[str, str]:
-    """The versions of Python and of the packages that a run depends on."""
+    """Return the versions of Python and of the packages that a run depends on."""
     return dict(_versions())
 
 

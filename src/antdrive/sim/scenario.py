@@ -27,7 +27,7 @@ from antdrive.worlds import Disc, Task, Trajectories, World
 from antdrive.worlds.svg import card, world_svg
 
 DRIFTING = "odometry", "matching"  # localisation without fixes
-FINE = 0.05  # without a map, plans are made on cells of this side at most [m]
+FINE = 0.05  # largest planning cell without a map [m]
 NO_LIDAR = "has no lidar; add one to its file, or drive jackal or turtlebot4"
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class LossFactors:
-    """What the loss of margin depends on, as far as a calibration takes it into account."""
+    """Factors of the loss of margin, as a calibration distinguishes them."""
 
-    robot: RobotSpec  # drives
-    controller: PurePursuit  # follows the route
-    noise: float  # the factor on the robot's documented noise
+    robot: RobotSpec  # the robot
+    controller: PurePursuit  # the controller
+    noise: float  # factor on the robot's documented noise
     smoothing: str  # how plans become routes
     physics_hz: int = 240  # physics steps per simulated second
     control_hz: int = 60  # control periods per simulated second
@@ -51,23 +51,23 @@ class LossFactors:
 
 @dataclass(frozen=True, kw_only=True)
 class MarginChoice:
-    """What a margin was chosen by, see `antdrive.runs.margins.choice.with_chosen_margin`."""
+    """Choice of a margin, see `antdrive.runs.margins.choice.with_chosen_margin`."""
 
-    margin: float  # the margin that was chosen [m]
-    record: MarginRecord  # what records say of the choice
-    factors: LossFactors  # what the loss depends on
+    margin: float  # the chosen margin [m]
+    record: MarginRecord  # its record
+    factors: LossFactors  # factors of the loss
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario(Settings):
-    """Everything a run depends on. The same scenario gives the same rollout, bit for bit, on one machine.
+    """Complete input of a run. The same scenario gives the same rollout, bit for bit, on one machine.
 
     Attributes:
         task: the world, the start and the goal
-        planner: finds the path
-        robot: drives it
-        planner_name: the planner's name in records; empty: the name of its class
-        margin_choice: what the margin was chosen by; None: it was given
+        planner: the planner
+        robot: the robot's specification
+        planner_name: the planner's name in records; empty: its class name
+        margin_choice: how the margin was chosen; None: it was given
 
     Raises:
         ValueError: a setting is out of range, or the robot's footprint overlaps an obstacle or a wall at the start.
@@ -98,7 +98,7 @@ class Scenario(Settings):
             raise FieldError("start", f"{self.robot.name} at {at} {overlap}; move the start away from it")
 
     def _check_kinds(self) -> None:
-        """Refuse objects of the wrong type here, where the field can be named, and not deep in a run."""
+        """Refuse objects of the wrong type with the name of their field."""
         kinds: dict[str, type] = {"task": Task, "robot": RobotSpec, "perception": Perception, "unseen": tuple}
         kinds |= {name: type(SETTINGS[name].default) for name in ("controller", "avoidance", "replanning")}
         for name, kind in kinds.items():
@@ -110,7 +110,7 @@ class Scenario(Settings):
             raise FieldError("unseen", f"must hold Disc objects, got {self.unseen!r:.60}")
 
     def _check_sensing(self) -> None:
-        """Refuse what does not go together of map, localisation, perception, planner and robot."""
+        """Refuse invalid combinations of map, localisation, perception, planner and robot."""
         try:
             Odometry().scaled(self.odometry)
         except FieldError as error:
@@ -128,15 +128,15 @@ class Scenario(Settings):
         if drifts and self.task.world.movers and kind != "lidar":
             raise FieldError(
                 "sees",
-                f"{kind}: the pose drifts with localisation {self.localisation}, and movers that are told would be "
-                "elsewhere in the robot's frame; write lidar, or localise by fixes or true",
+                f"{kind}: the pose drifts with localisation {self.localisation}, which displaces ground-truth movers in "
+                "the robot's frame; write lidar, or localise by fixes or true",
             )
         if self.map == "given" and self.localisation == "matching":
-            raise FieldError("localisation", "matching: needs map none; with a given map the robot makes none")
+            raise FieldError("localisation", "matching: needs map none, since scans are matched to the robot's own map")
         can = capabilities_of(self.planner)
         if self.map == "none" and can.needs_motions:
             raise FieldError(
-                "map", f"none: {self.planner_label} plans among known motions, and a robot without a map knows none"
+                "map", f"none: {self.planner_label} needs the motions of movers, which a robot without a map lacks"
             )
 
     @classmethod
@@ -149,19 +149,19 @@ class Scenario(Settings):
         options: Mapping[str, Any] | None = None,
         **settings: Any,
     ) -> Scenario:
-        """A scenario from names, files or objects.
+        """Create a scenario from names, files or objects.
 
         >>> Scenario.of("forest", "aco-han", "jackal", options={"ants": 30}, noise=1.0, seed=2)
 
         Args:
             world: a world of the catalogue, a world file, or a task
             planner: a planner's name, FILE.py:CLASS, MODULE:CLASS, or a planner
-            robot: a robot of the catalogue, a robot file, or a robot
-            options: options of a planner that is given by name
+            robot: a robot of the catalogue, a robot file, or a specification
+            options: options of a planner given by name
             settings: fields of `Scenario`, such as noise=1.0
 
         Raises:
-            InputError: there is no such world, planner, option or robot, or a file is wrong.
+            InputError: a world, planner, option or robot is unknown, or a file is invalid.
             ValueError: a setting is out of range, the robot does not fit, or `options` are given for a planner object.
         """
         from antdrive.planners import load_planner, record_name  # names need the catalogues
@@ -179,11 +179,11 @@ class Scenario(Settings):
         )
 
     def identity(self, *more: object, without: Collection[str] = ()) -> str:
-        """The SHA-256 of everything that the drive depends on, and of `more`.
+        """Return the SHA-256 of everything that the drive depends on, and of `more`.
 
         Args:
-            more: what else the result depends on
-            without: fields to leave out
+            more: further inputs of the result
+            without: fields to omit
         """
         fields = {name: getattr(self, name) for name in SETTINGS}
         text = identity_text(
@@ -193,7 +193,7 @@ class Scenario(Settings):
 
     @property
     def loss_factors(self) -> LossFactors:
-        """What the loss of margin depends on."""
+        """Factors of the loss of margin."""
         return LossFactors(
             robot=self.robot,
             controller=self.controller,
@@ -205,16 +205,16 @@ class Scenario(Settings):
 
     @property
     def chosen(self) -> MarginChoice | None:
-        """What the margin was chosen by; None where it was given, or the conditions have changed."""
+        """The choice of the margin; None if it was given, or the factors have changed."""
         choice = self.margin_choice
         same = choice is not None and (choice.margin, choice.factors) == (self.margin, self.loss_factors)
         return choice if same else None
 
     def as_dict(self) -> dict[str, Any]:
-        """The settings as plain values, for JSON; `docs/reference/rollout-format.md` lists the keys.
+        """Return the settings as plain values, for JSON; `docs/reference/rollout-format.md` lists the keys.
 
-        `settings` holds the values of controller, perception, avoidance and replanning that differ from their defaults, null
-        where there is none, and the unseen obstacles.
+        `settings` holds the non-default values of controller, perception, avoidance and replanning, null where there is none,
+        and the unseen obstacles.
         """
         task, planner = self.task, self.planner
         changed: dict[str, Any] = {}
@@ -252,37 +252,37 @@ class Scenario(Settings):
 
     @property
     def inflate(self) -> float:
-        """The distance that planners keep between the robot's centre and every surface [m]."""
+        """Distance that plans keep between the robot's centre and every surface [m]."""
         return self.robot.radius + self.margin
 
     @property
     def driven_world(self) -> World:
-        """The world that the robot drives in: the task's world with the unseen obstacles."""
+        """World of the drive: the task's world with the unseen obstacles."""
         world = self.task.world
         return dataclasses.replace(world, obstacles=world.obstacles + self.unseen) if self.unseen else world
 
     @property
     def trajectories(self) -> Trajectories:
-        """The motions of the world's movers, drawn from the seed."""
+        """Motions of the world's movers, drawn from the seed."""
         return Trajectories.of(self.driven_world, self.task.start[:2], self.seed)
 
     @property
     def planning_cell(self) -> float:
-        """The side of the cells that routes are planned on [m]; without a map fine ones: coarse ones close gaps."""
+        """Side of the planning cells [m]; fine without a map, since coarse cells close gaps."""
         if self.cell is not None:
             return self.cell
         return min(self.task.cell, FINE) if self.map == "none" else self.task.cell
 
     @property
     def sensing(self) -> SensingRecord | None:
-        """What the robot knows of the world and of its pose, for the record; None where that is the map and pose fixes."""
+        """Map, localisation and odometry for the record; None for a given map and pose fixes."""
         if (self.map, self.localisation) == ("given", "fixes"):
             return None
         return SensingRecord(map=self.map, localisation=self.localisation, odometry=float(self.odometry))
 
     @property
     def other_settings(self) -> dict[str, Any] | None:
-        """The settings that differ from their defaults and that no other key of the record holds."""
+        """Non-default settings that no other key of the record holds."""
         names = (
             name for name, one in SETTINGS.items() if not DriveRecord.held(name) and getattr(self, name) != one.default
         )
@@ -295,11 +295,11 @@ class Scenario(Settings):
 
     @property
     def known_perception(self) -> Perception:
-        """What the robot perceives of movers as asked for; the usual where nobody asked."""
+        """Perception of movers as set, else the default."""
         return self.perception or usual_perception(self.map, movers=bool(self.task.world.movers))
 
     def rng(self, purpose: str) -> np.random.Generator:
-        """A random stream from the seed; every `purpose` has its own, so that one does not change another."""
+        """Return the random stream of a purpose. Streams of different purposes are independent."""
         return random_stream(self.seed, purpose)
 
     def _repr_html_(self) -> str:
@@ -318,7 +318,7 @@ class Scenario(Settings):
 
 
 def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:
-    """The driven world as SVG, with start, goal, the ways of movers, and lines: points, colour, whether dashed."""
+    """Draw the driven world as SVG, with start, goal, paths of movers, and lines: points, colour, whether dashed."""
     world, task = s.driven_world, s.task
     goal, movers = (*task.goal, task.goal_tolerance), world.mover_paths(task.start[:2], s.seed)
     return world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
@@ -330,10 +330,10 @@ def identity_text(
     options: Any,  # the planner, or its options as plain values
     robot: str,  # the robot's canonical hash
     fields: Mapping[str, Any],  # the values of `SETTINGS` by field
-    without: Collection[str] = (),  # fields to leave out
-    **more: str,  # what else the drive depends on
+    without: Collection[str] = (),  # fields to omit
+    **more: str,  # further inputs of the drive
 ) -> str:
-    """A scenario as JSON text, for hashes."""
+    """Return a scenario as JSON text, for hashes."""
     plain = settings_of(options) if isinstance(options, Mapping) or dataclasses.is_dataclass(options) else {}
     parts = {"task": task, "planner": planner, "options": plain, "robot": robot, **more}
     parts["settings"] = settings_of(part_of_key(fields, without))
@@ -341,7 +341,7 @@ def identity_text(
 
 
 def _short(signature: inspect.Signature) -> inspect.Signature:
-    """Return a signature whose types do not carry what is declared beside them, so that `help()` can be read."""
+    """Return a signature without the annotations' metadata, to keep `help()` readable."""
     parameters = [
         one.replace(annotation=get_args(one.annotation)[0]) if get_origin(one.annotation) is Annotated else one
         for one in signature.parameters.values()

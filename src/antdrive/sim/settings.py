@@ -1,7 +1,8 @@
-"""The settings of a scenario, each declared once: type, bounds, default, help, and how people write it.
+"""Settings of a scenario, each declared once: type, bounds, default, help, and notation.
 
-A new setting is a field of `Settings`; one that is neither a number nor a word needs a form in `antdrive.sim.forms`, too. Files,
-options, tables, keys, records and reference pages are read from `SETTINGS`. Imports nothing heavy: the command line does.
+A new setting is a field of `Settings`; one that is neither a number nor a word also needs a form in
+`antdrive.sim.forms`. Files, options, tables, keys, records and reference pages read `SETTINGS`. The module imports nothing
+heavy, since the command line loads it.
 """
 
 import dataclasses
@@ -24,29 +25,29 @@ if TYPE_CHECKING:
 
 #: The panels of `--help`, in order.
 PANELS = ("World", "Planner", "Robot", "Sensing", "Movers", "Output")
-#: What a robot may know of the world before it drives, and how it may know its pose.
+#: Sources of the robot's map and pose.
 MAPS = ("given", "none")
 LOCALISATIONS = ("fixes", "odometry", "matching", "true")
 SMOOTHINGS = ("none", "taut", "clearance")
-PHYSICS_HZ = (60, 10_000)  # slower physics jolts the robot
+PHYSICS_HZ = (60, 10_000)  # slower physics makes the robot jerk
 SLOWEST_CONTROL = 10  # [Hz]
 
 
 @dataclass(frozen=True)
 class Setting:
-    """How people write a field of a scenario."""
+    """Notation of a scenario's field."""
 
-    help: str  # the description, in files, in `--help` and on reference pages
-    group: str  # the panel of `--help`
-    metavar: str = ""  # what `--help` calls the value
-    key: str = ""  # the key in files, in errors and in tables; empty: the field's name
-    flag: str | None = None  # the option; None: the key with `--`; empty: there is none
-    form: str = "plain"  # how values are written, see `antdrive.sim.forms`
-    choices: tuple[str, ...] = ()  # the words that the field can be
-    axis: bool = False  # whether a campaign file lists values under its key; else it is one of the `settings`
-    column: str = ""  # the column in a campaign's table; empty: the key
-    usual: str = ""  # what the default None means, for `--help`
-    # the format of a campaign's keys that the setting joined in; later ones are left out at their default
+    help: str  # description in files, in `--help` and on reference pages
+    group: str  # panel of `--help`
+    metavar: str = ""  # placeholder of the value in `--help`
+    key: str = ""  # key in files, errors and tables; empty: the field's name
+    flag: str | None = None  # option; None: `--` and the key; empty: no option
+    form: str = "plain"  # name of the form of its values, see `antdrive.sim.forms`
+    choices: tuple[str, ...] = ()  # allowed words
+    axis: bool = False  # whether a campaign file lists values under its key; else it belongs to `settings`
+    column: str = ""  # column of a campaign's table; empty: the key
+    usual: str = ""  # meaning of the default None, for `--help`
+    # format version of campaign keys that added the setting; later ones are omitted at their default
     since: int = 1
 
 
@@ -64,12 +65,12 @@ def _avoidance() -> "Avoidance":
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """The fields of a scenario beside task, planner and robot."""
+    """Scenario fields other than task, planner and robot."""
 
     smoothing: Annotated[
         str,
         Setting(
-            "how the planned cells become a route: none (drive the cells), taut (as short as possible) or clearance (short, "
+            "how the planned cells become a route: none (drive the cells), taut (shortest) or clearance (short, "
             "and away from obstacles where there is room)",
             "Planner",
             "KIND",
@@ -80,16 +81,14 @@ class Settings:
     noise: Annotated[
         float,
         Ge(0),
-        Setting(
-            "factor on the noise that the robot's file documents; 0 is a perfect robot", "Robot", "FACTOR", axis=True
-        ),
+        Setting("factor on the robot's documented noise; 0 is a perfect robot", "Robot", "FACTOR", axis=True),
     ] = 0.0
     margin: Annotated[
         float,
         Ge(0),
         Setting(
-            "distance that plans keep from obstacles, beyond the robot's radius [m], or auto: the least that robot, noise and "
-            "smoothing are predicted to need, from 80 short drives for each margin that is tried, once",
+            "clearance of plans on top of the robot's radius [m], or auto: the smallest margin predicted to suffice for robot, "
+            "noise and smoothing, calibrated once with 80 short drives per tried margin",
             "Planner",
             "METRES|auto",
             form="margin",
@@ -105,7 +104,7 @@ class Settings:
     map: Annotated[
         str,
         Setting(
-            "what the robot knows of the world before it drives: given (all of it), or none (only what its lidar sees)",
+            "the robot's map before the drive: given (the whole world), or none (only what its lidar detects)",
             "Sensing",
             "given|none",
             choices=MAPS,
@@ -115,8 +114,8 @@ class Settings:
     localisation: Annotated[
         str,
         Setting(
-            "how the robot knows its pose: fixes (with the noise of its file), odometry (wheels and gyro, which drift), "
-            "matching (odometry, corrected by scan matching; needs map none) or true (without error)",
+            "the robot's pose estimate: fixes (with the robot's noise), odometry (wheels and gyro, which drift), "
+            "matching (odometry corrected by scan matching; needs map none) or true (without error)",
             "Sensing",
             "KIND",
             choices=LOCALISATIONS,
@@ -133,8 +132,8 @@ class Settings:
     perception: Annotated[
         Perception | None,
         Setting(
-            "what the robot perceives of movers, KIND or KIND:METRES: positions, velocities, motions (their whole future), or "
-            "lidar (only what its lidar shows); with METRES, only of movers within that range [m]",
+            "perception of movers, KIND or KIND:METRES: ground-truth positions, velocities or motions (their whole future), or "
+            "lidar (tracks from scans); with METRES, only within that range [m]",
             "Movers",
             "KIND[:METRES]",
             key="sees",
@@ -145,7 +144,7 @@ class Settings:
     avoidance: Annotated[
         "Avoidance | None",
         Setting(
-            "whether the robot avoids movers: true, false or none, or settings such as {horizon: 2.0}",
+            "local avoidance of movers: true, false or none, or settings such as {horizon: 2.0}",
             "Movers",
             key="avoid",
             form="avoidance",
@@ -154,8 +153,8 @@ class Settings:
     replanning: Annotated[
         ReplanPolicy | None,
         Setting(
-            "whether the robot replans around movers, or only after it has strayed from its route: true, false, none (never) or "
-            "settings such as {patience: 10}",
+            "replanning: true (around movers), false (only after deviations from the route), none (never), or settings such as "
+            "{patience: 10}",
             "Movers",
             key="replan",
             form="replanning",
@@ -164,7 +163,7 @@ class Settings:
     unseen: Annotated[
         "tuple[Disc, ...]",
         Setting(
-            "cylinders {x, y, radius} [m] that neither planner nor controller knows of",
+            "cylinders {x, y, radius} [m] unknown to planner and controller",
             "World",
             "X,Y,RADIUS",
             form="discs",
@@ -200,43 +199,43 @@ class Settings:
 
 @dataclass(frozen=True)
 class DeclaredSetting:
-    """A setting as declared in `Settings`."""
+    """Setting as declared in `Settings`."""
 
-    name: str  # the field of the scenario
-    kind: Any  # the field's type; that of other records as text
+    name: str  # the scenario's field
+    kind: Any  # the field's type; types of other records as text
     optional: bool  # whether None is a value
-    bounds: tuple[Ge | Gt | Le, ...]  # of numbers, as pydantic takes them
-    setting: Setting  # how people write it
-    field: "dataclasses.Field[Any]"  # the field of the record
+    bounds: tuple[Ge | Gt | Le, ...]  # bounds of numbers, as pydantic takes them
+    setting: Setting  # its notation
+    field: "dataclasses.Field[Any]"  # the record's field
 
     @property
     def key(self) -> str:
-        """The key in files, in errors and in tables."""
+        """Key in files, errors and tables."""
         return self.setting.key or self.name
 
     @property
     def flag(self) -> str:
-        """The option of commands; empty: there is none."""
+        """Command option; empty: there is none."""
         return f"--{self.key.replace('_', '-')}" if self.setting.flag is None else self.setting.flag
 
     @property
     def column(self) -> str:
-        """The column in a campaign's table."""
+        """Column of a campaign's table."""
         return self.setting.column or self.key
 
     @property
     def is_word(self) -> bool:
-        """Whether one word writes a value, so that a list of words can write several; seeds have a notation of their own."""
+        """Whether one word is one value, so that a list of words gives several; seeds have their own notation."""
         return self.setting.form in ("plain", "margin", "perception") and self.name != "seed"
 
     @property
     def default(self) -> Any:
-        """The value of a scenario that does not say."""
+        """Default value of a scenario."""
         made = self.field.default_factory
         return self.field.default if made is dataclasses.MISSING else made()
 
     def check(self, value: Any) -> None:
-        """Refuse a number of another kind or beyond its bounds, and a word that is none of the choices."""
+        """Refuse a number of the wrong type or out of bounds, and an unknown word."""
         if self.kind not in (int, float, str) or (value is None and self.optional):
             return
         choices = self.setting.choices
@@ -251,7 +250,7 @@ class DeclaredSetting:
 
     @property
     def range(self) -> str:
-        """The bounds in words."""
+        """Bounds in words."""
         ends = {type(bound): getattr(bound, type(bound).__name__.lower()) for bound in self.bounds}
         if Ge in ends and Le in ends:
             return f"between {ends[Ge]} and {ends[Le]}"
@@ -265,7 +264,7 @@ def _keeps(bound: Ge | Gt | Le, value: Any) -> bool:
 
 
 def declared(kind: type[Any]) -> Iterator[DeclaredSetting]:
-    """The settings that a record declares, in the order of its fields."""
+    """Yield the settings that a record declares, in the order of its fields."""
     for one in dataclasses.fields(kind):
         base, *notes = typing.get_args(one.type)
         of = typing.get_args(base)
@@ -275,12 +274,12 @@ def declared(kind: type[Any]) -> Iterator[DeclaredSetting]:
         yield DeclaredSetting(one.name, of[0] if optional else base, optional, bounds, setting, one)
 
 
-#: Every setting of a scenario by the name of its field, in the order of tables.
+#: Settings of a scenario by field name, in the order of tables.
 SETTINGS: Mapping[str, DeclaredSetting] = MappingProxyType({one.name: one for one in declared(Settings)})
 
 
 def part_of_key(fields: Mapping[str, Any], without: Collection[str] = ()) -> dict[str, Any]:
-    """The fields that a scenario is known by; those that came later are left out at their default, so keys stay valid."""
+    """Return the fields that identify a scenario. Fields added later are omitted at their default, so keys stay valid."""
     known = (one for one in SETTINGS.values() if one.name in fields and one.name not in without)
     return {one.name: fields[one.name] for one in known if one.setting.since == 1 or fields[one.name] != one.default}
 
@@ -293,7 +292,7 @@ def _columns() -> Iterator[tuple[str, str]]:
             yield one.key, "double"
 
 
-#: The columns of settings in a campaign's table and their types; the margin that was driven with follows the one asked for.
+#: Columns of settings in a campaign's table and their types; the driven margin follows the requested one.
 SETTING_COLUMNS: Mapping[str, str] = MappingProxyType(dict(_columns()))
 
 Settings.__doc__ = "\n".join(

@@ -1,4 +1,4 @@
-"""Everything that a log proves or contradicts, as plain values; the log is believed, a run's `result.json` is a claim."""
+"""Verification of logs: certificate, replay, and comparison with `result.json`. The log is evidence, the result a claim."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Task
 
 MAX_RESULT_BYTES = 10_000_000  # of a result.json
-SAME = 1e-9  # numbers that are written twice agree to this share
+SAME = 1e-9  # relative tolerance of numbers that are written twice
 
 
 def read_result(path: Path) -> Mapping[str, Any]:
-    """The content of a `result.json`; empty if it is no object."""
+    """Read a `result.json`; return an empty mapping if it is no object."""
     if not path.is_file():
         raise input_error(str(path), "cannot be read (no regular file)")
     if path.stat().st_size > MAX_RESULT_BYTES:
@@ -33,9 +33,9 @@ def read_result(path: Path) -> Mapping[str, Any]:
 
 
 def false_claims(result: Mapping[str, Any], rollout: Rollout, digest: str) -> Iterator[str]:
-    """A sentence for everything in a `result.json` that its log contradicts. Keys that it lacks are no contradiction."""
+    """Yield a sentence for every value in a `result.json` that the log contradicts. Missing keys are no contradiction."""
     if result.get("digest") != digest:
-        yield "result.json is about another log: its digest differs"
+        yield "result.json: belongs to another log: its digest differs"
         return
     for key, logged in logged_settings(rollout).items():
         if key in result and not _agree(result[key], logged):
@@ -43,7 +43,7 @@ def false_claims(result: Mapping[str, Any], rollout: Rollout, digest: str) -> It
 
 
 def logged_settings(rollout: Rollout) -> dict[str, Any]:
-    """What a log says about its run, by the keys of `result.json`."""
+    """Return the log's settings by the keys of `result.json`."""
     record = rollout.record
     task = record.task
     return {
@@ -66,7 +66,7 @@ def logged_settings(rollout: Rollout) -> dict[str, Any]:
 
 
 def _agree(a: Any, b: Any) -> bool:
-    """Whether two plain values are the same, numbers up to rounding."""
+    """Return whether two plain values are equal, numbers up to rounding."""
     if isinstance(a, Mapping) and isinstance(b, Mapping):
         return a.keys() == b.keys() and all(_agree(a[key], b[key]) for key in a)
     if isinstance(a, list | tuple) and isinstance(b, list | tuple):
@@ -86,7 +86,7 @@ def _short(value: Any) -> str:
 def verify_log(
     log: Path, task: Task | None, robot: RobotSpec | None, result: Path | None, *, replay: bool
 ) -> dict[str, Any]:
-    """Certify a log, and compare it with a world, a robot, its `result.json` and, with `replay`, its replay."""
+    """Certify a log; compare it with a world, a robot, its `result.json` and, with `replay`, its replay."""
     rollout = Rollout.load(log)
     certificate = certify(rollout)
     found = certificate.as_dict()

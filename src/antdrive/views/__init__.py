@@ -1,6 +1,6 @@
-"""What people see of runs: figures, films, pages and exports."""
+"""Figures, films, reports and exports of runs."""
 
 import lazy_loader
 
-# What this package offers is listed, with its types, in __init__.pyi; each name is imported when first used.
+# __init__.pyi lists the exported names and their types; each is imported on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""What is written about a test: the log, pictures, a film of then and now, and the commands that repeat it."""
+"""Artefacts of a test: log, figures, film beside the baseline, and commands to repeat it."""
 
 from __future__ import annotations
 
@@ -25,49 +25,49 @@ from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 
-#: Of which tests a film is made.
+#: Tests to film.
 Films: TypeAlias = Literal["never", "failed", "always"]
 
-#: Every file that may be written about a test.
+#: All files of a test's artefacts.
 FILES = (
     *("result.json", "commands.txt", "rollout.npz", "overview.png"),
     *("then-and-now.png", "then-and-now.mp4", "film.mp4", "traceback.txt"),
 )
 FILM_SIZE, FILM_FPS = (960, 540), 20.0
-MOST_FILMS = 10  # of failed tests, in one run of many; a film takes longer than most drives
-FILM_LENGTH = 12.0  # where a drive, then or now, is longer, its film is faster than the drive [s]
+MOST_FILMS = 10  # of failed tests in one session; a film takes longer than most drives
+FILM_LENGTH = 12.0  # films of longer drives are sped up to this length [s]
 
 
 @dataclasses.dataclass(frozen=True)
 class Results:
-    """Where results are written, and how much."""
+    """Folder and extent of results."""
 
-    folder: Path  # of all results; each test has a folder of its own in it
-    films: Films = "failed"  # of which tests a film is made
-    # a folder in which all processes of a run count the films of failed tests; None: they are not limited
+    folder: Path  # of all results, with a folder per test
+    films: Films = "failed"  # tests to film
+    # folder in which all processes count the films of failed tests; None: unlimited
     places: Path | None = None
-    # the project's folder; what lies in its folders gets results in folders of the same names
+    # the project's folder, whose structure the results mirror
     root: Path = dataclasses.field(default_factory=Path.cwd)
 
     def of(self, file: Path, name: str) -> Path:
-        """The folder of one test."""
+        """Return the folder of one test."""
         home = file.resolve().parent
         try:
             parts = home.relative_to(self.root.resolve()).parts
-        except ValueError:  # outside of the project
+        except ValueError:  # outside the project
             parts = (f"{file_name(home.name or 'root')}-{zlib.crc32(os.fsencode(home)):08x}",)
         stem = file.name.removesuffix(SUFFIX) if file.name.endswith(SUFFIX) else file.stem
         return self.folder.joinpath(*map(file_name, (*parts, stem, name)))
 
     def should_film(self, *, failed: bool) -> bool:
-        """Whether a test gets a film. Of failed tests the first `MOST_FILMS` do, and each of them takes a place."""
+        """Return whether to film a test. Of failed tests only the first `MOST_FILMS` are filmed, one place each."""
         if self.films != "failed":
             return self.films == "always"
         return failed and (self.places is None or any(_claim(self.places / str(k)) for k in range(MOST_FILMS)))
 
 
 def _claim(place: Path) -> bool:
-    """Whether this process is the first to take a place."""
+    """Claim a place and return whether this process is the first."""
     try:
         place.touch(exist_ok=False)
     except OSError:
@@ -76,10 +76,9 @@ def _claim(place: Path) -> bool:
 
 
 def file_name(name: str) -> str:
-    """A name that every file system takes, such as aisle-0 for aisle[0].
+    """Return a name that every file system accepts, such as aisle-0 for aisle[0].
 
-    Different names stay different, except for aisle[0] and aisle-0; a baseline holds the name of its test, so it is not taken
-    for the other's.
+    Only aisle[0] and aisle-0 share a name; a baseline holds its test's name, which prevents a mix-up.
     """
     plain = re.sub(r"\[(\d+)\]$", r"-\1", name)
     if re.fullmatch(r"[\w.-]{1,120}", plain, re.ASCII):
@@ -89,7 +88,7 @@ def file_name(name: str) -> str:
 
 
 def default_folder(root: Path) -> Path:
-    """The folder of a project's results in the user's cache, or among the temporary files where that cannot be written."""
+    """Return the folder of a project's results in the user's cache, or a temporary folder if the cache is read-only."""
     name = f"{file_name(root.name or 'root')}-{zlib.crc32(str(root).encode()):08x}"
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
     for folder in (cache / "antdrive" / "results", Path(tempfile.gettempdir()) / f"antdrive-results-{_user()}"):
@@ -109,7 +108,7 @@ def _user() -> str:
 def write_artefacts(
     run: Run, folder: Path, baseline: Baseline | None, *, film: bool, faults: Sequence[str], commands: Sequence[str]
 ) -> dict[str, str]:
-    """Write everything about a test into its folder; the files by what they are. Earlier files are removed first."""
+    """Replace a test's artefacts and return the files by kind."""
     from antdrive.views.figures.run_figures import draw_run
 
     remove_artefacts(folder)
@@ -126,7 +125,7 @@ def write_artefacts(
 
 
 def write_traceback(folder: Path, error: BaseException, commands: Sequence[str]) -> dict[str, str]:
-    """Write where an error arose, in place of what an earlier run wrote about the test; the files by what they are."""
+    """Replace a test's artefacts by an error's traceback and return the files by kind."""
     remove_artefacts(folder)
     write_text(folder / "traceback.txt", "".join(traceback.format_exception(error)))
     write_text(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
@@ -134,16 +133,16 @@ def write_traceback(folder: Path, error: BaseException, commands: Sequence[str])
 
 
 def remove_artefacts(folder: Path) -> None:
-    """Remove what an earlier run wrote about a test; other files stay."""
+    """Remove a test's artefacts; other files stay."""
     for name in FILES:
         with contextlib.suppress(OSError):
             (folder / name).unlink()
-    with contextlib.suppress(OSError):  # it holds something else, or is not there
+    with contextlib.suppress(OSError):  # not empty, or missing
         folder.rmdir()
 
 
 def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film: bool) -> dict[str, str]:
-    """The figure of then and now, and the film; without a baseline the film of now alone."""
+    """Write the figure and the film beside the baseline; without a baseline a film of the drive alone."""
     driven = max(float(rollout.t[-1]), 0.0 if baseline is None else baseline.metric("duration_s"))
     options: dict[str, Any] = {"size": FILM_SIZE, "fps": FILM_FPS, "speed": max(1.0, driven / FILM_LENGTH)}
     if baseline is None or len(baseline.line) < 2:
@@ -161,7 +160,7 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
     if film:
         from antdrive.views.film.comparison_film import Mark, compare_film
 
-        mark = None if found is None else Mark(found.t, *found.then, f"they part at {found.t:.1f} s")
+        mark = None if found is None else Mark(found.t, *found.then, f"divergence at {found.t:.1f} s")
         info = compare_film(
             [then, rollout], folder / "then-and-now.mp4", titles=("baseline", "now"), mark=mark, **options
         )
@@ -170,7 +169,7 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
 
 
 def baseline_rollout(baseline: Baseline, now: Rollout) -> Rollout:
-    """A drive along a baseline's line, in the world of the present drive, for pictures: it has no commands and no contacts."""
+    """Return a drive along a baseline's line in the world of `now`, for figures, without commands and contacts."""
     times = baseline.times
     samples = np.array(baseline.line, dtype=np.float64)
     pose = np.column_stack([samples[:, :2], np.unwrap(samples[:, 2])])

@@ -1,4 +1,4 @@
-"""The colours of films, figures and reports, and each planner's style; chosen for readers of any colour vision."""
+"""Colours of films, figures and reports, and planners' styles, safe for any colour vision."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ KERB: Colour = (196, 203, 213)
 OBSTACLE: Colour = (121, 136, 160)
 UNSEEN: Colour = (196, 74, 138)  # obstacles placed after planning
 MOVER: Colour = (224, 168, 40)
-ZONE: Colour = (96, 128, 186)  # inflation around obstacles
+ZONE: Colour = (96, 128, 186)  # no-go area for the robot's centre
 ROUTE: Colour = (24, 34, 66)
 SHELL: Colour = (255, 122, 14)  # the robot's deck
 TURRET: Colour = (226, 84, 0)  # the robot's upper part
@@ -33,11 +33,11 @@ START: Colour = (52, 92, 190)
 GOAL: Colour = (0, 138, 92)
 CONTACT: Colour = (214, 34, 44)
 
-# What a robot without a map has seen.
-TRACKED: Colour = (176, 36, 148)  # a mover as the robot believes it to be
+# Sensing of the robot.
+TRACKED: Colour = (176, 36, 148)  # estimate of a tracked mover
 BEAM: Colour = (20, 140, 214)
 HIT: Colour = (0, 62, 148)
-PALE: Colour = (222, 226, 232)  # ground not known to be free, and obstacles never seen
+PALE: Colour = (222, 226, 232)  # unknown ground and undetected obstacles
 HATCH: Colour = (186, 194, 206)
 
 # Text and the band below a film's picture.
@@ -45,13 +45,13 @@ INK: Colour = (28, 33, 44)
 MUTED: Colour = (104, 114, 130)
 BAND: Colour = (255, 255, 255)
 
-# What a label means.
+# Meaning of labels.
 GOOD: Colour = (0, 128, 84)
 BAD: Colour = (204, 32, 42)
 DOUBT: Colour = (176, 106, 0)
 CALM: Colour = (70, 82, 104)
 
-#: The label of each outcome on pictures, and its colour.
+#: Label and colour of each outcome.
 OUTCOME_LABELS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
     {
         Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
@@ -67,7 +67,7 @@ OUTCOME_LABELS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
     }
 )
 
-#: Colours from standing to the robot's top speed: viridis without the palest end, which a light ground would hide.
+#: Colours from standstill to the robot's top speed: viridis without its palest end, invisible on light ground.
 SPEED_STOPS: tuple[Colour, ...] = (
     *((72, 26, 108), (68, 58, 131), (57, 86, 140), (44, 113, 142), (33, 138, 141)),
     *((32, 163, 134), (64, 185, 112), (116, 206, 75), (168, 218, 50)),
@@ -77,8 +77,8 @@ SPEED_STOPS: tuple[Colour, ...] = (
 #: Colours of a planner's field, such as pheromone, from its low to its high values.
 FIELD_STOPS: tuple[Colour, ...] = ((244, 246, 249), (213, 228, 243), (143, 188, 224), (63, 131, 191), (18, 63, 122))
 
-#: One colour per planner. The first seven are Okabe and Ito's, without the yellow that white would hide; each other one
-#: is far (CIELAB) from those before it, for full colour vision and for deuteranopia.
+#: One colour per planner. The first seven are Okabe and Ito's without yellow, invisible on white; each other one is far
+#: (CIELAB) from its predecessors for full colour vision and for deuteranopia.
 PLANNER_COLOURS: tuple[Colour, ...] = (
     *((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (27, 35, 51)),
     *((17, 68, 204), (85, 68, 0), (221, 187, 136), (119, 0, 51), (170, 0, 136), (221, 51, 68), (68, 34, 119)),
@@ -92,25 +92,25 @@ _PLANNERS = (
     *("dstar-lite", "dstar", "apf", "sipp"),
 )
 
-#: The colour and line style of each planner, the same in every picture. No two share a colour.
+#: Colour and line style of each planner in all pictures. No two share a colour.
 PLANNER_STYLES: Mapping[str, tuple[Colour, str]] = MappingProxyType(
     {name: (PLANNER_COLOURS[k], _DASHES[k // 7]) for k, name in enumerate(_PLANNERS)}
 )
 
 
 def planner_style(name: str) -> tuple[Colour, str]:
-    """A planner's colour and line style; a plugin's planner gets one that depends on its name alone."""
+    """Return a planner's colour and line style; those of a plugin's planner depend on its name alone."""
     k = zlib.crc32(name.encode()) % len(PLANNER_COLOURS)
     return PLANNER_STYLES.get(name, (PLANNER_COLOURS[k], "dashdot"))
 
 
 def field_colours(level: npt.ArrayLike) -> Floats:
-    """Colours (N, 3), 0 to 255, for the levels (N,), 0 to 1, of a planner's field."""
+    """Return colours (N, 3), 0 to 255, for levels (N,), 0 to 1, of a planner's field."""
     return _along(FIELD_STOPS, level)
 
 
 def speed_colours(fraction: npt.ArrayLike) -> Floats:
-    """Colours (N, 3), 0 to 255, for speeds given as fractions (N,) of the robot's top speed."""
+    """Return colours (N, 3), 0 to 255, for speeds as fractions (N,) of the robot's top speed."""
     return _along(SPEED_STOPS, fraction)
 
 
@@ -122,12 +122,12 @@ def _along(colours: tuple[Colour, ...], fraction: npt.ArrayLike) -> Floats:
 
 
 def hexed(colour: Colour) -> str:
-    """The colour as #rrggbb."""
+    """Return the colour as #rrggbb."""
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
-DARK_LUMINANCE = 0.22  # of a colour on a dark page, at least: 4.3 times the contrast of the ground
-LIGHT_LUMINANCE = 0.45  # of a colour on a light page, at most
+DARK_LUMINANCE = 0.22  # least luminance on a dark page: a contrast of 4.3
+LIGHT_LUMINANCE = 0.45  # largest luminance on a light page
 
 
 class LabelStyle(NamedTuple):
@@ -139,7 +139,7 @@ class LabelStyle(NamedTuple):
 
 
 def label_styles(labels: Sequence[str], names: Sequence[str]) -> list[LabelStyle]:
-    """The style of each label."""
+    """Return the style of each label."""
     counts, seen = Counter(names), Counter[str]()
     styles: list[LabelStyle] = []
     for name in names:
@@ -158,22 +158,22 @@ def label_styles(labels: Sequence[str], names: Sequence[str]) -> list[LabelStyle
 
 
 def _shifted(colour: Colour, by: float) -> Colour:
-    """A colour mixed with black (-1) or white (1)."""
+    """Mix a colour with black (-1) or white (1)."""
     target = 255 if by > 0 else 0
     red, green, blue = (round(c + abs(by) * (target - c)) for c in colour)
     return red, green, blue
 
 
 def _until(colour: Colour, luminance: float, *, darker: bool) -> Colour:
-    """A colour, darker or lighter by as much as needed to reach a luminance."""
+    """Darken or lighten a colour until it reaches a luminance."""
     for step in range(21):
-        found = _shifted(colour, (-0.05 if darker else 0.05) * step)
-        if (_luminance(found) <= luminance) if darker else (_luminance(found) >= luminance):
+        tint = _shifted(colour, (-0.05 if darker else 0.05) * step)
+        if (_luminance(tint) <= luminance) if darker else (_luminance(tint) >= luminance):
             break
-    return found
+    return tint
 
 
 def _luminance(colour: Colour) -> float:
-    """Relative luminance (WCAG 2), 0 to 1."""
+    """Return the relative luminance (WCAG 2), 0 to 1."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (v / 255 for v in colour)]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

@@ -1,4 +1,4 @@
-"""What a robot without a map had seen at any moment of its drive, made again from the scans of its log."""
+"""Reconstruction of a mapless robot's occupancy map from the scans of its log."""
 
 from __future__ import annotations
 
@@ -17,51 +17,51 @@ from antdrive.sim.sensing.tracking import SKIN
 
 
 class MapReconstruction:
-    """The scans of a log, entered one after the other. Moments are asked for in increasing order.
+    """Occupancy map at any time of a drive. Times must be requested in increasing order.
 
-    The map is made anew at the poses that the robot believed in, so it is the robot's own. A robot that found no way forgets
-    what it saw long ago; here that is forgotten only if asked for.
+    Scans are inserted at the robot's estimated poses. `resets` repeats the robot's resets of its map; `detections` records
+    first detections of obstacles.
 
     Attributes:
         lidar: the robot's lidar
-        map: what was hit and which ground was seen free, in the frame of the estimated poses
-        met: when a beam first met each cylinder, in the order of `record.world.obstacles` (N,) [s]; infinite if none did yet
+        map: occupied and free cells, in the frame of the estimated poses
+        met: first detection of each cylinder, in the order of `record.world.obstacles` (N,) [s]; infinite before it
 
     Raises:
         ValueError: the log has no scans.
     """
 
-    def __init__(self, rollout: Rollout, *, forgetting: bool = False, meeting: bool = True) -> None:
+    def __init__(self, rollout: Rollout, *, resets: bool = False, detections: bool = True) -> None:
         self.lidar = lidar_of(rollout).at(rollout.record.control_hz)
         self._rollout = rollout
         self._times = rollout.t[rollout.scan_rows]
-        self._entered, self._meeting = 0, meeting
+        self._entered, self._detections = 0, detections
         self.met: Floats = np.full(len(rollout.record.world.obstacles), math.inf)
         self.map = self._empty_map(rollout.record.task.start)
-        ticks = reset_ticks(rollout.record) if forgetting else ()
-        self._forgetting = [tick / rollout.record.control_hz for tick in ticks]
+        ticks = reset_ticks(rollout.record) if resets else ()
+        self._reset_times = [tick / rollout.record.control_hz for tick in ticks]
 
     @property
     def times(self) -> Floats:
-        """When each scan was taken (S,) [s]."""
+        """Times of the scans (S,) [s]."""
         return self._times
 
     @property
     def explored(self) -> float:
-        """The ground on the map that was seen free or hit [m²]."""
+        """Known area of the map, free or hit [m²]."""
         return float(np.count_nonzero(self.seen)) * self.map.cell**2
 
     @property
     def seen(self) -> Flags:
-        """Which cells of the map were seen free or hit (rows, cols)."""
+        """Known cells of the map, free or hit (rows, cols)."""
         return np.asarray(self.map.seen_free | self.map.occupied)
 
     def advance(self, at: float) -> None:
-        """Enter all scans up to a moment."""
-        while self._forgetting and self._forgetting[0] <= at + 1e-9:
-            forgotten = self._forgetting.pop(0)
-            self._enter_until(forgotten)
-            self._forget(forgotten)
+        """Insert all scans up to a time [s]."""
+        while self._reset_times and self._reset_times[0] <= at + 1e-9:
+            reset_at = self._reset_times.pop(0)
+            self._enter_until(reset_at)
+            self._reset(reset_at)
         self._enter_until(at)
 
     def _enter_until(self, at: float) -> None:
@@ -70,8 +70,8 @@ class MapReconstruction:
             self._enter(k)
         self._entered = max(self._entered, last)
 
-    def _forget(self, at: float) -> None:
-        """Make the map anew of the latest scans, as the robot did: in the same control period, after the scan."""
+    def _reset(self, at: float) -> None:
+        """Reset the map to the latest scans, as the robot did in the same control period, after the scan."""
         record = self._rollout.record
         here = self._estimate(self._row(at))[:2]
         self.map = self.map.reset_around(here, turning_room(record.robot.radius), record.task.goal)
@@ -93,18 +93,18 @@ class MapReconstruction:
 
     def _enter(self, k: int) -> None:
         self._insert(k)
-        if self._meeting:
+        if self._detections:
             meet(self._rollout, k, self.met)
 
     def _of_movers(self, row: int, ranges: Floats) -> Flags | None:
-        """Which beams of a scan met movers that the robot followed, and left out of its map (beams,); None: no such movers."""
+        """Return which beams of a scan hit tracked movers, omitted from the map (beams,); None without such movers."""
         tracks = self._rollout.tracks
         movers = tracks[slice(*np.searchsorted(tracks[:, 0], (row, row + 1)))].astype(np.float64)
         if not len(movers):
             return None
         points = self.map.endpoints(self._estimate(row), ranges)
         away = np.hypot(*(points[:, None] - movers[:, 2:4]).transpose(2, 0, 1)) - movers[:, 6]
-        return np.asarray((away <= SKIN).any(axis=1))  # not a number where a beam met nothing
+        return np.asarray((away <= SKIN).any(axis=1))  # NaN for beams without a hit
 
     def _estimate(self, row: int) -> Pose:
         poses = self._rollout.estimate if len(self._rollout.estimate) else self._rollout.pose
@@ -112,30 +112,27 @@ class MapReconstruction:
         return x, y, yaw
 
     def _row(self, at: float) -> int:
-        """The last row of the log at or before a moment [s]."""
+        """Return the last row of the log at or before a time [s]."""
         return min(max(0, int(np.searchsorted(self._rollout.t, at + 1e-9, side="right")) - 1), len(self._rollout.t) - 1)
 
     def drift(self, at: float) -> Floats:
-        """Where the robot's map lies, if it is laid so that the robot is where it believes to be: (4,).
-
-        The cosine and the sine of a turn, then x and y [m]: what they do to a point of the world gives its place on the map.
-        """
+        """Return the transform from the world to the robot's map (4,): cosine and sine of a rotation, then x and y [m]."""
         row = self._row(at)
         x, y, turn = relative_frame(self._rollout.pose[[row]], np.array([self._estimate(row)]))[0].tolist()
         return np.array([math.cos(turn), math.sin(turn), x, y])
 
 
 def world_points(points: Floats, drift: Floats) -> Floats:
-    """Where places on the robot's map lie in the world (N, 2) [m]."""
+    """Transform points of the robot's map to the world (N, 2) [m]."""
     cos, sin, x, y = drift.tolist()
     return np.asarray((points - (x, y)) @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
 
 
 def enclosing_cylinders(cylinders: Floats) -> npt.NDArray[np.intp]:
-    """For each of the cylinders (N, 4) one that it stands in, or itself: nobody sees what stands in another one."""
-    found = np.arange(len(cylinders))
+    """Return for each of the cylinders (N, 4) the index of one that encloses and hides it, or its own index."""
+    enclosing = np.arange(len(cylinders))
     for j, (x, y, radius, _) in enumerate(cylinders):
         room = cylinders[:, 2] - radius - np.hypot(cylinders[:, 0] - x, cylinders[:, 1] - y)
         room[j] = 0.0
-        found[j] = room.argmax()
-    return found
+        enclosing[j] = room.argmax()
+    return enclosing

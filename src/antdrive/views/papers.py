@@ -1,4 +1,4 @@
-"""The papers: their figures, and a film of each, in which its colony plans on one of its maps and a robot drives the plan."""
+"""Figures of the papers, and films of a drive on one of each paper's maps."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ from antdrive.worlds.formats.cellmap import CellMap, map_task
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult, Query
 
-PAINTED = 3  # planners whose paths are drawn on one map
-CURVES = 3  # planners whose lengths are drawn by iteration for one map
+PAINTED = 3  # planners per map
+CURVES = 3  # planners per panel of lengths by iteration
 PC, PM = (0.1, 0.25, 0.5, 0.75, 0.9), (0.05, 0.1, 0.2, 0.4, 0.6)  # crossover, mutation: han2007's sweep
-CELL = 0.8  # side of a cell of a picture [m]: a turtlebot passes between two blocked ones
-HAN_UNIT = 0.7  # a unit of han2007 [m]
+CELL = 0.8  # side of a cell of a paper's map [m]: a turtlebot passes between two blocked ones
+HAN_UNIT = 0.7  # unit of han2007 [m]
 SIZE, FPS = (480, 360), 20.0
-PRELUDE, DRIVE = 3.0, 9.0  # how long the planning and the drive are shown [s]
+PRELUDE, DRIVE = 3.0, 9.0  # length of planning and drive in a film [s]
 
 Measured: TypeAlias = Sequence[tuple[Experiment, list[PaperRun]]]
 
 
 def draw_figures(paper: str, found: Measured, folder: Path, seeds: int, suffixes: Sequence[str]) -> dict[str, str]:
-    """Draw a paper's figures; their paths by name.
+    """Draw a paper's figures and return their paths by name.
 
-    Length by iteration is drawn twice: `history` shows all seeds, with intervals, and `run` one run, as the papers do.
+    There are two figures of length by iteration: `history` shows all seeds with intervals, `run` one run as in the papers.
     """
     files: dict[str, str] = {}
     curves = _curves(found)
@@ -69,7 +69,7 @@ def draw_figures(paper: str, found: Measured, folder: Path, seeds: int, suffixes
 
 
 def _curves(found: Measured) -> dict[str, list[ConvergenceCurve]]:
-    """By map, the histories of its first `CURVES` planners that have any."""
+    """Return the histories of the first `CURVES` planners with a history, by map."""
     curves: dict[str, list[ConvergenceCurve]] = {}
     for experiment, trials in _printed_first(found):
         on_map = curves.setdefault(experiment.map, [])
@@ -91,14 +91,14 @@ def _curves(found: Measured) -> dict[str, list[ConvergenceCurve]]:
 
 
 def _printed_first(found: Measured) -> Measured:
-    """The experiments that a paper prints a value for and, on maps with only one of them, the others, too."""
+    """Return experiments with printed values and, on maps with at most one of them, all experiments."""
     printed = [(e.map, e.name) for e, _ in found if e.printed is not None]
     several = {place for place, _ in printed if sum(place == other for other, _ in printed) > 1}
     return [(e, trials) for e, trials in found if e.printed is not None or e.map not in several]
 
 
 def _drawn(found: Measured) -> dict[str, tuple[Query, dict[str, PlanResult]]]:
-    """The first map of each experiment with the path of its median seed, for `PAINTED` planners of a map."""
+    """Return each experiment's first map with the paths of the median seeds of `PAINTED` planners."""
     maps_drawn: dict[str, tuple[Query, dict[str, PlanResult]]] = {}
     for experiment, trials in _printed_first(found):
         if experiment.name == "steps":  # the same plans as those of the total costs
@@ -112,7 +112,7 @@ def _drawn(found: Measured) -> dict[str, tuple[Query, dict[str, PlanResult]]]:
 
 
 def _han_figures(found: Measured, folder: Path, seeds: int, suffix: str) -> dict[str, Path]:
-    """Draw han2007's figures: path length by number of ants, and by the parameters of the genetic algorithm."""
+    """Draw han2007's path lengths by number of ants and by the genetic algorithm's parameters."""
     with_ants = [(e, trials) for e, trials in found if e.planner == "aco-han" and e.printed is not None]
     lengths = {int(e.options["ants"]): [t.length for t in trials if t.result.solved] for e, trials in with_ants}
     printed = {int(experiment.options["ants"]): experiment.printed or math.nan for experiment, _ in with_ants}
@@ -123,7 +123,7 @@ def _han_figures(found: Measured, folder: Path, seeds: int, suffix: str) -> dict
 
 
 def _sweep(seeds: int) -> dict[bool, Any]:
-    """Mean length of the genetic algorithm's paths by crossover and mutation, with and without elitism."""
+    """Return mean path lengths of the genetic algorithm by crossover and mutation, with and without elitism."""
     query = maps.han_genes()
     found = {}
     for elitism in (True, False):
@@ -137,7 +137,7 @@ def _sweep(seeds: int) -> dict[bool, Any]:
     return found
 
 
-#: By paper, the experiment whose first map is filmed.
+#: Experiment whose first map is filmed, by paper.
 SCENES: Mapping[str, Arm] = MappingProxyType(
     {
         "han2007": Arm("14 obstacles", "100 ants"),
@@ -150,7 +150,7 @@ SCENES: Mapping[str, Arm] = MappingProxyType(
 
 
 def paper_scenario(paper: str) -> Scenario:
-    """The drive that a paper's film shows: its planner with its parameters, on the first of its maps."""
+    """Return the scenario of a paper's film: its planner and parameters on its first map."""
     scene = SCENES[paper]
     experiment = next(e for e in PAPERS[paper]() if (e.map, e.name) == (scene.map, scene.name))
     if paper == "han2007":
@@ -166,7 +166,7 @@ def paper_scenario(paper: str) -> Scenario:
 
 
 def film_paper(paper: str, folder: Path) -> Path | None:
-    """Drive a paper's scenario and film it, the planning first where the planner shows it; None if no drive came about."""
+    """Drive and film a paper's scenario, with planning for iterative planners; return None without a drive."""
     scenario = paper_scenario(paper)
     result = run(scenario)
     if result.rollout is None:
@@ -186,7 +186,7 @@ def film_paper(paper: str, folder: Path) -> Path | None:
 
 
 def _han_task() -> Task:
-    """The map of han2007's ants in metres. The thesis' robot is a point: discs are smaller by the robot's radius and margin."""
+    """Return the map of han2007's ants [m]. The thesis' robot is a point: discs shrink by the robot's radius and margin."""
     low, high = 0.0, 21.0 * HAN_UNIT
     radius = HAN_UNIT - load_robot("turtlebot").radius - 0.03
     discs = tuple(Disc(x * HAN_UNIT, y * HAN_UNIT, radius) for x, y in HAN_ANTS)

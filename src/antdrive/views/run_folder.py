@@ -1,4 +1,4 @@
-"""The folder of a run: log, result, figures and films."""
+"""Folder of a run: log, result, figures and films."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
 
 FIGURES = ("overview", "certificate", "sight", "plan", "tour", "history", "field-bars", "field-contours")
-#: Every file that `write_run` may write into a folder.
+#: All files of `write_run`.
 RUN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES for suffix in (".png", ".pdf")))
 
 
 def check_folder(folder: Path) -> None:
-    """Make a folder and try to write into it, before any work is done for it."""
+    """Create a folder and raise `InputError` unless it is writable."""
     from antdrive.base.atomic import atomic_write
 
     probe = folder / ".antdrive"
@@ -34,39 +34,39 @@ def check_folder(folder: Path) -> None:
 
 
 def check_film(path: Path) -> None:
-    """Check that a film can be written to `--film PATH`, before any work is done for it."""
+    """Raise `InputError` unless a film can be written to `--film PATH`."""
     from antdrive.views.film.film_options import ENCODERS
 
     if path.suffix.lower() not in ENCODERS:
-        raise InputError(f"--film {path}: films are written as {', '.join(ENCODERS)}")
+        raise InputError(f"--film {path}: unknown suffix; choose one of {', '.join(ENCODERS)}")
     if path.is_dir():
-        raise InputError(f"--film {path}: is a directory; name a file")
+        raise InputError(f"--film {path}: a directory; name a file")
     check_folder(path.parent)
 
 
 def default_folder(scenario: Scenario) -> Path:
-    """The folder of a run for which no `--out` is given: below `out`, and never that of another scenario.
+    """Return the default folder of a run, below `out`.
 
-    Where the folder of that name holds a run of another scenario, the fingerprint is part of the name.
+    If the folder of that name holds another scenario's run, the fingerprint is added to the name.
     """
     parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
     return free_folder(Path("out") / "-".join(map(file_name, parts)), "result.json", fingerprint(scenario))
 
 
 def fingerprint(scenario: Scenario, *more: object) -> str:
-    """Eight hexadecimal digits that differ between scenarios."""
+    """Return eight hexadecimal digits that identify a scenario."""
     return scenario.identity(*more)[:8]
 
 
 def suffixes(vector: bool) -> tuple[str, ...]:
-    """The suffixes that figures are written with."""
+    """Return the file suffixes of figures."""
     return (".png", ".pdf") if vector else (".png",)
 
 
 def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
-    """Write a run's log and figures into a folder; the files by name, with the `result.json` that is still to write.
+    """Write a run's log and figures into a folder; return the files by name, including `result.json`, written later.
 
-    Files of an earlier run in that folder are removed first, because they would contradict the new result.
+    Files of an earlier run in that folder are removed first.
     """
     for name in RUN_FILES:
         (folder / name).unlink(missing_ok=True)
@@ -105,14 +105,14 @@ def _write_figures(run: Run, folder: Path, log: str, kinds: Sequence[str]) -> di
 
 
 def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, Any]:
-    """Write a run's `result.json`, at `files["result"]`; what was written."""
+    """Write a run's `result.json` at `files["result"]` and return its content."""
     result = {**run.as_dict(), "fingerprint": fingerprint(run.scenario), "files": dict(files), "command": command}
     write_json(Path(files["result"]), result)
     return result
 
 
 def write_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
-    """Film a drive, or several side by side; facts about the film."""
+    """Film a drive, or several side by side, and return facts about the film."""
     from antdrive.views.film.comparison_film import compare_film
     from antdrive.views.film.video import film
 
@@ -122,7 +122,7 @@ def write_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str,
 
 
 def caption(log: Rollout) -> str:
-    """The line in a film that says whether the drive is certified."""
+    """Return a film's line about the certificate."""
     from antdrive.sim.log.certificate import certify
 
     c = certify(log)

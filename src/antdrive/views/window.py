@@ -1,4 +1,4 @@
-"""Replay a run in real time in PyBullet's own viewer, for machines with a screen."""
+"""Real-time playback of a run in PyBullet's viewer."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from antdrive.views.film.meshes import Mesh, cylinder, join, kerb, robot_parts
 from antdrive.views.film.playback import Playback
 from antdrive.views.scene import Scene
 
-AT_ONCE = 400  # meshes in one body: PyBullet takes at most 131072 vertices
+AT_ONCE = 400  # meshes per body: PyBullet accepts at most 131072 vertices
 
 
 def check_display() -> None:
-    """Check, before any work, that a window can open."""
+    """Raise `InputError` unless a window can open."""
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         raise InputError("--gui: no display (DISPLAY is not set); --film FILE.mp4 works without one")
 
 
 def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
-    """Add a visible mesh to PyBullet client `number`; return its body number."""
+    """Add a visible mesh to PyBullet client `number` and return its body number."""
     p = bullet()
     shape = p.createVisualShape(
         p.GEOM_MESH,
@@ -43,7 +43,7 @@ def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
 
 
 def show(rollout: Rollout, *, hold: float = 3.0) -> None:
-    """Replay a run in a window until it ends or the window is closed."""
+    """Play a run in a window until it ends or the window is closed."""
     check_display()
     p = bullet()
     number = p.connect(p.GUI)

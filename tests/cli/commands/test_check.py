@@ -9,7 +9,7 @@ import pytest
 
 from antdrive import Run, run
 from antdrive.cli.commands import check
-from antdrive.cli.testing import checking
+from antdrive.cli.testing import evaluation
 
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
@@ -125,14 +125,14 @@ def test_a_test_that_kills_its_process_is_named(antdrive, suite):
     code, out, _ = antdrive("check", "a.drive.yaml", "--jobs", "2", "--json", "--results", "res")
     *others, deadly = json.loads(out)["tests"]
     assert (code, [test["passed"] for test in others]) == (3, [True] * 3)
-    assert deadly["faults"] == ["internal error: the process that made it ended with exit code 3"]
+    assert deadly["faults"] == ["internal error: its process ended with exit code 3"]
 
 
 def test_a_fault_of_the_program_is_told_with_its_traceback(antdrive, suite, monkeypatch):
     def broken(scenario):
         raise IndexError("of another's replanner")
 
-    monkeypatch.setattr(checking, "drive", broken)
+    monkeypatch.setattr(evaluation, "drive", broken)
     code, out, _ = antdrive("check", "a.drive.yaml::closed", "--results", "res")
     assert (code, out.splitlines()[1]) == (3, "  internal error: IndexError: of another's replanner")
     assert "in broken" in Path("res/a/closed-0/traceback.txt").read_text()
@@ -148,7 +148,7 @@ def test_results_are_printed_as_they_come(antdrive, suite, monkeypatch):
         made.append(run(scenario))
         return made[0]
 
-    monkeypatch.setattr(checking, "drive", interrupted)
+    monkeypatch.setattr(evaluation, "drive", interrupted)
     code, out, _ = antdrive("check", "a.drive.yaml", "--jobs", "1", "--film", "never")
     assert (code, out.splitlines()[0]) == (130, "a.drive.yaml::clear[0]: FAILED")
 

@@ -33,7 +33,7 @@ def test_fewer_than_two_paths_are_nothing_to_compare(antdrive, tmp_path):
     words = ["compare", "no-path", "-p", "astar", "-p", "dijkstra", "--out", str(tmp_path / "c"), "--no-figures"]
     code, _, err = antdrive(*words)
     assert code == 1
-    assert "nothing to compare" in err
+    assert "no comparison figure or film" in err
 
 
 def test_the_command_that_repeats_a_run_names_the_robot_as_it_was_given(antdrive, small):

@@ -27,6 +27,6 @@ def test_the_answer_says_how_many_worlds_it_rests_on():
     closing = MarginResult(margin=0.2, drives=0, impassable=10, failed=None, left=math.inf)
     trials = [closing, MarginResult(margin=0.1, drives=1, impassable=9, failed=None, left=0.02)]
     *_, said = _lines(Scenario.of("empty", "astar"), trials, 0.1)
-    assert said.endswith(": 0.100 m, from 1 drive; the margin closes 9 more worlds, which are left out")
+    assert said.endswith(": 0.100 m, from 1 drive; 9 more worlds have no path with this margin")
     *_, said = _lines(Scenario.of("empty", "astar"), trials[:1], None)
     assert said.endswith(": none up to 0.2 m")

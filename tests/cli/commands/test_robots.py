@@ -25,7 +25,7 @@ def test_the_file_of_a_robot_is_printed_as_a_start_for_another(antdrive, tmp_pat
     assert json.loads(antdrive("robots", "jackal", "--json")[1])["mass"] == 17.0
     code, _, error = antdrive("robots", "jackle")
     assert code == 2
-    assert error.startswith("antdrive: jackle: no robot of the catalogue; choose from husky, jackal, pioneer3dx, ")
+    assert error.startswith("antdrive: jackle: unknown robot; choose from husky, jackal, pioneer3dx, ")
     assert error.count("\n") == 1
     assert antdrive("robots", "--json", "jackal") == antdrive("robots", "print", "jackal", "--json")
     assert antdrive("robots", "list") == antdrive("robots")

@@ -28,7 +28,7 @@ def campaign(small):
 def test_a_dry_run_says_how_many_runs_there_are_and_writes_nothing(antdrive, campaign):
     code, out, err = antdrive("sweep", campaign, "-o", "out", "--seeds", "0-4", "--dry-run")
     assert (code, err) == (0, "")
-    assert out.splitlines()[-1] == "15 runs, 15 of them missing"
+    assert out.splitlines()[-1] == "15 runs, 15 missing"
     assert not Path("out").exists()
 
 
@@ -36,9 +36,9 @@ def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive, camp
     code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
     assert code == 0
     lines = out.splitlines()
-    assert lines[0] == "3 runs, 3 of them made now; 3 succeeded, certified"
+    assert lines[0] == "3 runs (3 new): 3 succeeded, certified"
     shown = {
-        line.split("  ")[0]: line for line in lines[lines.index("medians of the runs that succeeded (least to most)") :]
+        line.split("  ")[0]: line for line in lines[lines.index("medians of successful runs (minimum to maximum)") :]
     }
     rows = read_results("out").table.to_pylist()
     (astar,) = [row for row in rows if row["planner"] == "astar"]

@@ -52,7 +52,7 @@ def test_a_log_whose_commands_lead_elsewhere_is_exit_code_1(antdrive, small_run,
     assert antdrive("verify", path)[0] == 0, "the log alone does not show it"
     code, out, _ = antdrive("verify", path, "--replay")
     assert code == 1
-    assert "  replay: the logged commands lead up to " in out
+    assert "  replay: the logged commands lead to poses up to " in out
 
 
 def test_a_record_that_cannot_be_driven_is_a_problem_not_a_traceback(antdrive, small_run, tmp_path):
@@ -76,7 +76,7 @@ def test_the_folder_of_a_run_stands_for_its_log(antdrive, refused, log, tmp_path
     (tmp_path / "result.json").write_text("{}")
     for command in (["verify"], ["margin"], ["render", "-o", "x.mp4"]):
         line = refused(command[0], tmp_path, *command[1:])
-        assert f"{tmp_path}: no rollout.npz in this folder; the run there ended before the robot drove" in line
+        assert f"{tmp_path}: contains no rollout.npz; its run ended before the robot drove" in line
 
 
 def test_the_folder_of_a_run_is_verified_with_its_result(antdrive, small_run, tmp_path):

@@ -310,7 +310,7 @@ def test_a_ring_around_the_goal_has_no_path_with_a_reason():
     task = Task(World("w", (0, 0, 10, 10), tuple(ring)), (1.0, 1.0, 0.0), (7.0, 7.0))
     result = Tangent().plan(Query.between(rasterise(task.world, 0.25, 0.1), task), RNG)
     assert result.status is PlanStatus.NO_PATH
-    assert "no way" in result.reason
+    assert "no path from start" in result.reason
 
 
 def test_in_a_forest_of_400_discs_a_tenth_of_all_tangents_is_checked():

@@ -76,7 +76,7 @@ def test_gate_cells_are_closed_unless_there_is_no_other_way():
     free[4, 4] = True  # between two of its cells: a gate
     gate = Query(Grid.from_free(free), (1, 1), (7, 7))
     result = solve(MaxMinDStar(), gate)
-    assert "opened 1 gate cells again" in result.reason
+    assert "reopened 1 gate cells" in result.reason
     assert result.cost == pytest.approx(optimum(gate))
     free[6:9, :3] = True  # a wider way round
     wide = Query(Grid.from_free(free), (1, 1), (7, 7))

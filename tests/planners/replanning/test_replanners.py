@@ -306,7 +306,7 @@ def test_an_agent_drives_around_a_lasting_block(name):
         assert to != (4, 1)
     assert robot.arrived
     if name == "mmas-dstar":
-        assert "spread pheromone anew" in robot.note
+        assert "respread pheromone" in robot.note
 
 
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar"])

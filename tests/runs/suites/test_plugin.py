@@ -313,7 +313,7 @@ def test_kernels_are_compiled_before_the_first_drive_with_one_line(project, monk
     for _ in range(2):
         project.runpytest(*PLUGIN, "-k", "closed", "--drive-update-new").assert_outcomes(passed=1, deselected=1)
     assert compiled == [1]
-    assert capfd.readouterr().err.count("antdrive: compiling the planners, once for this installation") == 1
+    assert capfd.readouterr().err.count("antdrive: compiling the planners, once per installation") == 1
 
 
 def test_junit_properties_and_the_summary_of_a_ci_run(accepted, monkeypatch):

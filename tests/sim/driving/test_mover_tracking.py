@@ -194,8 +194,7 @@ def test_replays_take_the_scans_of_a_robot_with_a_map_again(log):
     scans[40, 300] += 10
     (problem,) = replay(replace(log, scans=scans)).problems
     assert problem == (
-        "replay: scans are not what the lidar measures from the logged poses, "
-        f"from t = {log.t[log.scan_rows[40]]:.3f} s"
+        f"replay: scans differ from the lidar at the logged poses, from t = {log.t[log.scan_rows[40]]:.3f} s"
     )
     fewer = replace(log, scans=np.delete(log.scans, 40, axis=0), scan_rows=np.delete(log.scan_rows, 40))
     assert replay(fewer).problems == (problem,)

@@ -49,7 +49,7 @@ def test_a_forged_log_is_far_off(small_run):
     straight = replace(log, command=log.command * [1.0, 0.0])
     check = replay(straight)
     assert check.position > 0.3
-    assert "lead up to" in check.problems[0]
+    assert "lead to poses up to" in check.problems[0]
     through = changed(log.record, "task", world=world)
     assert replay(replace(log, record=through)).exact, "only --world shows that a cylinder is gone"
 

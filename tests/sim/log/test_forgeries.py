@@ -37,10 +37,10 @@ SENTENCES = {
 }
 #: What only the noise that is drawn again shows.
 NOISE = {
-    "an estimate without error": ("turtlebot, noise", "estimate is not what the noise"),
-    "a higher noise level": ("jackal, noise", "estimate is not what the noise"),
-    "another seed of a noisy drive": ("jackal, movers, noise", "estimate is not what the noise"),
-    "targets without slip": ("turtlebot, noise", "actuated is not what the noise"),
+    "an estimate without error": ("turtlebot, noise", "estimate differs from the noise"),
+    "a higher noise level": ("jackal, noise", "estimate differs from the noise"),
+    "another seed of a noisy drive": ("jackal, movers, noise", "estimate differs from the noise"),
+    "targets without slip": ("turtlebot, noise", "actuated differs from the noise"),
 }
 
 

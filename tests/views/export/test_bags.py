@@ -16,7 +16,7 @@ import yaml
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import Scanner
 from antdrive.views.export.exporting import export
-from antdrive.views.export.samples import LEFT_OUT, TAKEN_AGAIN
+from antdrive.views.export.samples import OMITTED, SIMULATED
 from antdrive.views.export.topics import message_types
 from antdrive.worlds.files.world_file import load_task
 from antdrive.worlds.grid import rasterise
@@ -227,16 +227,16 @@ def test_a_lidar_that_the_drive_did_not_use_measures_at_export(folder, said, log
         assert np.allclose(entry.message.ranges, expected, rtol=1e-6)
     with (folder / "drive.mcap").open("rb") as file:
         (note,) = mcap_reader.make_reader(file).iter_metadata()
-    assert (note.name, note.metadata) == ("antdrive", {"scans": TAKEN_AGAIN})
+    assert (note.name, note.metadata) == ("antdrive", {"scans": SIMULATED})
     about = yaml.safe_load((folder / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert about["custom_data"] == {"antdrive_scans": TAKEN_AGAIN}
+    assert about["custom_data"] == {"antdrive_scans": SIMULATED}
 
 
 def test_scans_are_taken_at_export_only_if_asked_for(folder):
     export(folder / "rollout.npz", "mcap", folder / "none.mcap", scans=False)
     assert "/scan" not in {entry.topic for entry in by_mcap(folder / "none.mcap")}
     with (folder / "none.mcap").open("rb") as file:
-        assert [note.metadata for note in mcap_reader.make_reader(file).iter_metadata()] == [{"scans": LEFT_OUT}]
+        assert [note.metadata for note in mcap_reader.make_reader(file).iter_metadata()] == [{"scans": OMITTED}]
 
 
 def test_late_subscribers_get_what_is_sent_once(folder):

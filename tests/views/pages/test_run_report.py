@@ -175,9 +175,9 @@ def test_a_genuine_run_is_shown_as_certified(small_run, tmp_path):
     text = reported(tmp_path / "runs", tmp_path)
     assert "1 / 1" in text
     assert "Certified collision-free: at least" in text
-    assert "result.json is about another log" not in text
+    assert "result.json: belongs to another log" not in text
     write_run(small_run, tmp_path / "others" / "a", digest="0" * 64)
-    assert "result.json is about another log: its digest differs" in reported(tmp_path / "others", tmp_path)
+    assert "result.json: belongs to another log: its digest differs" in reported(tmp_path / "others", tmp_path)
 
 
 def test_without_a_log_a_drive_is_a_claim(small_run, tmp_path):

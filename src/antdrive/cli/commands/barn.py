@@ -26,26 +26,20 @@ if TYPE_CHECKING:
     localisation="matching",
 )
 def barn(
-    source: Annotated[Path, argument("FOLDER", "Folder with the challenge's world_N.world files, or their archive.")],
-    with_map: Annotated[
-        bool, flag("Drive each run with the map, too, and print what not knowing it costs.", "--with-map")
-    ] = False,
+    source: Annotated[Path, argument("FOLDER", "Folder or archive of the challenge's world_N.world files.")],
+    with_map: Annotated[bool, flag("Also drive with the map and compare.", "--with-map")] = False,
     planner: options.Planner = "astar",
     robot: options.Robot = "jackal",
-    trials: Annotated[int, option("NUMBER", "How often each world is driven.", min=1, max=10_000)] = 10,
+    trials: Annotated[int, option("NUMBER", "Runs per world.", min=1, max=10_000)] = 10,
     jobs: options.Jobs = None,
-    out: Annotated[Path, option("FOLDER", "Folder for the results; what is there is not driven again.")] = Path(
-        "out/barn"
-    ),
-    films: Annotated[
-        bool, flag("Film each run that did not arrive, into OUT/films; its cause is in the picture.", "--film")
-    ] = False,
+    out: Annotated[Path, option("FOLDER", "Output folder; resumable.")] = Path("out/barn"),
+    films: Annotated[bool, flag("Film failed runs, with the cause, into OUT/films.", "--film")] = False,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
-    """Drive the BARN challenge's worlds and print its table.
+    """Drive the BARN Challenge worlds and print the results table.
 
-    Exit code 0: all runs are done, whatever came out of them. The same command goes on after an interruption.
+    Repeat the command to resume it. Exit code 0: all runs are done, whatever their outcomes.
     """
     from antdrive.base.optional import parquet_library
     from antdrive.runs import barn_challenge as challenge
@@ -56,7 +50,7 @@ def barn(
 
     map = given["map"]
     if with_map and map != "none":
-        raise InputError("--with-map: is for --map none; with the map there is nothing to compare")
+        raise InputError("--with-map: needs --map none")
     parquet_library()
     folder = challenge.unpacked(source, out / "worlds")
     if map == "given" and given["localisation"] == "matching":
@@ -71,7 +65,7 @@ def barn(
     known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
     (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)
     if not json:
-        show(json, None, _lines(found, known, price))  # before the films, which take long and may fail
+        show(json, None, _lines(found, known, price))  # before filming, which is slow and may fail
     filmed = _films(results, out / "films") if films else {}
     facts = {
         "folder": str(results.folder),
@@ -88,7 +82,7 @@ def barn(
 
 
 def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
-    """Film what did not arrive; the films by the keys of the runs."""
+    """Film the failed runs. Return the films by run key."""
     from antdrive.views.film.video import film_failures
 
     with bar("filming failures") as progress:

@@ -19,13 +19,11 @@ if TYPE_CHECKING:
 
 Suites = Annotated[
     list[str],
-    argument("SUITE", "Suites (*.drive.yaml), folders with suites, SUITE::scenario or SUITE::scenario[seed]."),
+    argument("SUITE", "Suite (*.drive.yaml), folder, SUITE::scenario or SUITE::scenario[seed]."),
 ]
-Only = Annotated[str | None, option("PATTERN", "Only scenarios whose name matches, such as 'aisle-*'.")]
-ResultsFolder = Annotated[
-    Path | None, option("FOLDER", "Folder for logs, pictures and films of tests.  [default: in the user's cache]")
-]
-Film = Annotated[str, option("WHEN", "Of which tests a film is made: never, failed or always.")]
+Only = Annotated[str | None, option("PATTERN", "Run only matching scenarios, such as 'aisle-*'.")]
+ResultsFolder = Annotated[Path | None, option("FOLDER", "Folder for logs, figures, films.  [default: user cache]")]
+Film = Annotated[str, option("WHEN", "Film tests: never, failed or always.")]
 
 
 def check(
@@ -34,13 +32,13 @@ def check(
     jobs: options.Jobs = None,
     results: ResultsFolder = None,
     film: Film = "failed",
-    junit: Annotated[Path | None, option("FILE", "Write the results as JUnit XML, which CI services read.")] = None,
-    strict: Annotated[bool, flag("Fail if there are baselines that belong to no test.", "--strict")] = False,
+    junit: Annotated[Path | None, option("FILE", "Write the results as JUnit XML for CI services.")] = None,
+    strict: Annotated[bool, flag("Fail on unused baselines.", "--strict")] = False,
     json: options.Json = False,
 ) -> int:
-    """Drive suites and compare with their baselines.
+    """Run suites and compare the drives with their baselines.
 
-    Exit code 0: every drive is as its suite expects, and none is worse than its baseline.
+    Exit code 0: every drive meets its suite's expectations and is no worse than its baseline.
     """
     from antdrive.cli.testing.session_summary import add_to_page, drives_in, properties, save_junit
     from antdrive.cli.testing.unused import unused_beside
@@ -56,16 +54,15 @@ def check(
 def accept(
     tests: Suites,
     only: Only = None,
-    new: Annotated[bool, flag("Write missing baselines only.", "--new")] = False,
+    new: Annotated[bool, flag("Write only missing baselines.", "--new")] = False,
     jobs: options.Jobs = None,
     results: ResultsFolder = None,
     film: Film = "failed",
     json: options.Json = False,
 ) -> int:
-    """Drive suites and write their baselines.
+    """Run suites and save the drives as baselines.
 
-    A drive that is not as its suite expects is not accepted; its log, pictures and film say why. Exit code 0: every drive was
-    accepted.
+    A drive that misses its suite's expectations is rejected, with log, figures and film. Exit code 0: every drive was accepted.
     """
     from antdrive.cli.testing.unused import unused_beside
 
@@ -83,7 +80,7 @@ def drive_suites(
     *,
     json: bool,
 ) -> "list[CheckResult]":
-    """Drive and judge all tests that the words name, with a progress bar, and print what comes out of each."""
+    """Drive and evaluate all named tests with a progress bar, and print each result."""
     from antdrive.cli.testing import check_cases
     from antdrive.runs.pool import cores
     from antdrive.runs.suites import scenario_of, select
@@ -98,8 +95,8 @@ def drive_suites(
     cases = select(suites, only)
     compile_once()
     for case in cases:
-        if case.given.get("margin") == "auto":  # chosen once and with a bar, not by each process
-            with suppress(InputError, FieldError):  # is told as the fault of the test
+        if case.given.get("margin") == "auto":  # calibrate once, with a bar, before processes start
+            with suppress(InputError, FieldError):  # reported as the test's failure
                 scenario_of(case, with_chosen_margin)
     processes = min(jobs or cores(), len(cases))
     found = []
@@ -113,14 +110,14 @@ def drive_suites(
 
 
 def _print(result: "CheckResult") -> None:
-    """Print what came out of one test."""
+    """Print the result of one test."""
     print_line(f"{result.address}: {(result.accepted or 'passed') if result.passed else 'FAILED'}")
     for line in result.gains if result.passed else result.message.splitlines():
         print_line(f"  {line}")
 
 
 def _summarise(results: "list[CheckResult]", json: bool, unused: Sequence[str], *, strict: bool = False) -> int:
-    """Print how many tests passed, and unused baselines; the exit code, which is that of the worst test."""
+    """Print the number of passed tests and the unused baselines. Return the exit code of the worst test."""
     from antdrive.cli.testing.evaluation import INTERNAL_ERROR as INTERNAL
     from antdrive.cli.testing.evaluation import INVALID_INPUT as WRONG
     from antdrive.cli.testing.session_summary import films_omitted, unused_lines
@@ -131,7 +128,7 @@ def _summarise(results: "list[CheckResult]", json: bool, unused: Sequence[str], 
     if strict and unused:
         code = max(code, FAILED)
     better = sum(bool(result.gains) and result.passed for result in results)
-    gained = f"; {better} better than the baseline; antdrive accept renews it" if better else ""
+    gained = f"; {better} better than the baseline: renew it with antdrive accept" if better else ""
     unfilmed = sum(result.unfilmed for result in results)
     lines = [*unused_lines(unused, strict), f"{len(results) - len(failed)} of {len(results)} passed{gained}"]
     lines += [films_omitted(unfilmed, "--film always")] if unfilmed else []

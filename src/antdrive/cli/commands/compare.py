@@ -31,44 +31,39 @@ MARKER = "comparison.json"
 def compare(
     *,
     context: typer.Context,
-    worlds: Annotated[
-        list[str], argument("WORLD...", "Names of worlds in the catalogue, or world files; or campaigns' folders.")
-    ],
+    worlds: Annotated[list[str], argument("WORLD", "World names or files, or campaign folders.")],
     planner: Annotated[
         list[str] | None,
         option(
             "NAME",
-            "Planner; repeat it for two to six of them. LABEL=NAME gives it a label, so that one planner can be "
-            "compared with other options of its own.",
+            "Planner; give two to six. LABEL=NAME labels one, to compare it under different options.",
         ),
     ] = None,
     settings: Annotated[
         list[str] | None,
         option(
             "GROUP.KEY=VALUE",
-            "Set an option: of one planner by its name or label, such as aco-han.ants=50; of all with planner.ants=50; "
-            "or of the controller, such as controller.lookahead_time=0.5. May be repeated.",
+            "Option of a planner or label (aco-han.ants=50), of all planners (planner.ants=50) or of the controller "
+            "(controller.lookahead_time=0.5). Repeatable.",
             "--set",
             "-s",
         ),
     ] = None,
     robot: options.Robot = "turtlebot",
-    seeds: Annotated[int, option("NUMBER", "Number of seeds for each world, from --seed on.", min=1, max=10_000)] = 1,
+    seeds: Annotated[int, option("NUMBER", "Seeds per world, from --seed on.", min=1, max=10_000)] = 1,
     ends: Ends,
     out: options.Out = None,
     figures: options.Figures = True,
-    film: Annotated[
-        Path | None, option("FILE", "Film the first world's drives side by side: .mp4, .gif or .webp.")
-    ] = None,
+    film: Annotated[Path | None, option("FILE", "Film the first world side by side: .mp4, .gif or .webp.")] = None,
     speed: options.Speed = 1.0,
     asked: CampaignQuery,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
-    """Compare planners: drive worlds with each, or read a campaign.
+    """Compare planners on worlds or from campaign results.
 
-    The planners are paired by world and seed. Figures and film show the first of them. Exit code 0: every run succeeded.
-    Folders of campaigns, made by `antdrive sweep`: success with intervals, outcomes, and tests of every pair.
+    Worlds: pairs the planners by world and seed; figures and film show the first pair. Exit code 0: every run succeeded.
+    Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
     if campaigns := campaign_folders(worlds, context, asked):
         compare_campaigns(campaigns, planner or (), asked, json)
@@ -83,14 +78,14 @@ def compare(
     }
     names = {world: scenario.task.world.name for (world, _), scenario in scenarios.items()}
     if len(set(names.values())) < len(worlds):
-        raise InputError(f"{' '.join(worlds)}: name worlds with different names, each once")
+        raise InputError(f"{' '.join(worlds)}: world names must be unique")
     cases = [(world, number) for world in worlds for number in range(given["seed"], given["seed"] + seeds)]
     if film is not None:
         check_film(film)
     marks = {f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}
     mark = mark_of(marks, [(names[world], number) for world, number in cases])
     usual = Path("out") / file_name(f"compare-{'-'.join(names.values())}"[:100])
-    with results_folder(out, usual, MARKER, mark, told=False) as (folder, facts):
+    with results_folder(out, usual, MARKER, mark, write_manifest=False) as (folder, facts):
         runs: list[Compared] = []
         logs: dict[str, Rollout] = {}
         for world, seed in cases:
@@ -99,7 +94,7 @@ def compare(
             for entrant in entrants:
                 scenario = dataclasses.replace(scenarios[world, entrant], seed=seed)
                 result = _drive(scenario, entrant, part / entrant.label)
-                if not runs:  # an interrupted comparison leaves the results that it has, marked as its own
+                if not runs:  # mark the folder early, so that an interrupted comparison owns its results
                     write_json(folder / MARKER, facts)
                 written = write_run(result, part / entrant.label, figures=figures and is_first)
                 write_result(result, written, repeat_command(scenario, entrant, world, robot, ends.words))
@@ -108,19 +103,19 @@ def compare(
                     logs[entrant.label] = result.rollout
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, film, speed, figures)
-        told = {"differences": differences(runs), "same": same_drives(runs, given["smoothing"])}
-        told["drives"] = [{"label": run.label, **run.facts} for run in runs]
-        write_json(folder / MARKER, {**facts, **told})
-    results = {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **told, "files": files}
-    show(json, results, _lines(runs, len(cases) > 1, told, files))
+        comparison = {"differences": differences(runs), "same": same_drives(runs, given["smoothing"])}
+        comparison["drives"] = [{"label": run.label, **run.facts} for run in runs]
+        write_json(folder / MARKER, {**facts, **comparison})
+    results = {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **comparison, "files": files}
+    show(json, results, _lines(runs, len(cases) > 1, comparison, files))
     if len(logs) < 2:
-        found = "only one planner" if logs else "no planner"
-        print_error(f"{found} found a path: there is nothing to compare in a figure or film")
+        planned = "only one planner" if logs else "no planner"
+        print_error(f"{planned} found a path: no comparison figure or film")
     return all(run.facts["succeeded"] for run in runs)
 
 
 def _drive(scenario: "Scenario", entrant: Entrant, folder: Path) -> "Run":
-    """Drive with a progress bar, if the results can be written."""
+    """Drive with a progress bar, after checking that the results can be written."""
     from antdrive.sim.pipeline import run
 
     check_folder(folder)
@@ -129,7 +124,7 @@ def _drive(scenario: "Scenario", entrant: Entrant, folder: Path) -> "Run":
 
 
 def _views(logs: "dict[str, Rollout]", folder: Path, film: Path | None, speed: float, figures: bool) -> dict[str, str]:
-    """The figure and the film of the first world and seed."""
+    """Write the figure and the film of the first world and seed. Return their paths."""
     files: dict[str, str] = {}
     if len(logs) > 1 and figures:
         from antdrive.views.figures.run_figures import comparison_figure
@@ -141,7 +136,7 @@ def _views(logs: "dict[str, Rollout]", folder: Path, film: Path | None, speed: f
     return files
 
 
-def _lines(runs: Sequence[Compared], many: bool, told: Mapping[str, Any], files: Mapping[str, str]) -> Iterator[str]:
+def _lines(runs: Sequence[Compared], many: bool, facts: Mapping[str, Any], files: Mapping[str, str]) -> Iterator[str]:
     yield from table(
         (*(("world", "seed") if many else ()), "planner", *COMPARED.values(), "outcome"),
         (
@@ -150,8 +145,8 @@ def _lines(runs: Sequence[Compared], many: bool, told: Mapping[str, Any], files:
         ),
     )
     if many:
-        yield f"differences from {runs[0].label}, of the pairs in which both succeeded: median (least to most)"
+        yield f"differences from {runs[0].label} where both succeeded: median (minimum to maximum)"
         heads = ("planner", "succeeded", "pairs", *COMPARED.values())
-        yield from table(heads, map(difference_cells, told["differences"]))
-    yield from told["same"]
+        yield from table(heads, map(difference_cells, facts["differences"]))
+    yield from facts["same"]
     yield from file_lines(files)

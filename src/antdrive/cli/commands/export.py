@@ -12,26 +12,26 @@ from antdrive.cli.parse import log_at
 
 def export_drive(
     rollout: options.Log,
-    out: Annotated[Path, option("PATH", "The .mcap file, or a new folder for rosbag2 and csv.")],
-    to: Annotated[str, option("KIND", "mcap, rosbag2 or csv.", "--to")] = "mcap",
-    force: Annotated[bool, flag("Replace an .mcap file and a layout that exist.", "--force")] = False,
+    out: Annotated[Path, option("PATH", "Output: .mcap file or new folder.")],
+    to: Annotated[str, option("KIND", "Format: mcap, rosbag2 or csv.", "--to")] = "mcap",
+    force: Annotated[bool, flag("Replace an existing .mcap file and layout.", "--force")] = False,
     scans: Annotated[
         bool,
         flag(
-            "Whether a bag has what the robot's lidar would have measured, where the log holds no scans.",
+            "Simulate scans missing in the log.",
             "--scans/--no-scans",
         ),
     ] = True,
     json: options.Json = False,
 ) -> None:
-    """Export a drive for Foxglove, RViz and spreadsheets.
+    """Export a drive to Foxglove, RViz or CSV.
 
-    mcap and rosbag2 hold ROS 2 messages, without ROS; they need antdrive[ros].
+    mcap and rosbag2 hold ROS 2 messages. They need antdrive[ros], but no ROS installation.
     """
     from antdrive.views.export.exporting import EXPORTS, export
 
     if force and to in EXPORTS and to != "mcap":
-        raise InputError(f"--force: is for --to mcap; {to} makes a new folder and replaces none")
+        raise InputError(f"--force: applies to --to mcap only; {to} writes a new folder")
     try:
         files = export(log_at(rollout), to, out, replace=force, scans=scans)
     except FieldError as error:

@@ -19,48 +19,46 @@ if TYPE_CHECKING:
     from antdrive.runs.failures.hunt import Hunt
     from antdrive.runs.failures.reproducers import Reproducer
 
-MARKER = "falsify.json"  # which search a folder is of
+MARKER = "falsify.json"  # identifies the search in its folder
 
 
 @options.with_settings(("smoothing", "noise", "margin", "cell"))
 def falsify(
     *,
-    budget: Annotated[int, option("NUMBER", "Runs that the search may make.", min=1, max=1_000_000)] = 100,
-    seed: Annotated[
-        int, option("NUMBER", "Seed of the search; each run's is its number.", "--seed", min=0, max=2**63 - 1)
-    ] = 0,
+    budget: Annotated[int, option("NUMBER", "Maximum number of runs.", min=1, max=1_000_000)] = 100,
+    seed: Annotated[int, option("NUMBER", "Seed of the search.", "--seed", min=0, max=2**63 - 1)] = 0,
     method: Annotated[
-        str, option("NAME", "How worlds are chosen: guided (by rehearsals without physics) or random.")
+        str, option("NAME", "World selection: guided (by rehearsals without physics) or random.")
     ] = "guided",
-    obstacles: Annotated[int, option("NUMBER", "Cylinders in each world.", min=1, max=50)] = 10,
+    obstacles: Annotated[int, option("NUMBER", "Cylinders per world.", min=1, max=50)] = 10,
     setup: Setup,
     out: options.Out = None,
     seconds: Annotated[
-        float, option("SECONDS", "Time to shrink each failure [s]; 0: none.", "--shrink", min=0.0, max=1e6)
+        float, option("SECONDS", "Time to shrink a failure [s]; 0: none.", "--shrink", min=0.0, max=1e6)
     ] = 20.0,
     film: Annotated[bool, flag("Film and draw each failure.", "--film/--no-film")] = True,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
-    """Look for worlds where a set-up fails.
+    """Search for worlds in which a configuration fails.
 
-    A path exists in each of them. Failures are run again in another process, shrunk, and written as a suite with a film
-    each. Ctrl-C keeps what was found. Exit code 0: nothing was found. Exit code 1: the set-up fails in some world.
+    Every world has a path. Failures are repeated in another process, shrunk, and written as a suite with films.
+    Ctrl-C keeps the failures so far. Exit code 0: no failure. Exit code 1: at least one failure.
     """
     from antdrive.planners.user_code import is_user_code
     from antdrive.runs.failures.hunt import find_failures
 
     if is_user_code(setup.planner):
-        problem = "failures are run again in other processes, which know registered planners only"
         raise InputError(
-            f"--planner {setup.planner}: {problem}; register the class under the entry point antdrive.planners"
+            f"--planner {setup.planner}: must be registered, because failures are repeated in other processes; "
+            "register the class under the entry point antdrive.planners"
         )
     scenario = setup.scenario("empty", given)
     mark = fingerprint(scenario, budget, seed, method, obstacles, seconds)
     usual = Path("out") / file_name(f"falsify-{setup.planner}-{scenario.robot.name}-{seed}")
     asked: dict[str, Any] = {"budget": budget, "seed": seed, "method": method}
     with results_folder(out, usual, MARKER, mark) as (folder, _):
-        with bar("looking for failures") as progress:
+        with bar("searching for failures") as progress:
             hunt = find_failures(
                 scenario, obstacles=obstacles, progress=lambda runs, found: progress(runs / budget), **asked
             )
@@ -82,7 +80,7 @@ def falsify(
 
 
 def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reproducer]":
-    """Shrink, repeat and write every failure that differs from the others, in place of those of an earlier search."""
+    """Shrink, repeat and write each distinct failure, replacing those of an earlier search."""
     from antdrive.runs.failures.reproducers import SUITE, write_reproducers
 
     reported = []
@@ -94,11 +92,11 @@ def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Rep
     for place in folder.glob("failure-*/"):
         for name in (*RUN_FILES, "film.mp4"):
             (place / name).unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # it holds something else
+        with contextlib.suppress(OSError):  # it holds other files
             place.rmdir()
     for one in reported:
         small = one.small.run
-        if small is None:  # nothing was planned; the suite has the world
+        if small is None:  # planning raised an error; the suite has the world
             continue
         files = write_run(small, folder / one.name, figures=film)
         if film and small.rollout is not None:
@@ -111,8 +109,8 @@ def _lines(hunt: "Hunt", reported: "list[Reproducer]", folder: Path, filmed: boo
     from antdrive.runs.failures.reproducers import SUITE
 
     ended = "interrupted after" if hunt.interrupted else "after"
-    runs = f"{hunt.runs} runs, {hunt.driven} of them with a path on the grid"
-    yield f"{ended} {runs}: {len(hunt.findings)} failures, {len(hunt.distinct)} of them different"
+    runs = f"{hunt.runs} runs ({hunt.driven} with a path on the grid)"
+    yield f"{ended} {runs}: {len(hunt.findings)} failures, {len(hunt.distinct)} distinct"
     if reported:
         rows = (
             (
@@ -125,6 +123,6 @@ def _lines(hunt: "Hunt", reported: "list[Reproducer]", folder: Path, filmed: boo
             for one in reported
         )
         yield from table(("name", "run", "repeats", "obstacles", "failure"), rows)
-        yield f"the failures as a suite, {'with worlds, logs and films' if filmed else 'with worlds and logs'}: {folder}"
+        yield f"suite of the failures, {'with worlds, logs and films' if filmed else 'with worlds and logs'}: {folder}"
         yield f"repeat: {shlex.join(['antdrive', 'check', str(folder / SUITE)])}"
-        yield f"a page: {shlex.join(['antdrive', 'report', str(folder), '-o', str(folder / 'report.html')])}"
+        yield f"report: {shlex.join(['antdrive', 'report', str(folder), '-o', str(folder / 'report.html')])}"

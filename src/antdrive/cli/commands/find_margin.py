@@ -23,25 +23,21 @@ ASTAR = Setup(planner="astar")
 @options.with_settings(("smoothing", "noise", "cell", "seed"))
 def find_margin(
     *,
-    world: Annotated[str | None, argument("WORLD", "Name of a world in the catalogue, or a world file.")] = None,
-    kind: Annotated[
-        str | None, option("KIND", "Instead of WORLD: a random forest or barn for each seed.", "--generate")
-    ] = None,
+    world: Annotated[str | None, argument("WORLD", "World name or file.")] = None,
+    kind: Annotated[str | None, option("KIND", "Random worlds instead of WORLD: forest or barn.", "--generate")] = None,
     ends: Ends,
     setup: Setup = ASTAR,
-    seeds: Annotated[int, option("NUMBER", "Number of drives, with seeds from --seed on.", min=1, max=10_000)] = 10,
+    seeds: Annotated[int, option("NUMBER", "Number of drives, seeded from --seed on.", min=1, max=10_000)] = 10,
     max_speed: Annotated[
         float | None, option("SPEED", "Speed limit [m/s].  [default: the robot's own]", min=0.05)
     ] = None,
-    reserve: Annotated[
-        float, option("METRES", "Part of the margin that every drive must leave unused [m].", min=0.0, max=1.0)
-    ] = 0.005,
+    reserve: Annotated[float, option("METRES", "Margin that must stay unused [m].", min=0.0, max=1.0)] = 0.005,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
-    """Find the least margin with which all drives are safe.
+    """Find the smallest margin at which all drives are safe.
 
-    `--margin auto` of the other commands predicts one for any world. Exit code 0: there is a safe margin of at most 0.2 m.
+    `--margin auto` of other commands predicts a margin for any world. Exit code 0: a margin of at most 0.2 m is safe.
     """
     from antdrive.runs.margins.choice import find_margin as search
     from antdrive.sim.pipeline import run as drive
@@ -62,7 +58,7 @@ def find_margin(
         return drive(dataclasses.replace(base, task=tasks[seed], margin=margin, seed=seed))
 
     compile_once()
-    with planning("looking for the smallest safe margin"):
+    with planning("searching for the smallest safe margin"):
         trials = list(search(drive_with, list(tasks), reserve=reserve))
     smallest = min((trial.margin for trial in trials if trial.safe), default=None)
     facts = {
@@ -82,15 +78,13 @@ def find_margin(
 
 
 def _chosen(world: str | None, kind: str | None, ends: Ends) -> "str | Task":
-    """The world of every drive; for random worlds a stand-in."""
+    """Return the world of every drive, or a placeholder for random worlds."""
     if (world is None) == (kind is None):
-        raise InputError("find-margin: name a world, or a kind of random worlds with --generate forest|barn")
+        raise InputError("find-margin: name either a world or --generate forest|barn")
     if world is not None:
         return ends.of(world)
     if ends.words:
-        raise InputError(
-            "--task, --start, --goal: random worlds have their own starts and goals; name a world for others"
-        )
+        raise InputError("--task, --start, --goal: need a WORLD; random worlds have their own starts and goals")
     return "empty"
 
 
@@ -98,8 +92,8 @@ def _lines(base: "Scenario", trials: "Sequence[MarginResult]", smallest: float |
     from antdrive.runs.margins.choice import MARGIN_HEADS
 
     yield from table(MARGIN_HEADS, (trial.cells for trial in sorted(trials, key=lambda trial: trial.margin)))
-    found = "none up to 0.2 m" if smallest is None else f"{smallest:.3f} m"
+    result = "none up to 0.2 m" if smallest is None else f"{smallest:.3f} m"
     if trial := next((trial for trial in trials if trial.margin == smallest), None):
-        closed = f"; the margin closes {trial.impassable} more worlds, which are left out" if trial.impassable else ""
-        found += f", from {trial.drives} drive{'' if trial.drives == 1 else 's'}{closed}"
-    yield f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {found}"
+        closed = f"; {trial.impassable} more worlds have no path with this margin" if trial.impassable else ""
+        result += f", from {trial.drives} drive{'' if trial.drives == 1 else 's'}{closed}"
+    yield f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {result}"

@@ -12,15 +12,14 @@ if TYPE_CHECKING:
 
 
 def margin(rollout: options.Log, json: options.Json = False) -> None:
-    """Break a drive's safety margin down by cause.
+    """Break down a drive's safety margin by cause.
 
-    Planning keeps the margin free around the robot. Reports how much of it the drive used up, where, and why:
-    rounding, cutting corners, tracking, slip or localisation. For a margin that --margin auto chose, it also compares the
-    loss that was predicted with that of this drive.
+    Plans keep the margin free around the robot. The table shows how much of it the drive used, where, and why: rounding,
+    corner cutting, tracking, slip or localisation. For a margin of --margin auto, it also compares the predicted loss with
+    the actual loss.
 
-    "Used at most" is the most that a cause took of the margin anywhere in the drive, and where. "At the tightest place" is
-    each cause's share of the margin less the least room left, which is their sum: positive where it brought the robot
-    closer to the obstacle, negative where it took the robot away from it.
+    "Used at most" is the maximum that a cause used anywhere in the drive. "At the tightest place" splits the loss at the
+    smallest remaining clearance by cause: positive towards the obstacle, negative away from it.
     """
     from antdrive.sim.log.margin import budget
     from antdrive.sim.log.rollout import Rollout
@@ -38,23 +37,23 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
         for share in spent.contributions
     )
     lines = [
-        f"{rollout}: margin {spent.margin:.3f} m, least room left around the disc {spent.left:.4f} m at {place}",
+        f"{rollout}: margin {spent.margin:.3f} m, smallest clearance of the robot's disc {spent.left:.4f} m at {place}",
         *table(("cause", "used at most m", "at", "at the tightest place m"), rows),
-        f"the largest loss is due to {spent.largest.cause}"
+        f"largest loss: {spent.largest.cause}"
         if spent.largest.metres
-        else "nothing was used: the robot never came closer to an obstacle than the margin",
+        else "no loss: the robot never came closer to an obstacle than the margin",
     ]
     if prediction is not None:
         loss = prediction["footprint_loss_m"]
-        drive = "this drive had movers or unseen obstacles" if loss is None else f"the footprint lost {loss:.4f} m"
-        lines.append(f"chosen by --margin auto for a predicted loss of {prediction['loss_m']:.4f} m; {drive}")
+        drive = "not measured (movers or unseen obstacles)" if loss is None else f"{loss:.4f} m for the footprint"
+        lines.append(f"--margin auto: predicted loss {prediction['loss_m']:.4f} m, actual loss {drive}")
     show(json, {**spent.as_dict(), "prediction": prediction}, lines)
 
 
 def _prediction(log: "Rollout") -> dict[str, float | None] | None:
-    """What --margin auto predicted, beside what the footprint lost; None where the margin was given.
+    """Return the loss predicted by --margin auto and the footprint's actual loss; None for a fixed margin.
 
-    The prediction is about the standing obstacles that the planner knew, and so must be the drive's own loss.
+    The prediction covers static obstacles known to the planner only, so drives among others have no actual loss.
     """
     from antdrive.sim.log.certificate import certify
 

@@ -25,14 +25,14 @@ def plan(
     world: options.World,
     setup: Setup,
     ends: Ends,
-    out: Annotated[Path | None, option("FOLDER", "Draw the plan's figures into this folder.")] = None,
+    out: Annotated[Path | None, option("FOLDER", "Folder for the plan's figures.")] = None,
     vector: options.Vector = False,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
     """Plan a path without driving it.
 
-    Exit code 0: there is a path.
+    Exit code 0: a path exists.
     """
     from antdrive.planners import keep_best
     from antdrive.sim.pipeline import plan as make_plan

@@ -9,7 +9,7 @@ from antdrive.cli.output import plain
 
 
 def planners(json: options.Json = False) -> None:
-    """List the planners with their options."""
+    """List the planners and their options."""
     from antdrive.planners import describe, list_planners
 
     known = {name: (describe(planner), _options(planner)) for name, planner in list_planners().items()}
@@ -26,6 +26,6 @@ def planners(json: options.Json = False) -> None:
 
 
 def _options(planner: Any) -> dict[str, Any]:
-    """A planner's options with the values they have; another package's planner may have none."""
+    """Return a planner's options with their values; planners of other packages may have none."""
     fields = dataclasses.fields(planner) if dataclasses.is_dataclass(planner) else ()
     return {field.name: getattr(planner, field.name) for field in fields}

@@ -15,30 +15,26 @@ from antdrive.views.run_folder import caption
 
 
 def render(
-    rollouts: Annotated[
-        list[Path], argument("ROLLOUT", "Logs of drives or folders of runs; two to six are shown side by side.")
-    ],
-    out: Annotated[Path, option("FILE", "The film: .mp4, .gif or .webp; .png writes one frame.")],
-    camera: Annotated[str, option("NAME", "Camera: oblique, top or follow.")] = "oblique",
+    rollouts: Annotated[list[Path], argument("ROLLOUT", "Logs or folders of runs; two to six play side by side.")],
+    out: Annotated[Path, option("FILE", "Film (.mp4, .gif, .webp) or frame (.png).")],
+    camera: Annotated[str, option("NAME", "View: oblique, top or follow.")] = "oblique",
     size: Annotated[
         str | None,
         option(
             "WIDTHxHEIGHT",
-            "Size of the picture [px]. Of several drives from above as much of the default as their worlds fill.",
+            "Picture size [px]; several drives in top view crop the default to their worlds.",
             show_default="1280x720",
         ),
     ] = None,
     fps: Annotated[int, option("NUMBER", "Frames per second.", min=1, max=240)] = 30,
     speed: options.Speed = 1.0,
-    at: Annotated[
-        float | None, option("SECONDS", "Write the one frame of this moment [s]: .png or .webp.", min=0.0)
-    ] = None,
+    at: Annotated[float | None, option("SECONDS", "Frame at this time [s]: .png or .webp.", min=0.0)] = None,
     prelude: options.Prelude = 0.0,
     json: options.Json = False,
 ) -> None:
-    """Film drives from their logs, from any camera.
+    """Render films of logged drives from any camera.
 
-    Nothing is simulated again.
+    Films replay the log, without physics.
     """
     from antdrive.sim.log.rollout import Rollout
 
@@ -46,7 +42,7 @@ def render(
     shape = {} if size is None else {"size": parse_size(size)}
     one_frame = at is not None or out.suffix.lower() == ".png"
     if len(logs) > 1 and (prelude or one_frame):
-        raise InputError(f"--out {out}: several rollouts give a film, without a prelude")
+        raise InputError(f"--out {out}: several rollouts need a film format and no --prelude")
     compile_once()
     if one_frame:
         from antdrive.views.film.video import still

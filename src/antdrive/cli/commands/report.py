@@ -14,21 +14,19 @@ from antdrive.cli.options import argument, flag, option
 def report(
     *,
     folders: Annotated[
-        list[Path], argument("FOLDER...", "Holds the folders that `antdrive run` wrote, or a campaign.")
+        list[Path], argument("FOLDER", "Folders that contain runs of `antdrive run`, or campaign folders.")
     ],
-    out: Annotated[Path, option("FILE", "The page: .html, or .md for a pull request; of a campaign also .tex, .csv.")],
-    title: Annotated[str | None, option("TEXT", "Title of the page.  [default: the folders' names]")] = None,
-    embed_films: Annotated[bool, flag("Put films into the page instead of linking to them.", "--embed-films")] = False,
-    planner: Annotated[
-        list[str] | None, option("LABEL", "Report about this planner of a campaign. May be repeated.")
-    ] = None,
+    out: Annotated[Path, option("FILE", "Report: .html or .md; for campaigns also .tex or .csv.")],
+    title: Annotated[str | None, option("TEXT", "Title.  [default: the folders' names]")] = None,
+    embed_films: Annotated[bool, flag("Embed films instead of linking to them.", "--embed-films")] = False,
+    planner: Annotated[list[str] | None, option("LABEL", "Campaign: report on this planner only. Repeatable.")] = None,
     asked: CampaignQuery,
     json: options.Json = False,
 ) -> None:
-    """Write one page about many runs.
+    """Write a report on many runs or on a campaign.
 
-    A table to sort and filter, films, figures, and the commands that repeat the runs. Of a campaign: paired comparisons of
-    its planners, charts, and all runs.
+    Runs: a sortable table, films, figures, and the commands that repeat the runs. Campaigns: paired comparisons of
+    planners, charts, and all runs.
     """
     campaigns = [folder for folder in folders if is_campaign(folder)]
     if campaigns and len(campaigns) == len(folders):
@@ -36,7 +34,7 @@ def report(
         return
     other = next(folder for folder in folders if folder not in campaigns)
     if campaigns:
-        raise InputError(f"{other}: is no campaign's folder, as {campaigns[0]} is; report about them apart")
+        raise InputError(f"{other}: is not a campaign folder, but {campaigns[0]} is; write separate reports")
     refuse_campaign_options([*(["planner"] if planner else []), *asked.given], other)
     from antdrive.views.pages.run_report import write_report
 

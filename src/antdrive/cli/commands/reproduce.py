@@ -17,20 +17,20 @@ QUICK_SEEDS = 6
 def reproduce(
     paper: Annotated[str, argument("PAPER", "han2007, suganthi2019, ibraheem2016, lee2008, hasan or all.")],
     out: options.Out = None,
-    seeds: Annotated[int, option("NUMBER", "Number of seeds for each experiment.", min=1, max=1000)] = 10,
+    seeds: Annotated[int, option("NUMBER", "Seeds per experiment.", min=1, max=1000)] = 10,
     quick: Annotated[
-        bool, flag("A look: six seeds, fewer ant steps, two maps for each picture, no slow experiment.", "--quick")
+        bool, flag("Six seeds, fewer ant steps, two maps per figure, no slow experiments.", "--quick")
     ] = False,
     jobs: options.Jobs = None,
-    films: Annotated[bool, flag("Film a drive for each paper: its colony plans, a robot drives.", "--film")] = False,
+    films: Annotated[bool, flag("Film one plan and drive per paper.", "--film")] = False,
     vector: options.Vector = False,
     json: options.Json = False,
 ) -> None:
-    """Repeat a paper's experiments: printed against measured.
+    """Repeat a paper's experiments and test its claims.
 
-    Prints a table of what the paper printed beside what was measured, then each of the paper's claims with our figure, its
-    interval, whether it holds, and why; and draws the paper's figures. With 50 seeds every claim can be decided; a line says how
-    many cannot with fewer. The same command goes on where it was interrupted.
+    Prints published beside measured figures, then each claim with our figure, its interval, verdict and reason. Draws the
+    paper's figures. 50 seeds decide every claim; with fewer, a line counts the undecidable ones. Repeat the command to resume
+    it.
     """
     from antdrive.runs.papers.claims import VERDICT_HEADS, verdict_cells, verdict_facts
     from antdrive.runs.papers.experiments import PAPERS
@@ -42,7 +42,7 @@ def reproduce(
     seeds = min(seeds, QUICK_SEEDS) if quick else seeds
     few = too_few_seeds(papers, seeds, quick=quick)
     mark = "quick" if quick else f"{seeds}-seeds"
-    with results_folder(out, Path("out") / f"reproduce-{paper}", MARKER, mark, told=False) as (folder, facts):
+    with results_folder(out, Path("out") / f"reproduce-{paper}", MARKER, mark, write_manifest=False) as (folder, facts):
         if few:
             print_error(few)
         with bar("planning") as progress:
@@ -66,5 +66,5 @@ def reproduce(
     lines += file_lines(files)
     if found.kept:
         count = f"{found.kept} of {len(found.rows)}"
-        lines.append(f"{count} experiments were done before and were taken from {folder / RUNS_FOLDER}")
+        lines.append(f"{count} experiments reused from {folder / RUNS_FOLDER}")
     show(json, result, lines)

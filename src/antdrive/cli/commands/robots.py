@@ -24,24 +24,22 @@ def list_all(json: options.Json = False) -> None:
     show(json, {spec.name: robot_to_dict(spec) for spec in specs}, table(heads, rows))
 
 
-def print_robot(
-    name: Annotated[str, argument("NAME", "A robot of the catalogue.")], json: options.Json = False
-) -> None:
-    """Print the file of a robot in the catalogue, to start another from."""
+def print_robot(name: Annotated[str, argument("NAME", "Catalogue robot.")], json: options.Json = False) -> None:
+    """Print the file of a catalogue robot, as a template."""
     from antdrive.robots import list_robots, load_robot, robot_to_dict
 
     known = list_robots()
     if name not in known:
-        raise InputError(f"{name}: no robot of the catalogue; choose from {', '.join(known)}")
+        raise InputError(f"{name}: unknown robot; choose from {', '.join(known)}")
     show(json, robot_to_dict(load_robot(name)), [known[name].read_text(encoding="utf-8").rstrip()])
 
 
 def show_robot(
-    robot: Annotated[str, argument("ROBOT", "Name of a robot in the catalogue, or a robot file.")],
-    out: Annotated[Path | None, option("FILE", "Draw the robot: .png, .svg or .pdf.")] = None,
+    robot: Annotated[str, argument("ROBOT", "Robot name or file.")],
+    out: Annotated[Path | None, option("FILE", "Drawing: .png, .svg or .pdf.")] = None,
     json: options.Json = False,
 ) -> None:
-    """Describe a robot, and draw it from above."""
+    """Describe a robot and draw it from above."""
     from antdrive.robots import load_robot, robot_to_dict
     from antdrive.robots.card import facts_of
 
@@ -57,47 +55,43 @@ def show_robot(
 
 
 def import_robot(
-    path: Annotated[Path, argument("FILE", "A robot's .urdf or .xacro.")],
-    out: Annotated[
-        Path | None, option("FILE", "The robot file to write.  [default: FILE's name, in this folder]")
-    ] = None,
-    figure: Annotated[
-        Path | None, option("FILE", "Draw the footprint over the collision geometry: .png, .svg or .pdf.")
-    ] = None,
+    path: Annotated[Path, argument("FILE", "Robot description: .urdf or .xacro.")],
+    out: Annotated[Path | None, option("FILE", "Robot file to write.  [default: FILE's name]")] = None,
+    figure: Annotated[Path | None, option("FILE", "Drawing of the footprint: .png, .svg or .pdf.")] = None,
     left: Annotated[str | None, option("NAME", "Joint or link of the left driven wheel.")] = None,
     right: Annotated[str | None, option("NAME", "Joint or link of the right driven wheel.")] = None,
     below: Annotated[
         float | None,
         option(
             "METRES",
-            "Leave collision geometry that lies higher above the floor out of the footprint [m].  [default: none is left out]",
+            "Omit collision geometry above this height from the footprint [m].",
             min=0.0,
         ),
     ] = None,
-    footprint: Annotated[str, option("KIND", "disc, rectangle, polygon, or auto: the first that fits.")] = "auto",
+    footprint: Annotated[str, option("KIND", "disc, rectangle, polygon or auto (first that fits).")] = "auto",
     wheel_radius: Annotated[float | None, option("METRES", "Radius of the driven wheels [m].", min=0.0)] = None,
     given: Annotated[
         list[str] | None,
-        option("KEY=VALUE", "A value of the robot file, such as mass=12. May be repeated.", "--set", "-s"),
+        option("KEY=VALUE", "Value of the robot file, such as mass=12. Repeatable.", "--set", "-s"),
     ] = None,
-    meshes: Annotated[Path | None, option("FOLDER", "Where the file's meshes are.")] = None,
-    without_meshes: Annotated[bool, flag("Leave out meshes that are not found.", "--without-meshes")] = False,
+    meshes: Annotated[Path | None, option("FOLDER", "Folder of the meshes.")] = None,
+    without_meshes: Annotated[bool, flag("Omit missing meshes.", "--without-meshes")] = False,
     arguments: Annotated[
-        list[str] | None, option("NAME=VALUE", "Value of an argument of a .xacro. May be repeated.", "--arg")
+        list[str] | None, option("NAME=VALUE", "Argument of a .xacro file. Repeatable.", "--arg")
     ] = None,
     packages: Annotated[
         list[str] | None,
         option(
             "NAME=FOLDER",
-            "Where a ROS package is.  [default: a folder of its name beside FILE or above it] May be repeated.",
+            "Folder of a ROS package. Repeatable.  [default: folder NAME beside or above FILE]",
             "--package",
         ),
     ] = None,
     json: options.Json = False,
 ) -> None:
-    """Write the robot file of a differential-drive robot in URDF.
+    """Create a robot file from a differential-drive robot's URDF.
 
-    A comment says where each value comes from.
+    Comments in the robot file state the source of each value.
     """
     from antdrive.base.atomic import write_text
     from antdrive.robots import robot_to_dict

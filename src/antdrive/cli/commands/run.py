@@ -25,19 +25,17 @@ def run(
     setup: Setup,
     ends: Ends,
     out: options.Out = None,
-    film: Annotated[Path | None, option("FILE", "Film the drive: .mp4, .gif or .webp.", panel="Output")] = None,
+    film: Annotated[Path | None, option("FILE", "Film: .mp4, .gif or .webp.", panel="Output")] = None,
     prelude: options.Prelude = 0.0,
     vector: options.Vector = False,
     figures: options.Figures = True,
-    gui: Annotated[
-        bool, flag("Replay the drive in a window afterwards; needs a screen.", "--gui", panel="Output")
-    ] = False,
+    gui: Annotated[bool, flag("Show the drive in a window; needs a display.", "--gui", panel="Output")] = False,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
     """Plan a path, drive it in physics and certify the drive.
 
-    Exit code 0: the robot stopped at the goal, and its log proves that it touched nothing.
+    Exit code 0: the robot stopped at the goal and its log proves the drive collision-free.
     """
     from antdrive.planners import keep_best
     from antdrive.sim.pipeline import plan
@@ -67,7 +65,7 @@ def run(
 
 
 def _check_views(scenario: "Scenario", film: Path | None, prelude: float, gui: bool) -> None:
-    """Refuse, before any work, a film or a window that could not be made afterwards."""
+    """Raise an error before any work if the film or the window cannot be made afterwards."""
     if gui:
         from antdrive.views.window import check_display
 
@@ -76,10 +74,8 @@ def _check_views(scenario: "Scenario", film: Path | None, prelude: float, gui: b
         from antdrive.planners import capabilities_of
 
         if film is None:
-            raise InputError("--prelude: belongs to a film; give --film, too")
+            raise InputError("--prelude: needs --film")
         if not capabilities_of(scenario.planner).iterative:
-            raise InputError(
-                f"--prelude: {scenario.planner_name} does not plan in iterations; there is no field to show"
-            )
+            raise InputError(f"--prelude: needs an iterative planner; {scenario.planner_name} is not one")
     if film is not None:
         check_film(film)

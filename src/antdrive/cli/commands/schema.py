@@ -7,10 +7,10 @@ from antdrive.cli.console import print_json
 from antdrive.cli.options import argument
 
 
-def schema(kind: Annotated[str, argument("KIND", "Kind of file: world, robot, suite or campaign.")] = "world") -> None:
-    """Print the JSON Schema of a kind of file.
+def schema(kind: Annotated[str, argument("KIND", "File type: world, robot, suite or campaign.")] = "world") -> None:
+    """Print the JSON Schema of a file type.
 
-    An editor that knows it completes keys and marks mistakes.
+    Editors use it to complete keys and mark errors.
     """
     from antdrive.robots import robot_schema
     from antdrive.runs.campaigns import campaign_schema

@@ -20,39 +20,34 @@ if TYPE_CHECKING:
     from antdrive.runs.suites.suite import SuiteCase
     from antdrive.sim.scenario import Scenario
 
-MARKER = "shrink.json"  # which failure a folder is of
+MARKER = "shrink.json"  # identifies the failure in its folder
 
 
 def shrink(
-    failure: Annotated[
-        str, argument("ROLLOUT|SUITE::SCENARIO", "Log of a failed drive or its folder, or a test of a suite.")
-    ],
+    failure: Annotated[str, argument("ROLLOUT|SUITE::SCENARIO", "Failed drive (log or folder) or test of a suite.")],
     bound: Annotated[
         str | None,
         option(
             "BOUND",
-            'What counts as failing, such as "min_clearance_m < 0.02".  [default: anything but a certified success]',
+            'Failure, such as "min_clearance_m < 0.02".  [default: anything but a certified success]',
             "--while",
         ),
     ] = None,
-    planner: Annotated[
-        str | None, option("FILE.py:CLASS", "Where the class of a log's planner is, if it is not registered.")
-    ] = None,
+    planner: Annotated[str | None, option("FILE.py:CLASS", "Class of the log's planner, if not registered.")] = None,
     seconds: Annotated[
-        float, option("SECONDS", "Time for the search [s]; a later call goes on from there.", min=1.0, max=1e6)
+        float, option("SECONDS", "Search time [s]; repeating the command continues.", min=1.0, max=1e6)
     ] = 60.0,
     out: options.Out = None,
-    film: Annotated[bool, flag("Film the small failure.", "--film/--no-film")] = True,
+    film: Annotated[bool, flag("Film the reproducer.", "--film/--no-film")] = True,
     figures: options.Figures = True,
-    jobs: Annotated[int, option("NUMBER", "Processes; the result is the same.", min=1, max=64)] = 1,
+    jobs: Annotated[int, option("NUMBER", "Processes.", min=1, max=64)] = 1,
     json: options.Json = False,
 ) -> bool:
-    """Find the smallest world that still fails.
+    """Reduce a failure to a minimal reproducer.
 
-    It fails in the same way: same outcome, same kind of thing touched, same cause; a test that ends as expected but breaks a
-    bound of its `expect`, or is worse than its baseline allows, does that in the same way. Leaves out obstacles and movers, noise
-    and digits, and moves start, goal and walls nearer. Writes the world, a suite with the scenario and how it fails, the log
-    and a film. Exit code 0: the result fails in the same way, in another process too.
+    Removes obstacles, movers, noise and digits, and moves start, goal and walls closer, while the failure stays the same:
+    outcome, kind of contact and cause, or the broken bound or baseline of a test. Writes the world, a suite with the
+    scenario, the log and a film. Exit code 0: the result fails in the same way in another process.
     """
     from antdrive.runs.failures.failure import parse_bound
     from antdrive.runs.failures.handover import planner_beside, scenario_name
@@ -60,7 +55,7 @@ def shrink(
     from antdrive.runs.failures.shrinker import shrink as make_small
 
     if planner is not None and "::" in failure:
-        raise InputError(f"--planner: is for logs; the suite says which planner {failure} has")
+        raise InputError(f"--planner: applies to logs only; the suite names the planner of {failure}")
     scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure, planner), None)
     crossed = parse_bound(bound) if bound is not None else _broken_bound(case, scenario)
     name = f"{scenario_name(scenario.task.world.name)}-small"
@@ -73,7 +68,7 @@ def shrink(
         small, suite, repeats = write_reproducer(shrunk, name, folder, bound=crossed, planner=words)
         files = {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
         report: dict[str, Any] = {"files": files}
-        if small.run is not None:  # else the planner raises something
+        if small.run is not None:  # else the planner raises an error
             files = {**write_run(small.run, folder, figures=figures), **files}
             if film and small.rollout is not None:
                 files["film"] = film_drives([small.rollout], folder / f"{name}.mp4")["file"]
@@ -91,7 +86,7 @@ def shrink(
 
 
 def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
-    """A suite's test and its scenario."""
+    """Return the scenario of a suite's test, and the test."""
     from antdrive.runs.suites.names import select
     from antdrive.runs.suites.scenarios import scenario_of
 
@@ -102,7 +97,7 @@ def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
 
 
 def _broken_bound(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | None":
-    """What counts as failing where a test's drive ends as expected and breaks a bound of the test or of its baseline."""
+    """Return the broken bound of a test, or of its baseline, whose drive ends as expected."""
     from antdrive.runs.failures.failure import Attempt, bound_broken_in
 
     if case is None or not (case.demands.bounds or case.entry.baseline):
@@ -113,14 +108,14 @@ def _broken_bound(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | No
 
 
 def _of_a_log(words: str, planner: str | None) -> "Scenario":
-    """The scenario of a log, rebuilt from its record."""
+    """Rebuild the scenario of a log from its record."""
     from antdrive.base.errors import input_error
     from antdrive.runs.failures.rebuild import rebuilt
     from antdrive.runs.suites.suite import SUFFIX
     from antdrive.sim.log.rollout import read_record
 
     if words.endswith(SUFFIX):
-        raise InputError(f"{words}: is a suite; name one of its tests, as {words}::SCENARIO")
+        raise InputError(f"{words}: is a suite; name one of its tests: {words}::SCENARIO")
     if (log := Path(words) / "rollout.npz").is_file():
         words = str(log)
     try:
@@ -134,7 +129,7 @@ def _lines(shrunk: "Shrunk", files: dict[str, str], repeats: bool) -> Iterator[s
     smaller = "smaller" if shrunk.smaller else "no smaller"
     yield f"{smaller} after {shrunk.runs} runs: {shrunk.summary}"
     if not shrunk.complete:
-        yield "the time was over: the same command goes on from here, --seconds gives it longer"
+        yield "time limit reached: repeat the command to continue, or raise --seconds"
     if not repeats:
-        yield "the small scenario did not repeat in another process; what it uses is not deterministic"
+        yield "the reproducer did not fail in the same way in another process: the scenario is not deterministic"
     yield from file_lines(files)

@@ -22,30 +22,28 @@ if TYPE_CHECKING:
 @options.with_settings((name for name, one in SETTINGS.items() if one.flag and one.is_word), many=True)
 def sweep(
     campaign: Annotated[
-        Path | None, argument("CAMPAIGN", "Campaign file; may be left out where the options name all.")
+        Path | None, argument("CAMPAIGN", "Campaign file; optional if options name worlds and planners.")
     ] = None,
-    out: Annotated[Path | None, option("FOLDER", "Folder for the results; a campaign there goes on.")] = None,
-    world: Annotated[
-        list[str] | None, option("NAME", "World of the catalogue, file, or pattern. May be repeated.")
-    ] = None,
+    out: Annotated[Path | None, option("FOLDER", "Output folder; resumes the campaign there.")] = None,
+    world: Annotated[list[str] | None, option("NAME", "World name, file or pattern. Repeatable.")] = None,
     generate: Annotated[
-        list[str] | None, option("KIND:SEEDS", "Random worlds, such as forest:20 or barn:0-9. May be repeated.")
+        list[str] | None, option("KIND:SEEDS", "Random worlds: forest:20 or barn:0-9. Repeatable.")
     ] = None,
     planner: Annotated[
         list[str] | None,
         option(
             "NAME",
-            "Planner, or FILE.py:CLASS, with options such as aco-han:ants=10,50 or aco-han:ants=10..50..20. May be repeated.",
+            "Planner or FILE.py:CLASS, with options as in as:ants=10,50 or as:ants=10..50..20. Repeatable.",
         ),
     ] = None,
-    robot: Annotated[list[str] | None, option("NAME", "Robot of the catalogue, or file. May be repeated.")] = None,
-    seeds: Annotated[str | None, option("SEEDS", "How many seeds, such as 10, or which, such as 0-9 or 3,7.")] = None,
+    robot: Annotated[list[str] | None, option("NAME", "Robot name or file. Repeatable.")] = None,
+    seeds: Annotated[str | None, option("SEEDS", "Number of seeds (10), or seeds (0-9 or 3,7).")] = None,
     tasks: Annotated[
         str | None,
         option(
-            "NUMBER[:METRES]|named",
-            "Random starts and goals in each world, at least so many metres apart; or named: those that its file lists.  "
-            "[default: its own]",
+            "TASKS",
+            "Tasks per world: NUMBER[:METRES] random ones at least METRES apart, or named (those of the world file).  "
+            "[default: the main task]",
         ),
     ] = None,
     jobs: options.Jobs = None,
@@ -53,44 +51,41 @@ def sweep(
         str | None,
         option(
             "ADDRESS",
-            "Make the runs on a cluster: tcp://HOST:PORT of a dask scheduler, or local:N. Whoever reaches a scheduler can "
-            "run code on its machines: use it in trusted networks only.",
+            "Run on a cluster: tcp://HOST:PORT of a Dask scheduler, or local:N. Use trusted networks only: a scheduler runs "
+            "code for anyone who can reach it.",
         ),
     ] = None,
     keep: Annotated[
-        str | None, option("WHICH", "Logs to keep: none, failed or all.  [default: as the campaign says]", "--keep")
+        str | None, option("WHICH", "Logs to keep: none, failed, all.  [default: campaign's]", "--keep")
     ] = None,
     run_limit: Annotated[
         float | None,
-        option("SECONDS", "Wall-clock time of a run, after which its process is ended [s].", "--run-limit"),
+        option("SECONDS", "Wall-clock limit per run [s].", "--run-limit"),
     ] = None,
-    retry_crashed: Annotated[bool, flag("Make runs again that crashed.", "--retry-crashed")] = False,
+    retry_crashed: Annotated[bool, flag("Repeat crashed runs.", "--retry-crashed")] = False,
     again: Annotated[
         list[str] | None,
-        option("NAME", "Make runs again of a planner, or with an outcome: planner_fault. May be repeated."),
+        option("NAME", "Repeat runs of a planner or with an outcome, such as planner_fault. Repeatable."),
     ] = None,
-    dry_run: Annotated[
-        bool, flag("Say how many runs there are and how many are missing; run nothing.", "--dry-run")
-    ] = False,
+    dry_run: Annotated[bool, flag("Only count all and missing runs.", "--dry-run")] = False,
     report: Annotated[
         Path | None,
-        option("FILE", "Write the campaign's statistics too, as `antdrive report` does: .html, .md, .tex or .csv."),
+        option("FILE", "Also write a report: .html, .md, .tex or .csv."),
     ] = None,
     json: options.Json = False,
     **given: Any,
 ) -> None:
-    """Drive every combination of a campaign.
+    """Run a campaign: every combination of its settings.
 
-    The folder holds a row for each run as Parquet. The same command goes on after an interruption, and runs what is new after
-    a change. Options that name worlds, planners and so on take the place of what the file says. Exit code 0: all runs are
-    done, whatever came out of them.
+    The output folder holds one row per run as Parquet. Repeat the command to resume, or to add runs after a change. Options
+    override the keys of the campaign file. Exit code 0: all runs are done, whatever their outcomes.
     """
     from antdrive.runs.campaigns.expanding import expand
     from antdrive.runs.campaigns.sweeping import missing_runs
     from antdrive.runs.campaigns.sweeping import sweep as make_runs
 
     if out is None and not dry_run:
-        raise InputError("--out: missing; name the folder for the results")
+        raise InputError("--out: missing; name the output folder")
     _check(keep, dask, jobs, report, dry_run)
     asked = campaign_from(
         campaign, given, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, tasks=tasks,
@@ -128,41 +123,41 @@ def sweep(
 
 
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
-    """Refuse options that mean nothing."""
+    """Raise an error about options without effect."""
     if report is not None:
         from antdrive.views.pages.campaign_report import check_suffix
 
         check_suffix(report)
         if dry_run:
-            raise InputError("--report: has no effect with --dry-run, which runs nothing")
+            raise InputError("--report: has no effect with --dry-run; omit one")
     from antdrive.runs.campaigns.running import Keep as Kinds
 
     if keep is not None and keep not in get_args(Kinds):
         raise InputError(f"--keep {keep}: unknown; choose from {', '.join(get_args(Kinds))}")
     if dask is not None and jobs is not None:
-        raise InputError("--jobs: has no effect with --dask; write --dask local:N for N processes, or leave it out")
+        raise InputError("--jobs: has no effect with --dask; use --dask local:N for N processes")
 
 
 def _size_lines(expansion: "Expansion", missing: int) -> Iterator[str]:
-    """How large a campaign is, in words."""
+    """Yield the size of a campaign as lines."""
 
     def counted(name: str, count: int) -> str:
         plural = count != 1 or " " in name or name == "settings"
         return f"{count} {name if plural else name.removesuffix('s')}"
 
     yield " x ".join(counted(name, count) for name, count in expansion.counts.items())
-    left_out = f"; {expansion.duplicates} combinations that mean the same as others are left out"
-    yield f"{len(expansion.jobs)} runs, {missing} of them missing{left_out if expansion.duplicates else ''}"
+    omitted = f"; {expansion.duplicates} duplicate combinations omitted" if expansion.duplicates else ""
+    yield f"{len(expansion.jobs)} runs, {missing} missing{omitted}"
 
 
 def _lines(results: "SweepResults", reports: Sequence[str]) -> Iterator[str]:
-    """How the runs of a campaign ended, what was measured in those that succeeded, and where more is said."""
+    """Yield the outcomes of a campaign, metrics of successful runs, and paths as lines."""
     from antdrive.runs.campaigns.results import MEDIANS
 
-    yield f"{results.size} runs, {results.made} of them made now; {results.succeeded} succeeded, certified"
+    yield f"{results.size} runs ({results.made} new): {results.succeeded} succeeded, certified"
     yield from table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
     yield ""
-    yield "medians of the runs that succeeded (least to most)"
+    yield "medians of successful runs (minimum to maximum)"
     yield from table(("planner", "runs", *MEDIANS.values()), results.medians())
     yield f"  table    {results.path}"
     yield from (f"  report   {file}" for file in reports)

@@ -12,19 +12,16 @@ from antdrive.cli.parse import log_at
 
 
 def verify(
-    rollouts: Annotated[list[Path], argument("ROLLOUT", "Logs of drives, or the folders of runs.")],
-    world: Annotated[str | None, option("WORLD", "The logs must be about this world: a name or a file.")] = None,
-    robot: Annotated[str | None, option("NAME", "The logs must be about this robot of the catalogue or file.")] = None,
-    replay: Annotated[
-        bool, flag("Drive the logged commands in physics again: they must give the log.", "--replay")
-    ] = False,
+    rollouts: Annotated[list[Path], argument("ROLLOUT", "Logs of drives, or folders of runs.")],
+    world: Annotated[str | None, option("WORLD", "Require this world (name or file) in the logs.")] = None,
+    robot: Annotated[str | None, option("NAME", "Require this robot (name or file) in the logs.")] = None,
+    replay: Annotated[bool, flag("Re-execute the logged commands and compare the logs.", "--replay")] = False,
     json: options.Json = False,
 ) -> bool | int:
-    """Certify drives again, from their logs alone.
+    """Re-certify drives from their logs alone.
 
-    With --world and --robot, a log must also be about these. In the folder of a run, result.json must agree with the log.
-    Exit code 0: every log proves that the robot touched nothing.
-    Exit code 2: one cannot be read; the others are certified all the same.
+    In a run's folder, result.json must agree with the log. Exit code 0: every log proves its drive collision-free.
+    Exit code 2: a log cannot be read; the others are still certified.
     """
     from antdrive.robots.robot_file import load_robot
     from antdrive.sim.verifying import verify_log

@@ -6,18 +6,18 @@ from antdrive.cli.console import bar, print_line
 
 
 def warm(jobs: options.Jobs = None) -> None:
-    """Compile every planner into the cache.
+    """Compile all planners ahead of time.
 
-    Needed once for an installation; otherwise the first command that plans or drives does it.
+    Needed once per installation; otherwise the first command that plans or drives compiles them.
     """
     from antdrive.base.kernel_cache import cache_folder
     from antdrive.cli.compiling import is_warm
     from antdrive.cli.compiling import warm as compile_all
 
     if cache_folder() is None:
-        raise InputError("warm: no folder for compiled code can be written; name one in NUMBA_CACHE_DIR")
+        raise InputError("warm: no writable cache folder; name one in NUMBA_CACHE_DIR")
     done = is_warm()
     if not done:
         with bar("compiling the planners") as progress:
             compile_all(jobs, progress=progress)
-    print_line(f"every planner is compiled{' already' if done else ''}")
+    print_line(f"all planners are {'already ' if done else ''}compiled")

@@ -15,7 +15,7 @@ from antdrive.cli.scenario_options import Ends, random_world
 if TYPE_CHECKING:
     from antdrive.worlds import Task
 
-MANY = 5000  # cylinders; from here on, planning takes seconds
+MANY = 5000  # cylinders; planning takes seconds beyond this
 UNITS = {
     "frame": " m, m, rad",
     "bounds": " m",
@@ -43,7 +43,7 @@ def _row(name: str, facts: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _facts(task: "Task") -> dict[str, Any]:
-    """A task in short, as plain values."""
+    """Summarise a task as plain values."""
     return {
         "name": task.world.name,
         "source": task.world.source,
@@ -64,11 +64,11 @@ def show_world(
     world: options.World,
     robot: options.Robot = "turtlebot",
     ends: Ends,
-    out: Annotated[Path | None, option("FILE", "Draw the world: .png, .svg or .pdf.")] = None,
+    out: Annotated[Path | None, option("FILE", "Drawing: .png, .svg or .pdf.")] = None,
     json: options.Json = False,
     **asked: Any,
 ) -> None:
-    """Describe a world, and whether a robot can cross it."""
+    """Describe a world and check whether a robot can cross it."""
     from antdrive.base.plane import world_to_map
     from antdrive.planners import Query, load_planner, reachable
     from antdrive.robots import list_robots, load_robot, overlap_at
@@ -76,7 +76,7 @@ def show_world(
 
     margin = asked["margin"]
     if margin == "auto":
-        raise InputError("--margin auto: is chosen for a drive; write a number of metres")
+        raise InputError("--margin auto: applies to drives only; give a number of metres")
     given, spec = ends.of(world), load_robot(robot)
     shown = load_task(given) if isinstance(given, str) else given
     grid = rasterise(shown.world, shown.cell, spec.radius + margin)
@@ -106,20 +106,20 @@ def show_world(
 
 @options.with_settings(("seed",))
 def generate_world(
-    kind: Annotated[str, argument("KIND", "forest (Han's rule) or barn (the BARN cellular automaton).")],
-    out: Annotated[Path, option("FILE", "The world file to write.")],
+    kind: Annotated[str, argument("KIND", "forest (Han's rule) or barn (cellular automaton).")],
+    out: Annotated[Path, option("FILE", "World file to write.")],
     settings: Annotated[
         list[str] | None,
         option(
             "KEY=VALUE",
-            "Set an option of the generator, such as count=20 for a forest or fill=0.25 for a barn. May be repeated.",
+            "Generator option, such as count=20 (forest) or fill=0.25 (barn). Repeatable.",
             "--set",
             "-s",
         ),
     ] = None,
     **given: Any,
 ) -> None:
-    """Write a random world."""
+    """Generate a random world."""
     from antdrive.worlds import save_task
 
     values = dict(pair(text) for text in settings or ())
@@ -136,46 +136,44 @@ def import_world(
         Path | None,
         option(
             "FILE",
-            "The world file to write; for DynaBARN's .json a folder of them.  [default: FILE's name, in this folder]",
+            "World file to write (DynaBARN: folder).  [default: FILE's name]",
         ),
     ] = None,
-    barn: Annotated[bool, flag("SDF: use the start and goal of the BARN challenge.", "--barn")] = False,
-    start: Annotated[str | None, option("X,Y,YAW", "Start pose [m, m, rad]; maps have none of their own.")] = None,
-    goal: Annotated[str | None, option("X,Y", "Goal [m]; maps have none of their own.")] = None,
+    barn: Annotated[bool, flag("SDF: start and goal of the BARN Challenge.", "--barn")] = False,
+    start: Annotated[str | None, option("X,Y,YAW", "Start pose [m, m, rad]; maps contain none.")] = None,
+    goal: Annotated[str | None, option("X,Y", "Goal [m]; maps contain none.")] = None,
     bounds: Annotated[
         str | None,
-        option("XMIN,YMIN,XMAX,YMAX", "SDF: where the walls stand [m].  [default: 1 m around the cylinders]"),
+        option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the cylinders]"),
     ] = None,
-    skip_unsupported: Annotated[
-        bool, flag("SDF: skip whatever is not an upright cylinder.", "--skip-unsupported")
-    ] = False,
+    skip_unsupported: Annotated[bool, flag("SDF: skip all but upright cylinders.", "--skip-unsupported")] = False,
     unknown: Annotated[
-        str | None, option("KIND", "map_server: treat unknown cells as blocked or free.  [default: blocked]")
+        str | None, option("KIND", "map_server: unknown cells are blocked or free.  [default: blocked]")
     ] = None,
     overhang: Annotated[
         float | None,
         option(
             "METRES",
-            "Maps: how far cylinders may protrude from blocked cells [m].  [default: 0.207 cells]",
+            "Maps: overhang of cylinders beyond blocked cells [m].  [default: 0.207 cells]",
             min=0,
             max=1e6,
         ),
     ] = None,
     resolution: Annotated[
-        float | None, option("METRES", "MovingAI: side of a cell [m].  [default: 1]", min=1e-6, max=1e6)
+        float | None, option("METRES", "MovingAI: cell size [m].  [default: 1]", min=1e-6, max=1e6)
     ] = None,
     problem: Annotated[
         int | None,
-        option("NUMBER", "MovingAI: take start and goal from this problem of FILE.scen, counted from 0.", min=0),
+        option("NUMBER", "MovingAI: start and goal of this problem in FILE.scen, from 0.", min=0),
     ] = None,
     json: options.Json = False,
     **given: Any,
 ) -> None:
-    """Turn a world or map of another program into a world file.
+    """Convert another program's world or map to a world file.
 
-    Worlds are made of upright cylinders. Those of an SDF file stay as they are. A map is converted: every blocked
-    cell beside free ground that the start or the goal can reach is fully covered by cylinders, so that no passage is
-    wider than on the map. The key `source` of the world file says how far cylinders protrude from blocked cells.
+    World files consist of upright cylinders. SDF cylinders are kept. In a map, cylinders cover every blocked cell next to
+    free ground reachable from start or goal, so no passage becomes wider. The key `source` of the world file states the
+    overhang of cylinders beyond blocked cells.
     """
     from antdrive.worlds import import_file, save_task
     from antdrive.worlds.formats.cellmap import conversion_progress
@@ -204,7 +202,7 @@ def import_world(
     usual = Path(f"{path.stem}.yaml")
     files = _targets(path, out or Path(path.stem), tasks) if is_set else [import_target(path, out, usual, "world")]
     for task, file in zip(tasks, files, strict=True):
-        # A map that antdrive wrote has the other tasks in its file.
+        # A map written by antdrive holds the other tasks in its file.
         save_task(task, file, kept_tasks(path, task) if file_format is IMPORTS["map_server"] else {})
     found = [{**_facts(task), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
     lines = []
@@ -212,38 +210,36 @@ def import_world(
         world = tasks[0].world
         lines.append(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")
         if file_format.is_map and len(world.obstacles) > MANY:
-            lines.append(f"  more than {MANY} make planning take seconds; a larger --overhang needs fewer of them")
+            lines.append(f"  planning takes seconds beyond {MANY} obstacles; a larger --overhang needs fewer")
     lines += [line for file in files for line in file_lines({"world": file})]
     show(json, {"worlds": found} if is_set else found[0], lines)
 
 
 def _targets(path: Path, folder: Path, tasks: "Sequence[Task]") -> list[Path]:
-    """A file in a folder for each world of a set."""
+    """Return one file per world of a set."""
     files = [folder / f"{file_name(task.world.name)}.yaml" for task in tasks]
     twice = next((file for i, file in enumerate(files) if file in files[:i]), None)
     if twice is not None:
-        raise InputError(f"{path}: two worlds would be written to {twice}; give them different names")
+        raise InputError(f"{path}: two worlds map to {twice}; give them different names")
     return files
 
 
 def export_world(
     world: options.World,
-    out: Annotated[
-        Path, option("FILE", "Gazebo: .sdf or .world; map_server: .yaml (and .pgm); MovingAI: .map (and .scen).")
-    ],
+    out: Annotated[Path, option("FILE", "Gazebo: .sdf, .world; map_server: .yaml; MovingAI: .map.")],
     resolution: Annotated[
         float | None,
-        option("METRES", "Maps: side of a cell [m].  [default: the world's own cell size]", min=1e-6, max=1e6),
+        option("METRES", "Maps: cell size [m].  [default: the world's]", min=1e-6, max=1e6),
     ] = None,
-    force: Annotated[bool, flag("Replace files that exist, also those beside FILE.", "--force")] = False,
+    force: Annotated[bool, flag("Replace existing files, including .pgm and .scen.", "--force")] = False,
     json: options.Json = False,
 ) -> None:
-    """Write a world for another program.
+    """Export a world to another program.
 
-    FILE's suffix decides the format. SDF keeps the world, its start and its goal. In a map, every cell that a cylinder
-    reaches into is blocked; importing the map again gives a similar world, not the same. A .yaml keeps the world's
-    other tasks, too. A .map gets a .scen file beside it with the path from start to goal, if there is one on its cells.
-    A world that was made from a map is written where it lies in that map, but for a .map, which has no coordinates.
+    FILE's suffix selects the format. SDF keeps the world, its start and its goal. Maps block every cell that a cylinder
+    touches, so re-importing gives a similar world. A .yaml comes with a .pgm and also keeps other tasks. A .map comes with
+    a .scen of the path from start to goal, if one exists on its cells. Worlds imported from a map keep its coordinates,
+    except as .map, which has none.
     """
     from antdrive.base.files import require_new
     from antdrive.views.export.world_export import SDF, SUFFIXES, file_beside, write_world
@@ -251,12 +247,12 @@ def export_world(
 
     suffix = out.suffix.lower()
     if suffix not in SUFFIXES:
-        raise InputError(f"--out {out}: worlds are written as .sdf, .world, .yaml (map_server) or .map (MovingAI)")
+        raise InputError(f"--out {out}: unknown suffix; use .sdf, .world, .yaml (map_server) or .map (MovingAI)")
     task, tasks = load_task(world), load_tasks(world)
     if out.exists() and Path(world).exists() and out.samefile(world):
-        raise InputError(f"--out {out}: is the world itself; choose another name")
+        raise InputError(f"--out {out}: would overwrite the world; choose another name")
     if suffix in SDF and resolution is not None:
-        raise InputError("--resolution: an SDF world has no cells")
+        raise InputError("--resolution: applies to maps only; SDF worlds have no cells")
     beside = file_beside(out)
     require_new((out, *([] if beside is None else [beside])), replace=force)
     facts, lost = write_world(task, tasks, out, resolution)

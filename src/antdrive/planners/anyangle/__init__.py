@@ -1,1 +1,1 @@
-"""Planners whose lines are not bound to grid directions."""
+"""Any-angle planners."""

@@ -1,4 +1,4 @@
-"""A genetic algorithm on via points (Han, MSc thesis, Missouri 2007, section 4.1)."""
+"""Genetic algorithm on via points (Han, MSc thesis, Missouri 2007, section 4.1)."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
 
 @dataclass(frozen=True, kw_only=True)
 class ViaPointPlanner(IterativePlanner):
-    """A planner whose answer is a polyline over via points that need not lie on the grid's moves."""
+    """A planner that returns a polyline over via points, independent of the grid's moves."""
 
     @property
     def work_unit(self) -> str:
-        """What `work` counts."""
+        """The unit of `work`."""
         return "chromosomes rated"
 
     def _conclude(self, query: Query, done: list[Iteration], note: str) -> PlanResult:
@@ -35,13 +35,13 @@ class ViaPointPlanner(IterativePlanner):
 
 
 class Incumbent:
-    """The best line so far, with its leads; the cells beside it are searched only when it changes.
+    """The best line so far with its leads; the path of cells along it is updated only when the line changes.
 
     Attributes:
         query: the query
-        ends: the ends of the line, and its leads
+        ends: the ends of the line and its leads
         best: the length of the best line, leads included [m], inf while there is none
-        cells: a path of cells beside the line (N, 2)
+        cells: a path of cells along the line (N, 2)
         waypoints: the line in fractional cells (M, 2), None while there is none
     """
 
@@ -52,7 +52,10 @@ class Incumbent:
         self.waypoints: Floats | None = None
 
     def keep_if_shorter(self, via: Floats, length: float) -> bool:
-        """Keep the line over via points (n, 2) [m], of this length without leads, if it is the best; whether it is."""
+        """Keep the line over via points (n, 2) [m] if it is the shortest, and return whether it is.
+
+        `length` excludes the leads [m].
+        """
         length += self.ends.lead_length
         if length >= self.best:
             return False
@@ -63,7 +66,7 @@ class Incumbent:
         return True
 
     def report(self, population: Floats, lengths: Floats, *, arrived: int, work: int) -> Iteration:
-        """The state after a generation, whose shortest line is offered first."""
+        """Update the incumbent and return the state after a generation."""
         leads = self.ends.lead_length
         if len(lengths):
             first = int(lengths.argmin())
@@ -90,7 +93,7 @@ class Incumbent:
 
 
 def seeded(rng: np.random.Generator) -> Any:
-    """A seed for the random numbers of compiled code."""
+    """Draw a seed for compiled code."""
     return np.uint64(rng.bit_generator.random_raw()) | np.uint64(1)
 
 
@@ -98,25 +101,24 @@ def seeded(rng: np.random.Generator) -> Any:
 class GaHan(ViaPointPlanner):
     """A genetic algorithm on a few via points, refilled with random chromosomes (Han 2007).
 
-    Section 4.1 of the thesis: a chromosome is a row of via points on free cells. Each generation selects by 1
-    / length, crosses, mutates, eliminates what touches an obstacle and refills the population at random. The
-    defaults are those of the thesis. `field` counts the chromosomes of the last population that pass each
-    cell.
+    Section 4.1 of the thesis: a chromosome is a sequence of via points on free cells. Each generation selects by
+    1 / length, crosses, mutates, eliminates chromosomes that touch an obstacle and refills the population at
+    random. The defaults are those of the thesis. `field` counts the chromosomes of the last population that
+    pass each cell.
 
-    Known weakness, measured (docs/benchmarks.md): the algorithm depends on chance finding a first feasible
-    line. In worlds with many obstacles there may be no line over so few via points, or none that chance
-    finds: then the answer is `STOPPED`. With a quarter of the cells blocked 6 of 10 runs find one on 20 x 20
-    cells, and none on 50 x 50.
+    Known weakness, measured (docs/benchmarks.md): the first feasible line must be found by chance. Among many
+    obstacles no line over so few via points may exist, or none is drawn: the status is then `STOPPED`. With a
+    quarter of the cells blocked, 6 of 10 runs find a line on 20 x 20 cells, and none on 50 x 50.
 
     Attributes:
-        population: chromosomes
-        iterations: generations
+        population: number of chromosomes
+        iterations: number of generations
         crossover: Pc, the probability that a chromosome takes part in crossover
         mutation: Pm, the probability that a gene mutates; the thesis uses 0.4 with nine obstacles
-        via_points: via points of a chromosome, 1 to 6 in the thesis
+        via_points: via points per chromosome, 1 to 6 in the thesis
         elitism: whether the best chromosome always survives
-        tries: random chromosomes drawn at most in the whole run
-        complete: False, as the planner may miss a path that exists
+        tries: maximum number of random chromosomes in the whole run
+        complete: False; the planner may miss an existing path
     """
 
     population: int = 100
@@ -129,7 +131,7 @@ class GaHan(ViaPointPlanner):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs. It may miss a path that exists."""
+        """Capabilities and requirements of this planner. It may miss an existing path."""
         return Capabilities(iterative=True, complete=False)
 
     def __post_init__(self) -> None:
@@ -141,7 +143,7 @@ class GaHan(ViaPointPlanner):
         require("tries", self.tries, at_least=1)
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
-        """Breed generations as in section 4.1 viii, without end unless no feasible chromosome is ever found."""
+        """Breed generations as in section 4.1 viii; end only if no feasible chromosome is ever drawn."""
         from antdrive.planners.anyangle import _kernels_ga
 
         ends, land, state = route_ends(query), terrain(query), seeded(rng)
@@ -186,7 +188,7 @@ class GaHan(ViaPointPlanner):
 
 
 def _genes(query: Query) -> Cells:
-    """The cells a via point may lie on: all free ones but the start and the goal."""
+    """Return the free cells except start and goal, on which via points may lie."""
     free = query.grid.free.copy()
     free[query.start] = free[query.goal] = False
     cells = np.argwhere(free) if free.any() else np.array([query.start])

@@ -1,9 +1,8 @@
-"""Ants find the corridor, a genetic algorithm finds the line within it (after Han, MSc thesis, Missouri 2007, 6.3).
+"""Hybrid of an ant colony and a genetic algorithm (after Han, MSc thesis, Missouri 2007, section 6.3).
 
-The thesis proposes to combine the strengths of its two planners. Ants reach the goal, but along the moves of
-the grid; via points give straight lines, but random ones rarely pass many obstacles. Here the ants' path,
-pulled straight, is the ancestor of every chromosome, so all chromosomes are feasible from the start and none
-is drawn at random.
+The thesis proposes to combine its two planners. Ants reach the goal, but along the grid's moves. Via points give
+straight lines, but random ones rarely pass many obstacles. Here every chromosome descends from the ants' path,
+pulled straight, so all chromosomes are feasible from the start.
 """
 
 from __future__ import annotations
@@ -25,39 +24,37 @@ from antdrive.planners.colonies.colony import Colony
 from antdrive.planners.iterative import WARMUP_ITERATIONS, Iteration
 from antdrive.planners.plan import Cells, Query
 
-ROUNDS = 20  # how often each via point of a new path is tightened
+ROUNDS = 20  # tightening passes over the via points of a new path
 
 
 @dataclass(frozen=True, kw_only=True)
 class Hybrid(ViaPointPlanner):
     """Ants find the corridor, then a genetic algorithm moves via points freely within it (after Han 2007).
 
-    Section 6.3 of the thesis only proposes the combination; how it is done is antdrive's own. `ant_runs`
-    colonies run one after the other, each for `ant_iterations`, and longer while none of its ants has
-    arrived. The best of their paths, pulled straight, becomes the first population; the remaining
-    `iterations` are generations. While ants run, the history's means and counts and `field` are those of
-    the ants, afterwards those of the chromosomes. The history's best is always the length of the line to be
-    driven.
+    Section 6.3 of the thesis only proposes the combination; the details are antdrive's. `ant_runs` colonies run
+    in sequence, each for `ant_iterations` or until its first ant arrives, whichever is later. The best of their
+    paths, pulled straight, seeds the population; the remaining `iterations` are generations. The history's means
+    and counts and `field` describe first the ants, then the chromosomes. The history's best is always the length
+    of the line to drive.
 
-    Known weakness, measured (docs/benchmarks.md): the line stays in the corridor that the ants have chosen,
-    which may not be the best. With a quarter of 100 x 100 cells blocked the cells beside it are 3.6 per cent
-    longer than the shortest path in the median and 7.5 at worst; among cylinders 0.0 and 1.2.
+    Known weakness, measured (docs/benchmarks.md): the line stays in the ants' corridor, which may not be the
+    best. With a quarter of 100 x 100 cells blocked, its cells are 3.6 per cent longer than the shortest path in
+    the median and 7.5 at worst; among cylinders 0.0 and 1.2.
 
     Attributes:
-        iterations: iterations of ants and generations together
-        colony: the name of the ant planner, as `antdrive planners` lists it
-        ants: ants per iteration, in place of the ant planner's own number
-        ant_runs: how many colonies run, each from fresh trails
-        ant_iterations: the iterations of each
-        population: chromosomes
+        iterations: total of ant iterations and generations
+        colony: the name of the ant planner in `antdrive planners`
+        ants: ants per iteration; overrides the ant planner's own number
+        ant_runs: number of colonies, each with new trails
+        ant_iterations: iterations per colony
+        population: number of chromosomes
         crossover: the probability that a chromosome is crossed with another
         mutation: the probability that a gene mutates
-        degrees_per_point: a corner of the pulled line gets one via point for every so many degrees it turns
-            by [deg]
+        degrees_per_point: turn per via point at a corner of the pulled line [deg]
         max_shift: the longest move of a via point in a mutation [cells]
 
     Raises:
-        FieldError: an option is out of range; names it and what would be right.
+        FieldError: an option is out of range; names it and the valid range.
     """
 
     iterations: int = 200
@@ -85,13 +82,13 @@ class Hybrid(ViaPointPlanner):
         require("max_shift", self.max_shift, above=0)
 
     def for_warmup(self) -> Hybrid:
-        """This planner with one iteration of ants and two of the genetic algorithm."""
+        """Return this planner with one iteration of ants and two generations."""
         few = dataclasses.replace(self, ant_runs=1, ant_iterations=1, time_budget=None)
         return dataclasses.replace(few, iterations=min(self.iterations, 1 + WARMUP_ITERATIONS))
 
     @property
     def work_unit(self) -> str:
-        """What `work` counts."""
+        """The unit of `work`."""
         return "ant steps and chromosomes rated"
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
@@ -108,7 +105,7 @@ class Hybrid(ViaPointPlanner):
                 if len(state.cells) and state.cells.tobytes() != pulled:
                     pulled = state.cells.tobytes()
                     candidate = self._pulled(query, ends, state.cells)
-                    # Paths are compared once they are tight: the shortest path of cells need not give the shortest line.
+                    # Compare tightened paths: the shortest path of cells need not give the shortest line.
                     length = float(_kernels_ga.tighten_all(candidate, fixed, land, ROUNDS))
                     if incumbent.keep_if_shorter(candidate, length):
                         via = candidate
@@ -144,13 +141,13 @@ class Hybrid(ViaPointPlanner):
 
 
 def _via_points(xy: Floats, angle: float) -> Floats:
-    """Via points on a polyline (M, 2): its corners, and beside a sharp one another for each `angle` [rad] of its turn."""
+    """Return via points on a polyline (M, 2): its corners, and more beside sharp ones, one per `angle` [rad] of turn."""
     via: list[Floats] = []
     for before, here, after in zip(xy[:-2], xy[1:-1], xy[2:], strict=True):
         a, b = here - before, after - here
         turn = abs(math.atan2(a[0] * b[1] - a[1] * b[0], float(a @ b)))
         more = max(1, math.ceil(turn / angle)) - 1
-        # All points lie on the line and all corners are among them, so the line does not change.
+        # All points lie on the line and include all corners, so the line does not change.
         via += [here - a * k / (2 * more + 2) for k in range(more // 2, 0, -1)]
         via.append(here)
         via += [here + b * k / (2 * more + 2) for k in range(1, more - more // 2 + 1)]

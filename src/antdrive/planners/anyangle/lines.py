@@ -1,4 +1,4 @@
-"""Straight lines, their ends and the cells beside them, for planners that are not bound to the grid's directions."""
+"""Straight lines, their ends and the cells along them, for any-angle planners."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ from antdrive.worlds.route import longest_line
 if TYPE_CHECKING:  # importing kernels loads the compiler
     from antdrive.planners.anyangle._kernels_lines import Terrain
 
-CONTACT = 5e-10  # m: an end whose room falls short of the clearance by no more than this has just the clearance
+CONTACT = 5e-10  # m: an end short of the clearance by no more than this has exactly the clearance
 
 
 class RouteEnds(NamedTuple):
-    """The ends of the part of a route that keeps the clearance, and the exact ends where these have too little room."""
+    """The ends of the part of a route that keeps the clearance, with straight leads from and to the exact ends."""
 
-    start: Point  # where the part that keeps the clearance starts [m]
-    goal: Point  # where it stops [m]
-    # the exact start, where it has too little room itself and is left on a straight line to `start`
+    start: Point  # start of the part that keeps the clearance [m]
+    goal: Point  # end of that part [m]
+    # the exact start if it lacks the clearance; a straight line leads to `start`
     lead_in: tuple[Point, ...] = ()
-    # the exact goal, where it has just the clearance and is reached on a straight line from `goal`
+    # the exact goal if it has exactly the clearance; a straight line leads there from `goal`
     lead_out: tuple[Point, ...] = ()
 
     @property
     def lead_length(self) -> float:
-        """The length of both leads together [m]."""
+        """Total length of both leads [m]."""
         return polyline_length([*self.lead_in, self.start]) + polyline_length([self.goal, *self.lead_out])
 
     def with_leads(self, xy: npt.ArrayLike) -> Floats:
-        """The route (M, 2) [m]: a polyline from `start` to `goal` with both leads."""
+        """Add both leads to a polyline from `start` to `goal`; returns the route (M, 2) [m]."""
         parts = [np.reshape(part, (-1, 2)) for part in (self.lead_in, xy, self.lead_out)]
         return np.vstack(parts).astype(np.float64)
 
 
 def route_ends(query: Query, *, touching: bool = False) -> RouteEnds:
-    """The exact start and goal of the query's task; without a task, the centres of its end cells.
+    """Return the exact start and goal of the query's task; without a task, the centres of its end cells.
 
-    A start with too little room is left on the straight line to the centre of its cell, which `Query.between`
-    has found clear. A goal with too little room is not reached: the route ends at the centre of its cell. A
-    goal with just the clearance is reached from that centre.
+    From a start below the clearance, the robot leaves on the straight line to the centre of its cell, which
+    `Query.between` has checked. With a goal below the clearance, the route ends at the centre of its cell. A goal
+    with exactly the clearance is reached from that centre.
     """
     (start, goal) = (_point(xy) for xy in query.grid.xy([query.start, query.goal]))
     if query.task is None:
@@ -66,7 +66,7 @@ def route_ends(query: Query, *, touching: bool = False) -> RouteEnds:
 
 
 def terrain(query: Query) -> Terrain:
-    """Where straight lines may run: among the discs of the query's world or, without a task, over free cells."""
+    """Return the terrain for straight lines: the discs of the query's world or, without a task, its free cells."""
     from antdrive.planners.anyangle._kernels_lines import Terrain
 
     grid, task = query.grid, query.task
@@ -78,10 +78,10 @@ def terrain(query: Query) -> Terrain:
 
 
 def clear_line(query: Query, start: Point, goal: Point) -> bool:
-    """Whether the straight line between two points [m] keeps the clearance; contact counts as too close.
+    """Return whether the straight line between two points [m] keeps the clearance; contact counts as too close.
 
-    With a world, the exact distance to discs and walls decides. On a bare grid, every cell that the line
-    touches, if only at a corner, must be free.
+    With a world, the exact distance to discs and walls decides. On a bare grid, every cell that the line touches,
+    even at a corner, must be free.
     """
     from antdrive.planners.anyangle import _kernels_lines
 
@@ -89,11 +89,11 @@ def clear_line(query: Query, start: Point, goal: Point) -> bool:
 
 
 def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
-    """A path of allowed moves from start to goal beside a polyline in fractional cells; empty if there is none.
+    """Return a path of allowed moves along a polyline in fractional cells; empty if there is none.
 
-    It is the shortest path within a corridor around the polyline; the corridor widens until it contains a
-    path. Where the line makes a loop or comes back beside itself, that path would cut it short. Then the path goes
-    leg by leg, from the cell of one waypoint to that of the next.
+    It is the shortest path within a corridor around the polyline; the corridor widens until it contains a path.
+    If the line loops or runs beside itself, that path would cut it short. The path then goes leg by leg, from the
+    cell of one waypoint to that of the next.
     """
     line = np.ascontiguousarray(waypoints, dtype=np.float64).reshape(-1, 2)
     whole = np.vstack([query.start, line, query.goal]).astype(np.float64)
@@ -104,19 +104,19 @@ def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
     parts = [cells[:1]]
     for cell in [*_passed(query, line), query.goal]:
         leg = _shortest_beside(query, np.array([parts[-1][-1], cell], dtype=np.float64))
-        if len(leg) > 1:  # 1: the cell is the last one's; 0: no move leads there
+        if len(leg) > 1:  # 1: the same cell as the last; 0: unreachable
             parts.append(leg[1:])
     return np.asarray(np.vstack(parts), dtype=np.int32)
 
 
 def _passed(query: Query, line: Floats) -> list[tuple[int, int]]:
-    """The free cells that hold points of a line (M, 2) in fractional cells; a point whose cell is blocked has none."""
+    """Return the cells of a line's points (M, 2) in fractional cells, without blocked cells."""
     cells = np.clip(np.floor(line + 0.5).astype(np.int64), 0, np.array(query.grid.shape) - 1)
     return [(int(row), int(col)) for row, col in cells if query.grid.free[row, col]]
 
 
 def _shortest_beside(query: Query, line: Floats) -> Cells:
-    """The shortest path of cells from the first to the last point of a line, which are cells, in a corridor around it."""
+    """Return the shortest path between the first and last cell of a line within a corridor around it."""
     from antdrive.planners.anyangle import _kernels_lines
     from antdrive.planners.graph import _kernels_search
 
@@ -125,7 +125,7 @@ def _shortest_beside(query: Query, line: Floats) -> Cells:
     while True:
         within = width < max(query.grid.shape)
         near = _kernels_lines.corridor_moves(moves, line, width) if within else moves
-        near.setflags(write=False)  # the search is compiled for read-only moves, as those of a grid are
+        near.setflags(write=False)  # the search is compiled for read-only moves, like a grid's
         cells, _, _, _ = _kernels_search.shortest_path(near, r0, c0, r1, c1, True)
         if len(cells) or not within:
             return np.asarray(cells, dtype=np.int32)
@@ -133,7 +133,7 @@ def _shortest_beside(query: Query, line: Floats) -> Cells:
 
 
 def cells_under(query: Query, waypoints: npt.ArrayLike) -> Cells:
-    """The cells that a polyline in fractional cells passes over, each a neighbour of the last; they need not be free."""
+    """Return the cells under a polyline in fractional cells, each a neighbour of the last; they need not be free."""
     line = np.asarray(waypoints, dtype=np.float64).reshape(-1, 2)
     line = np.vstack([query.start, line, query.goal])
     parts = [line[:1]]

@@ -1,7 +1,7 @@
-"""The widest disc that gets from a start to a goal, and the narrowest place on its way. Exact.
+"""The exact widest disc that fits from start to goal, and its bottleneck.
 
-As a disc grows, its way closes when it fills the gap between two obstacles, or the room at an end. So the widest disc is
-found among these sizes, by halving, with the exact planner among discs to tell whether a size still passes.
+A growing disc is blocked when it fills the gap between two obstacles or the free space at an end. These sizes are the
+candidates. Bisection finds the largest that passes, using the exact planner among discs.
 """
 
 from __future__ import annotations
@@ -15,37 +15,37 @@ from antdrive.base import Floats, Point
 from antdrive.planners.anyangle.tangent import shortest
 from antdrive.worlds import Task, point_clearance
 
-MOST_OBSTACLES = 1000  # in larger worlds the search takes too long
-CLOSER = 1e-7  # a gap passes discs that are smaller by this; contact closes it [m]
+MOST_OBSTACLES = 1000  # larger worlds take too long
+CLOSER = 1e-7  # a disc passes a gap if it is smaller by this; contact closes the gap [m]
 
 
 @dataclass(frozen=True)
 class Passage:
-    """The narrowest place on the way of the widest disc that gets from the start to the goal."""
+    """The bottleneck on the path of the widest disc from start to goal."""
 
-    radius: float  # of that disc [m]
-    at: Point  # the narrowest place: x, y [m]
-    # the two obstacles that form it, counting the world's obstacles and then its left, lower, right and upper
-    # wall; empty where an end has the least room
+    radius: float  # radius of that disc [m]
+    at: Point  # position of the bottleneck [m]
+    # indices of the two obstacles that form it: the world's obstacles, then its left, lower, right and upper wall;
+    # empty if the bottleneck is an end
     between: tuple[int, ...] = ()
 
 
 def feasible(task: Task, clearance: float) -> bool:
-    """Whether a path exists from start to goal that keeps a clearance [m], by the exact shortest path."""
+    """Return whether a path from start to goal keeps a clearance [m], by the exact shortest path."""
     world = task.world
     return shortest(world.discs, world.bounds, clearance, task.start[:2], task.goal) is not None
 
 
 def widest_passage(task: Task, most: float) -> Passage | None:
-    """The narrowest place on the way of the widest disc from the task's start to its goal.
+    """Return the bottleneck on the path of the widest disc from the task's start to its goal, up to radius `most` [m].
 
-    None if not even a point gets there, or in worlds of more than `MOST_OBSTACLES`.
+    None if not even a point passes, or in worlds of more than `MOST_OBSTACLES` obstacles.
     """
     world = task.world
     if len(world.obstacles) > MOST_OBSTACLES:
         return None
     radii, places, pairs = _candidates(task, most)
-    low, high = 0, len(radii)  # the sizes before `low` pass, those from `high` on do not
+    low, high = 0, len(radii)  # sizes below index `low` pass, those from `high` on do not
     while low < high:
         middle = (low + high) // 2
         low, high = (middle + 1, high) if feasible(task, max(radii[middle] - CLOSER, 0.0)) else (low, middle)
@@ -56,7 +56,7 @@ def widest_passage(task: Task, most: float) -> Passage | None:
 
 
 def _candidates(task: Task, most: float) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
-    """The radii (C,) up to `most` at which something closes; where (C, 2); between what (C, 2), or -1."""
+    """Return the C radii up to `most` at which a gap closes (C,), its place (C, 2) and its obstacles (C, 2), or -1."""
     discs, (xmin, ymin, xmax, ymax) = task.world.discs, task.world.bounds
     x, y, r = discs.T
     count = len(discs)
@@ -91,6 +91,6 @@ def _candidates(task: Task, most: float) -> tuple[Floats, Floats, npt.NDArray[np
     all_radii, all_places, all_pairs = np.concatenate(radii), np.concatenate(places), np.concatenate(pairs)
     order = np.argsort(all_radii, kind="stable")
     order = order[(all_radii[order] > CLOSER) & (all_radii[order] <= most)]
-    # A gap with something else in its middle is none.
+    # Discard gaps with another obstacle in the middle.
     order = order[(point_clearance(task.world, all_places[order]) >= all_radii[order] - CLOSER)]
     return all_radii[order], all_places[order], all_pairs[order].astype(np.int64)

@@ -1,6 +1,6 @@
-"""The lower bound on every planner's length: the shortest path in the plane among inflated discs.
+"""Shortest path in the plane among inflated discs: a lower bound for every planner.
 
-A shortest path among discs consists of lines tangent to two of them and of arcs along their rims, as
+A shortest path among discs consists of lines tangent to two discs and of arcs along their rims, as
 described for polygons by Lozano-Pérez & Wesley (*An algorithm for planning collision-free paths among
 polyhedral obstacles*, CACM 22, 1979) and for curved obstacles by Liu & Arimoto (*Path planning using a
 tangent graph for mobile robots among polygonal and curved obstacles*, IJRR 11, 1992).
@@ -21,21 +21,21 @@ from antdrive.planners.graph.search import AStar
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Task
 
-#: Among more discs than this, a path on the grid bounds the search first; among fewer the bound would not pay.
+#: Above this number of discs, a path on the grid bounds the search; below, the bound does not pay off.
 MANY_DISCS = 1000
-NO_GAP = "discs and walls leave no way from the start to the goal for this clearance"
+NO_GAP = "no path from start to goal keeps the clearance from discs and walls"
 
 
 @dataclass(frozen=True)
 class Line:
     """A straight piece of a path."""
 
-    start: Point  # its first point [m]
-    end: Point  # its last point [m]
+    start: Point  # first point [m]
+    end: Point  # last point [m]
 
     @property
     def length(self) -> float:
-        """Its length [m]."""
+        """Length [m]."""
         return math.dist(self.start, self.end)
 
 
@@ -45,38 +45,38 @@ class Arc:
 
     centre: Point  # the centre of the disc [m]
     radius: float  # the radius of the inflated disc [m]
-    begin: float  # the angle of its first point, seen from the centre [rad]
-    sweep: float  # the angle from its first point to its last, positive counter-clockwise [rad]
+    begin: float  # the angle of the first point about the centre [rad]
+    sweep: float  # the angle from the first point to the last, positive counter-clockwise [rad]
 
     @property
     def length(self) -> float:
-        """Its length [m]."""
+        """Length [m]."""
         return self.radius * abs(self.sweep)
 
     def at(self, angle: float, stretch: float = 1.0) -> Point:
-        """The point `angle` [rad] after the first, at `stretch` radii from the centre [m]."""
+        """Return the point `angle` [rad] after the first, at `stretch` radii from the centre [m]."""
         direction = self.begin + math.copysign(angle, self.sweep)
         reach = self.radius * stretch
         return self.centre[0] + reach * math.cos(direction), self.centre[1] + reach * math.sin(direction)
 
     @property
     def start(self) -> Point:
-        """Its first point [m]."""
+        """First point [m]."""
         return self.at(0.0)
 
     @property
     def end(self) -> Point:
-        """Its last point [m]."""
+        """Last point [m]."""
         return self.at(abs(self.sweep))
 
 
 @dataclass(frozen=True)
 class TangentPath:
-    """A smooth path of lines and arcs: each piece begins where the last one ends, in the same direction.
+    """A smooth path of lines and arcs: each piece continues the last in position and direction.
 
     Attributes:
         pieces: the lines and arcs in order
-        work: how many tangents were checked to find it
+        work: number of tangents checked
     """
 
     pieces: tuple[Line | Arc, ...]
@@ -84,17 +84,17 @@ class TangentPath:
 
     @property
     def length(self) -> float:
-        """Its length [m]."""
+        """Length [m]."""
         return math.fsum(piece.length for piece in self.pieces)
 
     def polyline(self, bulge: float, discs: npt.ArrayLike, bounds: Bounds, inflate: float) -> Floats:
-        """The path as a polyline (M, 2) [m]; its corners lie outside the arcs, so it never cuts into a disc.
+        """Return the path as a polyline (M, 2) [m]; its corners lie outside the arcs, so it never cuts into a disc.
 
         Args:
-            bulge: how far corners may stand off the arcs [m]; in narrow gaps they stand off less
-            discs: the discs that the path must clear: x, y, radius [m] (N, 3)
-            bounds: the walls that it must clear [m]
-            inflate: the clearance that it must keep [m]
+            bulge: maximum distance of corners from the arcs [m]; smaller in narrow gaps
+            discs: the discs to clear: x, y, radius [m] (N, 3)
+            bounds: the walls to clear [m]
+            inflate: the clearance to keep [m]
         """
         points = [self.pieces[0].start]
         for piece in self.pieces:
@@ -107,17 +107,17 @@ class TangentPath:
 def shortest(
     discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point, goal: Point, *, expected: float = math.inf
 ) -> TangentPath | None:
-    """The shortest path that stays `inflate` [m] from all discs (N, 3: x, y, radius) and inside the bounds.
+    """Return the shortest path that stays `inflate` [m] from all discs (N, 3: x, y, radius) and inside the bounds.
 
     None if there is no such path. Contact closes a gap: nothing passes between two discs exactly 2 `inflate`
-    apart, or between such a disc and a wall. Both ends must have the clearance; having just the clearance
-    suffices.
+    apart. Both ends need the clearance; exactly the clearance suffices. `expected` is an estimate of the length that
+    speeds up the search [m].
     """
     from antdrive.planners.anyangle import _kernels_tangent
 
     inflated = np.array(discs, dtype=np.float64).reshape(-1, 3)
     inflated[:, 2] += inflate
-    xmin, ymin, xmax, ymax = map(float, bounds)  # whole numbers would compile every kernel again
+    xmin, ymin, xmax, ymax = map(float, bounds)  # integers would compile every kernel again
     box = np.array([xmin + inflate, ymin + inflate, xmax - inflate, ymax - inflate])
     if not (box[0] <= box[2] and box[1] <= box[3]):
         return None
@@ -135,7 +135,7 @@ def shortest(
             break
     if not len(links):
         return None
-    pieces = _pieces(links, inflated) or [Line(start, goal)]  # the ends may be one point
+    pieces = _pieces(links, inflated) or [Line(start, goal)]  # the ends may coincide
     return TangentPath(tuple(pieces), int(checked))
 
 
@@ -143,19 +143,18 @@ def shortest(
 class Tangent(GridPlanner):
     """The shortest path in the plane, over the tangents between inflated discs: a lower bound for every planner.
 
-    A* on the tangent graph of Liu & Arimoto (1992); the result is exact. It plans among the discs of the
-    query's world, not on the grid, so it may find a path where the grid is too coarse for one. `cells` are
-    then the cells that the path passes over, and `cost` is infinite. Ends with too little room are left and
-    reached through the centres of their cells, as for all planners.
+    A* on the tangent graph of Liu & Arimoto (1992); the result is exact. It plans among the discs of the query's
+    world, so it may find a path that the grid is too coarse for. `cells` are then the cells under the path, and
+    `cost` is infinite. Ends below the clearance connect through the centres of their cells, as for all planners.
 
     Known weaknesses, measured (docs/benchmarks.md): the path grazes discs at exactly the clearance, which leaves
-    a driving robot no margin; and tangents grow with the square of the discs. Among 400 discs a plan takes 23
-    to 52 ms, in a building of 11,937 cylinders 0.69 s, where a grid of 480,000 cells is planned on in less than
-    10 ms.
+    a driving robot no margin. The number of tangents grows with the square of the number of discs. Among 400
+    discs a plan takes 23 to 52 ms, in a building of 11,937 cylinders 0.69 s; there, planning on a grid of 480,000
+    cells takes less than 10 ms.
 
     Attributes:
-        bulge: how far corners of the driven polyline may stand off an arc [m]
-        needs_world: True, as the planner needs the discs themselves
+        bulge: maximum distance of the driven polyline's corners from an arc [m]
+        needs_world: True; the planner needs the discs themselves
 
     Raises:
         InputError: the query has no task, so there is no world to plan in.
@@ -165,7 +164,7 @@ class Tangent(GridPlanner):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs."""
+        """Capabilities and requirements of this planner."""
         return Capabilities(needs_world=True)
 
     def __post_init__(self) -> None:
@@ -176,7 +175,7 @@ class Tangent(GridPlanner):
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         if query.task is None:
-            raise InputError("query: has no task; the tangent planner needs the discs of a world, a grid is not enough")
+            raise InputError("query: has no task; the tangent planner needs the discs of a world")
         grid, world = query.grid, query.task.world
         ends = route_ends(query, touching=True)
         reason = _unusable_ends(query, query.task, ends)
@@ -207,7 +206,7 @@ WORK_UNIT = "tangents checked"
 
 
 def _expected(query: Query, ends: RouteEnds, rng: np.random.Generator) -> float:
-    """The length of the shortest path on the grid, with the ways to its ends [m]; infinite if there is none."""
+    """Return the length of the shortest path on the grid, including the leads to its ends [m]; infinite without one."""
     answer = AStar().plan(query, rng)
     if not answer.solved:
         return math.inf
@@ -216,7 +215,7 @@ def _expected(query: Query, ends: RouteEnds, rng: np.random.Generator) -> float:
 
 
 def _unusable_ends(query: Query, task: Task, ends: RouteEnds) -> str:
-    """A sentence for each end that has neither room itself nor a free cell to leave or reach it through; or empty."""
+    """Return a sentence for each end with neither the clearance nor a usable free cell; or empty."""
     from antdrive.worlds.geometry import point_clearance, segment_clearance
 
     unusable = []
@@ -235,7 +234,7 @@ def _unusable_ends(query: Query, task: Task, ends: RouteEnds) -> str:
 
 
 def _pieces(links: Floats, discs: Floats) -> list[Line | Arc]:
-    """The lines of the kernel and the arcs between them, without pieces of no length."""
+    """Return the kernel's lines and the arcs between them, without empty pieces."""
     pieces: list[Line | Arc] = []
     for k, (ax, ay, bx, by, disc, turn) in enumerate(links):
         if math.dist((ax, ay), (bx, by)) > 0.0:
@@ -252,9 +251,9 @@ def _pieces(links: Floats, discs: Floats) -> list[Line | Arc]:
 
 
 def _around(arc: Arc, bulge: float, discs: Floats, bounds: Bounds, inflate: float) -> list[Point]:
-    """Corners around an arc: where its tangents at successive points meet.
+    """Return corners around an arc: the intersections of its tangents at successive points.
 
-    The points are evenly spaced, and closer together where a corner would lose the clearance.
+    The points are evenly spaced, and closer together where a corner would violate the clearance.
     """
     from antdrive.worlds._kernels import segment_clearances
 

@@ -1,1 +1,1 @@
-"""Ant colonies on the grid."""
+"""Ant colony planners on the grid."""

@@ -1,4 +1,4 @@
-"""Ants guided by the direction of the goal (Han, MSc thesis, Missouri 2007, section 4.2)."""
+"""Ant colony guided by the direction of the goal (Han, MSc thesis, Missouri 2007, section 4.2)."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from antdrive.planners.colonies.colony import (
 class AcoHan(Colony):
     """Ants guided by pheromone on cells and by the direction of the goal (Han 2007).
 
-    Section 4.2 of the thesis: a move attracts by the next cell's share of the pheromone plus alpha times the
-    cosine between the move and the direction of the goal (eq. 4.2.1); pheromone evaporates (eq. 4.2.2), every
-    ant that arrives deposits on its cells (eq. 4.2.3) and an elite deposits more (eq. 4.2.4). The thesis'
-    program differs from its equations; `form` chooses between them.
+    Section 4.2 of the thesis: the weight of a move is the next cell's fraction of the pheromone plus alpha times
+    the cosine between the move and the direction of the goal (eq. 4.2.1). Pheromone evaporates (eq. 4.2.2), every
+    ant that arrives deposits on its cells (eq. 4.2.3), and an elite deposits more (eq. 4.2.4). The thesis'
+    program differs from its equations; `form` selects one of them.
 
     By eq. 4.2.1 alone a move away from the goal weighs 0, less than a step back, and no ant leaves a dead
-    end. A comment in the program asks that ants turn back only when every neighbour has been visited;
-    `min_weight` gives moves to unvisited cells that priority.
+    end. A comment in the program lets ants turn back only after visiting every neighbour; `min_weight` gives
+    moves to unvisited cells that priority.
 
     Known weakness, measured (docs/papers/han2007.md): walks are long and full of loops. On the thesis' map
     paths are 7 per cent longer than the shortest in the median, on 100 x 100 cells with a quarter of them
@@ -42,17 +42,17 @@ class AcoHan(Colony):
         ants: ants per iteration
         iterations: iterations
         evaporation: rho
-        deposit: an ant deposits deposit / length on its cells; the thesis has 1 in its text, 5 in its program
+        deposit: an ant deposits deposit / length on its cells; 1 in the thesis' text, 5 in its program
         attraction: alpha of eq. 4.2.1
-        elitism: e of eq. 4.2.4, by how many ants' worth the best tour so far deposits; 0: no elite
-        form: "equation": as the equations; "listing": as the program, with pheromone in place of its shares,
-            one direction from start to goal for all cells, moves not normalised, and evaporation only where
-            ants deposit
-        revisit: the weight of a cell that the ant has already visited
-        min_weight: the least weight of an unvisited cell; 0 is the equation to the letter
+        elitism: e of eq. 4.2.4, the additional deposit of the best tour so far in ants; 0: no elite
+        form: "equation": as in the equations; "listing": as in the program, with absolute pheromone, one
+            direction from start to goal for all cells, moves not normalised, and evaporation only where ants
+            deposit
+        revisit: the weight of a visited cell
+        min_weight: the least weight of an unvisited cell; 0 follows the equation literally
 
     Raises:
-        FieldError: an option is out of range; names it and what would be right.
+        FieldError: an option is out of range; names it and the valid range.
     """
 
     ants: int = 500
@@ -77,11 +77,11 @@ class AcoHan(Colony):
             raise FieldError("form", f"must be 'equation' or 'listing', got {self.form!r}")
 
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
-        """tau(0) = 0 on every cell of `graph`."""
+        """Return tau(0) = 0 on every cell of `graph`."""
         return np.zeros(len(graph.mask))
 
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
-        """Omega of eq. 4.2.1 for each move of `graph`: how well the move points to the goal."""
+        """Return Omega of eq. 4.2.1 for each move of `graph`: how well the move points to the goal."""
         from antdrive.planners.colonies import _kernels_colony
 
         omega = np.empty((len(graph.mask), 8))
@@ -103,9 +103,9 @@ class AcoHan(Colony):
         weights: Weights,
         context: ChoiceContext = FIRST_KIND,
     ) -> None:
-        """phi = tau_j / sum tau + alpha Omega (eq. 4.2.1) for every move of `graph`.
+        """Fill `weights` with phi = tau_j / sum tau + alpha Omega (eq. 4.2.1) for every move of `graph`.
 
-        `weights` receives phi, `trail` is tau, `heuristic` Omega; `context` does not matter.
+        `trail` is tau, `heuristic` Omega; `context` is ignored.
         """
         from antdrive.planners.colonies import _kernels_colony
 
@@ -115,7 +115,7 @@ class AcoHan(Colony):
         )
 
     def update(self, trail: Floats, state: IterationState) -> None:
-        """Evaporate `trail`; every ant of `state` that arrived deposits on the cells it walked, then the elite."""
+        """Evaporate `trail`, then deposit along the complete walks of `state` and for the elite."""
         from antdrive.planners.colonies import _kernels_colony
 
         walks, best = state.walks, state.best

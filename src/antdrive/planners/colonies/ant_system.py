@@ -1,4 +1,4 @@
-"""The ant system and its variants: ants that deposit less with age, exploratory ants, and MAX-MIN ants.
+"""Ant system and variants: ageing ants, exploratory ants and MAX-MIN ants.
 
 ibraheem2016: I. K. Ibraheem, F. H. Ajeil, *Path planning of an autonomous mobile robot using swarm based
 optimization techniques*, Al-Khwarizmi Engineering Journal, 2016. suganthi2019: P. H. Suganthi, K. Subha,
@@ -33,11 +33,11 @@ STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
 
 @dataclass(frozen=True, kw_only=True)
 class AntSystem(Colony):
-    """Ants guided by pheromone on arcs and by a heuristic: the ant system, as ibraheem2016 sets it up.
+    """Ants guided by pheromone on arcs and by a heuristic: the ant system with the setup of ibraheem2016.
 
-    Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q /
-    length on the arcs it used. The defaults are the values of ibraheem2016. suganthi2019 uses beta 1 and
-    heuristic "step"; lee2008 uses 500 ants, beta 2 and evaporation 0.01.
+    Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q / length
+    on its arcs. The defaults are those of ibraheem2016. suganthi2019 uses beta 1 and heuristic "step"; lee2008
+    uses 500 ants, beta 2 and evaporation 0.01.
 
     Known weaknesses, measured (docs/benchmarks.md): ants die in dead ends, as in the papers. With a quarter
     of the cells blocked, 6 of 10 runs cross 50 x 50 cells, with paths twice as long as the shortest, and none
@@ -47,18 +47,17 @@ class AntSystem(Colony):
         alpha: the exponent of the pheromone
         beta: the exponent of the heuristic; None: 0.22 N on a map of N x N cells, the rule of ibraheem2016,
             Table 1
-        evaporation: rho, the share of the pheromone that is lost per iteration; rho of lee2008 is the share
-            retained
+        evaporation: rho, the fraction of pheromone lost per iteration; rho of lee2008 is the fraction retained
         deposit: Q; an ant deposits Q / length on each of its arcs
-        initial: the pheromone on every arc at the start
+        initial: the initial pheromone on every arc
         heuristic: "goal": eta = 1 / distance from the next cell to the goal (ibraheem2016 eq. 6, lee2008);
             "step": eta = 1 / length of the move (suganthi2019 eq. 6)
-        ranks: paths in the ranking list of an iteration: its best `ranks` ants deposit, the first all of eq. 4
-            and each later one a share of 1 / `ranks` less; None: all ants that arrive deposit all of eq. 4.
-            Section V of lee2008 gives its conventional colony such a list of 100 and leaves open what it does
+        ranks: length of an iteration's ranking list: the best `ranks` ants deposit, the first all of eq. 4, each
+            later one a fraction 1 / `ranks` less; None: all ants that arrive deposit all of eq. 4. Section V of
+            lee2008 gives its conventional colony a list of 100 without defining its use
 
     Raises:
-        FieldError: an option is out of range; names it and what would be right.
+        FieldError: an option is out of range; names it and the valid range.
     """
 
     alpha: float = 1.0
@@ -83,13 +82,13 @@ class AntSystem(Colony):
             raise FieldError("heuristic", f"must be 'goal' or 'step', got {self.heuristic!r}")
 
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
-        """tau(0) = `initial` on every arc of `graph`."""
+        """Return tau(0) = `initial` on every arc of `graph`."""
         return np.full((len(graph.mask), 8), self.initial)
 
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
-        """eta^beta for each move of `graph`, as a share of the largest value in its cell."""
+        """Return eta^beta for each move of `graph`, relative to the largest value in its cell."""
         if self.heuristic == "goal":
-            # The goal is at distance 0 from itself; the bound makes every ant beside the goal step onto it.
+            # The goal's distance is 0; the bound makes every ant beside the goal step onto it.
             eta = graph.at_neighbours(1.0 / np.maximum(graph.distance_to(graph.goal), 0.01))  # ibraheem2016 eq. 6
         else:
             eta = np.where(
@@ -106,16 +105,16 @@ class AntSystem(Colony):
         weights: Weights,
         context: ChoiceContext = FIRST_KIND,
     ) -> None:
-        """p ~ tau^alpha eta^beta (eq. 1 of all three papers).
+        """Fill `weights` with p ~ tau^alpha eta^beta (eq. 1 of all three papers).
 
-        `weights` depends on `trail` and `heuristic` alone, neither on `graph` nor on `context`.
+        `trail` is tau, `heuristic` eta^beta; `graph` and `context` are ignored.
         """
         from antdrive.planners.colonies import _kernels_colony
 
         _kernels_colony.arc_weights(trail, heuristic, self.alpha, weights)
 
     def update(self, trail: Floats, state: IterationState) -> None:
-        """Evaporate `trail`; every ant of `state` that arrived deposits on its arcs (suganthi2019 eq. 2-4)."""
+        """Evaporate `trail` and deposit on the arcs of the complete tours of `state` (suganthi2019 eq. 2-4)."""
         from antdrive.planners.colonies import _kernels_colony
 
         tours, amounts = state.tours, self.amounts(state)
@@ -125,7 +124,7 @@ class AntSystem(Colony):
         _kernels_colony.deposit_on_arcs(trail, state.graph.shape[1], tours.cells, tours.sizes, amounts)  # eq. 2-3
 
     def amounts(self, state: IterationState) -> Floats:
-        """What each ant of `state` deposits on an arc (ants,): Q / L_k, 0 if the ant did not arrive."""
+        """Return the deposit per arc of each ant of `state` (ants,): Q / L_k, 0 if the ant did not arrive."""
         return self.deposit / state.tours.lengths  # eq. 4
 
 
@@ -136,9 +135,9 @@ class AgeingAnts(AntSystem):
     Ant m of M deposits Q_m / length, and Q_m falls from Q_max to Q_min with m (eq. 5). The paper gives no
     values for the two bounds.
 
-    Known weaknesses, measured (docs/papers/ibraheem2016.md): these ants die as those of `AntSystem` do, and
-    ageing does not pay. On maps of 30 x 30 and 40 x 40 cells paths are longer than those of `AntSystem` in 170
-    of 400 runs and shorter in 71; no values of the bounds change that.
+    Known weaknesses, measured (docs/papers/ibraheem2016.md): ants die in dead ends like those of `AntSystem`, and
+    ageing does not pay off. On maps of 30 x 30 and 40 x 40 cells paths are longer than those of `AntSystem` in
+    170 of 400 runs and shorter in 71; no values of the bounds change that.
 
     Attributes:
         q_max: Q_max, the deposit of a young ant
@@ -154,12 +153,12 @@ class AgeingAnts(AntSystem):
         require("q_max", self.q_max, at_least=self.q_min)
 
     def amounts(self, state: IterationState) -> Floats:
-        """Q_m / L_m for each ant m of `state`, with Q_m by eq. 5."""
+        """Return Q_m / L_m for each ant m of `state`, with Q_m by eq. 5."""
         count = len(state.tours)
         return self.aged(state.rng.random(count)) / state.tours.lengths  # eq. 4
 
     def aged(self, rand: Floats) -> Floats:
-        """Q_m of ants m = 1 to M (eq. 5), clipped to its bounds, which eq. 5 as printed may leave.
+        """Return Q_m of ants m = 1 to M (eq. 5), clipped to its bounds, which eq. 5 as printed may exceed.
 
         Args:
             rand: a random number in [0, 1) for each ant (M,)
@@ -174,31 +173,32 @@ class ExploringAnts(AntSystem):
     """Common ants, exploratory ants that avoid pheromone, and an elite: the improved ACO of suganthi2019.
 
     Section IV of suganthi2019: common ants choose by tau^alpha eta^beta (eq. 1), exploratory ants by eta^beta
-    / tau^alpha (eq. 5), and the best ants of an iteration, of either kind, deposit more (eq. 7-8). The text
-    below eq. 7 says that its second term is what common ants deposit, and its third has the factor alpha,
-    whose value is 1: that is the default. With `depositors="all"` exploratory ants deposit like common ones.
+    / tau^alpha (eq. 5), and the best ants of an iteration, of either kind, deposit more (eq. 7-8). By the text
+    below eq. 7, its second term is the deposit of common ants and its third has the factor alpha = 1: the
+    default here. With `depositors="all"` exploratory ants deposit like common ones.
 
-    The paper leaves open what an ant in a dead end does and whether loops are cut; with `backtrack=False` and
-    `shortcut=False` ants die and walk in loops. docs/papers/suganthi2019.md says which readings were tried.
+    The paper does not define the behaviour in dead ends nor whether loops are cut. With `backtrack=False` and
+    `shortcut=False` ants die in dead ends and walk in loops. docs/papers/suganthi2019.md compares the
+    interpretations.
 
-    Known weaknesses, measured on the same page: exploratory ants wander, which makes an iteration up to ten
-    times as long as that of `AntSystem`; where they deposit like common ants, they keep paths long unless the
-    elite is heavy (`elite=25`). At 50 x 50 cells paths are 7 per cent longer than the shortest.
+    Known weaknesses, measured on the same page: exploratory ants wander, so an iteration takes up to ten times
+    as long as with `AntSystem`. If they deposit like common ants, paths stay long unless the elite is heavy
+    (`elite=25`). At 50 x 50 cells paths are 7 per cent longer than the shortest.
 
     Attributes:
         ants: the number of common ants
         explorers: the number of exploratory ants
         beta: the exponent of the heuristic
-        elite: the factor alpha of eq. 7, the additional deposit of the iteration's best ants in units of Q /
-            length
-        depositors: whose tours count in the second term of eq. 7. "common": those of common ants, as the text
-            says; "all": those of exploratory ants, too
+        elite: the factor alpha of eq. 7, the additional deposit of the iteration's best ants in units of
+            Q / length
+        depositors: the ants in the second term of eq. 7. "common": common ants only, as in the text; "all": also
+            exploratory ants
         heuristic: as in `AntSystem`
-        backtrack: as in `Colony`; open in the paper, which only says that ants in deadlock are a difficulty
-        shortcut: as in `Colony`; open in the paper
+        backtrack: as in `Colony`; undefined in the paper, which only mentions deadlock as a difficulty
+        shortcut: as in `Colony`; undefined in the paper
 
     Raises:
-        FieldError: an option is out of range; names it and what would be right.
+        FieldError: an option is out of range; names it and the valid range.
     """
 
     ants: int = 25
@@ -230,17 +230,16 @@ class ExploringAnts(AntSystem):
         weights: Weights,
         context: ChoiceContext = FIRST_KIND,
     ) -> None:
-        """p ~ eta^beta tau^alpha for common ants (eq. 1), eta^beta / tau^alpha for exploratory ants (eq. 5).
+        """Fill `weights` with eta^beta tau^alpha for common ants (eq. 1), eta^beta / tau^alpha for exploratory (eq. 5).
 
-        `context` says which kind the `weights` are for; they depend on `trail` and `heuristic`, not on
-        `graph`.
+        `context` names the kind of ant; `trail` is tau, `heuristic` eta^beta; `graph` is ignored.
         """
         from antdrive.planners.colonies import _kernels_colony
 
         _kernels_colony.arc_weights(trail, heuristic, self.alpha if context.kind == 0 else -self.alpha, weights)
 
     def amounts(self, state: IterationState) -> Floats:
-        """Q / L_k where an ant is a depositor and, for the best ants of `state`, elite Q / L_best, shared among them."""
+        """Return Q / L_k for depositors plus, for the best ants of `state`, elite Q / L_best divided among them."""
         lengths = state.tours.lengths
         best = lengths <= lengths.min() + 1e-9
         usual = 1.0 if self.depositors == "all" else np.arange(len(lengths)) < self.ants
@@ -248,22 +247,21 @@ class ExploringAnts(AntSystem):
 
 
 def ranked(lengths: Floats, ranks: int) -> Floats:
-    """The share of its deposit that each ant makes (ants,): 1 for the best, 1 / ranks less with each rank, 0 off the list."""
+    """Return the fraction of its deposit that each ant makes (ants,): 1 for the best, 1 / ranks less per rank."""
     rank = np.empty(len(lengths), dtype=np.int64)
     rank[np.argsort(lengths, kind="stable")] = np.arange(len(lengths))
     return np.maximum(1.0 - rank / ranks, 0.0)
 
 
 def ibraheem_beta(side: int) -> float:
-    """The exponent of the heuristic that ibraheem2016, Table 1, gives for a map of side x side cells."""
+    """Return the heuristic's exponent of ibraheem2016, Table 1, for a map of side x side cells."""
     return 1.605e-17 * side**2 + 0.22 * side + 6.181e-15
 
 
 def normalised(eta: Floats, beta: float) -> Weights:
-    """eta^beta (cells, 8) as a share of each cell's largest value; 0 for moves that are not allowed (eta = -inf).
+    """Return eta^beta (cells, 8) relative to each cell's largest value; 0 for moves that are not allowed (eta = -inf).
 
-    Ants choose by ratios within a cell, so the scale does not matter to them, and no power leaves the range
-    of float32.
+    Ants choose by ratios within a cell, so the scale is irrelevant, and powers stay within float32.
     """
     largest = eta.max(axis=1, keepdims=True)
     with np.errstate(invalid="ignore"):
@@ -275,22 +273,21 @@ def normalised(eta: Floats, beta: float) -> Weights:
 class MaxMinAnts(AntSystem):
     """MAX-MIN ant system: one ant deposits per iteration, on trails kept between two bounds.
 
-    Stützle & Hoos 2000: the ant is the best of the iteration or the best so far (section 5), the bounds
-    follow the best tour (eq. 7 and 11), all trails start at the upper bound (section 3.3) and return there
-    when the search stagnates (section 3.4). The paper's problems have no dead ends; on a grid these ants
-    backtrack out of them. Cutting tours short takes the place of the paper's local search, and evaporation
-    and schedule are those the paper uses with it.
+    Stützle & Hoos 2000: the depositing ant is the best of the iteration or the best so far (section 5), the
+    bounds follow the best tour (eq. 7 and 11), and all trails start at the upper bound (section 3.3) and return
+    there when the search stagnates (section 3.4). The paper's problems have no dead ends; on a grid these ants
+    backtrack out of them. Cutting tours short replaces the paper's local search; evaporation and schedule are
+    those of the paper with local search.
 
-    Known weakness, measured (docs/benchmarks.md): the larger the grid, the longer the paths. With a quarter of
-    the cells blocked all of 10 are the shortest at 20 x 20; at 50 x 50 they are 0.4 per cent longer in the
-    median and 2.6 at worst, at 100 x 100 1.4 and 3.8.
+    Known weakness, measured (docs/benchmarks.md): paths get longer with the grid's size. With a quarter of the
+    cells blocked, 10 of 10 are the shortest at 20 x 20; at 50 x 50 they are 0.4 per cent longer in the median and
+    2.6 at worst, at 100 x 100 1.4 and 3.8.
 
     Attributes:
         evaporation: rho; the paper retains 0.8 with local search
-        initial: the pheromone before the first update; arbitrarily high, so that the bounds bring it to
-            tau_max
-        p_best: the probability of building the best tour once the trails have converged (eq. 11)
-        patience: iterations without a better tour after which all trails return to the upper bound
+        initial: the pheromone before the first update; arbitrarily high, so that it is clamped to tau_max
+        p_best: the probability of building the best tour after the trails have converged (eq. 11)
+        patience: iterations without a better tour before all trails return to the upper bound
         backtrack: as in `Colony`
         shortcut: as in `Colony`
     """
@@ -309,11 +306,11 @@ class MaxMinAnts(AntSystem):
         require("patience", self.patience, at_least=1)
 
     def update(self, trail: Floats, state: IterationState) -> None:
-        """Evaporate `trail`, let one ant of `state` deposit, clamp to the bounds; reset when the search stagnates."""
+        """Evaporate `trail`, deposit for one ant of `state`, clamp to the bounds; reset on stagnation."""
         from antdrive.planners.colonies import _kernels_colony
 
         if state.best is None:
-            return  # the bounds follow the best tour, and there is none yet
+            return  # without a best tour there are no bounds
         tau_min, tau_max = self.bounds(state.graph, state.best)
         if state.since and state.since % self.patience == 0:
             trail.fill(tau_max)  # section 3.4
@@ -326,11 +323,11 @@ class MaxMinAnts(AntSystem):
         _kernels_colony.clamp(trail.ravel(), tau_min, tau_max)
 
     def depositor(self, state: IterationState) -> Walks | None:
-        """The tour that deposits: the best of the iteration in `state` or, every so often, the best so far."""
+        """Return the tour that deposits: the best of the iteration in `state` or, periodically, the best so far."""
         return state.best if state.number % best_so_far_every(state.number) == 0 else state.tours.shortest()
 
     def bounds(self, graph: ColonyGraph, best: Walks) -> tuple[float, float]:
-        """tau_min and tau_max on `graph`, by the `best` tour so far (eq. 7 and 11)."""
+        """Return tau_min and tau_max on `graph` for the `best` tour so far (eq. 7 and 11)."""
         tau_max = self.deposit / (self.evaporation * float(best.lengths[0]))
         steps = max(1, int(best.sizes[0]) - 1)
         choices = float(np.unpackbits(graph.mask).sum()) / max(1, int(np.count_nonzero(graph.mask))) - 1
@@ -340,7 +337,7 @@ class MaxMinAnts(AntSystem):
 
 
 def best_so_far_every(number: int) -> int:
-    """Every how many iterations the best tour so far deposits, at iteration `number`: ever more often (section 5)."""
+    """Return the period of deposits by the best tour so far at iteration `number`; it shrinks over time (section 5)."""
     for limit, every in ((25, 25), (75, 5), (125, 3), (250, 2)):
         if number < limit:
             return every

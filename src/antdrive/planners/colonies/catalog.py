@@ -1,4 +1,4 @@
-"""The ant planners by name."""
+"""Catalogue of ant planners by name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from antdrive.planners.colonies.mmas_dstar import MaxMinDStar
 from antdrive.planners.colonies.pfaco import PotentialFieldAnts
 from antdrive.planners.plan import Planner
 
-#: The planners of this folder; the registry includes them, and `Hybrid` takes its colony from them.
+#: The ant planners; the registry includes them, and `Hybrid` selects its colony from them.
 ANT_PLANNERS: Mapping[str, Planner] = MappingProxyType(
     {
         "aco-han": AcoHan(),
@@ -30,5 +30,5 @@ ANT_PLANNERS: Mapping[str, Planner] = MappingProxyType(
 
 
 def colonies() -> Mapping[str, Colony]:
-    """The ant planners that run in iterations over trails, as `Colony` does."""
+    """Return the ant planners derived from `Colony`."""
     return {name: planner for name, planner in ANT_PLANNERS.items() if isinstance(planner, Colony)}

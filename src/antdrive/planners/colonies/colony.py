@@ -1,4 +1,4 @@
-"""The loop of an ant colony; the ant planners differ in how ants choose moves and how trails change."""
+"""Ant colony loop; the ant planners define how ants choose moves and how trails change."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ Heuristic = npt.NDArray[np.floating[Any]]  # (cells, 8)
 
 @dataclass(frozen=True, eq=False)
 class ColonyGraph:
-    """The graph that ants walk on, in the form that compiled code takes: cells are flat indices."""
+    """The ants' graph for compiled code; cells are flat indices."""
 
     mask: npt.NDArray[np.uint8]  # the allowed moves of each cell, one bit per direction (cells,)
-    offset: npt.NDArray[np.int64]  # what each of the eight moves adds to a flat index (8,)
+    offset: npt.NDArray[np.int64]  # flat index offset of each of the eight moves (8,)
     shape: tuple[int, int]  # rows and columns of the grid
     start: int  # the start cell
     goal: int  # the goal cell
 
     @classmethod
     def of(cls, query: Query) -> ColonyGraph:
-        """The graph of a query's grid."""
+        """Build the graph of a query's grid."""
         from antdrive.planners.colonies import _kernels_colony
 
         cols = query.grid.shape[1]
@@ -49,11 +49,11 @@ class ColonyGraph:
         )
 
     def cells(self, walk: Flat) -> npt.NDArray[np.int32]:
-        """The cells of a walk as (row, col), (N, 2)."""
+        """Return the cells of a walk as (row, col), (N, 2)."""
         return np.stack(np.divmod(walk, self.shape[1]), axis=1).astype(np.int32)
 
     def at_neighbours(self, values: Floats) -> Floats:
-        """`values` (cells,) at the cell that each move leads to, (cells, 8); -inf where the move is not allowed."""
+        """Return `values` (cells,) at the target of each move, (cells, 8); -inf where the move is not allowed."""
         out = np.full((len(self.mask), 8), -np.inf)
         for k in range(8):
             (here,) = np.nonzero(self.mask >> k & 1)
@@ -61,7 +61,7 @@ class ColonyGraph:
         return out
 
     def distance_to(self, cell: int) -> Floats:
-        """The straight-line distance from every cell to one cell [cells], (cells,)."""
+        """Return the straight-line distance from every cell to one cell [cells], (cells,)."""
         rows, cols = np.indices(self.shape)
         row, col = divmod(cell, self.shape[1])
         return np.asarray(np.hypot(rows - row, cols - col).ravel())
@@ -69,99 +69,99 @@ class ColonyGraph:
 
 @dataclass(frozen=True, eq=False)
 class Walks:
-    """The walks of one iteration's ants, a row each. A row of an ant that did not arrive has no meaning."""
+    """The walks of one iteration's ants, one row each. Rows of ants that did not arrive are undefined."""
 
     cells: Flat  # the cells of each walk in order, as flat indices (ants, room)
-    sizes: npt.NDArray[np.int64]  # how many cells of each row are used (ants,), 0 where the ant did not arrive
-    lengths: Floats  # the length of each walk [cells] (ants,), inf where the ant did not arrive
+    sizes: npt.NDArray[np.int64]  # number of cells of each walk (ants,), 0 if the ant did not arrive
+    lengths: Floats  # length of each walk [cells] (ants,), inf if the ant did not arrive
 
     def __len__(self) -> int:
         return len(self.sizes)
 
     def only(self, ant: int) -> Walks:
-        """A copy of the walk of one ant."""
+        """Return a copy of one ant's walk."""
         size = int(self.sizes[ant])
         return Walks(self.cells[ant : ant + 1, :size].copy(), self.sizes[[ant]], self.lengths[[ant]])
 
     def shortest(self) -> Walks | None:
-        """A copy of the shortest walk; None if no ant arrived."""
+        """Return a copy of the shortest walk; None if no ant arrived."""
         summary = self.summary()
         return self.only(summary.shortest) if summary.arrived else None
 
     def summary(self) -> WalkSummary:
-        """How many ants arrived, and how long their walks are."""
+        """Count the ants that arrived and measure their walks."""
         from antdrive.planners.colonies import _kernels_colony
 
         return WalkSummary(*_kernels_colony.summarise(self.lengths))
 
     @classmethod
     def allocate(cls, ants: int, room: int) -> Walks:
-        """Rows to be filled, one per ant, each for up to `room` cells."""
+        """Allocate one row per ant for up to `room` cells each."""
         return cls(np.empty((ants, room), dtype=np.int32), np.zeros(ants, dtype=np.int64), np.empty(ants))
 
 
 class WalkSummary(NamedTuple):
-    """How the ants of an iteration fared."""
+    """Statistics of an iteration's ants."""
 
-    arrived: int  # how many ants reached the goal
-    mean: float  # the mean length of their walks [cells], inf if no ant arrived
-    shortest: int  # the row of the shortest walk
+    arrived: int  # number of ants that reached the goal
+    mean: float  # mean length of their walks [cells], inf if no ant arrived
+    shortest: int  # row of the shortest walk
 
 
 class ChoiceContext(NamedTuple):
-    """What choice weights depend on besides trails and heuristic."""
+    """Inputs of choice weights besides trails and heuristic."""
 
-    kind: int = 0  # the kind of ant that the weights are for, an index of `Colony.kinds`
+    kind: int = 0  # the kind of ant, an index of `Colony.kinds`
     uniform: float = 0.5  # a random number in [0, 1), drawn once per iteration and kind
 
 
 @dataclass(eq=False)
 class Memory:
-    """What a colony hands on to a later colony on the same cells; the colony keeps it up to date."""
+    """State that a colony passes to a later colony on the same cells; the colony updates it in place."""
 
     trail: Floats | None = None  # the trails, as `Colony.initial_trail` returns them
     tour: Walks | None = None  # the best tour, a single row
 
 
 class IterationState(NamedTuple):
-    """One iteration of a colony, as the rules that change trails see it."""
+    """The state of an iteration, for the rules that change trails."""
 
     number: int  # the iteration's number, from 0
-    graph: ColonyGraph  # the graph that ants walk on
-    walks: Walks  # the ants' walks, loops included
-    tours: Walks  # the same walks without loops and, with `Colony.shortcut`, cut short
-    daemon_tour: Walks | None  # the tour that `Colony.daemon_action` made, a single row
+    graph: ColonyGraph  # the ants' graph
+    walks: Walks  # the ants' walks, including loops
+    tours: Walks  # the walks without loops and, with `Colony.shortcut`, cut short
+    daemon_tour: Walks | None  # the tour of `Colony.daemon_action`, a single row
     best: Walks | None  # the best tour so far, a single row
-    since: int  # number of iterations since the best tour was found
+    since: int  # iterations since the best tour was found
     rng: np.random.Generator  # the colony's source of random numbers
 
 
-#: The context of colonies that have one kind of ant.
+#: The context of colonies with one kind of ant.
 FIRST_KIND = ChoiceContext()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Colony(IterativePlanner):
-    """Ants that walk from the start to the goal, guided by the pheromone trails of ants that arrived before.
+    """Ants that walk from start to goal, guided by the pheromone trails of earlier ants that arrived.
 
-    This class runs the iterations: ants walk, loops are cut out of their walks, the best tour is kept, work is
-    counted. A planner of the family adds its rules, named as in ACOTSP (Stützle) and in Dorigo & Stützle,
+    This class runs the iterations: it sends the ants, cuts loops out of their walks, keeps the best tour and
+    counts the work. A subclass adds its rules, named as in ACOTSP (Stützle) and in Dorigo & Stützle,
     *Ant Colony Optimization*, 2004:
 
     - `initial_trail`: tau before the first iteration
-    - `heuristic_values`: eta, how much each move attracts ants regardless of the trails
-    - `choice_weights`: how trails and heuristic combine into the attraction of each move
-    - `update`: how trails evaporate and which ants deposit
-    - `kinds`, `daemon_action` and `finished`, where a planner has several kinds of ants, improves on the
-      tours of an iteration in one central step, or can stop early
+    - `heuristic_values`: eta, the attraction of each move regardless of the trails
+    - `choice_weights`: combines trails and heuristic into the weight of each move
+    - `update`: evaporates trails and deposits
+    - `kinds`, `daemon_action` and `finished`, for several kinds of ants, a central improvement step per
+      iteration, or an early stop
 
     Attributes:
         ants: ants per iteration
-        max_steps: an ant gives up after this many steps; None: see `default_steps`
-        revisit: the weight of a cell that the ant has already visited; at 0 ants never visit a cell twice
-        backtrack: whether an ant in a dead end steps back until it finds another way; otherwise it dies there
+        max_steps: step limit of an ant; None: see `default_steps`
+        revisit: the weight of a visited cell; at 0 ants never visit a cell twice
+        backtrack: whether an ant in a dead end steps back until it finds another path; otherwise it dies there
         shortcut: whether tours are cut short where they pass next to an earlier part of themselves
-        threads: how many threads the ants walk on; the plan does not depend on it
+        threads: number of threads; the plan does not depend on it
     """
 
     ants: int = 50
@@ -180,16 +180,16 @@ class Colony(IterativePlanner):
 
     @property
     def work_unit(self) -> str:
-        """What `work` counts."""
+        """The unit of `work`."""
         return "ant steps"
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs. Ants that die in dead ends may miss a path that exists."""
+        """Capabilities and requirements of this planner. Ants that die in dead ends may miss an existing path."""
         return Capabilities(iterative=True, complete=self.backtrack or self.revisit > 0)
 
     def default_steps(self, rows: int, cols: int) -> int:
-        """How many steps an ant may take on a grid of `rows` x `cols` where `max_steps` is None.
+        """Return the step limit of an ant on a grid of `rows` x `cols` if `max_steps` is None.
 
         One step per cell, but at least 100 and at most 20 000. Ants that backtrack get two steps per cell,
         one in and one out, which suffices for every ant to reach the goal.
@@ -203,11 +203,11 @@ class Colony(IterativePlanner):
 
     @abc.abstractmethod
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
-        """The trails on `graph` before the first iteration: on cells (cells,) or on arcs (cells, 8)."""
+        """Return the trails on `graph` before the first iteration: on cells (cells,) or on arcs (cells, 8)."""
 
     @abc.abstractmethod
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
-        """Eta of each move of `graph` (cells, 8), which does not depend on the trails; `choice_weights` receives it."""
+        """Return eta of each move of `graph` (cells, 8) for `choice_weights`; it does not depend on the trails."""
 
     @abc.abstractmethod
     def choice_weights(
@@ -218,11 +218,11 @@ class Colony(IterativePlanner):
         weights: Weights,
         context: ChoiceContext = FIRST_KIND,
     ) -> None:
-        """Fill in how much each move attracts one kind of ant in the coming iteration.
+        """Fill in the attraction of each move for one kind of ant in the coming iteration.
 
         Args:
-            graph: the graph that ants walk on
-            trail: the trails as they are now, on cells (cells,) or on arcs (cells, 8)
+            graph: the ants' graph
+            trail: the current trails, on cells (cells,) or on arcs (cells, 8)
             heuristic: the result of `heuristic_values`
             weights: the table to fill (cells, 8); 0 for moves that are not allowed
             context: the kind of ant, and a random number for rules that draw one per iteration
@@ -230,7 +230,7 @@ class Colony(IterativePlanner):
 
     @abc.abstractmethod
     def update(self, trail: Floats, state: IterationState) -> None:
-        """Evaporate and deposit: change `trail` in place after the iteration that `state` describes.
+        """Evaporate and deposit on `trail` in place after an iteration.
 
         Args:
             trail: the trails, on cells (cells,) or on arcs (cells, 8)
@@ -238,17 +238,17 @@ class Colony(IterativePlanner):
         """
 
     def daemon_action(self, graph: ColonyGraph, tours: Walks, best: Walks | None) -> Walks | None:
-        """One more tour, made centrally after the ants have walked; None if there is none.
+        """Build one more tour centrally after the ants have walked; None if there is none.
 
         Args:
-            graph: the graph that ants walk on
+            graph: the ants' graph
             tours: the tours of this iteration
             best: the best tour before this iteration; in the first, that of the memory, if any
         """
         return None
 
     def finished(self, state: IterationState) -> bool:
-        """Whether the colony can stop after the iteration that `state` describes."""
+        """Return whether the colony can stop after the iteration of `state`."""
         return False
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
@@ -256,10 +256,9 @@ class Colony(IterativePlanner):
         return self.resume(query, rng, Memory())
 
     def resume(self, query: Query, rng: np.random.Generator, memory: Memory) -> Iterator[Iteration]:
-        """Iterate with the trails and the best tour in `memory`, and keep both up to date there.
+        """Iterate from the trails and the best tour in `memory`, and update both in place.
 
-        If the grid has changed since the memory was filled, only those arcs of the remembered tour are used that are
-        still allowed.
+        After a change of the grid, only the allowed arcs of the remembered tour are used.
         """
         graph = ColonyGraph.of(query)
         if memory.trail is None:
@@ -267,7 +266,7 @@ class Colony(IterativePlanner):
         trail, heuristic = memory.trail, self.heuristic_values(graph)
         construction = TourConstruction.of(self, graph)
         cell = query.grid.cell
-        picture = np.empty(graph.shape)  # one array for all iterations: it always shows the latest trails
+        picture = np.empty(graph.shape)  # shared by all iterations: always shows the latest trails
         best: Walks | None = None
         best_cells, best_number = graph.cells(np.empty(0, dtype=np.int32)), 0
         with ExitStack() as stack:
@@ -304,28 +303,28 @@ class Colony(IterativePlanner):
 
 @dataclass(frozen=True, eq=False)
 class TourConstruction:
-    """Sends the ants of one plan; the arrays are allocated once and reused in every iteration."""
+    """Tour construction for one plan; its arrays are reused in every iteration."""
 
-    planner: Colony  # the colony, for its numbers of ants and rules of walking
-    graph: ColonyGraph  # the graph that ants walk on
-    limit: int  # the steps after which an ant gives up
-    weights: tuple[Weights, ...]  # the choice weights of each kind of ant, to be filled before `construct`
-    walks: Walks  # where `construct` puts the walks
-    tours: Walks  # where `shorten` puts the tours
+    planner: Colony  # the colony, for its numbers of ants and walking rules
+    graph: ColonyGraph  # the ants' graph
+    limit: int  # step limit of an ant
+    weights: tuple[Weights, ...]  # choice weights of each kind of ant, to fill before `construct`
+    walks: Walks  # output of `construct`
+    tours: Walks  # output of `shorten`
 
     @classmethod
     def of(cls, planner: Colony, graph: ColonyGraph) -> TourConstruction:
-        """The arrays that a colony needs on a graph."""
+        """Allocate the arrays of a colony on a graph."""
         limit = planner.max_steps or planner.default_steps(*graph.shape)
-        # Ants that never revisit a cell visit each cell once at most.
+        # Without revisits, an ant visits each cell at most once.
         room = 1 + (limit if planner.revisit else min(limit, len(graph.mask)))
         weights = tuple(np.zeros((len(graph.mask), 8), dtype=np.float32) for _ in planner.kinds)
         ants = sum(planner.kinds)
         return cls(planner, graph, limit, weights, Walks.allocate(ants, room), Walks.allocate(ants, room))
 
     def construct(self, rng: np.random.Generator, pool: Executor | None = None) -> tuple[Walks, int]:
-        """Send every ant, on the threads of `pool` if there is one: their walks, and the steps of all together."""
-        # Each ant has a random stream of its own, so the order in which ants walk does not matter.
+        """Send every ant, on the threads of `pool` if given; returns the walks and the total number of steps."""
+        # Each ant has its own random stream, so the order of ants is irrelevant.
         seeds = rng.bit_generator.random_raw(len(self.walks)).astype(np.uint64) | np.uint64(1)
         jobs, first = [], 0
         for kind, count in enumerate(self.planner.kinds):
@@ -356,21 +355,21 @@ class TourConstruction:
         )
 
     def shorten(self, walks: Walks) -> Walks:
-        """The tours of these walks: without loops and, if the planner says so, cut short."""
+        """Return the tours of these walks: without loops and, with `Colony.shortcut`, cut short."""
         if self.planner.shortcut:
             return cut_short(walks, self.graph, self.tours)
         return without_loops(walks, self.graph, self.tours) if self.planner.revisit else walks
 
 
 def without_loops(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:
-    """The same walks with their loops cut out."""
+    """Return the walks with their loops cut out."""
     from antdrive.planners.colonies import _kernels_colony
 
     return _cut(_kernels_colony.cut_loops, walks, graph, out)
 
 
 def cut_short(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:
-    """The same walks, each going straight from every cell to the last of its cells that is one allowed move away."""
+    """Return the walks cut short: from each cell straight to the walk's last cell that is one allowed move away."""
     from antdrive.planners.colonies import _kernels_colony
 
     return _cut(_kernels_colony.cut_short, walks, graph, out)
@@ -383,7 +382,7 @@ def _cut(kernel: Callable[..., None], walks: Walks, graph: ColonyGraph, out: Wal
 
 
 def _draw_field(trail: Floats, out: Floats) -> None:
-    """Fill `out` (R, C) with the trail of each cell; for trails on arcs, the strongest arc that leaves the cell."""
+    """Fill `out` (R, C) with the trail of each cell; for trails on arcs, the strongest outgoing arc."""
     if trail.ndim == 1:
         out.ravel()[:] = trail
     else:

@@ -1,7 +1,4 @@
-"""The strongest colony here: MAX-MIN ants and scouts, whose tours of an iteration are merged into one.
-
-It replans from the trails that it already has.
-"""
+"""MAX-MIN ants and scouts whose tours are merged in each iteration; replans start from existing trails."""
 
 from __future__ import annotations
 
@@ -33,39 +30,38 @@ from antdrive.planners.plan import Capabilities, PlanResult, Query
 class MergingAnts(MaxMinAnts):
     """MAX-MIN ants that avoid detours, scouts beside them, and the shortest path over all arcs they used.
 
-    Bounds, backtracking, cutting tours short and resets are those of `MaxMinAnts`. New are:
+    Bounds, backtracking, shortcuts and resets are those of `MaxMinAnts`. Additional rules:
 
-    - The heuristic is exp(-greed * detour). The detour of a move is how much longer than necessary it makes
-      the path over open ground to the goal. Unlike a power of the distance, it is as strong far from the goal
-      as near it.
-    - Scouts ignore the trails. They follow a lane parallel to the line from start to goal, drawn anew in each
-      iteration, so that ways around the other side of obstacles are not forgotten.
-    - As daemon action, the shortest path over the arcs of this iteration's tours and of the best tour is
-      found, and that path deposits. Ants find the pieces; the search puts the best of them together. It looks
-      at no other arc, which leaves about nine tenths of a grid out.
-    - The colony stops after `settled` iterations without a better tour, or when no tour on any grid could be
-      shorter.
+    - The heuristic is exp(-greed * detour). The detour of a move is the excess length that it adds to the path
+      over open ground to the goal. Unlike a power of the distance, it is equally strong far from the goal.
+    - Scouts ignore the trails. They follow a lane parallel to the line from start to goal, redrawn in each
+      iteration, and so keep exploring the other side of obstacles.
+    - The daemon action is the shortest path over the arcs of this iteration's tours and of the best tour, and
+      that path deposits. The search combines the best pieces that ants found. It ignores all other arcs, about
+      nine tenths of a grid.
+    - The colony stops after `settled` iterations without a better tour, or when the tour is as short as over open
+      ground.
 
     These rules are antdrive's own; no paper describes them.
 
-    Known weaknesses, measured (docs/benchmarks.md): a path is only as good as the pieces that ants have found.
-    Among cylinders on 200 x 200 cells it is up to 0.2 per cent longer than the shortest, and where trails are
-    kept after a change up to 0.7 per cent. On 100 x 100 cells it takes 95 to 233 ms, A* 0.07 to 0.17 ms.
+    Known weaknesses, measured (docs/benchmarks.md): a path is only as good as the ants' pieces. Among cylinders on
+    200 x 200 cells it is up to 0.2 per cent longer than the shortest, and up to 0.7 per cent after replans from
+    kept trails. On 100 x 100 cells it takes 95 to 233 ms, A* 0.07 to 0.17 ms.
 
     Attributes:
         ants: ants that follow trails
         scouts: ants that follow lanes
-        greed: how strongly detours repel [1 / cell]
-        lane_pull: how many cells of detour a scout accepts to come one cell nearer to its lane
-        lane_spread: how far to either side lanes lie at most, in units of the distance from start to goal
+        greed: repulsion of detours [1 / cell]
+        lane_pull: cells of detour that a scout accepts per cell closer to its lane
+        lane_spread: maximum offset of lanes to either side, relative to the distance from start to goal
         evaporation: rho
-        patience: iterations without a better tour after which all trails return to the upper bound
-        iterations: iterations at most
-        settled: the colony stops after this many iterations without a better tour; where tours are short,
-            after 0.6 times their length in cells, but not before 20
+        patience: iterations without a better tour before all trails return to the upper bound
+        iterations: maximum number of iterations
+        settled: iterations without a better tour before the colony stops; for short tours 0.6 times their length
+            in cells, but at least 20
 
     Raises:
-        FieldError: an option is out of range; names it and what would be right.
+        FieldError: an option is out of range; names it and the valid range.
     """
 
     ants: int = 25
@@ -93,11 +89,11 @@ class MergingAnts(MaxMinAnts):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs."""
+        """Capabilities and requirements of this planner."""
         return replace(super().capabilities, own_replanner=True)
 
     def replanner(self, query: Query, rng: np.random.Generator) -> WarmStartedColony:
-        """A colony that continues on its trails after every change; `rng` serves all its answers."""
+        """Return a colony that continues on its trails after every change; all its plans draw from `rng`."""
         return WarmStartedColony(self, query, rng)
 
     @property
@@ -106,7 +102,7 @@ class MergingAnts(MaxMinAnts):
         return (self.ants, self.scouts)
 
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
-        """exp(-greed * detour) for each move of `graph`."""
+        """Return exp(-greed * detour) for each move of `graph`."""
         return self._detour_weights(graph, np.empty((len(graph.mask), 8), dtype=np.float32))
 
     def choice_weights(
@@ -119,7 +115,7 @@ class MergingAnts(MaxMinAnts):
     ) -> None:
         """Fill `weights`: `trail` times `heuristic` for ants; for scouts, detours on `graph` from this iteration's lane.
 
-        `context` names the kind and holds the random number that places the lane.
+        `context` holds the kind of ant and the random number that places the lane.
         """
         if context.kind == 0:
             super().choice_weights(graph, trail, heuristic, weights)
@@ -146,7 +142,7 @@ class MergingAnts(MaxMinAnts):
         return out
 
     def daemon_action(self, graph: ColonyGraph, tours: Walks, best: Walks | None) -> Walks | None:
-        """The shortest path on `graph` over the arcs of these `tours` and of the `best` one."""
+        """Return the shortest path on `graph` over the arcs of these `tours` and of the `best` one."""
         from antdrive.planners.colonies import _kernels_colony
         from antdrive.planners.graph import _kernels_search
 
@@ -154,8 +150,8 @@ class MergingAnts(MaxMinAnts):
         for walks in (tours, best):
             if walks is not None:
                 _kernels_colony.union_moves(walks.cells, walks.sizes, graph.shape[1], moves)
-        moves &= graph.mask  # the best tour may be older than the last change of the grid
-        moves.setflags(write=False)  # the search is compiled for read-only moves, as those of a grid are
+        moves &= graph.mask  # the best tour may predate the last change of the grid
+        moves.setflags(write=False)  # the search is compiled for read-only moves, like a grid's
         cols = graph.shape[1]
         cells, straight, diagonal, _ = _kernels_search.shortest_path(
             moves.reshape(graph.shape), *divmod(graph.start, cols), *divmod(graph.goal, cols), True
@@ -167,11 +163,11 @@ class MergingAnts(MaxMinAnts):
         return Walks(walk[np.newaxis], np.array([len(walk)]), np.array([length]))
 
     def depositor(self, state: IterationState) -> Walks | None:
-        """The merged tour of the iteration in `state`; parts of it may be of the best tour so far."""
+        """Return the merged tour of the iteration in `state`; it may contain parts of the best tour so far."""
         return state.daemon_tour
 
     def finished(self, state: IterationState) -> bool:
-        """Whether, after the iteration in `state`, the best tour is old or as short as open ground allows."""
+        """Return whether the best tour of `state` has settled or is as short as over open ground."""
         if state.best is None:
             return False
         cols = state.graph.shape[1]
@@ -183,20 +179,19 @@ class MergingAnts(MaxMinAnts):
 
 
 class WarmStartedColony(CachedReplanner):
-    """Ants that continue on their old trails, which are evened out near the cells that changed.
+    """A colony that replans from its old trails, evened out near changed cells.
 
     After a change, the trails of arcs within `reach` cells of it move towards the strongest trail, more so
     the nearer they are (M. Guntsch and M. Middendorf, *Pheromone modification strategies for ant algorithms
-    applied to dynamic TSP*, 2001: the strategy by distance). The part of the best tour that can still be
-    walked joins the tours of the first iteration. The colony stops after `settled` iterations without
-    improvement.
+    applied to dynamic TSP*, 2001: the strategy by distance). The passable part of the best tour joins the tours
+    of the first iteration. The colony stops after `settled` iterations without improvement.
 
     Args:
         planner: the colony
-        query: the query to begin with
-        rng: the source of randomness of all answers
-        settled: iterations without improvement after which a warm-started colony stops
-        reach: how far from a changed cell trails are evened out [cells]
+        query: the initial query
+        rng: the source of randomness of all plans
+        settled: iterations without improvement before a warm-started colony stops
+        reach: distance from a changed cell within which trails are evened out [cells]
 
     Raises:
         ValueError: `settled` or `reach` is below 1.
@@ -222,11 +217,11 @@ class WarmStartedColony(CachedReplanner):
 
 
 def even_out(trail: Floats, shape: tuple[int, int], changed: npt.NDArray[np.int64], reach: int) -> None:
-    """Move trails near changed cells towards the strongest trail, by a fraction 1 - d / (reach + 1)."""
+    """Move trails at distance d from changed cells towards the strongest trail by a fraction 1 - d / (reach + 1)."""
     near = np.zeros(shape, dtype=np.bool_)
     near.ravel()[changed] = True
     fraction = near / (reach + 1.0)
-    for _ in range(reach):  # the neighbourhood grows by one cell per pass, so nearer cells are counted more often
+    for _ in range(reach):  # the neighbourhood grows by one cell per pass, so nearer cells count more often
         near[1:] |= near[:-1].copy()
         near[:-1] |= near[1:].copy()
         near[:, 1:] |= near[:, :-1].copy()

@@ -1,4 +1,4 @@
-"""One ant on pheromone that spreads from the goal.
+"""Single-ant planner on pheromone spread from the goal.
 
 A. H. Hasan, *Robot path planning based on improved max-min ant colony optimization algorithm in dynamic
 environment* (hasan). `MaxMinDStar` plans in a static world; its `PheromoneAgent` drives among movers.
@@ -21,32 +21,32 @@ from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import Capabilities, Cell, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.planners.replanners import SteppingAgent
 
-RESPREAD = "spread pheromone anew around what was in the way"
-PATIENCE = 4  # waits in a row, or visits of one cell, after which an agent spreads pheromone anew
-ONLINE_FACTOR = 2.0  # what an agent multiplies alpha by, as each circle costs it a detour that is really driven
+RESPREAD = "respread pheromone around blocked cells"
+PATIENCE = 4  # consecutive waits, or visits of one cell, before an agent respreads pheromone
+ONLINE_FACTOR = 2.0  # factor on alpha per cycle of an agent, as the robot drives every cycle
 
 
 @dataclass(frozen=True, kw_only=True)
 class MaxMinDStar(GridPlanner):
-    """One ant that follows pheromone spread from the goal as D* spreads costs: hasan's improved max-min algorithm.
+    """One ant that follows pheromone spread from the goal like the costs of D*: hasan's improved max-min algorithm.
 
-    The ant always takes the neighbour of the smallest `pheromone^alpha * distance^beta` (eq. 1, as the
-    paper's program reads it). As the straight distance to the goal counts, the ant may walk in circles in
-    front of a wall. The author chose other exponents for such maps; here `exponents` is the rule for all of
-    them, and it always arrives. The result's `reason` reports what it did.
+    The ant always takes the neighbour with the smallest `pheromone^alpha * distance^beta` (eq. 1, as in the
+    paper's program). Because of the straight distance to the goal, the ant may cycle in front of a wall. The
+    author chose other exponents for such maps; here the rule `exponents` covers all maps and always arrives. The
+    result's `reason` reports the changes.
 
-    Known weaknesses, measured (docs/papers/hasan.md): with alpha 1 and beta 1 alpha must be raised in five of
-    the paper's six environments, with the exponents that the paper gives for each in none; paths are up to 11
-    per cent longer than the shortest. With a quarter of 50 x 50 cells blocked they are 1.8 per cent longer in
-    the median and 44 per cent at worst.
+    Known weaknesses, measured (docs/papers/hasan.md): with alpha 1 and beta 1, alpha must be raised in five of
+    the paper's six environments; with the paper's exponents in none. Paths are up to 11 per cent longer than the
+    shortest. With a quarter of 50 x 50 cells blocked they are 1.8 per cent longer in the median and 44 per cent at
+    worst.
 
     Attributes:
-        alpha: exponent of the pheromone to begin with; in the paper 1 to 26, depending on the environment
-        beta: exponent of the distance to begin with; in the paper 0 to 3
-        alpha_max: highest alpha that is tried before beta becomes 0
-        evaporation: share of the pheromone that is lost; the paper's rho, 0.98, is the share that is kept
+        alpha: initial exponent of the pheromone; in the paper 1 to 26, depending on the environment
+        beta: initial exponent of the distance; in the paper 0 to 3
+        alpha_max: maximum alpha before beta becomes 0
+        evaporation: fraction of pheromone lost; the paper's rho, 0.98, is the fraction retained
         gates: whether cells between two diagonally opposite blocked cells are closed, the paper's gate raise
-            state; if that leaves no path, they are opened again
+            state; if that leaves no path, they are reopened
     """
 
     alpha: float = 1.0
@@ -63,11 +63,11 @@ class MaxMinDStar(GridPlanner):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs."""
+        """Capabilities and requirements of this planner."""
         return Capabilities(cell_by_cell=True)
 
     def agent(self, query: Query, rng: np.random.Generator) -> PheromoneAgent:
-        """hasan's robot at the query's start; it draws nothing from `rng`."""
+        """Return hasan's robot at the query's start; it does not use `rng`."""
         return PheromoneAgent(self, query)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -91,7 +91,7 @@ class MaxMinDStar(GridPlanner):
         )
 
     def spread(self, query: Query) -> tuple[ColonyGraph, Floats, int, list[str]]:
-        """The graph to walk on, the pheromone (cells,), how many cells got some, and remarks on the plan."""
+        """Return the ant's graph, the pheromone (cells,), the number of cells that received some, and remarks."""
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
 
         graph, work = ColonyGraph.of(query), 0
@@ -106,16 +106,16 @@ class MaxMinDStar(GridPlanner):
             work = kernels.propagate(gated.mask, graph.offset, graph.start, graph.goal, retained, pheromone)
             if math.isfinite(pheromone[graph.start]):
                 return gated, pheromone, work, notes
-            notes.append(f"opened {closed} gate cells again, without which there is no way")
+            notes.append(f"reopened {closed} gate cells; without them there is no path")
         work += kernels.propagate(graph.mask, graph.offset, graph.start, graph.goal, retained, pheromone)
         return graph, pheromone, work, notes
 
     def walk(self, graph: ColonyGraph, pheromone: Floats) -> tuple[Flat, str]:
-        """The flat cells of the path to the goal, and a remark on how the exponents had to change for it.
+        """Return the flat cells of the path to the goal, and a remark on changes of the exponents.
 
         Args:
-            graph: the graph to walk on
-            pheromone: the pheromone of each cell (cells,), as `spread` returns it
+            graph: the ant's graph
+            pheromone: the pheromone of each cell (cells,), from `spread`
         """
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
 
@@ -132,15 +132,15 @@ class MaxMinDStar(GridPlanner):
         return walk[:size], note
 
     def exponents(self, *, factor: float = 1.0, increment: float = 1.0) -> Iterator[tuple[float, float]]:
-        """alpha and beta in the order in which they are tried; the next ones are due when the ant walks in a circle.
+        """Yield alpha and beta in the order of attempts; each cycle of the ant triggers the next attempt.
 
-        alpha rises up to `alpha_max`, which makes the straight distance count less and less; at last beta is
-        0. That always arrives, as pheromone alone decreases at every step.
+        alpha rises up to `alpha_max`, which reduces the influence of the straight distance; finally beta is 0.
+        That always arrives, as pheromone alone decreases at every step.
 
         Args:
-            factor: what alpha is multiplied by at each circle
-            increment: what is then added. A plan raises alpha by 1, as trying again costs next to nothing; an
-                agent doubles it (`ONLINE_FACTOR`), as its robot drives the circle.
+            factor: factor on alpha per cycle
+            increment: increment of alpha per cycle, after the factor. A plan increments alpha by 1, as attempts are
+                cheap; an agent doubles it (`ONLINE_FACTOR`), as its robot drives the cycle.
         """
         alpha, beta = float(self.alpha), float(self.beta)
         while alpha <= self.alpha_max:
@@ -149,10 +149,7 @@ class MaxMinDStar(GridPlanner):
         yield 1.0, 0.0
 
     def describe_exponents(self, alpha: float, beta: float) -> str:
-        """A sentence on how `alpha` and `beta` differ from the exponents to begin with.
-
-        It is empty if they do not.
-        """
+        """Describe how `alpha` and `beta` differ from the initial exponents; empty if they do not."""
         if beta != self.beta:
             return f"alpha up to {self.alpha_max:g} did not help, and beta was set to 0"
         return f"alpha was raised from {self.alpha:g} to {alpha:g}" if alpha != self.alpha else ""
@@ -161,10 +158,9 @@ class MaxMinDStar(GridPlanner):
 class PheromoneAgent(SteppingAgent):
     """hasan's robot: one decision per cell, on pheromone spread once from the goal, and never into an occupied cell.
 
-    The robot goes to the allowed neighbour of the smallest `pheromone^alpha * distance^beta`. When it is
-    about to return to a cell that it visited with the current exponents, it is going in a circle and takes
-    the next ones of `MaxMinDStar.exponents`. If cells that stay blocked hold it up even then, it spreads
-    pheromone anew around them.
+    The robot moves to the allowed neighbour with the smallest `pheromone^alpha * distance^beta`. Before it returns
+    to a cell visited with the current exponents, it detects a cycle and takes the next exponents of
+    `MaxMinDStar.exponents`. If blocked cells still hold it up, it respreads pheromone around them.
     """
 
     def __init__(self, planner: MaxMinDStar, query: Query) -> None:
@@ -179,12 +175,12 @@ class PheromoneAgent(SteppingAgent):
         self._graph, self._pheromone, self.stats.propagated, notes = planner.spread(query)
         self._notes = [blocked] if blocked else notes
         self._visits = np.zeros(len(self._pheromone), dtype=np.int64)
-        self._idle = 0  # waits in a row
+        self._idle = 0  # consecutive waits
         self._enter(self._graph.start)
 
     @property
     def note(self) -> str:
-        """A sentence on what the agent had to change to get on; empty if nothing."""
+        """A remark on what the agent changed to make progress; may be empty."""
         circles = f"went in circles {self.stats.cycles} times" if self.stats.cycles else ""
         return "; ".join(
             filter(None, (*self._notes, circles, self._planner.describe_exponents(self._alpha, self._beta)))
@@ -193,7 +189,7 @@ class PheromoneAgent(SteppingAgent):
     def _decide(self, blocked: npt.NDArray[np.int64]) -> Cell | None:
         mask, cols = self._open_moves(self._graph, blocked), self._graph.shape[1]
         here = self._cell[0] * cols + self._cell[1]
-        # A robot that was moved may be where no pheromone was spread.
+        # After `move`, the robot may be on a cell without pheromone.
         astray = not math.isfinite(self._pheromone[here]) and not self._idle
         to = self._best_neighbour(mask, here)
         visits = int(self._visits[to]) if to >= 0 else 0
@@ -231,7 +227,7 @@ class PheromoneAgent(SteppingAgent):
         self._forget_visits(here)
 
     def _respread(self, blocked: npt.NDArray[np.int64], here: int) -> None:
-        """Spread pheromone around what is blocked; if that leaves no path, over gate cells too."""
+        """Respread pheromone around blocked cells; if that leaves no path, also over gate cells."""
         retained = 1.0 - self._planner.evaporation
         for graph in (self._graph, ColonyGraph.of(self._query)):
             pheromone, mask = np.empty_like(self._pheromone), self._open_moves(graph, blocked)
@@ -246,7 +242,7 @@ class PheromoneAgent(SteppingAgent):
                 return
 
     def _open_moves(self, graph: ColonyGraph, blocked: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
-        """The moves (cells,) that are left while these cells (N, 2) are blocked."""
+        """Return the moves (cells,) that remain while these cells (N, 2) are blocked."""
         moves = graph.mask.reshape(graph.shape).copy()
         self._kernels.close_cells(moves, blocked)
         return moves.ravel()
@@ -257,6 +253,6 @@ class PheromoneAgent(SteppingAgent):
 
 
 def _finite(pheromone: Floats) -> Floats:
-    """The pheromone, with the highest finite value in cells that got none."""
+    """Return the pheromone, with the highest finite value in cells without any."""
     most = pheromone[np.isfinite(pheromone)].max()
     return np.asarray(np.minimum(pheromone, most))

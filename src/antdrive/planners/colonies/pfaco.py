@@ -1,4 +1,4 @@
-"""Ants on a potential field, without generations.
+"""Ant colony on a potential field, without generations.
 
 J.-W. Lee, J.-J. Kim, B.-S. Choi, J.-J. Lee, *Improved ant colony optimization algorithm by potential field
 concept for optimal path planning*, 2008 (lee2008), section IV.
@@ -31,58 +31,53 @@ class PotentialFieldAnts(IterativePlanner):
     """Ants guided by a potential field, with ranked paths and without generations: lee2008's improved ACO.
 
     Section IV of lee2008: an ant chooses the next cell by pheromone^alpha U_ij^beta (eq. 13). The potential
-    rises away from the start (eq. 9) and falls near obstacles (eq. 11); the first pheromone is a mix of
-    potential and chance (eq. 14). All ants move by one cell per tick. An ant that arrives enters its path
-    into a ranking list by length times number of cells (eq. 15), deposits by rank and starts again. Where the
-    pheromone has converged it is rebuilt from the list (section IV-B). An iteration here is as many ticks as
-    it takes for `ants` walks to end.
+    rises away from the start (eq. 9) and falls near obstacles (eq. 11); the initial pheromone mixes potential
+    and chance (eq. 14). All ants move by one cell per tick. An ant that arrives enters its path into a ranking
+    list by length times number of cells (eq. 15), deposits by rank and restarts. Converged pheromone is rebuilt
+    from the list (section IV-B). An iteration here ends when `ants` walks have ended.
 
-    The paper leaves three things open, each an option here: what U_ij is (`form`), whether an ant may return
-    to a cell (`memory`), and the constants from `attraction` on, for which it gives no values.
-    docs/papers/lee2008.md says which readings were tried. Only readings in which U_ij depends on how much
-    the potential differs between cells reach the paper's claims on 100 x 100 cells: to the letter, U of two
-    neighbours differs by a few per cent far from the start, and ants walk almost at random.
+    The paper leaves three points open, each an option here: the definition of U_ij (`form`), whether an ant may
+    return to a cell (`memory`), and the constants from `attraction` on. docs/papers/lee2008.md compares the
+    interpretations. Only those in which U_ij depends on differences of the potential reach the paper's claims on
+    100 x 100 cells. Taken literally, U of two neighbours far from the start differs by a few per cent, and ants
+    walk almost at random.
 
-    Known weaknesses, measured on the same page. The potential has no maximum at the goal: where the goal is
-    not the cell that is farthest from the start, ants are drawn past it, and paths may be three
-    times as long as the shortest; `field="goal"` mends that. Ants start again in dead ends; 9 of 10 runs cross
-    100 x 100 cells of which 25 per cent are blocked, and 18 of 50 the winding maps of 25 x 25 cells that lee2008's map 1 stands
-    for; all do with `backtrack`. The ranking list soon holds
-    copies of one path, and the colony then improves no further.
+    Known weaknesses, measured on the same page. The potential has no maximum at the goal: unless the goal is the
+    cell farthest from the start, ants are drawn past it, and paths may be three times as long as the shortest;
+    `field="goal"` fixes that. Ants restart in dead ends: 9 of 10 runs cross 100 x 100 cells with 25 per cent
+    blocked, and 18 of 50 the winding maps of 25 x 25 cells that represent lee2008's map 1; with `backtrack` all
+    do. The ranking list soon holds copies of one path, and the colony stops improving.
 
     Attributes:
         ants: ants, and walks per iteration
         ranks: paths in the ranking list
-        evaporation: the share of the pheromone lost per tick; rho of lee2008, 0.99, is the share retained
-        mix: k_mix of eq. 14, the share of chance in the first pheromone
+        evaporation: the fraction of pheromone lost per tick; rho of lee2008, 0.99, is the fraction retained
+        mix: k_mix of eq. 14, the fraction of chance in the initial pheromone
         alpha_1: the exponent of the pheromone in stage 1, until the list has been filled twice
         beta_1: the exponent of the potential in stage 1
-        alpha_2: the exponent of the pheromone in stage 2, until as many more paths as ants have entered the
-            list
+        alpha_2: the exponent of the pheromone in stage 2, until `ants` more paths have entered the list
         beta_2: the exponent of the potential in stage 2
         alpha_3: the exponent of the pheromone in stage 3
         beta_3: the exponent of the potential in stage 3
         attraction: k_att of eq. 9
         repulsion: k_rep of eq. 11
-        influence: d0 of eq. 11, how far obstacles repel [cells]
-        deposit: the deposit on each cell of a path of the first rank; it falls linearly with the rank
-        min_pheromone: the pheromone of a free cell does not decay below this
-        convergence: the pheromone has converged when its sum changes by less than this share in an iteration
-        max_steps: a walk ends after this many steps; None: one step per cell, but at least 100 and at most 20
-            000
-        form: U_ij of eq. 13, of which eq. 9 and 11 define only the value U at a cell. "local": how much U_j
-            exceeds the lowest U of cell i and the cells around it; "rise": how much U_j exceeds U_i; both
-            with attraction / 2 more, or at least, so that every move attracts; "letter": U_j
-        field: what eq. 9 measures from. "start": from the start, as section IV-A says; "goal": the same
-            parabola with its highest point at the goal
-        memory: allowed_k of eq. 13. "tabu": the cells around that the ant has not visited, as in eq. 1; "none":
-            all of them, to the letter; walks then keep their loops in the ranking, and the path loses them
-        backtrack: whether an ant in a dead end steps back until it finds another way; otherwise it starts
-            again
+        influence: d0 of eq. 11, the range of the repulsion [cells]
+        deposit: the deposit on each cell of a first-rank path; it falls linearly with the rank
+        min_pheromone: the lower bound of a free cell's pheromone
+        convergence: the pheromone has converged when its sum changes by less than this fraction in an iteration
+        max_steps: step limit of a walk; None: one step per cell, but at least 100 and at most 20 000
+        form: U_ij of eq. 13; eq. 9 and 11 define only U at a cell. "local": U_j minus the lowest U of cell i and
+            its neighbours, plus attraction / 2; "rise": U_j - U_i, at least attraction / 2; "letter": U_j. All
+            moves attract
+        field: the origin of eq. 9. "start": the start, as in section IV-A; "goal": the same parabola with its
+            maximum at the goal
+        memory: allowed_k of eq. 13. "tabu": the neighbours that the ant has not visited, as in eq. 1; "none":
+            all neighbours, taken literally; loops then count in the ranking, and are cut out of the path
+        backtrack: whether an ant in a dead end steps back until it finds another path; otherwise it restarts
         shortcut: whether paths are cut short where they pass next to an earlier part of themselves
 
     Raises:
-        FieldError: an option is out of range; names it and what would be right.
+        FieldError: an option is out of range; names it and the valid range.
     """
 
     ants: int = 500
@@ -127,16 +122,16 @@ class PotentialFieldAnts(IterativePlanner):
 
     @property
     def work_unit(self) -> str:
-        """What `work` counts."""
+        """The unit of `work`."""
         return "ant steps"
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs. Ants that start again in dead ends may miss a path that exists."""
+        """Capabilities and requirements of this planner. Ants that restart in dead ends may miss an existing path."""
         return Capabilities(iterative=True, complete=self.backtrack)
 
     def potential(self, query: Query) -> Floats:
-        """The field that ants climb (cells,), above 0 where free: eq. 9 measured as `field` says, lowered by eq. 11."""
+        """Return the field that ants climb (cells,), above 0 where free: eq. 9 by `field`, lowered by eq. 11."""
         from antdrive.planners.colonies import _kernels_pfaco
 
         graph = ColonyGraph.of(query)
@@ -151,10 +146,10 @@ class PotentialFieldAnts(IterativePlanner):
         return np.where(free, climb - climb[free].min() + 0.5 * self.attraction, 0.0)
 
     def attractions(self, graph: ColonyGraph, field: Floats) -> Floats:
-        """U_ij of eq. 13 for each move of `graph` (cells, 8); 0 where the move is not allowed.
+        """Return U_ij of eq. 13 for each move of `graph` (cells, 8); 0 where the move is not allowed.
 
         Args:
-            graph: the graph to walk on
+            graph: the ants' graph
             field: the potential (cells,)
         """
         there, here, least = graph.at_neighbours(field), field[:, None], 0.5 * self.attraction
@@ -167,7 +162,7 @@ class PotentialFieldAnts(IterativePlanner):
         return np.where(allowed, there, 0.0)
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
-        """Run the ants without end, and rebuild the pheromone whenever it has converged."""
+        """Run the ants without end, and rebuild the pheromone whenever it converges."""
         field = self.potential(query)
         free = query.grid.free.ravel()
         trail = self.mix * rng.random(len(field)) + (1 - self.mix) * field / field.max()  # eq. 14
@@ -187,19 +182,19 @@ class PotentialFieldAnts(IterativePlanner):
             yield pool.report(query.grid.cell, trail, arrivals, steps)
 
     def stage(self, entries: int) -> int:
-        """The stage, 1 to 3, after so many `entries` into the ranking list (section IV-B)."""
+        """Return the stage, 1 to 3, after `entries` paths have entered the ranking list (section IV-B)."""
         twice = 2 * self.ranks
         return 1 if entries < twice else 2 if entries < twice + self.ants else 3
 
     def rebuild(
         self, trail: Floats, free: npt.NDArray[np.bool_], stage: int, pool: AntPool, rng: np.random.Generator
     ) -> None:
-        """Reset converged pheromone: at random, from the best tenth of the list, from all of it (section IV-B).
+        """Reset converged pheromone: at random, from the best tenth of the list, or from all of it (section IV-B).
 
         Args:
             trail: the pheromone, changed in place (cells,)
             free: whether each cell is free (cells,)
-            stage: which of the three ways
+            stage: the stage, which selects the rule
             pool: the ants, for their ranking list
             rng: the source of random numbers, for stage 1
         """
@@ -215,21 +210,21 @@ class PotentialFieldAnts(IterativePlanner):
 
 @dataclass(eq=False)
 class AntPool:
-    """The ants of one plan and their ranking list, in the form that compiled code takes."""
+    """The ants of one plan and their ranking list, for compiled code."""
 
     planner: PotentialFieldAnts  # the parameters
-    graph: ColonyGraph  # the graph that ants walk on
-    limit: int  # the steps after which a walk ends
+    graph: ColonyGraph  # the ants' graph
+    limit: int  # step limit of a walk
     ants: Ants  # the ants and their unfinished walks
     ranking: Ranking  # the ranking list
-    buffer: npt.NDArray[np.int32]  # where compiled code puts a new best walk (room,)
-    arrivals: Floats  # where compiled code puts the lengths of the walks that arrived
-    shortest: float = math.inf  # the length of the best walk [cells], inf while there is none
+    buffer: npt.NDArray[np.int32]  # output of kernels: a new best walk (room,)
+    arrivals: Floats  # output of kernels: lengths of the walks that arrived
+    shortest: float = math.inf  # length of the best walk [cells], inf while there is none
     best: npt.NDArray[np.int32] | None = None  # the cells of the best walk, as flat indices
 
     @classmethod
     def of(cls, planner: PotentialFieldAnts, graph: ColonyGraph, rng: np.random.Generator) -> AntPool:
-        """All ants at the start, and an empty list."""
+        """Place all ants at the start, with an empty list."""
         from antdrive.planners.colonies import _kernels_pfaco
 
         cells, count, ranks = len(graph.mask), planner.ants, planner.ranks
@@ -257,20 +252,20 @@ class AntPool:
 
     @property
     def listed(self) -> int:
-        """How many walks are in the ranking list."""
+        """Number of walks in the ranking list."""
         from antdrive.planners.colonies._kernels_pfaco import LISTED
 
         return int(self.ranking.counts[LISTED])
 
     @property
     def entries(self) -> int:
-        """How many walks were ever entered into the ranking list."""
+        """Total number of walks entered into the ranking list."""
         from antdrive.planners.colonies._kernels_pfaco import ENTRIES
 
         return int(self.ranking.counts[ENTRIES])
 
     def run(self, trail: Floats, heuristic: Floats, alpha: float) -> tuple[Floats, int]:
-        """Run one iteration: the lengths of the walks that arrived [cells], and the steps of all ants together."""
+        """Run one iteration; returns the lengths of the walks that arrived [cells] and the total number of steps."""
         from antdrive.planners.colonies import _kernels_pfaco
 
         planner, graph = self.planner, self.graph
@@ -301,7 +296,7 @@ class AntPool:
         return self.arrivals[:arrived].copy(), int(steps)
 
     def report(self, cell: float, trail: Floats, arrivals: Floats, steps: int) -> Iteration:
-        """The state after an iteration: the results of `run` and the pheromone, for cells of side `cell` [m]."""
+        """Return the state after an iteration from the results of `run` and the pheromone, for cells of side `cell` [m]."""
         best: Any = np.empty(0, dtype=np.int32) if self.best is None else self.best
         return Iteration(
             cells=self.graph.cells(best),

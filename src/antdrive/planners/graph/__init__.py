@@ -1,1 +1,1 @@
-"""Graph search on the grid, incremental search, safe-interval planning, and the potential field."""
+"""Graph search, incremental search, safe-interval planning and the potential field."""

@@ -1,4 +1,4 @@
-"""The artificial potential field of Lee et al. 2008, section III (eq. 5 to 12)."""
+"""Artificial potential field of Lee et al. 2008, section III (eq. 5 to 12)."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanSt
 
 @dataclass(frozen=True, kw_only=True)
 class PotentialField(GridPlanner):
-    """Descends the potential of an attracting goal and repelling obstacles (Lee et al. 2008, III); may get stuck.
+    """Descent of the potential of an attracting goal and repelling obstacles (Lee et al. 2008, III); may get stuck.
 
-    The potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0 (eq. 11) is followed
-    along the allowed move of steepest descent. U has local minima besides the goal. There the planner stops
-    and reports the cell; it cannot go in circles, as every step leads down. The paper gives no values for the
-    gains and d0; of those tried, these defaults arrive most often among random cylinders.
+    The planner follows the potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0
+    (eq. 11) along the allowed move of steepest descent. At a local minimum it stops and reports the cell; it
+    cannot cycle, as every step descends. The paper gives no values for the gains and d0; these defaults
+    arrive most often among random cylinders.
 
     Known weaknesses, measured (docs/benchmarks.md): local minima. In forests of cylinders 9 of 10 runs arrive
-    on 20 x 20 cells and 2 of 10 on 50 x 50 and on 100 x 100; where a quarter of single cells is blocked, 1 of
-    10 and none. An obstacle near the goal moves the minimum away from it (`tests/planners/graph/test_apf.py`).
+    on 20 x 20 cells and 2 of 10 on 50 x 50 and on 100 x 100; with a quarter of single cells blocked, 1 of
+    10 and none. An obstacle near the goal shifts the minimum away from it (`tests/planners/graph/test_apf.py`).
 
-    `d` is measured from the cell's centre to the nearest cylinder, less the grid's inflation; on a grid
-    without a world behind it, to the centre of the nearest blocked cell. Walls do not repel.
+    `d` is the distance from the cell's centre to the nearest cylinder, less the grid's inflation; on a grid
+    without a world, to the centre of the nearest blocked cell. Walls do not repel.
 
     Attributes:
         k_att: gain of the attraction
         k_rep: gain of the repulsion
-        influence: d0, the distance beyond which obstacles do not repel [m]
+        influence: d0, the range of the repulsion [m]
     """
 
     k_att: float = 1.0
@@ -46,7 +46,7 @@ class PotentialField(GridPlanner):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs. It may miss a path that exists."""
+        """Capabilities and requirements of this planner. It may miss an existing path."""
         return Capabilities(complete=False)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -65,7 +65,7 @@ class PotentialField(GridPlanner):
         return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=cost, work=work, work_unit="steps", field=field)
 
     def potential(self, query: Query) -> Floats:
-        """The potential U of every cell (R, C), inf where blocked."""
+        """Return the potential U of every cell (R, C), inf where blocked."""
         from antdrive.planners.graph import _kernels_apf
 
         grid = query.grid
@@ -78,7 +78,7 @@ class PotentialField(GridPlanner):
 
 
 def obstacle_distance(query: Query, reach: float = math.inf) -> Floats:
-    """Distance from each cell's centre to the nearest obstacle (R, C) [m]."""
+    """Return the distance from each cell's centre to the nearest obstacle (R, C) [m]."""
     from antdrive.planners.graph import _kernels_apf
 
     grid = query.grid

@@ -1,4 +1,4 @@
-"""Replanning on a grid: queries that can be edited while the robot moves, and searches that are repaired.
+"""Replanning on a grid: editable queries and incremental searches.
 
 D* is that of A. Stentz, *Optimal and efficient path planning for partially-known environments*, ICRA 1994.
 """
@@ -35,14 +35,14 @@ if TYPE_CHECKING:
 
 @runtime_checkable
 class Replanner(Protocol):
-    """A query that can be edited, and its answer.
+    """An editable query and its plan.
 
-    Report where the robot is and which cells changed, then ask for the path from there.
+    Report the robot's cell and the changed cells, then request the path from there.
     """
 
     @property
     def query(self) -> Query:
-        """The query as it stands now. Its grid is read-only and changes with every edit."""
+        """The current query. Its grid is read-only and changes with every edit."""
         ...
 
     def move(self, start: Cell) -> None:
@@ -54,43 +54,43 @@ class Replanner(Protocol):
         ...
 
     def block(self, cells: npt.ArrayLike) -> int:
-        """Report that cells (N, 2) are blocked from now on.
+        """Mark cells (N, 2) as blocked.
 
-        Returns how many cells have other moves than before.
+        Returns the number of cells whose moves changed.
         """
         ...
 
     def clear(self, cells: npt.ArrayLike) -> int:
-        """Report that cells (N, 2) are free from now on.
+        """Mark cells (N, 2) as free.
 
-        Returns how many cells have other moves than before.
+        Returns the number of cells whose moves changed.
         """
         ...
 
     def change(self, grid: Grid) -> int:
         """Replace the grid by another one of the same shape.
 
-        Returns how many cells have other moves than before.
+        Returns the number of cells whose moves changed.
         """
         ...
 
     def result(self) -> PlanResult:
-        """The planner's path from the robot's cell; `work` and `wall_s` are what this call took."""
+        """Return the path from the robot's cell; `work` and `wall_s` are those of this call."""
         ...
 
 
 class ReplanningPlanner(Planner, Protocol):
-    """A planner that makes a replanner of its own, as it declares by `Capabilities.own_replanner`."""
+    """A planner with its own replanner, declared by `Capabilities.own_replanner`."""
 
     def replanner(self, query: Query, rng: np.random.Generator) -> Replanner:
-        """A replanner for a query; `rng` serves all its answers."""
+        """Return a replanner for a query; all its plans draw from `rng`."""
         ...
 
 
 class CachedReplanner(abc.ABC):
-    """The part that all replanners share: the present query, and the answer, kept as long as nothing has changed.
+    """Base class of replanners: the current query and its cached plan.
 
-    An answer is good for the robot on its path.
+    The plan stays valid for any cell on its path until the grid changes.
     """
 
     def __init__(self, query: Query) -> None:
@@ -98,16 +98,16 @@ class CachedReplanner(abc.ABC):
 
         self._common = _kernels_incremental
         self._free, self._moves = query.grid.free.copy(), query.grid.moves.copy()
-        # The moves that the grid closes although its cells are free; found when first needed.
+        # Moves that the grid forbids although the cells are free; computed on first use.
         self._closed: npt.NDArray[np.uint8] | None = None
-        self._edited = np.empty(self._moves.size, dtype=np.int64)  # kernels list the cells of one edit here
+        self._edited = np.empty(self._moves.size, dtype=np.int64)  # buffer for the cells of one edit
         self._edits: list[npt.NDArray[np.int64]] = []  # the cells of each edit since the last answer
         self._query = dataclasses.replace(query, grid=self._view(query.grid), task=None)
         self._last: PlanResult | None = None
 
     @property
     def query(self) -> Query:
-        """The query as it stands now. Its grid is read-only and changes with every edit."""
+        """The current query. Its grid is read-only and changes with every edit."""
         return self._query
 
     def move(self, start: Cell) -> None:
@@ -115,18 +115,18 @@ class CachedReplanner(abc.ABC):
         self._query = dataclasses.replace(self._query, start=start)
 
     def block(self, cells: npt.ArrayLike) -> int:
-        """Report that cells (N, 2) are blocked from now on; returns how many cells have other moves than before."""
+        """Mark cells (N, 2) as blocked; returns the number of cells whose moves changed."""
         return self._mark(cells, False)
 
     def clear(self, cells: npt.ArrayLike) -> int:
-        """Report that cells (N, 2) are free from now on; returns how many cells have other moves than before.
+        """Mark cells (N, 2) as free; returns the number of cells whose moves changed.
 
-        A move that the grid closed although its cells were free stays closed.
+        Moves that the grid forbids between free cells stay forbidden.
         """
         return self._mark(cells, True)
 
     def change(self, grid: Grid) -> int:
-        """Replace the grid by another one of the same shape; returns how many cells have other moves than before."""
+        """Replace the grid by another one of the same shape; returns the number of cells whose moves changed."""
         if grid.shape != self._query.grid.shape:
             raise FieldError("grid", f"must have the shape {self._query.grid.shape}, got {grid.shape}")
         self._free[:] = grid.free
@@ -134,7 +134,7 @@ class CachedReplanner(abc.ABC):
         return self._record(int(self._common.adopt(self._moves, grid.moves, self._edited)))
 
     def result(self) -> PlanResult:
-        """A path from the robot's cell; `work` and `wall_s` are what this call took."""
+        """Return the path from the robot's cell; `work` and `wall_s` are those of this call."""
         started = time.perf_counter()
         blocked = self._query.blocked_end
         if blocked:
@@ -146,10 +146,10 @@ class CachedReplanner(abc.ABC):
 
     @abc.abstractmethod
     def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
-        """The answer to a query whose ends are free, after the moves of these flat cells changed."""
+        """Return the plan for a query with free ends, after the moves of the `changed` flat cells changed."""
 
     def _remaining_path(self) -> PlanResult | None:
-        """The rest of the last path, if nothing has changed and the robot is on it."""
+        """Return the rest of the last path if nothing has changed and the robot is on it."""
         if self._edits or self._last is None or not self._last.solved:
             return None
         here = np.flatnonzero((self._last.cells == self._query.start).all(axis=1))
@@ -185,14 +185,14 @@ class CachedReplanner(abc.ABC):
         return count
 
     def _take_edits(self) -> npt.NDArray[np.int64]:
-        """The cells whose moves changed since the last call."""
+        """Return the cells whose moves changed since the last call."""
         changed = self._edits[0] if len(self._edits) == 1 else np.concatenate([self._edited[:0], *self._edits])
         self._edits.clear()
         return changed
 
 
 class IncrementalSearch(CachedReplanner):
-    """A search that is repaired after an edit."""
+    """A search that repairs its result after an edit."""
 
     def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
         cells, diagonal, work = self._repair(changed, self._index(query.start))
@@ -203,7 +203,7 @@ class IncrementalSearch(CachedReplanner):
 
     @abc.abstractmethod
     def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
-        """The path from a cell after other cells changed, its diagonal steps, and how many cells were expanded.
+        """Return the path from a cell after edits, its number of diagonal steps, and the number of expanded cells.
 
         The path is empty if there is none.
         """
@@ -211,16 +211,16 @@ class IncrementalSearch(CachedReplanner):
 
 @dataclass(frozen=True, kw_only=True)
 class IncrementalPlanner(GridPlanner):
-    """A planner by an incremental search, which is also its replanner."""
+    """A planner whose incremental search is also its replanner."""
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs."""
+        """Capabilities and requirements of this planner."""
         return Capabilities(own_replanner=True)
 
     @abc.abstractmethod
     def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:
-        """A search that can be repaired after its first answer; it draws nothing from `rng`."""
+        """Return a search that can be repaired after its first plan; it does not use `rng`."""
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return self.replanner(query, rng).result()
@@ -235,12 +235,12 @@ class DStar(IncrementalPlanner):
     """
 
     def replanner(self, query: Query, rng: np.random.Generator) -> DStarSearch:
-        """A search that can be repaired after its first answer; it draws nothing from `rng`."""
+        """Return a search that can be repaired after its first plan; it does not use `rng`."""
         return DStarSearch(query)
 
 
 class DStarSearch(IncrementalSearch):
-    """D*: Dijkstra's algorithm from the goal, whose RAISE and LOWER states propagate changes."""
+    """D*: Dijkstra's algorithm from the goal, with RAISE and LOWER states that propagate changes."""
 
     def __init__(self, query: Query) -> None:
         super().__init__(query)
@@ -273,12 +273,12 @@ class DStarLite(IncrementalPlanner):
     """
 
     def replanner(self, query: Query, rng: np.random.Generator) -> DStarLiteSearch:
-        """A search that can be repaired after its first answer; it draws nothing from `rng`."""
+        """Return a search that can be repaired after its first plan; it does not use `rng`."""
         return DStarLiteSearch(query)
 
 
 class DStarLiteSearch(IncrementalSearch):
-    """D* Lite: the optimised version, Figure 4 of the paper, in exact integer costs."""
+    """D* Lite: the optimised version (Figure 4 of the paper) in exact integer costs."""
 
     def __init__(self, query: Query) -> None:
         super().__init__(query)

@@ -1,4 +1,4 @@
-"""The shortest path on the grid: Dijkstra's algorithm and A* (Hart, Nilsson & Raphael 1968)."""
+"""Shortest paths on the grid: Dijkstra's algorithm and A* (Hart, Nilsson & Raphael 1968)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Dijkstra(GridPlanner):
     """The shortest path over the grid's moves, by Dijkstra's algorithm.
 
     Known weakness, measured (docs/benchmarks.md): the search is not directed; on 100 x 100 cells among cylinders
-    it takes three times as long as A*. The weakness of A*'s paths is that of these, too.
+    it takes three times as long as A*. Its paths share A*'s weakness.
     """
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -30,7 +30,7 @@ class AStar(GridPlanner):
 
     Known weakness, measured (`tests/planners/graph/test_search.py`): paths turn by multiples of 45 degrees only.
     In five worlds of the catalogue they are up to 21 per cent longer than the exact shortest path among the
-    discs (`tangent`), 12 per cent in the median; open ground costs 8.2 per cent at most.
+    discs (`tangent`), 12 per cent in the median; on open ground at most 8.2 per cent.
     """
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -38,9 +38,9 @@ class AStar(GridPlanner):
 
 
 def shortest(query: Query, *, informed: bool = True) -> PlanResult:
-    """The shortest path between two free cells, or `NO_PATH`.
+    """Return the shortest path between two free cells, or `NO_PATH`.
 
-    By A* if `informed`, else by Dijkstra's algorithm.
+    Uses A* if `informed`, else Dijkstra's algorithm.
     """
     from antdrive.planners.graph import _kernels_search  # imported here because it loads the compiler
 
@@ -54,7 +54,7 @@ def shortest(query: Query, *, informed: bool = True) -> PlanResult:
 
 
 def reachable(query: Query) -> bool:
-    """Whether allowed moves lead from the start to the goal."""
+    """Return whether allowed moves lead from the start to the goal."""
     from antdrive.planners.graph import _kernels_search
 
     return bool(_kernels_search.connected(query.grid.moves, *query.start, *query.goal))

@@ -1,4 +1,4 @@
-"""Planning in space and time, among movers whose motions are known: safe-interval path planning.
+"""Safe-interval path planning (SIPP): space-time planning among movers with known motions.
 
 M. Phillips and M. Likhachev, *SIPP: Safe interval path planning for dynamic environments*, ICRA 2011.
 """
@@ -20,27 +20,27 @@ from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, TimedPlan, path_cost
 from antdrive.worlds import MoverMotion
 
-STEP = 0.05  # time between the first samples of a motion; more are added where it turns in between [s]
-INSTANT = 1e-6  # a motion that is not straight over so short a time is a jump [s]
-# How far a motion may stray from its samples' chords, and those samples from the legs that replace them [m]. Twice this
-# is added to the distance that the robot keeps.
+STEP = 0.05  # initial sampling period of a motion; refined where it turns [s]
+INSTANT = 1e-6  # a motion that is not straight over this time is a jump [s]
+# Maximum distance of a motion from its samples' chords, and of the samples from the legs that replace them [m]. Twice
+# this is added to the clearance.
 TOLERANCE = 1e-3
 UNIT = "safe intervals expanded"
 
 
 @dataclass(frozen=True, kw_only=True)
 class SafeIntervals(GridPlanner):
-    """The path that arrives first among movers whose motions are known, with waits where they help: SIPP.
+    """The earliest-arrival path among movers with known motions, with waits where they help: SIPP.
 
-    The motions are the query's. Without any it is the shortest path. The answer is a `TimedPlan`.
+    The motions are those of the query; without any, the path is the shortest. The plan is a `TimedPlan`.
 
-    Known weaknesses, measured (docs/benchmarks.md): it must know all motions in advance, and its effort grows
-    with them. Among 40 movers in circles the median plan takes 43 ms on 50 x 50 cells and 92 ms on 200 x 200,
-    among 10 of them 12 and 30 ms.
+    Known weaknesses, measured (docs/benchmarks.md): all motions must be known in advance, and the effort grows
+    with their number. Among 40 movers in circles the median plan takes 43 ms on 50 x 50 cells and 92 ms on
+    200 x 200, among 10 of them 12 and 30 ms.
 
     Attributes:
         speed: the robot's speed on every move [m/s]
-        horizon: time from the departure for which the motions are known, and within which the robot must arrive [s]
+        horizon: time after departure for which motions are known and within which the robot must arrive [s]
         stay: whether the goal must also be safe from the arrival to the horizon
     """
 
@@ -54,7 +54,7 @@ class SafeIntervals(GridPlanner):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do, and that it needs the movers' motions."""
+        """Capabilities and requirements of this planner: it needs the movers' motions."""
         return Capabilities(needs_motions=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -72,20 +72,20 @@ def plan_in_time(
     horizon: float = 120.0,
     stay: bool = False,
 ) -> TimedPlan:
-    """The path over the grid's moves that arrives first, or `NO_PATH` if none arrives within `horizon` seconds.
+    """Return the earliest-arrival path over the grid's moves, or `NO_PATH` if none arrives within `horizon` seconds.
 
-    The robot makes each move at `speed` and may wait in any cell for any time. Each motion is replaced by
-    straight legs, at most `2 * TOLERANCE` off. The robot's centre keeps the grid's `inflate` and `2 * TOLERANCE`
-    from a mover's surface on these legs, and so at least `inflate` from the mover itself. Over the legs the
-    answer is exact: no path on this grid, at this speed, arrives sooner. Motions are sampled `STEP` apart,
-    closer near turns and jumps; two turns within half a `STEP` may be missed.
+    The robot makes each move at `speed` and may wait in any cell for any time. Straight legs, at most
+    `2 * TOLERANCE` off, replace each motion. On these legs, the robot's centre keeps `inflate + 2 * TOLERANCE`
+    from a mover's surface, and so at least the grid's `inflate` from the mover itself. Over the legs the plan is
+    exact: no path on this grid, at this speed, arrives sooner. Motions are sampled every `STEP`, more densely near
+    turns and jumps; two turns within half a `STEP` may be missed.
 
     Args:
-        query: the grid and its ends; its own motions are not used
+        query: the grid and its ends; its own motions are ignored
         movers: the motions of the movers
         speed: the robot's speed on every move [m/s]
-        start_time: when the robot sets out, on the clock of the motions [s]
-        horizon: how long after `start_time` the robot may arrive [s]
+        start_time: departure time on the clock of the motions [s]
+        horizon: latest arrival after `start_time` [s]
         stay: whether the goal must also be safe from the arrival to the horizon
 
     Raises:
@@ -106,7 +106,7 @@ def plan_in_time(
 def _earliest(
     query: Query, movers: Iterable[MoverMotion], *, speed: float, start_time: float, horizon: float, stay: bool
 ) -> TimedPlan:
-    """The plan that arrives first, on a grid that can be crossed."""
+    """Return the earliest-arrival plan on a grid whose goal is reachable without movers."""
     from antdrive.planners.graph import _kernels_sipp as kernels
 
     grid, cols = query.grid, query.grid.shape[1]
@@ -120,13 +120,13 @@ def _earliest(
     intervals = kernels.Intervals(*kernels.safe_intervals(near, grid.free, frame, start_time, end))
     first = intervals.first[start]
     if first == intervals.first[start + 1] or intervals.since[first] > start_time:
-        reason = "a mover is too close to the start when the robot sets out"
+        reason = "a mover is too close to the start at departure"
         return TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
     trip = kernels.Trip(start, goal, float(speed), float(start_time), end, stay)
     cells, arrive, leave, work = kernels.earliest(grid.moves, frame, near, intervals, trip)
     if not len(cells):
         stays = " and can stay there" if stay else ""
-        reason = f"no way past the movers reaches the goal within {horizon:g} s{stays}"
+        reason = f"no path past the movers reaches the goal within {horizon:g} s{stays}"
         return TimedPlan(status=PlanStatus.NO_PATH, reason=reason, work=work)
     return TimedPlan(
         status=PlanStatus.SOLVED,
@@ -140,7 +140,7 @@ def _earliest(
 
 
 def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Floats:
-    """A motion as straight legs (L, 7) at constant speed, with the columns of `_kernels_sipp`."""
+    """Return a motion as straight legs (L, 7) at constant speed, with the columns of `_kernels_sipp`."""
     from antdrive.planners.graph import _kernels_sipp as kernels
 
     t, xy, jump = _samples(mover, start, end)
@@ -153,18 +153,17 @@ def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Float
 
 
 def _samples(mover: MoverMotion, start: float, end: float) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
-    """A motion as times (T,), positions (T, 2), and whether it jumps after each sample (T - 1,).
+    """Return a motion as times (T,), positions (T, 2), and whether it jumps after each sample (T - 1,).
 
     Between samples without a jump, the motion is within `TOLERANCE` of the straight line that joins them.
     """
     t = np.linspace(start, end, max(2, math.ceil((end - start) / STEP) + 1))
     xy = np.asarray(mover.at(t), dtype=np.float64)
-    unchecked = np.arange(len(t) - 1)  # stretches not yet known to be straight
+    unchecked = np.arange(len(t) - 1)  # intervals to be checked for straightness
     while len(unchecked):
         middle = (t[unchecked] + t[unchecked + 1]) / 2
         there = np.asarray(mover.at(middle), dtype=np.float64)
-        # A motion of two straight legs that meet within a stretch strays from the stretch's chord at most twice as
-        # far as its middle does.
+        # Two straight legs that meet within an interval deviate from its chord at most twice as far as its midpoint.
         stray = 2 * np.hypot(*(there - (xy[unchecked] + xy[unchecked + 1]) / 2).T)
         bent = (stray > TOLERANCE) & (t[unchecked + 1] - t[unchecked] > INSTANT)
         if not bent.any():

@@ -1,1 +1,1 @@
-"""From a plan in cells to a route: its own line, pulled taut, or with more clearance."""
+"""Path smoothing: the plan's line, pulled taut, or with more clearance."""

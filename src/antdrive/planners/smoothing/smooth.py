@@ -1,15 +1,15 @@
-"""From a plan to a route: pulled taut in the plan's own corridor, and moved away from discs where there is room.
+"""Path smoothing: string pulling within the plan's homotopy class, with more clearance where there is room.
 
 The shortest line among discs that is homotopic to a given one consists of tangents and of arcs along the
-discs. It is found by carrying the end of a string along the given line, as the funnel algorithm does in a
-sleeve of triangles (Lee & Preparata, *Euclidean shortest paths in the presence of rectilinear barriers*,
-Networks 14, 1984; for homotopy among obstacles Hershberger & Snoeyink, *Computing minimum length paths of a
-given homotopy class*, Comput. Geom. 4, 1994). Here the string bends around the discs themselves, so no triangles are
-needed: between two events the string's last link turns about one disc, and the next event is the first of its
-tangents to come. Walls are left out, as leaving a convex room never makes a line shorter.
+discs. The end of a string is carried along the given line, as in the funnel algorithm for a sleeve of triangles
+(Lee & Preparata, *Euclidean shortest paths in the presence of rectilinear barriers*, Networks 14, 1984; for
+homotopy among obstacles Hershberger & Snoeyink, *Computing minimum length paths of a given homotopy class*,
+Comput. Geom. 4, 1994). Here the string bends around the discs directly, without triangles: between two events
+its last link turns about one disc, and the next event is the first tangent it meets. Walls are ignored, as
+leaving a convex room never shortens a line.
 
-A line with more clearance is the taut line among discs that have grown: each by up to a preferred clearance,
-and in a gap by no more than its share of the gap.
+A line with more clearance is the taut line among grown discs: each grows by up to a preferred clearance, and
+in a gap by no more than its half of the gap.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ if TYPE_CHECKING:
 
 
 def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
-    """The plan's own line in metres, from the exact start to the goal, without points that lie on a straight line.
+    """Return the plan's line in metres from the exact start to the goal, without collinear points.
 
-    The first or last point of the plan is left out if the straight line past it keeps the grid's clearance,
-    so that no kink remains between the start and the centre of its cell. If the goal itself has less room
-    than the grid's clearance, the route ends at the plan's last point.
+    The first or last point of the plan is omitted if the straight line past it keeps the grid's clearance. This
+    avoids a kink between the exact end and the centre of its cell. If the goal is below the grid's clearance,
+    the route ends at the plan's last point.
 
     Args:
         plan: a plan with a path
-        grid: the grid that it was made on
-        task: the task that the grid was made from
+        grid: the plan's grid
+        task: the task of the grid
 
     Raises:
         ValueError: the plan has no path.
@@ -56,7 +56,7 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
         xy = _join(xy[::-1], np.array(task.goal), grid, task)[::-1]
     xy = _straightened(xy)
     if np.ptp(xy, axis=0).max() < 1e-6:
-        # The robot is at the goal already; a route needs two points, so it is a tenth of a millimetre long.
+        # The robot is already at the goal; a route needs two points, so it is 0.1 mm long.
         yaw = task.start[2]
         xy = np.vstack([xy[0], xy[0] + 1e-4 * np.array([math.cos(yaw), math.sin(yaw)])])
     return Route(xy)
@@ -69,7 +69,7 @@ def _join(xy: Floats, end: Floats, grid: Grid, task: Task) -> Floats:
 
 
 def _straightened(xy: Floats) -> Floats:
-    far = segment_lengths(xy[:-1]) > 1e-6  # points that differ by rounding alone have no direction
+    far = segment_lengths(xy[:-1]) > 1e-6  # points that differ only by rounding define no direction
     xy = np.vstack([xy[:1], xy[1:-1][far], xy[-1:]])
     if len(xy) > 2 and np.hypot(*(xy[-1] - xy[-2])) <= 1e-6:
         xy = np.vstack([xy[:-2], xy[-1:]])
@@ -79,10 +79,10 @@ def _straightened(xy: Floats) -> Floats:
     return xy[np.concatenate(([True], ~straight, [True]))]
 
 
-#: The kinds of smoothing: the plan's own line, that line pulled taut, or taut with more clearance where there is room.
+#: The kinds of smoothing: the plan's line, that line pulled taut, or taut with more clearance where there is room.
 SMOOTHINGS: tuple[str, ...] = ("none", "taut", "clearance")
 
-#: What may be wrong with a smoothed line, by the numbers of the kernel `fault`.
+#: Reasons to reject a smoothed line, by the return value of the kernel `fault`.
 REJECTIONS: tuple[str, ...] = (
     "",
     "the smoothed line would be longer than the plan's",
@@ -90,8 +90,8 @@ REJECTIONS: tuple[str, ...] = (
     "the smoothed line would pass an obstacle on its other side",
 )
 
-SLACK = 1e-9  # how much too close or too long a line may be, by rounding [m]
-SHRINK = 2e-9  # strings are first pulled among discs that are smaller by this, which the plan's line surely clears [m]
+SLACK = 1e-9  # rounding tolerance of clearances and lengths [m]
+SHRINK = 2e-9  # strings are first pulled among discs smaller by this, which the plan's line certainly clears [m]
 
 
 def smooth(
@@ -104,22 +104,22 @@ def smooth(
     stretch: float = 0.03,
     bulge: float = 5e-4,
 ) -> Route:
-    """The route for a plan.
+    """Smooth a plan into a route.
 
     A smoothed route keeps the grid's clearance exactly, passes every disc on the same side as the plan's
     line, and is never longer than that line or than the plan's cells. Parts that cannot be smoothed this way
-    stay as planned, and the route's note says why. Where the plan's line itself comes closer than the grid's
-    clearance, for example at a start close to a disc, the line is kept.
+    stay as planned, and the route's note gives the reason. Where the plan's line itself comes closer than the
+    grid's clearance, for example at a start close to a disc, the line is kept.
 
     Args:
         plan: a plan with a path
-        grid: the grid that it was made on
-        task: the task that the grid was made from
-        kind: `none` for the plan's own line, `taut` for that line pulled taut, `clearance` for a taut line
-            that keeps more distance from discs where there is room
-        clearance: how much more than the grid's clearance the kind `clearance` keeps at most [m]
-        stretch: how much longer than the taut line the kind `clearance` may be, as a fraction of its length
-        bulge: how far the corners of the route's polyline may stand off an arc [m]
+        grid: the plan's grid
+        task: the task of the grid
+        kind: `none` for the plan's line, `taut` for that line pulled taut, `clearance` for a taut line with more
+            distance from discs where there is room
+        clearance: maximum additional clearance of the kind `clearance` [m]
+        stretch: maximum additional length of the kind `clearance`, relative to the taut line
+        bulge: maximum distance of the route's corners from an arc [m]
 
     Raises:
         ValueError: the plan has no path, the kind is unknown, or a setting is out of range.
@@ -156,7 +156,7 @@ def smooth(
 
 
 def pull_taut(xy: npt.ArrayLike, discs: npt.ArrayLike, bounds: Bounds, inflate: float) -> TangentPath | None:
-    """The shortest path that keeps a distance from all discs and passes each on the same side as a polyline does.
+    """Return the shortest path that keeps a distance from all discs and passes each on the same side as a polyline.
 
     Args:
         xy: the polyline (M, 2) [m]
@@ -179,32 +179,32 @@ def pull_taut(xy: npt.ArrayLike, discs: npt.ArrayLike, bounds: Bounds, inflate: 
 class Piece:
     """A part of a route."""
 
-    xy: Floats  # its points (N, 2) [m]
+    xy: Floats  # points (N, 2) [m]
     curvature: Floats  # curvature from each point on (N,) [1/m]
-    kind: str = "none"  # its kind of smoothing
-    note: str = ""  # why it is not smoothed as asked; empty if it is
+    kind: str = "none"  # kind of smoothing
+    note: str = ""  # why it is not smoothed as requested; empty if it is
 
 
 @dataclass(frozen=True, eq=False)
 class TautString:
     """A taut string with K contacts, where it bends around discs, and K + 1 straight links."""
 
-    disc: npt.NDArray[np.int64]  # index of the disc that it bends around at each contact (K,)
-    turn: Floats  # 1 where it bends to the left, -1 to the right (K,)
-    sweep: Floats  # by how much it bends (K,) [rad]
+    disc: npt.NDArray[np.int64]  # index of the disc at each contact (K,)
+    turn: Floats  # direction of the bend: 1 left, -1 right (K,)
+    sweep: Floats  # angle of the bend (K,) [rad]
     links: Floats  # ends of each link as x, y from and x, y to (K + 1, 4) [m]
-    discs: Floats  # the discs that it bends around, with the radii of its arcs (N, 3) [m]
+    discs: Floats  # the discs, with the radii of the arcs (N, 3) [m]
 
     @property
     def length(self) -> float:
-        """Its length [m]."""
+        """Length [m]."""
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         return float(kernels.string_length(self.compiled))
 
     @property
     def path(self) -> TangentPath:
-        """Its lines and arcs."""
+        """Lines and arcs of the string."""
         pieces: list[Line | Arc] = []
         for i, (ax, ay, bx, by) in enumerate(self.links.tolist()):
             if (ax, ay) != (bx, by):
@@ -216,14 +216,14 @@ class TautString:
         return TangentPath(tuple(pieces))
 
     def clearance(self, world: World) -> float:
-        """The exact distance to the nearest disc surface or wall [m]."""
+        """Return the exact distance to the nearest disc surface or wall [m]."""
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         box = np.asarray(world.bounds, dtype=np.float64)
         return float(kernels.string_clearance(self.compiled, world.discs, box))
 
     def drawn(self, world: World, inflate: float, bulge: float) -> tuple[Floats, Floats]:
-        """A polyline (M, 2) [m] whose corners stand off the arcs by at most `bulge`, and its curvature (M,)."""
+        """Return a polyline (M, 2) [m] with corners at most `bulge` from the arcs, and its curvature (M,)."""
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         box = np.asarray(world.bounds, dtype=np.float64)
@@ -232,15 +232,17 @@ class TautString:
 
     @property
     def compiled(self) -> Any:
-        """The record that kernels take."""
+        """The string as a record for kernels."""
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         return kernels.String(kernels.Contacts(self.disc, self.turn, self.sweep), self.links, self.discs)
 
 
 def _runs(xy: Floats, world: World, inflate: float) -> Iterator[tuple[Floats, bool]]:
-    """The polyline cut where it begins or ceases to keep the clearance; with each part, whether it does."""
-    clear = segment_clearance(world, xy[:-1], xy[1:]) >= inflate - 1.01 * SLACK  # joined lines just have the clearance
+    """Split the polyline where it begins or ceases to keep the clearance; yields each part and whether it does."""
+    clear = (
+        segment_clearance(world, xy[:-1], xy[1:]) >= inflate - 1.01 * SLACK
+    )  # joined lines have exactly the clearance
     cuts = [0, *(np.flatnonzero(clear[1:] != clear[:-1]) + 1).tolist(), len(clear)]
     for first, last in itertools.pairwise(cuts):
         yield np.ascontiguousarray(xy[first : last + 1]), bool(clear[first])
@@ -258,13 +260,13 @@ def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
 def _smoothed(
     line: Floats, world: World, inflate: float, extra: float, stretch: float, spare: float, bulge: float
 ) -> Piece:
-    """A clear polyline, smoothed as far as the checks allow."""
+    """Smooth a clear polyline as far as the checks allow."""
     own = polyline_length(line)
     taut = _pulled(line, world.discs, inflate)
     if taut is None:
         return Piece(line, np.zeros(len(line)), note="the line could not be pulled taut")
     note = ""
-    for fine in (bulge, bulge / 100.0):  # a plan whose arcs are drawn finer than ours may be shorter
+    for fine in (bulge, bulge / 100.0):  # a plan with finer arcs may be shorter
         drawn = taut.drawn(world, inflate, fine)
         note = _rejection(taut, drawn[0], line, world, inflate, own)
         if not note:
@@ -281,7 +283,7 @@ def _smoothed(
 
 
 def _pulled(line: Floats, discs: Floats, inflate: float) -> TautString | None:
-    """The taut string that passes all discs as a clear polyline does; None if it was not found."""
+    """Return the taut string that passes all discs on the same side as a clear polyline; None on failure."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     grown = discs[kernels.outermost(discs)]
@@ -290,7 +292,7 @@ def _pulled(line: Floats, discs: Floats, inflate: float) -> TautString | None:
     if not pulled:
         return None
     ends = np.ascontiguousarray(line[[0, -1]])
-    for more in (SHRINK, SHRINK * 0.6):  # if rounding closes a gap, there is no string among discs of exact radius
+    for more in (SHRINK, SHRINK * 0.6):  # rounding may close a gap between discs of exact radius
         exact = grown.copy()
         exact[:, 2] += more
         string = _settled(disc, turn, sweep, exact, ends)
@@ -309,7 +311,7 @@ def _settled(
 
 
 def _rejection(string: TautString, xy: Floats, line: Floats, world: World, inflate: float, longest: float) -> str:
-    """The reason why a smoothed line cannot be used; empty if it can."""
+    """Return the reason to reject a smoothed line; empty if it is usable."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     box = np.asarray(world.bounds, dtype=np.float64)
@@ -319,7 +321,7 @@ def _rejection(string: TautString, xy: Floats, line: Floats, world: World, infla
 def _with_clearance(
     taut: TautString, xy: Floats, world: World, inflate: float, extra: float, longest: float, bulge: float
 ) -> Piece | None:
-    """The line with the most clearance that is no longer than `longest`; None if there is no room or length for more."""
+    """Return the line with the most clearance no longer than `longest`; None if there is no room or length for more."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     near = np.flatnonzero(kernels.near_polyline(xy, taut.discs, 2.0 * extra))

@@ -1,4 +1,4 @@
-"""Campaign files: the grid of worlds, tasks, planners with options, robots, settings and seeds that `antdrive sweep` runs."""
+"""Campaign files: the grid of worlds, tasks, planners, robots, settings and seeds that `antdrive sweep` runs."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from antdrive.sim.forms import (
 )
 from antdrive.sim.settings import SETTINGS
 
-MOST_SEEDS = 1_000_000  # given as a number
+MOST_SEEDS = 1_000_000  # as a count
 
 
 def _listed(value: Any) -> Any:
-    """One value stands for a list of it."""
+    """Wrap a single value in a list."""
     return value if isinstance(value, list) else [value]
 
 
 def seeds_of(value: Any) -> list[int]:
-    """The seeds that people write as a number of them, as [3, 7] or as 0-9."""
+    """Parse seeds written as a count, as [3, 7] or as 0-9."""
     if type(value) is int:
         if not 1 <= value <= MOST_SEEDS:
             raise ValueError(f"must be from 1 to {MOST_SEEDS} seeds, or a list such as [{value}], got {value}")
@@ -58,18 +58,18 @@ def _of(item: dict[str, Any]) -> dict[str, Any]:
 Names = Annotated[list[str], Field(min_length=1), BeforeValidator(_listed), WithJsonSchema(_of({"type": "string"}))]
 NamesOrMappings = Annotated[list[TextOrMapping], Field(min_length=1), BeforeValidator(_listed)]
 
-#: The settings that a campaign lists under keys of their own; the others are its `settings`.
+#: The settings with keys of their own in a campaign; the others belong to `settings`.
 AXES = MappingProxyType({name: one for name, one in SETTINGS.items() if one.setting.axis and name != "seed"})
 SettingsEntry = create_model(
     "SettingsEntry",
     __config__=STRICT,
-    __doc__="How a robot drives: the settings that have no key of their own in a campaign.",
+    __doc__="Settings without a key of their own in a campaign.",
     **file_fields(one for one in SETTINGS.values() if not one.setting.axis),
 )
 
 
 def _axes() -> dict[str, Any]:
-    """The fields of a campaign file that list values of a setting."""
+    """Return the fields of a campaign file that list values of a setting."""
     fields = {}
     for one in AXES.values():
         kind, usual = written_kind(one), written_default(one)
@@ -80,23 +80,23 @@ def _axes() -> dict[str, Any]:
 
 
 class TaskEntry(BaseModel):
-    """A start and a goal that every world of the campaign is driven with."""
+    """A start and a goal, used in every world of the campaign."""
 
     model_config = STRICT
 
-    name: str | None = Field(None, min_length=1, max_length=100, description="what tables call the task")
+    name: str | None = Field(None, min_length=1, max_length=100, description="the task's name in tables")
     start: list[float] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
     goal: list[float] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
 
 
 class RandomTasks(BaseModel):
-    """Starts and goals drawn in each world: free cells for the largest robot, with a path between them."""
+    """Random starts and goals in each world: free cells for the largest robot, connected by a path."""
 
     model_config = STRICT
 
-    random: int = Field(ge=1, le=100_000, description="tasks in each world")
-    seed: int = Field(0, ge=0, lt=2**63, description="seed of the draws")
-    min_distance: float = Field(0.0, ge=0, description="distance from start to goal as the crow flies, at least [m]")
+    random: int = Field(ge=1, le=100_000, description="number of tasks in each world")
+    seed: int = Field(0, ge=0, lt=2**63, description="random seed")
+    min_distance: float = Field(0.0, ge=0, description="least straight-line distance from start to goal [m]")
 
 
 def _tasks(value: Any) -> Any:
@@ -125,7 +125,7 @@ def _settings_given(value: Any) -> Any:
 
 
 def _settings_schema() -> dict[str, Any]:
-    """The JSON Schema of settings in which a list of values may take the place of each, and of lists of such settings."""
+    """Return the JSON Schema of settings: each value may be a list, and so may the mapping."""
     schema = dict(schema_of(SettingsEntry))
     discs = {"type": "array", "items": schema.pop("$defs")["Disc"]}
     keys = {key: discs if key == "unseen" else one for key, one in schema["properties"].items()}
@@ -137,37 +137,37 @@ def _settings_schema() -> dict[str, Any]:
 
 
 class GridEntry(BaseModel):
-    """What a campaign lists beside settings."""
+    """The keys of a campaign besides those that list a setting."""
 
     model_config = STRICT
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
-    note: str | None = Field(None, description="what the campaign is for, free text")
+    note: str | None = Field(None, description="purpose of the campaign, free text")
     worlds: NamesOrMappings = Field(
         description="a list of files or patterns such as worlds/*.yaml, names of the catalogue, "
         "{generate: forest, seeds: 20} with the generator's options, or {import: barn/*.world, barn: true}"
     )
     planners: NamesOrMappings = Field(
-        description="a list of names, or {name: aco-han, ants: [10, 50]}; a list, or {from: 10, to: 50, step: 10}, "
-        "stands for several values"
+        description="a list of names, or {name: aco-han, ants: [10, 50]}; several values are a list or "
+        "{from: 10, to: 50, step: 10}"
     )
     robots: Names = Field(["turtlebot"], description="names of the catalogue, or files")
-    seeds: Seeds = Field([0], description="how many seeds, or a list such as [3, 7], or a range such as 0-9")
+    seeds: Seeds = Field([0], description="a number of seeds, a list such as [3, 7], or a range such as 0-9")
     tasks: Annotated[Any, PlainValidator(_tasks), WithJsonSchema(_TASKS_SCHEMA)] = Field(
         "own",
-        description="own: the worlds' own starts and goals; named: the tasks that their files list; {random: 30, seed: 1, "
+        description="own: the worlds' own start and goal; named: all tasks of the world files; {random: 30, seed: 1, "
         "min_distance: 5}; or a list of "
         "{start: [x, y, yaw], goal: [x, y]}",
     )
     settings: Annotated[Any, PlainValidator(_settings_given), WithJsonSchema(_settings_schema())] = Field(
         {},
-        description="how robots drive, such as {cell: 0.1, time_limit: 60}; a list of values stands for several settings, "
-        "and so does a list of such mappings",
+        description="settings of the drives, such as {cell: 0.1, time_limit: 60}; a list of values, or of such mappings, "
+        "gives several settings",
     )
     run_limit: float | None = Field(
-        None, gt=0, description="wall-clock time that a run may take before its process is ended [s]; none by default"
+        None, gt=0, description="wall-clock limit of a run; its process is killed after it [s]; by default none"
     )
-    rollouts: Literal["none", "failed", "all"] = Field("none", description="which runs' logs are kept")
+    rollouts: Literal["none", "failed", "all"] = Field("none", description="the runs whose logs are kept")
 
 
 if TYPE_CHECKING:
@@ -176,23 +176,23 @@ else:
     CampaignFile = create_model(
         "CampaignFile",
         __base__=GridEntry,
-        __doc__="A campaign, as written in a file: each combination of its lists is a run.",
+        __doc__="A campaign file: each combination of its lists is a run.",
         **_axes(),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """A campaign as read.
+    """A parsed campaign.
 
     Attributes:
-        source: its file, or what messages call it
-        folder: where relative paths begin
+        source: its file, or its name in messages
+        folder: base of relative paths
         document: its data, with the line of each value
-        entry: its data, checked
-        tasks: the tasks in each world; empty: the worlds' own
-        settings: every combination of the settings that it lists, as files write them, by key; one where it lists none
-        places: where in the file each of them is written
+        entry: its validated data
+        tasks: tasks in each world; empty: the worlds' own
+        settings: every combination of the listed settings, as files write them, by key; at least one
+        places: location of each of them in the file
     """
 
     source: str
@@ -204,24 +204,24 @@ class Campaign:
     places: tuple[Location, ...]
 
     def values(self, name: str) -> list[Any]:
-        """The values of a setting that the campaign lists under a key of its own."""
+        """Return the values of a setting with a key of its own."""
         return list(getattr(self.entry, AXES[name].key))
 
     def error(self, location: Location, problem: str) -> InputError:
-        """The error for a value: file, line, key and problem.
+        """Return the error for a value: file, line, key and problem.
 
         Args:
-            location: the path to the value
-            problem: what is wrong and what would be right
+            location: path to the value
+            problem: what is invalid, and what is valid
         """
         return self.document.error(location, problem)
 
 
 def load_campaign(path: str | os.PathLike[str]) -> Campaign:
-    """The campaign in a file.
+    """Load a campaign file.
 
     Raises:
-        InputError: there is no such file, or something in it is wrong.
+        InputError: the file is missing or invalid.
     """
     return _checked(read_document(path), Path(path).parent)
 
@@ -232,23 +232,23 @@ def make_campaign(
     source: str = "campaign",
     options: Mapping[str, str] = MappingProxyType({}),
 ) -> Campaign:
-    """A campaign from plain data with the keys of a campaign file; `schema` may be left out.
+    """Create a campaign from plain data with the keys of a campaign file; `schema` is optional.
 
     Args:
         data: mappings, lists, numbers and texts; also tuples, ranges, paths, and numbers and arrays of numpy
-        folder: where relative paths begin
-        source: what messages call the data
-        options: the options of a command that keys, also those of settings, come from; messages name them instead
+        folder: base of relative paths
+        source: name of the data in messages
+        options: command-line options by the key they set, also within settings; messages name the option
 
     Raises:
-        InputError: something in the data is wrong.
+        InputError: the data is invalid.
     """
     plain = {"schema": 1, **{key: _plain(value) for key, value in data.items()}}
-    return _checked(_Asked(source, plain, options=options), Path(folder))
+    return _checked(_CommandData(source, plain, options=options), Path(folder))
 
 
 def _plain(value: Any) -> Any:
-    """What Python code gives, as a file would hold it: numpy's numbers and arrays, tuples, ranges and paths."""
+    """Convert Python values to those of a file: numpy's numbers and arrays, tuples, ranges and paths."""
     if isinstance(value, Mapping):
         return {key: _plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple | range):
@@ -269,14 +269,14 @@ def _checked(document: Document, folder: Path) -> Campaign:
     names = [task.name or str(i) for i, task in enumerate(checked)]
     for i, name in enumerate(names):
         if name in names[:i]:
-            raise document.error(("tasks", i, "name"), f"{name!r} is the name of another task, too")
+            raise document.error(("tasks", i, "name"), f"{name!r} names another task already; rename one")
     return Campaign(document.source, folder, document, entry, checked, settings, places)
 
 
 def _settings(
     document: Document, given: dict[str, Any] | list[dict[str, Any]]
 ) -> Iterator[tuple[Mapping[str, Any], Location]]:
-    """Every combination of the settings that a campaign lists, and its place; the last of several lists varies fastest."""
+    """Yield every combination of the listed settings and its location; the last list varies fastest."""
     if isinstance(given, dict):
         yield from _combinations(document, given, ("settings",))
     else:
@@ -287,7 +287,7 @@ def _settings(
 def _combinations(
     document: Document, given: dict[str, Any], place: Location
 ) -> Iterator[tuple[Mapping[str, Any], Location]]:
-    """Every combination of the settings in one mapping."""
+    """Yield every combination of the settings in one mapping."""
     lists = [_alternatives(document, key, value, place) for key, value in given.items()]
     for values in itertools.product(*lists):
         data = dict(zip(given, values, strict=True))
@@ -295,22 +295,22 @@ def _combinations(
 
 
 def _alternatives(document: Document, key: str, value: Any, place: Location) -> list[Any]:
-    """The values that a setting takes: those of a list, and every combination of the lists within a mapping."""
+    """Return the values of a setting: those of a list, and every combination of the lists in a mapping."""
     if isinstance(value, dict):
         inner = [one if isinstance(one, list) else [one] for one in value.values()]
-        found: list[Any] = [dict(zip(value, values, strict=True)) for values in itertools.product(*inner)]
+        choices: list[Any] = [dict(zip(value, values, strict=True)) for values in itertools.product(*inner)]
     elif key == "unseen":  # one value is a list itself
-        found = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+        choices = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
     else:
-        found = value if isinstance(value, list) else [value]
-    if not found:
+        choices = value if isinstance(value, list) else [value]
+    if not choices:
         raise document.error((*place, key), "must have at least one value, got an empty list")
-    return found
+    return choices
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked(Document):
-    """Data some of which options of a command hold, whose errors name these."""
+class _CommandData(Document):
+    """Data partly from command-line options; errors name the option."""
 
     options: Mapping[str, str] = field(default_factory=dict)
 
@@ -322,7 +322,7 @@ class _Asked(Document):
 
 @dataclass(frozen=True, eq=False)
 class _Part(Document):
-    """A part of a document, whose errors are those of the whole."""
+    """A part of a document; its errors are those of the whole."""
 
     whole: Document | None = None
     place: Location = ()
@@ -333,7 +333,7 @@ class _Part(Document):
 
 
 def _part(document: Document, *place: str | int) -> Document:
-    """The part of a document at a place."""
+    """Return the part of a document at a location."""
     data = document.data
     for step in place:
         data = data[step]
@@ -341,6 +341,6 @@ def _part(document: Document, *place: str | int) -> Document:
 
 
 def campaign_schema() -> dict[str, Any]:
-    """The JSON Schema of campaign files, for editors."""
+    """Return the JSON Schema of campaign files, for editors."""
     schema = CampaignFile.model_json_schema(by_alias=True)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive campaign"}

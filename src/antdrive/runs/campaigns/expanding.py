@@ -1,4 +1,4 @@
-"""From a campaign to its runs: every combination of what it lists, in a fixed order, each with its key."""
+"""Expand a campaign to its runs: every combination in a fixed order, each with its key."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting
 from antdrive.sim.log.record import canonical_hash
 from antdrive.worlds import Task
 
-WORLDS, ROBOTS = "worlds", "robots"  # folders in a campaign's folder with what its commands name
+WORLDS, ROBOTS = "worlds", "robots"  # subfolders with the files that commands name
 
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
     """The runs of a campaign."""
 
-    # the runs in the campaign's order: by world, task, robot, smoothing, noise, margin, planner and seed
+    # runs in the campaign's order: by world, task, robot, smoothing, noise, margin, planner and seed
     jobs: tuple[Job, ...]
-    duplicates: int  # how many combinations were left out because they mean the same as an earlier one
-    counts: dict[str, int]  # how many there are of worlds, tasks in each, robots, and so on, by name
-    worlds: dict[str, Task]  # the world files that the runs' commands name, by path relative to the campaign's folder
-    robots: dict[str, Path]  # likewise the files of robots
-    planners: dict[str, Path]  # likewise the files of people's own planners
+    duplicates: int  # number of combinations omitted as equal to an earlier one
+    counts: dict[str, int]  # number of worlds, tasks in each, robots and so on, by name
+    worlds: dict[str, Task]  # world files named by the runs' commands, by path relative to the campaign's folder
+    robots: dict[str, Path]  # robot files, likewise
+    planners: dict[str, Path]  # files of custom planners, likewise
 
 
 def expand(campaign: Campaign) -> Expansion:
-    """The runs of a campaign.
+    """Return the runs of a campaign.
 
     Raises:
-        InputError: something that the campaign names does not exist or has a value that it cannot have; file, line, key.
+        InputError: a named item is missing or has an invalid value; the message has file, line and key.
     """
     planners, robots = planner_variants(campaign), _robots(campaign)
     worlds = campaign_worlds(campaign)
@@ -70,7 +70,7 @@ def expand(campaign: Campaign) -> Expansion:
 
 
 def _count_tasks(tasks: Sequence[NamedTask]) -> dict[str, int]:
-    """How many worlds there are, and tasks in each; where these differ, how many tasks in all worlds."""
+    """Count the worlds and the tasks in each; if these differ, the tasks in all worlds."""
     each = Counter(one.world for one in tasks)
     if len(set(each.values())) == 1:
         return {"worlds": len(each), "tasks": len(tasks) // len(each)}
@@ -78,8 +78,8 @@ def _count_tasks(tasks: Sequence[NamedTask]) -> dict[str, int]:
 
 
 def _robots(campaign: Campaign) -> list[NamedRobot]:
-    """The robots of a campaign, each once."""
-    known, found = list_robots(), dict[str, NamedRobot]()
+    """Return the robots of a campaign, each once."""
+    known, robots = list_robots(), dict[str, NamedRobot]()
     for i, name in enumerate(campaign.entry.robots):
         try:
             path = resolve("robot", name, known, campaign.folder)
@@ -88,21 +88,21 @@ def _robots(campaign: Campaign) -> list[NamedRobot]:
         robot = load_robot(path)
         content = canonical_hash(robot)
         word = name if name in known else f"{ROBOTS}/{content[:8]}/{path.name}"
-        if content not in found:
-            taken = {one.name for one in found.values()}
+        if content not in robots:
+            taken = {one.name for one in robots.values()}
             called = next(one for one in (robot.name, name, f"{name} {content[:8]}") if one not in taken)
-            found[content] = NamedRobot(robot, called, content, word, None if name in known else path)
-    return list(found.values())
+            robots[content] = NamedRobot(robot, called, content, word, None if name in known else path)
+    return list(robots.values())
 
 
 def _settings(campaign: Campaign) -> list[NamedSettings]:
-    """Every combination of the values that the campaign lists and of its settings."""
+    """Return every combination of the campaign's axes and settings."""
     for name, one in AXES.items():
         for i, value in enumerate(campaign.values(name)):
             if one.setting.choices and value not in one.setting.choices:
                 raise campaign.error((one.key, i), f"unknown {value!r}; {suggest(value, one.setting.choices)}")
     listed = list(zip(campaign.settings, campaign.places, strict=True))
-    found = []
+    combinations = []
     for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
         given = {**settings, **dict(zip((one.key for one in AXES.values()), values, strict=True))}
         try:
@@ -111,11 +111,11 @@ def _settings(campaign: Campaign) -> list[NamedSettings]:
             raise campaign.error((*place, *error.key.split(".")), error.problem) from None
         del fields["seed"]
         words = setting_words(given)
-        found.append(NamedSettings(fields, columns_of(fields), None if words is None else tuple(words), place))
-    return found
+        combinations.append(NamedSettings(fields, columns_of(fields), None if words is None else tuple(words), place))
+    return combinations
 
 
-#: Where a campaign writes what a scenario calls by another name.
+#: Locations in a campaign of a scenario's fields, where the names differ.
 _PLACES = {"start": ("tasks",), "seed": ("seeds",)} | {one.key: (one.key,) for one in AXES.values()}
 
 
@@ -126,10 +126,10 @@ def _check(
     settings: Sequence[NamedSettings],
     planner: PlannerVariant,
 ) -> None:
-    """Refuse, before any work, settings that a robot cannot have and starts where one has no room."""
+    """Reject, before any work, invalid settings and starts without room for the robot."""
     obstructed = list({one.fields["unseen"]: one for one in reversed(settings)}.values())
     moving = [n for n, task in enumerate(tasks) if task.task.world.movers]
-    whole = {0, *moving[:1]}  # what robots may perceive depends on whether there are movers
+    whole = {0, *moving[:1]}  # perception depends on whether there are movers
     for robot in robots:
         for n, task in enumerate(tasks):
             for one in settings if n in whole else obstructed:
@@ -156,7 +156,7 @@ def _cases(
     planners: Sequence[PlannerVariant],
     files: dict[str, Task],
 ) -> Iterator[SweepCase]:
-    """Every combination but for the seeds; `files` is filled with the worlds that commands name."""
+    """Yield every combination except seeds; collect the worlds named by commands in `files`."""
     for task in tasks:
         content = canonical_hash(task.task)
         word = task.catalogue or f"{WORLDS}/{_file_name(task)}-{content[:8]}.yaml"
@@ -170,7 +170,7 @@ def _cases(
 
 
 def _words(world: str, robot: str, settings: Sequence[str], planner: PlannerVariant) -> str:
-    """The command that repeats a run, from within the campaign's folder, without its seed."""
+    """Return the command that repeats a run from the campaign's folder, without its seed."""
     words = ["antdrive", "run", world, "--planner", planner.word]
     words += [word for key, value in planner.given.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
     return shlex.join([*words, "--robot", robot, *settings])

@@ -1,4 +1,4 @@
-"""The worlds, planners and tasks of a campaign: what its file lists, each under the name that tables call it."""
+"""Resolve the worlds, planners and tasks that a campaign lists, each under its name in tables."""
 
 from __future__ import annotations
 
@@ -26,34 +26,34 @@ from antdrive.worlds import Disc, Grid, Task, World, list_worlds, load_task, loa
 from antdrive.worlds.formats.importing import import_file
 from antdrive.worlds.generators.generate import generated
 
-OWN = "own"  # the name of the task that a world brings
+OWN = "own"  # name of a world's default task
 
 
 def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
-    """The worlds of a campaign with their own tasks, in its order; files of a pattern by name.
+    """Return the worlds of a campaign with their default tasks, in its order; files of a pattern by name.
 
-    Worlds that share a name have their path or options in what the campaign calls them, so that no two are called the same.
-    Several problems of one map are tasks of one world.
+    Worlds with the same name get their path or options as part of the name, so names are unique. Several problems of
+    one map are tasks of one world.
     """
-    found: list[tuple[NamedTask, str]] = []
+    tasks: list[tuple[NamedTask, str]] = []
     for i, entry in enumerate(campaign.entry.worlds):
         place: Location = ("worlds", i)
         if isinstance(entry, str):
-            found += _named(campaign, place, entry)
+            tasks += _named(campaign, place, entry)
         elif "generate" in entry:
-            found += _random(campaign, place, dict(entry))
+            tasks += _random(campaign, place, dict(entry))
         elif "import" in entry:
-            found += _imported(campaign, place, dict(entry))
+            tasks += _imported(campaign, place, dict(entry))
         else:
             raise campaign.error(place, "write a name, a file, {generate: forest, seeds: 20} or {import: FILES}")
-    return _distinct(found)
+    return _distinct(tasks)
 
 
-def _distinct(found: list[tuple[NamedTask, str]]) -> list[NamedTask]:
-    """The tasks, each once; no two of them, and no two worlds, are called the same."""
+def _distinct(named: list[tuple[NamedTask, str]]) -> list[NamedTask]:
+    """Return the tasks without repeats; rename worlds until names are unique."""
     geometries: dict[str, World] = {}
     tasks: dict[tuple[str, str], NamedTask] = {}
-    for one, second in found:
+    for one, second in named:
         geometry = dataclasses.replace(one.task.world, source=None)
         for world in itertools.chain((one.world, second), (f"{second} ({n})" for n in itertools.count(2))):
             there = tasks.get((world, one.name))
@@ -66,7 +66,7 @@ def _distinct(found: list[tuple[NamedTask, str]]) -> list[NamedTask]:
 
 
 def _same(task: Task, other: Task) -> bool:
-    """Whether two tasks differ in nothing but what is said of where their worlds come from."""
+    """Return whether two tasks are equal apart from the source of their worlds."""
     return dataclasses.replace(task, world=dataclasses.replace(task.world, source=other.world.source)) == other
 
 
@@ -75,7 +75,7 @@ def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[Nam
     if name in known:
         yield NamedTask(name, OWN, load_task(known[name]), name, place, load_tasks(name)), name
         return
-    for path in _files(campaign, place, name, f"nor a world of the catalogue; {suggest(Path(name).stem, known)}"):
+    for path in _files(campaign, place, name, f"and no world of the catalogue; {suggest(Path(name).stem, known)}"):
         task = load_task(path)
         yield (
             NamedTask(task.world.name, OWN, task, None, place, load_tasks(path)),
@@ -84,7 +84,7 @@ def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[Nam
 
 
 def _files(campaign: Campaign, place: Location, pattern: str, otherwise: str) -> list[Path]:
-    """The files that a pattern or a path names, in the order of their names."""
+    """Return the files of a path or pattern, sorted by name."""
     paths = sorted(glob.glob(str(campaign.folder / pattern), recursive=True))
     if not paths:
         raise campaign.error(place, f"{pattern}: no such file{' here, ' + otherwise if otherwise else ''}")
@@ -96,7 +96,7 @@ def _random(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Itera
     if not isinstance(kind, str):
         raise campaign.error((*place, "generate"), f"must be the name of a generator, got {show(kind)}")
     if "seed" in entry and "seeds" in entry:
-        raise campaign.error((*place, "seed"), "keep one of seed and seeds")
+        raise campaign.error((*place, "seed"), "use either seed or seeds")
     key = "seed" if "seed" in entry else "seeds"
     given = entry.pop(key, 1)
     try:
@@ -127,7 +127,7 @@ def _imported(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Ite
             except FieldError as error:
                 raise campaign.error((*place, error.key), error.problem) from None
             except TypeError:
-                raise campaign.error(place, "an option has a value of the wrong type") from None
+                raise campaign.error(place, "an option has an invalid type") from None
             for task in tasks:
                 name = OWN if problem is None else f"problem-{problem}"
                 second = f"{os.path.relpath(path, campaign.folder)}#{task.world.name}{suffix}"
@@ -135,7 +135,7 @@ def _imported(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Ite
 
 
 def _problems(campaign: Campaign, place: Location, entry: dict[str, Any]) -> list[int] | list[None]:
-    """The problems of a map that an entry lists as 7, [3, 7] or 0-99; it is left without them."""
+    """Pop the problems of a map from an entry: 7, [3, 7] or 0-99."""
     given = entry.pop("problem", None)
     if given is None:
         return [None]
@@ -145,21 +145,21 @@ def _problems(campaign: Campaign, place: Location, entry: dict[str, Any]) -> lis
         raise campaign.error((*place, "problem"), str(error)) from None
 
 
-MOST_VALUES = 10_000  # of one range
-PLANNER_FILES = "planners"  # the folder in a campaign's folder with the files that its commands name
+MOST_VALUES = 10_000  # in one range
+PLANNER_FILES = "planners"  # subfolder with the planner files that commands name
 
 
 def planner_variants(campaign: Campaign) -> list[PlannerVariant]:
-    """The planners of a campaign, in its order; the last of several options with lists varies fastest."""
-    found: dict[str, PlannerVariant] = {}
+    """Return the planners of a campaign, in its order; the last list of options varies fastest."""
+    variants: dict[str, PlannerVariant] = {}
     for i, entry in enumerate(campaign.entry.planners):
         for variant in _variants(campaign, ("planners", i), {"name": entry} if isinstance(entry, str) else dict(entry)):
-            taken = found.setdefault(variant.label, variant)
+            taken = variants.setdefault(variant.label, variant)
             if taken.source != variant.source:  # the same class name in another file of the same name
                 written = entry if isinstance(entry, str) else entry["name"]
                 label = variant.label.replace(variant.name, written, 1)
-                found[label] = dataclasses.replace(variant, label=label, name=written)
-    return list(found.values())
+                variants[label] = dataclasses.replace(variant, label=label, name=written)
+    return list(variants.values())
 
 
 def _variants(campaign: Campaign, place: Location, options: dict[str, Any]) -> Iterator[PlannerVariant]:
@@ -188,7 +188,7 @@ def _variants(campaign: Campaign, place: Location, options: dict[str, Any]) -> I
 
 
 def _at_option(campaign: Campaign, place: Location, text: str) -> InputError:
-    """The error of `load_planner` at the option that it names."""
+    """Move the error of `load_planner` to the option that it names."""
     key, mark, problem = text.partition(": ")
     if mark and key.startswith("planner."):
         return campaign.error((*place, key.removeprefix("planner.")), problem)
@@ -196,7 +196,7 @@ def _at_option(campaign: Campaign, place: Location, text: str) -> InputError:
 
 
 def values_of(campaign: Campaign, place: Location, value: Any) -> list[Any]:
-    """The values that an option takes: those of a list or of a range {from, to, step}, or one."""
+    """Return the values of an option: those of a list or of a range {from, to, step}, or one."""
     if isinstance(value, list):
         if not value or any(isinstance(one, list | dict) for one in value):
             raise campaign.error(place, f"must be a list of values, got {show(value)}")
@@ -208,19 +208,19 @@ def values_of(campaign: Campaign, place: Location, value: Any) -> list[Any]:
         raise campaign.error(place, "a range is written {from: 10, to: 50, step: 10}")
     first, last, step = numbers
     if not (all(map(math.isfinite, numbers)) and step > 0 and last >= first and (last - first) / step < MOST_VALUES):
-        raise campaign.error(place, f"must go up from a number in at most {MOST_VALUES} steps above 0")
+        raise campaign.error(place, f"must ascend in positive steps, at most {MOST_VALUES} of them")
     count = int((last - first) / step + 1e-9) + 1
     whole = all(isinstance(n, int) for n in numbers)
     return [first + k * step if whole else round(first + k * step, 12) for k in range(count)]
 
 
-NAMED = "named"  # the value of a campaign's key tasks that means those of the worlds' files
-TRIES = 1000  # pairs that are drawn for one task
-ROOM = 0.03  # the margin of drawn tasks where the campaign's margins are chosen later [m]
+NAMED = "named"  # value of the key tasks: those of the world files
+TRIES = 1000  # random pairs for one task
+ROOM = 0.03  # margin of random tasks if the campaign's margin is auto [m]
 
 
 def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequence[RobotSpec]) -> Iterator[NamedTask]:
-    """The tasks of a campaign: each world with each of its starts and goals."""
+    """Yield the tasks of a campaign: each world with each of its starts and goals."""
     if isinstance(campaign.tasks, RandomTasks):
         margins = [ROOM if margin == "auto" else float(margin) for margin in campaign.values("margin")]
         inflate = max(robot.radius for robot in robots) + max(margins)
@@ -230,7 +230,7 @@ def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequ
         for world in worlds:
             if not world.others:
                 raise campaign.error(
-                    ("tasks",), f"the file of world {world.world} lists no tasks; write them there, or own"
+                    ("tasks",), f"the file of world {world.world} lists no tasks; add them there, or write own"
                 )
             for name, task in world.others.items():
                 yield dataclasses.replace(world, name=name, task=task, catalogue=None)
@@ -242,11 +242,11 @@ def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequ
 
 
 def _each_once(worlds: Sequence[NamedTask]) -> Iterable[NamedTask]:
-    """The worlds, each with the first of its own tasks, which others take the place of."""
-    found: dict[str, NamedTask] = {}
+    """Return each world once, with its first task, which is replaced later."""
+    first: dict[str, NamedTask] = {}
     for one in worlds:
-        found.setdefault(one.world, one)
-    return found.values()
+        first.setdefault(one.world, one)
+    return first.values()
 
 
 def _listed(campaign: Campaign, world: NamedTask) -> Iterator[NamedTask]:
@@ -263,7 +263,7 @@ def _listed(campaign: Campaign, world: NamedTask) -> Iterator[NamedTask]:
 def _drawn(
     campaign: Campaign, request: RandomTasks, world: NamedTask, robots: Sequence[RobotSpec], inflate: float
 ) -> Iterator[NamedTask]:
-    """Random tasks in one world. They depend on it, the seed and what needs room, not on the campaign's other worlds."""
+    """Yield random tasks in one world. They depend on the world, the seed and the sizes of robots and unseen obstacles."""
     unseen = tuple(
         dict.fromkeys(Disc(d.x, d.y, d.radius, d.height) for one in campaign.settings for d in one.get("unseen", ()))
     )
@@ -276,7 +276,7 @@ def _drawn(
         task = _draw(rng, grid, free, request.min_distance, world.task, robots, unseen) if len(free) else None
         if task is None:
             problem = (
-                f"no start and goal {request.min_distance:g} m apart with a path between them found in {TRIES} draws in world "
+                f"no start and goal {request.min_distance:g} m apart with a path between them in {TRIES} draws in world "
                 f"{world.world} for a robot of radius {inflate:.3g} m with its margin; use a smaller min_distance"
             )
             raise campaign.error(("tasks",), problem)
@@ -292,7 +292,7 @@ def _draw(
     robots: Sequence[RobotSpec],
     unseen: tuple[Disc, ...],
 ) -> Task | None:
-    """A task with the start and the goal in free cells, the robot facing the goal; None if none was found."""
+    """Draw a task with start and goal in free cells, the robot facing the goal; None after too many draws."""
     for _ in range(TRIES):
         (x, y), (goal_x, goal_y) = grid.xy(free[rng.integers(len(free), size=2)]).tolist()
         if math.hypot(goal_x - x, goal_y - y) < max(distance, own.goal_tolerance):

@@ -1,1 +1,1 @@
-"""Driving a route in physics: the loop, the driver, perception, replanning and the log."""
+"""The drive loop and its parts: localisation, guidance, control rules, replanning, exploration and replay."""

@@ -1,9 +1,9 @@
-"""What movers block: the ground that they will cover soon, narrow gaps beside those that stand still, and every way.
+"""Blocked routes: ground that movers will cover, gaps beside standing movers, and goals that movers cut off.
 
-Planning keeps the safety margin from movers, local avoidance more. A robot that waits before a narrow gap would be sent
-into it again by every replan, so the guide notes the mover and plans with what avoidance keeps. If there is no other
-way, and all movers have stood still since, the robot passes at the safety margin, as it passes a cylinder; a robot that
-has to wait nevertheless does not try again.
+Plans keep the safety margin from movers; local avoidance keeps more. Replans would send a waiting robot back into a
+narrow gap. The guide therefore notes the mover and plans with the distance that avoidance keeps. If no other route
+exists and all movers have stood still since, the robot passes at the safety margin, as it passes a cylinder. If it
+has to wait again, it does not retry.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from antdrive.planners import Query
     from antdrive.sim.driving.movers_ahead import Zone
 
-STEP = 0.25  # movers are predicted at least this often [s]
-MIN_RADIUS = 0.01  # smaller discs are left out [m]
-STILL = 0.05  # a mover that stays this close to where it was stands still [m]
-GAP_RANGE = 3.0  # the route is looked at for this far [m]
-GAP_STEP = 0.05  # between two points of it [m]
-GAP_SLACK = 0.05  # avoidance may still refuse a route that passes a mover with this much more than it keeps [m]
-STANDING_STEP = 1.0  # predictions are checked this often for a mover that sets out again [s]
+STEP = 0.25  # longest time between predicted positions [s]
+MIN_RADIUS = 0.01  # smaller discs are omitted [m]
+STILL = 0.05  # a mover that stays within this distance stands still [m]
+GAP_RANGE = 3.0  # length of the route ahead that is checked for gaps [m]
+GAP_STEP = 0.05  # spacing of the checked points [m]
+GAP_SLACK = 0.05  # avoidance may refuse a gap with this much more than it keeps [m]
+STANDING_STEP = 1.0  # predictions are checked this often for a mover that starts moving [s]
 
 
 def covered_discs(
@@ -48,10 +48,10 @@ def covered_discs(
     only: npt.NDArray[np.int64] | None = None,
     wider: float = 0.0,
 ) -> list[Disc]:
-    """The discs that movers cover within `duration` [s] of a tick; with `only`, those of these movers, `wider` [m].
+    """Return the discs that movers cover within `duration` [s] of a tick; with `only`, those of these movers, `wider` [m].
 
-    Discs are made smaller where an end (N, 2) [m] would lie within the inflation around them: movers close
-    neither end. The first of the ends is the robot's position.
+    Discs shrink where their inflation would cover one of the `ends` (N, 2) [m], so movers close neither end. The
+    first end is the robot's position.
     """
     x, y = ends[0].tolist()
     times = np.linspace(0.0, duration, 1 + math.ceil(duration / STEP))
@@ -68,7 +68,7 @@ def covered_discs(
 
 
 def blocked_cells(grid: Grid, discs: Sequence[Disc]) -> npt.NDArray[np.bool_]:
-    """Which free cells (R, C) have their centre within a disc grown by the grid's inflation."""
+    """Return which free cells (R, C) have their centre within a disc grown by the grid's inflation."""
     rows, cols = grid.shape
     x = grid.origin[0] + grid.cell * np.arange(cols)
     y = grid.origin[1] + grid.cell * np.arange(rows)
@@ -83,7 +83,7 @@ def blocked_cells(grid: Grid, discs: Sequence[Disc]) -> npt.NDArray[np.bool_]:
 
 
 def closed_cells(query: Query, discs: Sequence[Disc], zone: Zone | None = None) -> npt.NDArray[np.bool_]:
-    """Which cells (R, C) discs and a zone close; neither the start nor the goal is."""
+    """Return which cells (R, C) discs and a zone close, except the start and the goal."""
     closed = blocked_cells(query.grid, discs)
     if zone is not None:
         closed |= zone.blocked
@@ -92,7 +92,7 @@ def closed_cells(query: Query, discs: Sequence[Disc], zone: Zone | None = None) 
 
 
 def close_route(discs: list[Disc], tracked: TrackedPath, arc: float, reach: float, inflate: float) -> bool:
-    """Whether a disc comes closer than `inflate` [m] to the route within `reach` [m] beyond an arc length on it [m]."""
+    """Return whether a disc is closer than `inflate` [m] to the route within `reach` [m] beyond an arc length [m]."""
     ahead = np.arange(arc, min(arc + reach, tracked.length), 0.1)
     if not discs or not len(ahead):
         return False
@@ -102,13 +102,13 @@ def close_route(discs: list[Disc], tracked: TrackedPath, arc: float, reach: floa
 
 
 def points_at(tracked: TrackedPath, arcs: Floats) -> Floats:
-    """The points (N, 2) of a route at arc lengths (N,) [m]."""
+    """Return the points (N, 2) of a route at arc lengths (N,) [m]."""
     route = tracked.route
     return np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
 
 
 def with_obstacles(task: Task, discs: Sequence[Disc]) -> Task:
-    """A task with more obstacles in its world, in plan view."""
+    """Add obstacles to a task's world, in plan view."""
     if not discs:
         return task
     more = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
@@ -117,17 +117,14 @@ def with_obstacles(task: Task, discs: Sequence[Disc]) -> Task:
 
 
 class Blockage:
-    """Counts the searches for a route that failed because movers that stand still close every way.
+    """Failed searches behind standing movers, and the narrow gaps beside such movers.
 
-    A mover that moves may open a way, so it never counts. While the same movers stand where they stood at the first
-    such failure, each further search waits twice as long as the one before.
-
-    It also notes the movers beside which the robot has waited for a gap that local avoidance does not enter: that keeps a
-    distance between the robot's centre and a mover's surface.
+    A moving mover may open a route and never counts. While the same movers stand where they stood at the first
+    failure, the wait before the next search doubles.
 
     Attributes:
         failures: failed searches in a row
-        reason: which mover stands where, once the robot has no patience left; empty before
+        reason: which mover blocks the robot and where, once its patience is over; empty before
     """
 
     def __init__(
@@ -135,11 +132,11 @@ class Blockage:
     ) -> None:
         self.failures, self.reason = 0, ""
         self._keeps = keeps
-        self._gaps: dict[int, tuple[float, float]] = {}  # where the noted movers stand
-        self._widths: dict[int, float] = {}  # what plans keep from their surfaces [m]
-        self._passed: set[int] = set()  # those of them that the robot passes at the safety margin
-        self._refused: set[int] = set()  # those of them where it had to wait nevertheless
-        self._all = np.empty((0, 2))  # where all movers were when the last one was noted
+        self._gaps: dict[int, tuple[float, float]] = {}  # positions of the noted movers
+        self._widths: dict[int, float] = {}  # clearance of plans from their surfaces [m]
+        self._passed: set[int] = set()  # noted movers that the robot passes at the safety margin
+        self._refused: set[int] = set()  # passed movers beside which it had to wait again
+        self._all = np.empty((0, 2))  # positions of all movers when the last one was noted
         self._task, self._grid, self._predictor, self._hz = task, grid, predictor, hz
         self._interval, self._patience = policy.min_interval, policy.patience
         self._since = self._due = -math.inf
@@ -147,7 +144,7 @@ class Blockage:
         self._places = np.empty((0, 2))
 
     def pause(self, tick: int, position: Point) -> bool:
-        """Whether a search now would only repeat the last one."""
+        """Return whether a search now would repeat the last one."""
         if not self.failures:
             return False
         if not self._still_there(tick, position):
@@ -156,11 +153,11 @@ class Blockage:
         return tick / self._hz < self._due
 
     def route_found(self) -> None:
-        """Take note that there is a way, or that there may be one soon."""
+        """Reset the count of failed searches: a route exists, or may open soon."""
         self.failures = 0
 
     def failed(self, tick: int, pose: Pose) -> None:
-        """Take note that a search from a pose [m, m, rad] found no route."""
+        """Count a search from a pose [m, m, rad] that found no route."""
         now, position = tick / self._hz, pose[:2]
         standing = self.standing(tick, position)
         if self.failures and not self._closed(tick, pose, np.intersect1d(standing, self._standing)):
@@ -177,14 +174,14 @@ class Blockage:
         self._due = min(now + wait, max(self._since + self._patience, now + self._interval))
 
     def may_pass(self, tick: int, position: Point) -> bool:
-        """Allow the robot to pass noted movers at the safety margin, after a failure, if all movers have stood still since."""
+        """Allow passing noted movers at the safety margin after a failure, if all movers have stood still since."""
         if not self.failures:
             return False
         noted = np.setdiff1d(self._noted(tick, position), [*self._passed, *self._refused])
         perceived, positions = self._predictor.perceived(tick, position)
         if not len(noted) or not np.isin(perceived, self.standing(tick, position)).all():
             return False
-        if len(positions) != len(self._all):  # a mover has come into sight
+        if len(positions) != len(self._all):  # a new mover is perceived
             return False
         if not (np.hypot(*(positions - self._all)[perceived].T) <= STILL).all():
             return False
@@ -192,7 +189,7 @@ class Blockage:
         return True
 
     def note_gaps(self, tick: int, position: Point, tracked: TrackedPath, arc: float) -> None:
-        """Note the movers that the route ahead passes hardly farther away than avoidance keeps, or than was noted before."""
+        """Note the movers that the route ahead passes within the clearance of avoidance, or of the last note."""
         standing = self.standing(tick, position)
         if self._keeps <= self._grid.inflate or not len(standing):
             return
@@ -211,7 +208,7 @@ class Blockage:
                     self._refused.add(m)
 
     def _noted(self, tick: int, position: Point) -> npt.NDArray[np.int64]:
-        """The movers (N,) that the robot noted and that stand where they stood."""
+        """Return the noted movers (N,) that stand where they stood."""
         positions = self._predictor.perceived(tick, position)[1]
         self._gaps = {m: at for m, at in self._gaps.items() if np.hypot(*(positions[m] - at)) <= STILL}
         self._passed &= self._gaps.keys()
@@ -219,7 +216,7 @@ class Blockage:
         return np.array(sorted(self._gaps), dtype=np.int64)
 
     def discs(self, tick: int, ends: Floats, only: npt.NDArray[np.int64] | None = None) -> list[Disc]:
-        """The noted movers as discs, so much larger that a plan keeps from them what avoidance keeps."""
+        """Return the noted movers as discs, enlarged so that plans keep the clearance of avoidance."""
         noted = self._noted(tick, (float(ends[0, 0]), float(ends[0, 1])))
         wanted = np.setdiff1d(noted if only is None else np.intersect1d(noted, only), list(self._passed))
         found: list[Disc] = []
@@ -229,7 +226,7 @@ class Blockage:
         return found
 
     def clearance_reduction(self, tick: int, position: Point) -> Floats:
-        """How much closer than usual the robot may come to each mover that it perceives (P,) [m]."""
+        """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""
         perceived = self._predictor.within_range(tick, position)
         if not self._passed:
             return np.zeros(len(perceived))
@@ -237,24 +234,24 @@ class Blockage:
         return np.where(passed, self._keeps - self._grid.inflate, 0.0)
 
     def standing(self, tick: int, position: Point) -> npt.NDArray[np.int64]:
-        """The movers (S,) that the robot perceives and predicts to stand still for as long as its patience lasts."""
+        """Return the perceived movers (S,) that are predicted to stand still for as long as the robot's patience."""
         perceived = self._predictor.within_range(tick, position)
         ahead = np.linspace(0.0, self._patience, 1 + math.ceil(self._patience / STANDING_STEP))
         positions, _ = self._predictor.predict(tick, position, ahead)
         return np.asarray(perceived[np.hypot(*np.moveaxis(positions - positions[0], -1, 0)).max(axis=0) <= STILL])
 
     def _still_there(self, tick: int, position: Point) -> bool:
-        """Whether the robot sees all movers that it noted at the first failure where they stood."""
+        """Return whether all movers of the first failure are perceived where they stood."""
         perceived, positions = self._predictor.perceived(tick, position)
         near = np.hypot(*(positions[self._standing] - self._places).T) <= STILL
         return bool(near.all() and np.isin(self._standing, perceived).all())
 
     def _closed(self, tick: int, pose: Pose, movers: npt.NDArray[np.int64]) -> bool:
-        """Whether these movers alone close every way that is open without them."""
+        """Return whether these movers alone close every route that is open without them."""
         return bool(len(movers)) and self._way(tick, pose, movers[:0]) and not self._way(tick, pose, movers)
 
     def _way(self, tick: int, pose: Pose, movers: npt.NDArray[np.int64], narrow: bool = False) -> bool:
-        """Whether the grid has a way from a pose to the goal among these movers; `narrow`: even one that is refused."""
+        """Return whether the grid has a route to the goal among these movers; `narrow` also counts refused gaps."""
         task = dataclasses.replace(self._task, start=pose)
         ends: Floats = np.array([pose[:2], task.goal])
         discs = covered_discs(self._predictor, tick, ends, 0.0, self._grid, only=movers)
@@ -263,7 +260,7 @@ class Blockage:
         return reachable(Query.between(rasterise(world, self._grid.cell, self._grid.inflate), task))
 
     def _sentence(self, tick: int, pose: Pose) -> str:
-        """The nearest mover without which there is a way, else the nearest of all; where it stands, how long for."""
+        """Name the nearest mover that alone blocks the robot, else the nearest of all, with its position and the time."""
         _, positions = self._predictor.perceived(tick, pose[:2])
         order = self._standing[np.argsort(np.hypot(*(positions[self._standing] - pose[:2]).T), kind="stable")]
         alone = (m for m in order.tolist() if self._way(tick, pose, order[order != m]))

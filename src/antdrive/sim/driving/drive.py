@@ -1,4 +1,4 @@
-"""The drive loop, and what the robot does in one control period: follow the guide, apply the rules, arrive."""
+"""Drive loop and driver: follow the guide, apply the rules, detect arrival and failure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import Task
 
 PROGRESS_HZ = 10  # calls of `progress` per simulated second
-#: Called with the fraction of the route that is done.
+#: Progress callback, called with the completed fraction of the route.
 Progress = Callable[[float], None]
 
 
@@ -26,7 +26,7 @@ def ignore_progress(fraction: float) -> None:
 
 
 def no_scan(tick: int, pose: Pose, estimate: Pose) -> Pose:
-    """The estimate of a robot that does not scan."""
+    """Return the estimate unchanged, for a robot without scans."""
     return estimate
 
 
@@ -37,10 +37,10 @@ def drive(
     scan: Scanning = no_scan,
     *,
     hz: int,  # control periods per second
-    limit: float,  # the longest time [s]
+    limit: float,  # time limit [s]
     progress: Progress = ignore_progress,
 ) -> Ending:
-    """Drive until the decider ends it, the robot touches something, or the time is over."""
+    """Drive until the decider ends the drive, the robot touches something, or the time limit passes."""
     ending = Ending(Outcome.COLLIDED) if plant.touched else None
     tick = 0
     for tick in range(round(limit * hz)):
@@ -53,7 +53,7 @@ def drive(
 
 
 def _control_period(tick: int, plant: Plant, decider: Decider, localiser: Localiser, scan: Scanning) -> Ending | None:
-    """Sense, decide and act for one control period; how the drive ends in it, if it does."""
+    """Run one control period: sense, decide, act. Return the ending, or None while the drive continues."""
     state = plant.state
     estimate = scan(tick, state.pose, localiser.sense(state))
     ending = decider.decide(tick, localiser.settle(estimate), state)
@@ -65,19 +65,19 @@ def _control_period(tick: int, plant: Plant, decider: Decider, localiser: Locali
 
 
 STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
-STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
+STUCK_PROGRESS = 0.02  # least progress along the route that counts [m]
 
 
 class StuckClock(NamedTuple):
-    """How long the robot has made no progress along its route. Waiting for a mover does not count."""
+    """Time without progress along the route. Waiting for a mover does not count."""
 
-    farthest: float = 0.0  # the farthest that the robot has got along the route [m]
-    driving: int = 0  # control periods since then in which the robot was to drive, not rotate
-    turning: int = 0  # control periods since then in which the robot rotated in place
-    held: int = 0  # how many of all these its sight limited the robot's speed
+    farthest: float = 0.0  # farthest arc length that the robot has reached [m]
+    driving: int = 0  # control periods since then with a driving command
+    turning: int = 0  # control periods since then with a turn on the spot
+    held: int = 0  # how many of these the stopping constraint limited
 
     def after(self, pursuit: PursuitState, waiting: bool) -> StuckClock:
-        """The clock after one more control period."""
+        """Return the clock after one more control period."""
         if pursuit.arc > self.farthest + STUCK_PROGRESS:
             return StuckClock(pursuit.arc)
         if waiting:
@@ -89,7 +89,7 @@ class StuckClock(NamedTuple):
 
     @property
     def reason(self) -> str:
-        """What is said of a robot that has made no progress for too long."""
+        """Reason for the outcome `STUCK`."""
         why = f"no progress along the route for {STUCK_TIME:g} s"
         if 2 * self.held > self.driving + self.turning:
             return f"{why}; its sight held it: it had seen no free ground where it was to go"
@@ -97,11 +97,11 @@ class StuckClock(NamedTuple):
 
 
 class Driver(Decider):
-    """Drives a robot along a path, period by period. `decide` makes each step.
+    """Decider that drives a robot along a path, one step per control period.
 
     Attributes:
-        path: the path that the robot follows now
-        step: what the robot does now
+        path: the current path
+        step: the current step
     """
 
     def __init__(
@@ -115,11 +115,11 @@ class Driver(Decider):
 
     @property
     def fraction(self) -> float:
-        """The fraction of the route that is done."""
+        """Completed fraction of the route."""
         return self.step.pursuit.arc / self.path.length
 
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """Make the step of one control period, or end the drive."""
+        """Choose the step of one control period, or end the drive."""
         guide, before = self._guide, self.step
         waiting = before.avoids and abs(state.speed) < WAITING_SPEED
         trigger = guide.trigger(tick, pose, waiting, self.path, before.pursuit.arc)
@@ -141,20 +141,20 @@ class Driver(Decider):
         return ending
 
     def gives_up(self, state: State) -> Ending | None:
-        """End the drive of a robot without progress for too long; rotating in place may take a full turn's time longer."""
+        """End the drive of a robot without progress. Turns on the spot get the time of a full turn on top."""
         clock = self._clock
         if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
             return None
         return Ending(Outcome.STUCK, clock.reason)
 
     def with_reason(self, ending: Ending, tick: int) -> Ending:
-        """How the drive ends; of a robot that did not get on, whether it had found no way."""
+        """Add the guide's failure note to the reason of a robot that got stuck or timed out."""
         if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
             return ending
         return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.failure_note(tick)))))
 
     def _follow(self, path: TrackedPath | None) -> bool:
-        """Go on along a new path; whether there is one."""
+        """Switch to a new path, and return whether there is one."""
         if path is None:
             return False
         self.path = path
@@ -163,12 +163,12 @@ class Driver(Decider):
         return True
 
     def _end_of_route(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """The ending of a robot that stands at the end of its route, unless it can still get to the goal."""
+        """End the drive of a robot that stands at the end of its route, unless it can still reach the goal."""
         left = self.path.length - self.step.pursuit.arc
         if left > self.path.goal_distance or not standing(state) or any(self.step.command):
             return None
         ending, guide, task = self._arrival(pose, state), self._guide, self._task
-        # The robot goes by its estimate: one that is at the goal by it stays, even if it missed it, and one that is not goes on.
+        # The estimate decides: the robot stays if the estimate is at the goal, else it continues.
         if math.dist(pose[:2], task.goal) <= task.goal_tolerance:
             return ending
         if self._follow(guide.missed(tick, pose)) or guide.may_wait:
@@ -176,11 +176,11 @@ class Driver(Decider):
         return self._invalid_plan(tick) if guide.plan_error else ending
 
     def _invalid_plan(self, tick: int) -> Ending:
-        """The ending of a drive on which the planner has given a wrong plan."""
+        """Return the ending after an invalid plan."""
         return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}")
 
     def _arrival(self, pose: Pose, state: State) -> Ending:
-        """How the drive ends if the robot stops here, where it believes that it is at a pose, without a contact."""
+        """Return the ending of a robot that stops at an estimated pose without contact."""
         task, true = self._task, (state.x, state.y)
         left, believed = math.dist(true, task.goal), math.dist(pose[:2], task.goal)
         if left <= task.goal_tolerance:
@@ -195,12 +195,12 @@ class Driver(Decider):
 
 
 def full_turn(robot: RobotSpec, hz: int) -> int:
-    """How many control periods a full turn on the spot takes."""
+    """Return the number of control periods of a full turn on the spot."""
     return round(2 * math.pi / robot.max_yaw_rate * hz)
 
 
 class OnePath(Guide):
-    """Always the same path."""
+    """Guide that keeps one path."""
 
     def __init__(self) -> None:
         self.log, self.walls = [], []
@@ -218,7 +218,7 @@ def follow(
     rules: Sequence[Rule] = (),
     progress: Progress = ignore_progress,
 ) -> Drive:
-    """Drive along a path from the start of a task, for at most a time [s]; `rules` apply after pursuit."""
+    """Drive along a path from the start of a task, for at most `limit` [s]; `rules` apply after pursuit."""
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
     driver = Driver(OnePath(), (pursuit, *rules), path, task, engine.robot, control_hz)
     plant = Bullet(engine, task.start, control_hz)

@@ -1,7 +1,7 @@
-"""Routes in a world without a map: planned through what the lidar has seen, and anew when it finds something in the way.
+"""Mapless guidance: plan through the robot's own occupancy map and re-plan when the lidar hits something new.
 
-What nobody has seen counts as free for a plan (S. Koenig and Y. Smirnov, *Sensor-based planning with the freespace
-assumption*, ICRA 1997), and never for the speed, see `antdrive.sim.driving.stopping_constraint`.
+Plans treat unknown ground as free (S. Koenig and Y. Smirnov, *Sensor-based planning with the freespace assumption*,
+ICRA 1997). The speed limit does not, see `antdrive.sim.driving.stopping_constraint`.
 """
 
 from __future__ import annotations
@@ -41,28 +41,28 @@ from antdrive.sim.policy import (
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 
-GROWTH = (4.0, 16.0)  # how far beyond start and goal plans may lead, then if there is no path [m]
-MARGINS = (1.0, 0.0)  # shares of the margin that plans keep, then if the way is long or there is none
-FAIR = 1.25  # a way that is longer than the straight line by more than this factor is long
-DETOUR = 1.15  # a way with less margin must be shorter by this factor
-CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of the plan, beyond the inflation [m]
-SAMPLES = 0.06  # spacing of the places on a route at which speed limits and lookaheads are worked out [m]
-SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
-INTERVAL = 0.15  # the shortest time between two plans [s]
-COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
-ROUTE_CHECK_STEP = 0.1  # spacing of the points of a route that are looked at [m]
-FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
-CORNERED = 0.1  # and those of other shapes by this share more of what their corners stand out [m/m]
-TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from what was hit than in a known world [m]
-LATELY = 30.0  # what plans found no longer ago than this is said of a drive that ends without a way [s]
+GROWTH = (4.0, 16.0)  # extent of the planning area beyond start and goal; the second if no path is found [m]
+MARGINS = (1.0, 0.0)  # fractions of the margin that plans keep; the second if the route is long or there is none
+FAIR = 1.25  # a route longer than the straight line by more than this factor is long
+DETOUR = 1.15  # a route with less margin must be shorter by this factor
+CORRIDOR = 1.2  # smoothing considers obstacles within this distance of the plan, beyond the inflation [m]
+SAMPLES = 0.06  # spacing of the points of a route that get speed limits and lookaheads [m]
+SPARE = 0.25  # the controller knows obstacles this much beyond its longest arcs [m]
+INTERVAL = 0.15  # shortest time between two plans [s]
+COVERS = 1e-3  # hits within this distance of the robot or its goal cover it [m]
+ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
+FORGIVING = 0.005  # arcs of a disc may come this much closer to hits than to obstacles of a given map [m]
+CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
+TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
+LATELY = 30.0  # failed searches up to this old explain how a drive ended [s]
 
 
 class Exploration(RouteGuide):
-    """Finds routes through what a robot without a map has seen.
+    """Guide that plans through the robot's own map.
 
     Attributes:
-        log: every attempt to find a new route
-        lost: whether there is no path through what was seen; then the robot stops
+        log: every search for a new route
+        lost: whether the map has no path; the robot then stops
     """
 
     def __init__(
@@ -88,12 +88,12 @@ class Exploration(RouteGuide):
 
     @property
     def plan_error(self) -> str:
-        """What is wrong with a plan that the planner gave; empty if nothing is."""
+        """Why the planner's plan is invalid; empty if it is valid."""
         return self._routes.plan_error
 
     @property
     def may_wait(self) -> bool:
-        """Whether the robot stays where it is for a while: it has no way, and tries again, or it makes a scan turn."""
+        """Whether the robot may stay in place: it has no path and tries again, or it makes a scan turn."""
         return self.lost or self.scan_turning
 
     @property
@@ -103,23 +103,23 @@ class Exploration(RouteGuide):
 
     @property
     def scan_turn(self) -> ScanTurn | None:
-        """The scan turn that the robot makes now; None: it makes none."""
+        """The current scan turn; None if there is none."""
         return self._recovery.scan_turn
 
     def first(self) -> tuple[Grid, PlanResult]:
-        """The grid and the plan from the start, through what the first scan shows. Later plans do not depend on it."""
-        found = self.plan(self._task.start)
+        """Plan from the start on the map of the first scan. Later plans do not depend on it."""
+        first = self.plan(self._task.start)
         self._routes.restart()
-        return found
+        return first
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
-        """Take a plan that was made elsewhere as it is."""
+        """Return an externally made plan unchanged."""
         return grid, plan
 
     # ---- plans
 
     def plan(self, pose: Pose, avoided: Sequence[Disc] = ()) -> tuple[Grid, PlanResult]:
-        """The grid and the plan from a pose, through what is known; with less margin where there is no path otherwise."""
+        """Plan on the map from a pose, with less margin where no path exists otherwise; return grid and plan."""
         straight = math.dist(pose[:2], self._task.goal)
         best: tuple[Grid, PlanResult] | None = None
         for growth in GROWTH:
@@ -143,7 +143,7 @@ class Exploration(RouteGuide):
         return rasterise(task.world, self._routes.cell, self._robot.radius + margin)
 
     def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
-        """The grid and the plan from a pose that keeps off the movers that are followed; and what the plan keeps off."""
+        """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""
         movers = self._movers
         if movers is None:
             return (*self.plan(pose), [])
@@ -162,7 +162,7 @@ class Exploration(RouteGuide):
         return (*self.plan(pose), [])
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
-        """Set out on a plan: its route, and the same prepared for the controller."""
+        """Return the route of a plan, and its path for the controller."""
         return self._route(self._task.start, grid, plan)
 
     def _route(
@@ -180,7 +180,7 @@ class Exploration(RouteGuide):
         return route, tracked
 
     def _bounds(self, growth: float, pose: Pose) -> Bounds:
-        """Around start and goal, and around the robot where drift took its estimated pose out of there."""
+        """Return bounds around start and goal, extended to a robot whose estimate drifted outside."""
         (x0, y0), (x1, y1), (x, y) = self._task.start[:2], self._task.goal, pose[:2]
         low, high = (min(x0, x1) - growth, min(y0, y1) - growth), (max(x0, x1) + growth, max(y0, y1) + growth)
         return (
@@ -191,8 +191,8 @@ class Exploration(RouteGuide):
         )
 
     def _known(self, pose: Pose, bounds: Bounds) -> Task:
-        """The task as it is known, from a pose."""
-        # A grid gives its bounds back but for rounding.
+        """Return the task with the map's discs as obstacles, from a pose."""
+        # The bounds of a grid are exact except for rounding.
         key = self.survey.map, len(self.survey.scans), pose, tuple(round(side, 9) for side in bounds)
         if self._known_as[0] == key:
             return self._known_as[1]
@@ -200,14 +200,14 @@ class Exploration(RouteGuide):
         if self._movers is not None:
             discs = self._movers.without_trails(discs, pose)
         ends = np.array((pose[:2], self._task.goal))
-        discs = _kernels_hits.beside(discs, ends, COVERS)  # what covers one of them is an error of the map
+        discs = _kernels_hits.beside(discs, ends, COVERS)  # hits that cover one of them are map errors
         known = dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
         self._known_as = key, known
         return known
 
     def _prepare(self, route: Route, world: World, margin: float) -> TrackedPath:
         robot = self._robot
-        self._indexed = -1  # the path knows the obstacles along the route, and is to know those near the robot
+        self._indexed = -1  # the path indexes obstacles along the route; the next refresh adds those near the robot
         tracked = self._routes.prepared(route, world, margin, SAMPLES, indexed=False)
         foot, tuning = robot.footprint, tracked.tuning
         give = FORGIVING + CORNERED * (robot.radius - foot.inner_radius)
@@ -221,10 +221,10 @@ class Exploration(RouteGuide):
             ),
         )
 
-    # ---- what the driver asks
+    # ---- the driver's queries
 
     def refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
-        """The path with what the lidar has just seen near the robot."""
+        """Return the path with the obstacles that the lidar has just seen near the robot."""
         if self._indexed == self.survey.whole:
             return path
         self._indexed = self.survey.whole
@@ -234,11 +234,11 @@ class Exploration(RouteGuide):
         return path.with_obstacles(unsorted_obstacles(discs, path.obstacles.bounds))
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
-        """A new path to a goal that the robot missed, unless it looks for a way already."""
+        """Return a new path to a missed goal, unless a search or scan turn is under way."""
         return None if self.may_wait else self.replan(tick, pose, MISSED)
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
-        """Why a new route is due now; empty if none is."""
+        """Return why a new route is due; empty if none is."""
         now = tick / self._hz
         if self._movers is not None:
             self._movers.observe(tick, pose, waiting)
@@ -270,7 +270,7 @@ class Exploration(RouteGuide):
         return DISCOVERED if self._discovered(pose, arc) else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """A new path from a pose, prepared for the controller; None: there is none, or the robot looks round first."""
+        """Return a new path from a pose; None if there is none, or a scan turn comes first."""
         now, started = tick / self._hz, time.perf_counter()
         self._planned_at, self._tick = now, tick
         if trigger in (STALLED, HELD, BACKED, MADE_ROOM, SCANNED):
@@ -298,7 +298,7 @@ class Exploration(RouteGuide):
         return None
 
     def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
-        """Whether a robot that did not get on does something else than to plan anew, and the way that it then follows."""
+        """Start a recovery; return whether it replaces planning, and the path that it follows."""
         recovery = self._recovery
         if trigger == SCANNED:
             recovery.end_scan_turn(now, pose)
@@ -311,37 +311,37 @@ class Exploration(RouteGuide):
             return True, None
         if trigger == HELD:
             return True, None
-        found = recovery.escape(pose) if trigger == STALLED else None
-        if found is None:
+        route = recovery.escape(pose) if trigger == STALLED else None
+        if route is None:
             return False, None
-        way = self._prepare(found, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
+        way = self._prepare(route, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
     def note_held(self, tick: int, held: Twist | None) -> None:
-        """Note whether the robot stands because its sight does not let it go on."""
+        """Note the twist that the stopping constraint reduced to a stop; None if it did not."""
         self._recovery.note_held(tick / self._hz, held)
 
     def failure_note(self, tick: int) -> str:
-        """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not."""
+        """Say that the last searches found no path; empty if they are long ago or found one."""
         if tick / self._hz - self._gave_up_at > LATELY:
             return ""
         return f"no way through what was seen, last at t = {self._gave_up_at:.1f} s"
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """The array `seen` of a log: the discs that each plan was made among. Cells lie on grids that nobody else knows."""
+        """Return the array `seen`: the discs behind each plan. `cells` is empty, since the log has no grid for them."""
         return {"seen": table_logged(self._seen, 4, log, per_tick), "cells": np.empty((0, 2), dtype=np.int32)}
 
     # ---- the route ahead
 
     def _note_route(self, route: Route, world: World, inflate: float) -> None:
-        """Note the points of a route and the clearance that they are to keep."""
+        """Note the points of a route and their required clearance, for route checks."""
         arcs = np.arange(0.0, route.length + ROUTE_CHECK_STEP, ROUTE_CHECK_STEP)
         self._arcs = arcs
         self._ahead = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
         self._needed = np.minimum(point_clearance(world, self._ahead), inflate)
 
     def _discovered(self, pose: Pose, arc: float) -> bool:
-        """Whether the last scan met something where the route ahead leads."""
+        """Return whether the last scan hit something on the route ahead."""
         first = int(arc / ROUTE_CHECK_STEP)
         ahead, needed = self._ahead[first:], self._needed[first:]
         return len(ahead) > 0 and self.survey.hit_within(ahead, needed, self._arcs[first:] - arc)

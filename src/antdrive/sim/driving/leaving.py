@@ -1,4 +1,4 @@
-"""Whether a robot gets away from a start where it cannot turn freely: its first motion, rehearsed with its footprint."""
+"""Narrow starts: a rehearsal of the robot's first motion with its exact footprint."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import World, point_clearance
 
-REHEARSED = 60.0  # after this time a robot that is still in a narrow place is left to the drive [s]
-STEP = 2e-4  # no point of the footprint moves farther between two poses that are checked [m]
+REHEARSED = 60.0  # limit of the rehearsal; the drive decides what follows [s]
+STEP = 2e-4  # longest motion of a footprint point between two checked poses [m]
 
 
 def is_narrow(world: World, robot: RobotSpec, pose: Pose) -> bool:
-    """Whether a robot that fits at a pose could touch something if it turned there."""
+    """Return whether a robot that fits at a pose could touch something by turning there."""
     return not robot.footprint.is_disc and _room(world, pose) <= robot.radius
 
 
 def cannot_leave(
     tracked: TrackedPath, controller: PurePursuit, world: World, robot: RobotSpec, start: Pose, control_hz: int
 ) -> str:
-    """What the robot would touch on its way out of a narrow place, and what turning needs there; empty if it gets out.
+    """Say what the robot would hit when it leaves a narrow start, and the room that a turn needs; empty if it gets out.
 
-    The controller's own commands are followed exactly, from rest, until the robot could turn freely. A way out that it does
-    not take is no way out. It turns the shorter way round; a robot that is not centred on its axle turns the other way
-    where the shorter is blocked and the longer is not.
+    The rehearsal follows the controller's commands exactly, from rest, until the robot can turn freely. Only the
+    route that the controller takes counts. The robot turns the shorter way round. A robot that is not centred on its
+    axle turns the other way where only the shorter is blocked.
     """
     if robot.footprint.corners:
         halting = Leaving(tracked, controller, world, robot, halts=True)
@@ -53,7 +53,7 @@ def cannot_leave(
 
 
 class Leaving(Decider):
-    """Follows a path until the robot could turn freely; one that `halts` gives up where the controller stops it."""
+    """Decider that follows a path until the robot can turn freely; with `halts`, a stop by the controller ends it."""
 
     def __init__(
         self, path: TrackedPath, controller: PurePursuit, world: World, robot: RobotSpec, *, halts: bool = False
@@ -62,7 +62,7 @@ class Leaving(Decider):
         self._path, self._controller, self._world, self._robot, self._halts = path, controller, world, robot, halts
 
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """The controller's command, as long as the place is narrow."""
+        """Return the controller's command while the place is narrow."""
         if not is_narrow(self._world, self._robot, pose):
             return Ending(Outcome.SUCCEEDED)
         self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
@@ -70,7 +70,7 @@ class Leaving(Decider):
 
 
 def _rehearsed(leaving: Leaving, world: World, robot: RobotSpec, start: Pose, hz: int) -> tuple[Ending, Kinematic]:
-    """How the way out ends, and the robot there."""
+    """Rehearse the start; return the ending and the robot."""
     plant = Kinematic(
         start,
         lambda pose, twist: _way(pose, twist, 1 / hz, robot.radius),
@@ -84,7 +84,7 @@ def _room(world: World, pose: Pose) -> float:
 
 
 def _way(pose: Pose, command: Twist, period: float, radius: float) -> Floats:
-    """The poses (K, 3) that a robot of this radius passes in a period, after the one given."""
+    """Return the poses (K, 3) of a robot of this radius during a period, without the first."""
     speed, yaw_rate = command
     count = max(1, math.ceil((abs(speed) + abs(yaw_rate) * radius) * period / STEP))
     t = period * np.arange(1, count + 1) / count

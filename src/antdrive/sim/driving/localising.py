@@ -1,8 +1,8 @@
-"""Localisers: exact, by noisy pose fixes, by dead reckoning (which scan matching may correct), or by the true pose.
+"""Localisers: exact pose, noisy pose fixes, dead reckoning (optionally corrected by scan matching), true pose.
 
-The same wheels slip and the same commands are late whichever way the robot localises itself. A new kind is a class here and a
-word of `LOCALISATIONS` in `antdrive.sim.settings`; what it needs is checked in `Scenario`, what its log must show in
-`antdrive.sim.log.consistency`. Scans correct the estimate in `antdrive.sim.driving.survey`.
+All of them share wheel slip and command delay. To add one, write a class and a word of `LOCALISATIONS` in
+`antdrive.sim.settings`. `Scenario` checks its requirements, `antdrive.sim.log.consistency` its log.
+`antdrive.sim.driving.survey` corrects estimates with scans.
 """
 
 from __future__ import annotations
@@ -23,39 +23,39 @@ from antdrive.sim.sensing.dead_reckoning import DeadReckoning
 
 
 class Exact:
-    """A robot that knows its pose and whose wheels do as they are told.
+    """Localiser with the exact pose and ideal wheels.
 
     Attributes:
         noisy: false
-        estimates: empty: estimates are poses
+        estimates: empty, since estimates equal the true poses
     """
 
     noisy = False
     estimates: Sequence[Pose] = ()
 
     def sense(self, state: State) -> Pose:
-        """The true pose."""
+        """Return the true pose."""
         return state.pose
 
     def settle(self, estimate: Pose) -> Pose:
-        """The pose itself: commands take effect at once."""
+        """Return the pose unchanged: commands take effect at once."""
         return estimate
 
     def actuate(self, command: Twist) -> Twist:
-        """The command itself."""
+        """Return the command unchanged."""
         return command
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """Nothing: estimates are poses, and the motors are set to the commands."""
+        """Return no arrays: estimates equal poses, and motor targets equal commands."""
         return {}
 
 
 class Fixes(NoiseModel):
-    """Wheel odometry that noisy pose fixes correct.
+    """Localiser that corrects wheel odometry by noisy pose fixes.
 
     Attributes:
         noisy: true
-        estimates: the estimated pose in each control period so far
+        estimates: the estimated pose of each control period so far
     """
 
     noisy = True
@@ -65,17 +65,17 @@ class Fixes(NoiseModel):
         self.estimates: list[Pose] = []
 
     def sense(self, state: State) -> Pose:
-        """The pose by odometry and, where one is due, a fix."""
+        """Return the odometry pose, corrected by a fix where one is due."""
         return self.estimate_pose(state.pose, Twist(state.speed, state.yaw_rate))
 
     def settle(self, estimate: Pose) -> Pose:
-        """Go on from an estimate; the pose after the commands that are under way."""
+        """Set the estimate, and return the pose after the delayed commands."""
         self.estimate = estimate
         self.estimates.append(estimate)
         return self.pose_after_delay()
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """The estimates, whose error stays the same between two control periods, and the targets of the motors."""
+        """Return the estimates and the motor targets; the error of an estimate stays constant within a control period."""
         errors = [
             (x - true_x, y - true_y, math.remainder(yaw - true_yaw, 2 * math.pi))
             for (x, y, yaw), (true_x, true_y, true_yaw) in zip(
@@ -87,22 +87,22 @@ class Fixes(NoiseModel):
 
 
 class TruePose(Fixes):
-    """The true pose, on wheels that slip."""
+    """Localiser with the true pose on slipping wheels."""
 
     def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
-        """The true pose."""
+        """Return the true pose."""
         return pose
 
 
 class Reckoned(Fixes):
-    """Dead reckoning: encoders tell the speed, a gyro the yaw rate, and errors add up. Scans may correct it."""
+    """Dead reckoning from encoders and a gyro. Errors accumulate; scans may correct them."""
 
     def __init__(self, robot: RobotSpec, noise: float, period: float, start: Pose, seed: int, errors: Odometry) -> None:
         super().__init__(robot.noise.scaled(noise), robot.track, period, start, random_stream(seed, "noise"))
         self._reckoning = DeadReckoning(errors, random_stream(seed, "odometry"), start)
 
     def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
-        """The pose that odometry gives for a robot whose true velocity is `twist`."""
+        """Return the odometry pose of a robot whose true velocity is `twist`."""
         noise = self._noise
         rolled = self._wheels(twist) / (1 + self._slip) * (1 + noise.encoder * self._rng.standard_normal(2))
         if self._tick:
@@ -111,7 +111,7 @@ class Reckoned(Fixes):
         return self.estimate
 
     def settle(self, estimate: Pose) -> Pose:
-        """Go on from an estimate; the pose after the commands that are under way."""
+        """Set the estimate, and return the pose after the delayed commands."""
         self._reckoning.pose = estimate
         return super().settle(estimate)
 
@@ -119,7 +119,8 @@ class Reckoned(Fixes):
 def localiser_of(
     kind: str, robot: RobotSpec, noise: float, odometry: float, period: float, start: Pose, seed: int
 ) -> Exact | Fixes:
-    """The localiser of one drive."""
+    """Create the localiser of a drive."""
+
     if kind in ("odometry", "matching"):
         return Reckoned(robot, noise, period, start, seed, Odometry().scaled(odometry))
     levels = robot.noise.scaled(noise)

@@ -1,7 +1,7 @@
-"""What movers mean for routes: when a new one is due, where movers will soon be, and where they roam.
+"""Traffic: replan triggers by movers, the ground that they cover soon, and the zones where they roam.
 
-A robot without a map knows only the tracks of `antdrive.sim.driving.survey`, so the ground that movers roam grows with
-what was seen of them.
+A robot without a map knows movers by the tracks of `antdrive.sim.driving.survey` only, so zones grow with its
+observations.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from antdrive.worlds import Disc, Grid, World, rasterise
 if TYPE_CHECKING:
     from antdrive.sim.driving.survey import Survey
 
-MIXING = 2.0  # after this time a mover's place counts as a new sample of where movers go [s]
-MEMORY = 2.0  # how much traffic a lidar shows is a mean over about this time [s]
-FADING = 30.0  # and the most that it showed fades within about this time [s]
-FAST = 0.75  # movers that are found by lidar count as traffic from this share of the robot's top speed on
-SOON = 0.1  # speeds are those of the predictions this far ahead [s]
-STRAY = 0.1  # a mover is expected this far beyond the box, but no farther [m]
-OPENING = 2.0  # half the width of the way that is kept open for the robot and the goal [cells]
+MIXING = 2.0  # after this time a mover's position is an independent sample of where movers go [s]
+MEMORY = 2.0  # time constant of the mean traffic in a lidar's view [s]
+FADING = 30.0  # time constant with which the highest traffic seen fades [s]
+FAST = 0.75  # movers tracked by lidar count as traffic above this fraction of the robot's top speed
+SOON = 0.1  # speeds are those of predictions over this time [s]
+STRAY = 0.1  # movers are expected up to this far beyond the box [m]
+OPENING = 2.0  # half the width of the corridor that stays open for the robot and the goal [cells]
 
 
 class Traffic:
-    """Where the robot has seen movers, and how many there are.
+    """Positions and density of the movers seen so far.
 
     Attributes:
-        box: the smallest box around all places of movers that were seen: xmin, ymin, xmax, ymax [m]
-        samples: how many independent places of movers that makes, about
+        box: bounding box of all observed positions: xmin, ymin, xmax, ymax [m]
+        samples: equivalent number of independent positions
     """
 
     def __init__(self, predictor: PerceivedMovers, radius: float, bounds: Bounds, hz: int) -> None:
@@ -48,39 +48,38 @@ class Traffic:
         self._noted = _nowhere()
 
     def observe(self, tick: int, position: Point) -> None:
-        """Take note of the movers that the robot perceives in a tick from a position [m]."""
+        """Note the movers that the robot perceives in a tick from a position [m]."""
         perceived, places = self._predictor.perceived(tick, position)
         self._note(places[perceived], 1 / self._hz)
 
     def _note(self, places: Floats, period: float) -> None:
-        """Take note of places of movers (N, 2) [m], a period [s] after the last ones."""
+        """Note positions of movers (N, 2) [m], a period [s] after the last ones."""
         if len(places):
             self.samples += len(places) * period / MIXING if self.samples else len(places)
             np.minimum(self.box[:2], places.min(axis=0), out=self.box[:2])
             np.maximum(self.box[2:], places.max(axis=0), out=self.box[2:])
 
     def grown(self, by: float) -> bool:
-        """Whether a side of the box has moved outwards by more than this [m] since the last `zones`."""
+        """Return whether a side of the box has moved outwards by more than this [m] since the last `zones`."""
         return bool(self.samples) and bool((np.abs(self.box - self._noted) > by).any())
 
     def rate(self, tick: int, position: Point) -> float:
-        """How many movers a second would meet a robot that stands anywhere in the world [1/s].
+        """Return how many movers would meet a standing robot per second [1/s].
 
-        A mover sweeps the ground where it would touch the robot: as wide as both, as long as it gets in a second.
+        Each mover sweeps the ground where it would touch the robot: a strip as wide as both, at the mover's speed.
         """
         places, radii = self._predictor.predict(tick, position, np.array([0.0, SOON]))
         speeds = np.hypot(*(places[1] - places[0]).T) / SOON
         return float((2 * (radii + self._radius) * speeds).sum() / self._area)
 
     def widest(self, tick: int, position: Point) -> float:
-        """The largest radius of the movers that the robot perceives from a position [m]."""
+        """Return the largest radius of the movers perceived from a position [m]."""
         return float(self._predictor.predict(tick, position, np.zeros(1))[1].max(initial=0.0))
 
     def zones(self, tick: int, position: Point, goal: Point, grid: Grid) -> list[Zone]:
-        """The ground that movers roam, as far as the robot can tell from a position [m]: as estimated, and as seen.
+        """Return the zones that movers roam, seen from a position [m]: estimated, then observed.
 
-        The box of n places that were seen is too small by about a share of 1 / (n + 1) on each side, if movers are
-        everywhere in theirs equally often.
+        The box of n uniform samples is too small by a fraction of about 1 / (n + 1) on each side.
         """
         self._noted = self.box.copy()
         radius = self.widest(tick, position)
@@ -90,10 +89,10 @@ class Traffic:
 
 
 class TrackedTraffic(Traffic):
-    """Where a robot has met movers with its lidar, and how many fast ones there are on the ground in sight.
+    """Traffic from lidar tracks: positions hit by scans, and the density of fast movers on visible ground.
 
-    Places of movers that are hidden are guesses, so they do not count. How much traffic there is in the whole world cannot be
-    seen; the ground that was in sight lately stands for it.
+    Positions of hidden movers are predictions and do not count. The recently visible ground represents the whole
+    world.
     """
 
     def __init__(self, predictor: Tracked, spec: RobotSpec, hz: int) -> None:
@@ -102,7 +101,7 @@ class TrackedTraffic(Traffic):
         self._last, self._lately, self._most = -1, 0.0, 0.0
 
     def observe(self, tick: int, position: Point) -> None:
-        """Take note of the movers that the last scan met, if it is a new one, from a position [m]."""
+        """Note the movers of the last scan, if it is new, from a position [m]."""
         tracking = self._tracks.tracking
         if tracking.tick == self._last:
             return
@@ -116,14 +115,14 @@ class TrackedTraffic(Traffic):
         self._most = max(self._lately, self._most * math.exp(-period / FADING))
 
     def rate(self, tick: int, position: Point) -> float:
-        """How many fast movers a second would meet a robot that stands anywhere on ground that is in sight [1/s].
+        """Return how many fast movers would meet a standing robot per second on visible ground [1/s].
 
-        Movers that are out of sight for a while are there still, so the most that was seen counts, and fades.
+        Movers hidden for a while still exist, so the highest rate seen counts, and fades.
         """
         return self._most
 
     def _sweep(self, tick: int, position: Point, reach: float) -> float:
-        """The ground on which fast movers within reach [m] would touch the robot, in a second [m^2/s]."""
+        """Return the area that fast movers within reach [m] sweep per second [m^2/s]."""
         places, radii = self._predictor.predict(tick, position, np.array([0.0, 1.0]))
         speeds = np.hypot(*(places[1] - places[0]).T)
         counts = (np.hypot(*(places[0] - position).T) - radii <= reach) & (speeds >= self._fast)
@@ -131,13 +130,13 @@ class TrackedTraffic(Traffic):
 
 
 class Zone:
-    """A box that movers roam, grown by their radius and the grid's inflation, with ways kept open into it.
+    """A box that movers roam, grown by their radius and the grid's inflation, with open corridors.
 
-    A goal within it has a way straight out. A robot within it may go anywhere within its distance from outside.
+    A goal inside has a straight corridor out. A robot inside may go anywhere within its distance to the outside.
 
     Attributes:
-        blocked: the free cells within it, off these ways (R, C)
-        discs: discs along the edge of the box, which keep a smoothed route outside
+        blocked: the free cells within the zone, outside the corridors (R, C)
+        discs: discs along the edge of the box that keep a smoothed route outside
     """
 
     def __init__(self, box: Floats, radius: float, position: Point, goal: Point, grid: Grid) -> None:
@@ -159,16 +158,16 @@ class Zone:
         self.discs = [Disc(x, y, size) for x, y, size in rows_of_discs]
 
     def holds(self, disc: Disc) -> bool:
-        """Whether a predicted disc is where movers go. One that is not will have turned before it gets there."""
+        """Return whether a predicted disc is where movers go. A mover would turn before it leaves."""
         return bool(_depth(np.array([disc.x, disc.y]), self._box, STRAY) > 0)
 
     def crossed(self, tracked: TrackedPath, arc: float) -> bool:
-        """Whether a route leads through blocked cells beyond an arc length on it [m]."""
+        """Return whether a route crosses blocked cells beyond an arc length [m]."""
         points = points_at(tracked, np.arange(arc, tracked.length, 0.5 * self._grid.cell))
         return any(self.blocked[self._grid.cell_at(x, y)] for x, y in points.tolist())
 
     def _off_ways(self, points: Floats) -> Floats:
-        """How far points (..., 2) are from the ways that are kept open [m]."""
+        """Return the distances of points (..., 2) from the corridors [m]."""
         off = np.full(points.shape[:-1], np.inf)
         for a, b, half in self._ways:
             step = b - a
@@ -178,17 +177,17 @@ class Zone:
 
 
 def _nowhere() -> Floats:
-    """The box of no places."""
+    """Return an empty box."""
     return np.array([math.inf, math.inf, -math.inf, -math.inf])
 
 
 def _depth(points: Floats, box: Floats, reach: float) -> Floats:
-    """How far points (..., 2) lie within a box that is grown by `reach` [m]; negative outside."""
+    """Return how deep points (..., 2) lie within a box grown by `reach` [m]; negative outside."""
     return np.asarray(np.minimum(points - box[:2], box[2:] - points).min(axis=-1) + reach)
 
 
 def _way_out(point: Floats, box: Floats, reach: float) -> Floats:
-    """The point outside a box that is grown by `reach` [m] that is nearest to a point within it."""
+    """Return the nearest point outside a box grown by `reach` [m]."""
     gaps = np.concatenate((point - box[:2], box[2:] - point)) + reach
     side = int(np.argmin(gaps))
     out = point.copy()
@@ -197,22 +196,20 @@ def _way_out(point: Floats, box: Floats, reach: float) -> Floats:
 
 
 def _edge(box: Floats, spacing: float) -> Floats:
-    """Points (N, 2) along the edge of a box, at most `spacing` apart [m]."""
+    """Return points (N, 2) along the edge of a box, at most `spacing` apart [m]."""
     xs, ys = (np.linspace(box[k], box[k + 2], 2 + math.ceil((box[k + 2] - box[k]) / spacing)) for k in (0, 1))
     sides = [np.stack([xs, np.full_like(xs, y)], axis=1) for y in (box[1], box[3])]
     sides += [np.stack([np.full_like(ys, x), ys], axis=1)[1:-1] for x in (box[0], box[2])]
     return np.vstack(sides)
 
 
-COARSE = 0.25  # side of the cells on which a route is held against the ground that movers roam [m]
-SLACK = (
-    0.4  # the lane that is left along the outermost walls is so much wider than the robot needs: maps are crooked [m]
-)
-MOST = 1.0  # movers have a radius of at most this [m]
+COARSE = 0.25  # side of the cells on which routes are checked against zones [m]
+SLACK = 0.4  # extra width of the lane along the outermost walls, since maps are distorted [m]
+MOST = 1.0  # largest radius of a mover [m]
 
 
 class MoversAhead:
-    """When movers make a new route due, and what it keeps off."""
+    """Replan triggers by movers, and the discs and zones that plans avoid."""
 
     def __init__(
         self,
@@ -229,7 +226,7 @@ class MoversAhead:
         self._waiting_since = math.nan
 
     def observe(self, tick: int, pose: Pose, waiting: bool) -> None:
-        """Take note of what the robot sees in a control period."""
+        """Note the perceived movers and the waiting time of one control period."""
         if self._traffic is not None:
             self._traffic.observe(tick, pose[:2])
         if not waiting:
@@ -238,11 +235,11 @@ class MoversAhead:
             self._waiting_since = tick / self._hz
 
     def wait_anew(self) -> None:
-        """Forget how long the robot has waited."""
+        """Reset the waiting time."""
         self._waiting_since = math.nan
 
     def trigger(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> str:
-        """Why movers make a new route due now; empty if they do not."""
+        """Return why movers make a new route due; empty if they do not."""
         policy = self._policy
         if tick / self._hz - self._waiting_since >= policy.max_wait:
             self.wait_anew()
@@ -255,30 +252,30 @@ class MoversAhead:
         return TRAFFIC if self.zones(tick, pose, self._around(pose))[-1].crossed(tracked, arc) else ""
 
     def heavy(self, tick: int, pose: Pose) -> bool:
-        """Whether there is so much traffic that the robot should go round the ground that movers roam."""
+        """Return whether traffic is heavy enough to plan around zones."""
         return self._traffic is not None and self._traffic.rate(tick, pose[:2]) > self._policy.max_traffic
 
     def discs(self, tick: int, pose: Pose) -> list[Disc]:
-        """What movers will cover soon; they close neither the robot's position nor the goal.
+        """Return the discs that movers will cover soon; they close neither the robot's position nor the goal.
 
-        They are larger where the robot has waited beside one.
+        Discs are larger where the robot has waited beside a mover.
         """
         ends = np.array([pose[:2], self._goal])
         covered = covered_discs(self._predictor, tick, ends, self._policy.prediction_time, self._grid)
         return covered if self._blockage is None else covered + self._blockage.discs(tick, ends)
 
     def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
-        """The ground that movers roam, largest first: as estimated, then as seen."""
+        """Return the zones that movers roam, largest first: estimated, then observed."""
         assert self._traffic is not None
         return self._traffic.zones(tick, pose[:2], self._goal, grid)
 
     def plan_around_zones(
         self, pose: Pose, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]
     ) -> tuple[PlanResult, list[Disc]] | None:
-        """A plan around the first zone where it is not too long, and what it keeps off; None: all are too long."""
+        """Return a plan around the first zone without a long detour, and its discs; None if all detours are too long."""
         reach, longest = self._policy.obstruction_range, self._policy.max_detour * math.dist(pose[:2], self._goal)
         for zone in zones:
-            # Movers that are far away will have moved on: they must not close the only way to the goal.
+            # Distant movers will have moved on and must not close the only route to the goal.
             near = [d for d in discs if math.dist((d.x, d.y), pose[:2]) <= reach and zone.holds(d)]
             answer = plan(near, zone)
             if answer.cost <= longest:
@@ -286,12 +283,12 @@ class MoversAhead:
         return None
 
     def _around(self, pose: Pose) -> Grid:
-        """The grid on which a route is held against the ground that movers roam."""
+        """Return the grid on which routes are checked against zones."""
         return self._grid
 
 
 class MoversSeenAhead(MoversAhead):
-    """Movers without a map: those that the robot tracks, around walls as far as they were seen."""
+    """Replan triggers by lidar tracks, for a robot without a map."""
 
     def __init__(
         self,
@@ -309,7 +306,7 @@ class MoversSeenAhead(MoversAhead):
         self._survey = survey
 
     def discs(self, tick: int, pose: Pose) -> list[Disc]:
-        """What movers will cover soon; they close neither the robot's position nor the goal."""
+        """Return the discs that movers will cover soon; they close neither the robot's position nor the goal."""
         return super().discs(tick, pose) if len(self._predictor.within_range(tick, pose[:2])) else []
 
     def _around(self, pose: Pose) -> Grid:
@@ -318,7 +315,7 @@ class MoversSeenAhead(MoversAhead):
         return rasterise(World("around movers", around), COARSE, self._grid.inflate)
 
     def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
-        """The ground that movers roam, largest first: all but a lane along the outermost walls that were seen, then as seen."""
+        """Return the zones, largest first: all but a lane along the outermost observed walls, estimated, observed."""
         zones = self._roamed.zones(tick, pose[:2], self._goal, grid)
         roamed, radius = self._roamed.box, self._roamed.widest(tick, pose[:2])
         lane = radius + 2 * self._grid.inflate + SLACK
@@ -327,7 +324,7 @@ class MoversSeenAhead(MoversAhead):
         return [Zone(inner, radius, pose[:2], self._goal, grid), *zones]
 
     def bounds(self, least: Bounds) -> Bounds:
-        """Bounds that hold a way round the ground that movers roam, as far as it was seen."""
+        """Return bounds that contain a route around the zones."""
         box, more = self._roamed.box, 2 * (MOST + self._grid.inflate)
         lower, upper = self._outermost()
         x0, y0 = np.floor(np.minimum(lower, box[:2] - more)).tolist()
@@ -335,16 +332,16 @@ class MoversSeenAhead(MoversAhead):
         return min(least[0], x0), min(least[1], y0), max(least[2], x1), max(least[3], y1)
 
     def _outermost(self) -> tuple[Floats, Floats]:
-        """The lower left and the upper right corner of all that was hit (2,), (2,) [m]; of what movers roam if nothing was."""
+        """Return the lower left and upper right corner of all hits (2,), (2,) [m]; without hits those of the observed box."""
         hits = self._survey.map.discs()[:, :2]
         if not len(hits):
             return self._roamed.box[:2], self._roamed.box[2:]
         return hits.min(axis=0), hits.max(axis=0)
 
     def without_trails(self, discs: Floats, pose: Pose) -> Floats:
-        """What was hit, as discs (N, 3) [m], without what movers may have left behind where they roam.
+        """Return the discs (N, 3) [m] without those that movers may have left behind where they roam.
 
-        A mover that is as far away as ground is not seen free is no track yet, so its hits are entered in the map.
+        Beyond the distance at which ground is observed as free, a mover has no track yet and its hits enter the map.
         """
         if not self._roamed.samples:
             return discs

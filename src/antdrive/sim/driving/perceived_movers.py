@@ -1,4 +1,4 @@
-"""The movers as a robot perceives them, and the prediction that follows: by ground truth, or by tracks of its lidar."""
+"""Movers as a robot perceives and predicts them: ground truth, or lidar tracks."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from antdrive.sim.sensing.tracking import TrackedMovers
 
 CHUNK = 240  # control periods whose positions and velocities are computed at once
-STANDS = 0.08  # a mover that is slower than this, as far as scans tell, stands still [m/s]
+STANDS = 0.08  # tracks slower than this stand still [m/s]
 
 #: The numbers (P,) of movers.
 Numbers: TypeAlias = npt.NDArray[np.int64]
 
 
 class PerceivedMovers(abc.ABC):
-    """The movers as the robot perceives them, within range. Each goes on at the velocity that the robot knows.
+    """Perceived movers within range, predicted at constant velocity.
 
     Attributes:
-        guesses: whether movers may do something else than is predicted
+        uncertain: whether movers may deviate from their prediction
     """
 
     uncertain = True
@@ -38,27 +38,27 @@ class PerceivedMovers(abc.ABC):
 
     @abc.abstractmethod
     def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
-        """The numbers (M,) of all movers in a tick, their places (M, 2) [m], velocities (M, 2) [m/s] and radii (M,) [m]."""
+        """Return the numbers (M,) of all movers in a tick, positions (M, 2) [m], velocities (M, 2) [m/s] and radii (M,) [m]."""
 
     @abc.abstractmethod
     def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
-        """The numbers (P,) of the perceived movers, and the places of all by number (M, 2) [m]; nan where not known."""
+        """Return the numbers (P,) of the perceived movers, and all positions by number (M, 2) [m]; nan where unknown."""
 
     @abc.abstractmethod
     def radius_of(self, mover: int) -> float:
-        """The radius of a mover [m]."""
+        """Return the radius of a mover [m]."""
 
     @abc.abstractmethod
     def name_of(self, mover: int) -> str:
-        """What people call a mover."""
+        """Return the name of a mover in messages."""
 
     def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
-        """The positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
+        """Return the positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
         _, places, velocities, radii = self._near(tick, position)
         return places + ahead[:, None, None] * velocities, radii
 
     def within_range(self, tick: int, position: Point) -> Numbers:
-        """The numbers (P,) of the perceived movers."""
+        """Return the numbers (P,) of the perceived movers."""
         return self._near(tick, position)[0]
 
     def _near(self, tick: int, position: Point) -> tuple[Numbers, Floats, Floats, Floats]:
@@ -70,7 +70,7 @@ class PerceivedMovers(abc.ABC):
 
 
 class GroundTruth(PerceivedMovers):
-    """Movers by ground truth: positions, velocities or motions."""
+    """Ground-truth positions, velocities or motions of movers."""
 
     def __init__(self, trajectories: Trajectories, perception: Perception, hz: int) -> None:
         super().__init__(perception, hz)
@@ -79,7 +79,7 @@ class GroundTruth(PerceivedMovers):
         self._first, self._positions, self._velocities = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
 
     def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
-        """The positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
+        """Return the positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
         if self._perception.kind != "motions":
             return super().predict(tick, position, ahead)
         perceived, _, _, radii = self._near(tick, position)
@@ -87,15 +87,15 @@ class GroundTruth(PerceivedMovers):
         return np.ascontiguousarray(positions[:, perceived]), radii
 
     def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
-        """The numbers (P,) of the perceived movers, and the places of all (M, 2) [m]."""
+        """Return the numbers (P,) of the perceived movers, and all positions (M, 2) [m]."""
         return self.within_range(tick, position), self._now(tick)[1]
 
     def radius_of(self, mover: int) -> float:
-        """The radius of a mover [m]."""
+        """Return the radius of a mover [m]."""
         return float(self._trajectories.radii[mover])
 
     def name_of(self, mover: int) -> str:
-        """What people call a mover."""
+        """Return the name of a mover in messages."""
         return f"movers[{mover}]"
 
     def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
@@ -109,10 +109,10 @@ class GroundTruth(PerceivedMovers):
 
 
 class Tracked(PerceivedMovers):
-    """Movers by tracks of a lidar, counted as they are found.
+    """Movers tracked by a lidar, numbered in the order of detection.
 
     Attributes:
-        watch: what the scans tell
+        tracking: the tracks
     """
 
     def __init__(self, tracking: MoverTracking, perception: Perception, hz: int) -> None:
@@ -120,22 +120,22 @@ class Tracked(PerceivedMovers):
         self.tracking = tracking
 
     def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
-        """The numbers (P,) of the movers that are followed, and the places of all (M, 2) [m]; nan: not followed any more."""
+        """Return the numbers (P,) of the tracked movers, and all positions (M, 2) [m]; nan for lost tracks."""
         numbers, places, _, _ = self._now(tick)
         everywhere = np.full((self.tracking.tracker.tracks_begun, 2), np.nan)
         everywhere[numbers] = places
         return self.within_range(tick, position), everywhere
 
     def visible(self, tick: int) -> Floats:
-        """Where the movers are in a tick that the last scan met (N, 2) [m]: not those that are hidden."""
+        """Return the positions of the movers hit by the last scan (N, 2) [m], in a tick; hidden movers are omitted."""
         return self._now(tick)[1][self._followed.met]
 
     def radius_of(self, mover: int) -> float:
-        """The radius of a mover that is followed [m]."""
+        """Return the radius of a tracked mover [m]."""
         return float(self._followed.radii[self._followed.numbers == mover][0])
 
     def name_of(self, mover: int) -> str:
-        """What people call a mover."""
+        """Return the name of a mover in messages."""
         return f"tracked mover {mover}"
 
     @property

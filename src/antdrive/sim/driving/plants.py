@@ -1,4 +1,4 @@
-"""Plants: a robot in physics with a log of every step, and one that follows its commands exactly."""
+"""Plants: a robot in physics that logs every step, and a kinematic robot."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Contact, Engine, State
 from antdrive.worlds import Trajectories
 
-AFTER_CONTACT = 0.5  # after a collision the robot brakes for this long in the log [s]
+AFTER_CONTACT = 0.5  # logged time of braking after a collision [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """What a drive logged: T rows, one per physics step; row 0 is the start."""
+    """Log of a drive: T rows, one per physics step; row 0 is the start."""
 
     outcome: Outcome  # how the drive ended
-    reason: str  # what the outcome's sentence leaves open; may be empty
+    reason: str  # details beyond the outcome's sentence; may be empty
     t: Floats  # times since the start (T,) [s]
     pose: Floats  # true poses of the axle's centre (T, 3) [m, m, rad]
     twist: Floats  # measured speeds and yaw rates (T, 2) [m/s, rad/s]
-    command: Floats  # the commands that were in force when a row was reached (T, 2) [m/s, rad/s]
+    command: Floats  # commands in force before each row (T, 2) [m/s, rad/s]
     clearance: Floats  # distances from the footprint to the nearest obstacle, mover or wall (T,) [m]
-    limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]  # what held the speed (T,), an index into `LIMITERS`
+    limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]  # limiting rule (T,), an index into `LIMITERS`
     movers: Floats  # positions of the movers (T, M, 2) [m]
-    contacts: Floats  # one line per contact (K, 4): row, obstacle, distance [m], force [N]
-    actuated: Floats  # the twists that the wheels' motors were set to (T, 2) [m/s, rad/s]
+    contacts: Floats  # one row per contact (K, 4): row, obstacle, distance [m], force [N]
+    actuated: Floats  # motor targets (T, 2) [m/s, rad/s]
 
 
 class Bullet:
-    """The robot of an engine, placed at a pose. Logs a row per physics step.
+    """Robot of an engine, placed at a pose. It logs one row per physics step.
 
     Attributes:
-        state: the robot's true pose and velocity in the last row
+        state: true pose and velocity in the last row
 
     Raises:
         FieldError: the control rate does not divide the physics rate.
@@ -71,7 +71,7 @@ class Bullet:
         self._log(self.per_tick, (*step.command, step.pursuit.limiter, *actuated))
 
     def play(self, targets: Floats) -> Drive:
-        """Set the motors to targets (N, 2), a row for each physics step, whatever happens; the log."""
+        """Play motor targets (N, 2), one row per physics step, and return the log."""
         for row in range(0, len(targets), self.per_tick):
             target = targets[row].tolist()
             self._engine.command(*target)
@@ -88,7 +88,7 @@ class Bullet:
                 self._add_contacts(contacts)
 
     def finish(self, ending: Ending) -> Drive:
-        """The whole log; a robot that has touched something brakes first. A collision is attributed to it or to the mover."""
+        """Return the whole log. After a contact the robot brakes first, and the contact is attributed to it or to the mover."""
         if self.touched:
             self._engine.command(0.0, 0.0)
             self._log(round(AFTER_CONTACT * self._engine.physics_hz), (0.0, 0.0, self._rows[-1][7], 0.0, 0.0))
@@ -125,13 +125,13 @@ class Bullet:
 
 
 class Kinematic:
-    """A robot without physics, whose wheels do exactly as told.
+    """Kinematic robot: follows its commands exactly.
 
     Attributes:
-        state: where the robot is and how fast
+        state: pose and velocity
         touched: whether it touched something in the last control period
-        way: the poses (K, 3) that it passed in that period [m, m, rad]
-        poses: where it was after each control period, and at first [m, m, rad]
+        way: the poses (K, 3) of that period [m, m, rad]
+        poses: the pose at the start and after each control period [m, m, rad]
     """
 
     def __init__(
@@ -162,7 +162,7 @@ def _attribute(
     movers: Floats,
     contacts: Floats,
 ) -> Ending:
-    """Attribute the first touch to the robot or to the mover, and name the mover and both speeds."""
+    """Attribute the first contact to the robot or to the mover, and name the mover and both speeds."""
     discs = len(engine.world.obstacles)
     attribution = Attribution(
         pose=pose,

@@ -1,4 +1,4 @@
-"""What a robot without a map does where it does not get on: it looks round, backs off along its track, or makes room ahead."""
+"""Recovery behaviours of a robot without a map: scan turn, backing off along its track, moving ahead for room."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from antdrive.robots.lidar import FULL_CIRCLE
 from antdrive.sim.driving.survey import Survey
 from antdrive.worlds import Route
 
-STALL_TIME = 2.5  # a robot that does not move for this long tries something else [s]
+STALL_TIME = 2.5  # a robot that stays within `STALL_DISTANCE` for this long has stalled [s]
 STALL_DISTANCE = 0.06  # [m]
-HELD_TIME = 0.5  # a robot that its sight has held for this long looks round [s]
+HELD_TIME = 0.5  # a robot held by the stopping constraint for this long makes a scan turn [s]
 TRAIL = 0.05  # spacing of the points of the driven track [m]
-LENGTHS = (0.4, 0.8, 1.5)  # how far the robot backs off, the first time and then [m]
-AGAIN = 1.0  # a stall that is nearer to the one before than this is the next at one place [m]
-ELSEWHERE = 0.3  # the robot looks round once, and again where it is so far from there [m]
-NARROW = math.pi / 2  # a lidar that sees less does not see the ground ahead of the sides of the robot [rad]
-OVERLAP = 0.2  # so much more than what its lidar does not see is turned through [rad]
-WORTH = 0.3  # less than this is not worth a look [rad]
-SPARE_TURN = 0.1  # so much of the turn that is free is left [rad]
-TURNED = 0.02  # a heading is reached so near to it [rad]
-VIEWS = 3  # every direction stays in view until so many scans have entered the free way of each of their beams
-PATIENT = 2.0  # a look that takes longer than it needs by this factor is given up: movers, or its sight, keep the robot from it
-WAY = 1.0  # so far ahead the ground is asked for that holds the robot [m], [rad]
-WORTH_SEEING = 0.1  # ground that was not seen holds the robot if it could otherwise go on so much farther [m], [rad]
-STOPPED = 0.01  # a robot that turns more slowly than this has stopped [rad/s]
+LENGTHS = (0.4, 0.8, 1.5)  # distances of successive attempts to back off [m]
+AGAIN = 1.0  # stalls within this distance are at one place [m]
+ELSEWHERE = 0.3  # shortest distance between two scan turns [m]
+NARROW = math.pi / 2  # a narrower field of view misses the ground ahead of the robot's sides [rad]
+OVERLAP = 0.2  # scan turns exceed the blind sector by this [rad]
+WORTH = 0.3  # shorter scan turns are omitted [rad]
+SPARE_TURN = 0.1  # part of a free turn that is left unused [rad]
+TURNED = 0.02  # tolerance of a target heading [rad]
+VIEWS = 3  # whole scans that must cover each direction
+PATIENT = 2.0  # a scan turn is given up after this multiple of its planned duration
+WAY = 1.0  # distance within which unknown ground is checked [m], [rad]
+WORTH_SEEING = 0.1  # unknown ground blocks the robot if it shortens the free path by this [m], [rad]
+STOPPED = 0.01  # a robot that turns more slowly has stopped [rad/s]
 
 
 class ScanTurn:
-    """A turn on the spot, one way and then the other if the first is not free all round.
+    """Scan turn: a turn on the spot, first one way, then the other if the first is not free all round.
 
     Attributes:
         done: whether it is over
@@ -46,7 +46,7 @@ class ScanTurn:
         self.done = False
 
     def command(self, pose: Pose, last: Twist) -> Twist:
-        """The twist of the next control period, of a robot that turns or stands."""
+        """Return the next twist of a robot that turns or stands."""
         self._left -= math.remainder(pose[2] - self._yaw, 2 * math.pi)
         self._yaw = pose[2]
         self._periods -= 1
@@ -57,7 +57,7 @@ class ScanTurn:
             else:
                 self.done = True
         hardest = self._robot.max_yaw_acceleration
-        # Within one control period less, so that the robot does not turn too far before it brakes.
+        # Limited to one control period's travel, so that the robot brakes in time.
         rate = min(self._rate, math.sqrt(2 * hardest * abs(self._left)), abs(self._left) * self._hz)
         if self._periods < 0 or self.done:
             self.done, rate = True, 0.0
@@ -66,16 +66,16 @@ class ScanTurn:
 
 
 class Recovery:
-    """Notes where the robot does not get on, and says what it does then.
+    """Recovery behaviours for a robot that stalls or that the stopping constraint holds.
 
-    A robot that has found a new route in vain, or that its sight holds, backs off along its own track; one that has not come from
-    anywhere goes ahead, as far as it sees free ground, to have room for a turn. Where its lidar does not see all around, it then
-    looks round, and so it does as soon as ground that it has not seen holds it.
+    A robot that re-planned without success, or that the constraint holds, backs off along its track. If it has not moved
+    yet, it drives straight ahead over free ground, to have room for a turn. If its lidar does not see all around, it then
+    makes a scan turn, as it does whenever unknown ground holds it.
 
     Attributes:
-        look: the turn with which the robot looks round now; None: it does not
-        route: the last way out that was found; None: none was
-        backwards: whether that way leads back along the track
+        scan_turn: the current scan turn; None if there is none
+        route: the last escape route; None if there was none
+        backwards: whether that route leads back along the track
     """
 
     def __init__(self, survey: Survey, robot: RobotSpec, start: Pose, hz: int) -> None:
@@ -91,14 +91,14 @@ class Recovery:
         self._turned_at = (math.inf, math.inf)
 
     def note_progress(self, now: float, pose: Pose, *, waiting: bool, backwards: bool) -> None:
-        """Note where the robot is: whether it moves, and its track unless it follows that back."""
+        """Note whether the robot moves, and extend its track unless it follows the track back."""
         if waiting or math.dist(self._rest[1], pose[:2]) > STALL_DISTANCE:
             self.note_rest(now, pose)
         if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
             self._trail.append(pose[:2])
 
     def note_held(self, now: float, held: Twist | None) -> None:
-        """Note whether the robot stands because its sight does not let it go on."""
+        """Note the twist that the stopping constraint reduced to a stop; None if it did not."""
         if held is None:
             self._held_since = math.inf
         elif self._held_since == math.inf:
@@ -106,15 +106,15 @@ class Recovery:
         self._wanted = held
 
     def note_rest(self, now: float, pose: Pose) -> None:
-        """Count from now on how long the robot has not moved."""
+        """Restart the count of the time without motion."""
         self._rest = now, pose[:2]
 
     def stalled(self, now: float) -> bool:
-        """Whether the robot has not moved for long."""
+        """Return whether the robot has stalled."""
         return now - self._rest[0] > STALL_TIME
 
     def held(self, now: float, pose: Pose) -> bool:
-        """Whether ground that was not seen held the robot for long where it has not looked round, or will from the start on."""
+        """Return whether a scan turn is due: unknown ground held the robot for long, or a narrow lidar has not turned yet."""
         if not self._may_turn(pose):
             return False
         if self._turned_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW:
@@ -122,7 +122,7 @@ class Recovery:
         return now - self._held_since > HELD_TIME and self.held_by_unknown(pose)
 
     def held_by_unknown(self, pose: Pose) -> bool:
-        """Whether the robot stands because it has not seen the ground ahead, not because something was hit there."""
+        """Return whether the robot stands because ground ahead is unknown, rather than because of hits."""
         if self._wanted is None:
             return False
         seen, open_ = (
@@ -131,7 +131,7 @@ class Recovery:
         return open_ > seen + WORTH_SEEING
 
     def begin_scan_turn(self, pose: Pose) -> bool:
-        """Begin to look round; whether there is anything to look at that the robot has not looked at from here."""
+        """Begin a scan turn; return False if none is possible or one was made here."""
         if not self._may_turn(pose):
             return False
         self._turned_at = pose[:2]
@@ -144,18 +144,18 @@ class Recovery:
         return True
 
     def end_scan_turn(self, now: float, pose: Pose) -> None:
-        """Go on after a look."""
+        """End the scan turn."""
         self.scan_turn, self._held_since = None, math.inf
         self.note_rest(now, pose)
 
     def note_stall(self, now: float, pose: Pose) -> None:
-        """Note a stall, and how many there were at this place."""
+        """Note a stall, and count the stalls at this place."""
         self.note_rest(now, pose)
         self._stalls = self._stalls + 1 if math.dist(self._stalled_at, pose[:2]) < AGAIN else 1
         self._stalled_at = pose[:2]
 
     def escape(self, pose: Pose) -> Route | None:
-        """A way out for a robot that stalls again, or that its sight holds: back along the track, else ahead. None: no way."""
+        """Return an escape route for a robot that stalls again or is held: back along the track, else ahead; None if none."""
         tries = self._stalls - 2 if self._held_since == math.inf else self._stalls - 1
         if not 0 <= tries <= len(LENGTHS):
             return None
@@ -172,7 +172,7 @@ class Recovery:
         return self.route
 
     def _back(self, pose: Pose, wanted: float) -> list[tuple[float, float]]:
-        """The driven track, from the robot back; only the first point if it is too short."""
+        """Return the driven track backwards from the robot; only its first point if it is too short."""
         points, length = [pose[:2]], 0.0
         while self._trail and length < wanted:
             point = self._trail.pop()
@@ -186,7 +186,7 @@ class Recovery:
         return not self._survey.lidar.full_circle and math.dist(self._turned_at, pose[:2]) >= ELSEWHERE
 
     def _turns(self, pose: Pose) -> Iterator[float]:
-        """The turns with which the lidar sees all around, as far as they are free."""
+        """Yield the turns that show the lidar all directions, as far as they are free."""
         needed = FULL_CIRCLE - self._survey.lidar.field_of_view + OVERLAP
         left, right = (
             min(needed, self._survey.clear_turn(pose, side, needed + SPARE_TURN) - SPARE_TURN) for side in (1.0, -1.0)
@@ -195,5 +195,5 @@ class Recovery:
         turned = 0.0
         for turn, side in sides:
             if turn > WORTH and turned < needed - OVERLAP:
-                yield side * (turn + turned)  # back over what was turned through before
+                yield side * (turn + turned)  # includes the way back over the first turn
                 turned += turn

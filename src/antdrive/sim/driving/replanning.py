@@ -1,11 +1,11 @@
-"""New routes while driving: around movers, or back to the goal after straying from the route.
+"""Replanning during a drive: around movers, or to the goal after a deviation from the route.
 
-When: `trigger`, which asks `MoversAhead` about movers; a robot without a map has `antdrive.sim.driving.exploring` instead.
-Thresholds are those of `antdrive.sim.policy`. How:
+Triggers: `trigger` queries `MoversAhead` for movers; thresholds are those of `antdrive.sim.policy`. Mapless robots use
+`antdrive.sim.driving.exploring`. Methods:
 
-- Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown
-  exactly as the grid's obstacles are; cells that movers have left are cleared.
-- Planners that need the world plan again in a world with discs in the movers' places.
+- Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown like the
+  grid's obstacles; cells that movers have left are cleared.
+- Planners that need the world plan in a world with discs in place of movers.
 - Planners in space and time plan again when the robot is late.
 - Cell-by-cell planners choose one cell after the other, as hasan's robot does.
 """
@@ -44,9 +44,9 @@ from antdrive.worlds import Grid, Route, segment_clearance
 
 
 class Replanning(OneRoute):
-    """Follow the first route until another is due: around movers, or back to the goal.
+    """Guide that follows the first route until movers or deviations require another.
 
-    It knows the world's obstacles, and of its movers what the robot perceives.
+    It knows the world's obstacles, and the movers that the robot perceives.
 
     Attributes:
         policy: when to replan
@@ -64,7 +64,7 @@ class Replanning(OneRoute):
         self._replanned_at = -math.inf
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
-        """Set out on a plan: its route, and the same prepared for the controller."""
+        """Return the route of a plan, and its path for the controller."""
         self._grid, policy = grid, self.policy
         movers, robot, task = self._predictor, self._routes.robot, self._task
         self.blockage = Blockage(task, grid, movers, self._hz, policy, self._keeps)
@@ -77,23 +77,23 @@ class Replanning(OneRoute):
 
     @property
     def blocked(self) -> str:
-        """Which mover closes every way, once the robot has no patience left; empty before."""
+        """Description of the mover that blocks every route, once the robot's patience is over; empty before."""
         return self.blockage.reason
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
-        """A new path for a robot that stands at the end of its route, but not at the goal."""
+        """Return a new path for a robot that stands at the end of its route, but not at the goal; None if there is none."""
         return self.replan(tick, pose, MISSED)
 
     def clearance_reduction(self, tick: int, position: Point) -> Floats:
-        """How much closer than usual the robot may pass each perceived mover (P,) [m]."""
+        """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""
         return self.blockage.clearance_reduction(tick, position)
 
     def _track(self, plan: PlanResult, route: Route) -> None:
-        """Note that the robot sets out on a route that was made from a plan."""
+        """Set the schedule of a new route."""
         self.schedule = Schedule.of(plan, route) if self._timed and isinstance(plan, TimedPlan) else None
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
-        """Why a new route is due now; empty if none is."""
+        """Return why a new route is due; empty if none is."""
         now, policy = tick / self._hz, self.policy
         self._ahead.observe(tick, pose, waiting)
         if self.blockage.pause(tick, pose[:2]) or now - self._replanned_at < policy.min_interval:
@@ -110,12 +110,12 @@ class Replanning(OneRoute):
         return due
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """A new path from a pose [m, m, rad], prepared for the controller; None if there is none."""
+        """Return a new path from a pose [m, m, rad]; None if there is none."""
         now = tick / self._hz
         self._replanned_at = now
         self._ahead.wait_anew()
         started = time.perf_counter()
-        # A robot that has missed the goal is near it, where avoiding movers is enough.
+        # Near the goal, local avoidance is enough.
         around_movers = self.policy.around_movers and trigger != MISSED and not self._timed
         discs = self._ahead.discs(tick, pose) if around_movers else []
         try:
@@ -134,7 +134,7 @@ class Replanning(OneRoute):
             plan = self._routes.around(task, self._grid, discs)
         route = None
         if plan.solved and len(plan.cells) and not self._routes.plan_error:
-            # A timed plan's times are those of its cells, so its route must follow the cells.
+            # The times of a timed plan belong to its cells, so its route must follow them.
             smoothing = "none" if self._timed else self._routes.smoothing
             route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
             self._track(plan, route)
@@ -152,22 +152,22 @@ class Replanning(OneRoute):
 
 
 def _point_at(route: Route, arc: float) -> tuple[float, float]:
-    """The point of a route at a distance from its start [m]."""
+    """Return the point of a route at an arc length [m]."""
     x, y = (float(np.interp(arc, route.arc, route.xy[:, k])) for k in (0, 1))
     return x, y
 
 
-DECISION_PAUSE = 0.2  # the shortest time between two decisions [s]
-DECIDE_BEFORE = 0.6  # a decision is due when less than this many cells of the route remain
-STRAIGHT_BACK = 1.5  # a robot within this many cells of its cell's centre goes back to it straight
-AT_CELL = 0.25  # a robot this close to its cell's centre, in cells, need not drive through it
+DECISION_PAUSE = 0.2  # shortest time between two decisions [s]
+DECIDE_BEFORE = 0.6  # a decision is due when fewer cells than this remain on the route
+STRAIGHT_BACK = 1.5  # within this many cells of its cell's centre the robot returns straight
+AT_CELL = 0.25  # a robot within this many cells of its cell's centre need not drive through it
 
 
 class CellByCell(Replanning):
-    """Decide cell by cell: the route never goes beyond the next cell."""
+    """Guide that decides cell by cell: the route ends at the next cell."""
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
-        """Set out; the whole route of the plan, which the robot leaves at its first decision."""
+        """Return the route of the whole plan, which the first decision replaces."""
         self._query = Query.between(grid, self._task)
         self._online = agent_for(self._routes.planner, self._query, self._routes.rng)
         self._goal = self._query.goal
@@ -176,11 +176,11 @@ class CellByCell(Replanning):
 
     @property
     def may_wait(self) -> bool:
-        """Whether a robot at the end of its route may wait there for a way on."""
+        """Whether a robot at the end of its route may wait for a new one."""
         return not self._online.arrived
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
-        """A decision is due shortly before the robot reaches its cell, and repeatedly while it waits."""
+        """Return `DECISION` shortly before the robot reaches its cell, and repeatedly while it waits; else empty."""
         if tick == 0:
             return DECISION
         since = tick / self._hz - self._replanned_at
@@ -193,8 +193,8 @@ class CellByCell(Replanning):
         return DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """The path to the next cell, prepared for the controller; None if the robot waits."""
-        if trigger == MISSED:  # a robot that has not arrived waits: its next decision will be due soon
+        """Return the path to the next cell; None if the robot waits."""
+        if trigger == MISSED:  # before arrival the next decision is due soon
             return super().replan(tick, pose, trigger) if self._online.arrived else None
         now, started = tick / self._hz, time.perf_counter()
         self._replanned_at = now
@@ -215,13 +215,13 @@ class CellByCell(Replanning):
             work = self._online.stats.propagated - propagated
             self.note(now, trigger, time.perf_counter() - started, work, polyline_length(xy), xy)
             return self._prepare(Route(xy))
-        if tick == 0:  # the robot waits where it is, and must not set out on the plan for the whole way
+        if tick == 0:  # the robot waits in place and must not follow the plan's whole route
             heading = np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])
             return self._prepare(Route(np.array(pose[:2]) + 1e-4 * heading))
         return None
 
     def _note_no_path(self, tick: int, pose: Pose) -> None:
-        """Take note that the robot does not get on; the attempt at which it gives up is logged."""
+        """Note that the robot makes no progress; log the attempt at which it gives up."""
         now = tick / self._hz
         if self.blockage.pause(tick, pose[:2]) or now - self._noted_at < self.policy.min_interval:
             return
@@ -231,7 +231,7 @@ class CellByCell(Replanning):
             self.note(now, DECISION)
 
     def _line(self, pose: Pose, here: tuple[int, int], to: tuple[int, int] | None, tick: int) -> Floats:
-        """From the robot to the next cell (2 or 3, 2) [m], by the centre of its own cell where it must."""
+        """Return the line from the robot to the next cell (2 or 3, 2) [m], through the centre of its own cell if necessary."""
         ends = self._grid.xy(np.array([here, to or here]))
         if to == self._goal and self._clear(ends[0], self._task.goal):
             ends[1] = self._task.goal
@@ -241,7 +241,7 @@ class CellByCell(Replanning):
         return np.vstack([self._way_back(pose, ends[0]), ends[1:]])
 
     def _way_back(self, pose: Pose, centre: Floats) -> Floats:
-        """From the robot to the centre of its own cell (N, 2) [m]; around obstacles if avoiding movers took it far away."""
+        """Return the line from the robot to the centre of its own cell (N, 2) [m], around obstacles if it is far away."""
         straight = np.array([pose[:2], centre])
         far = math.dist(pose[:2], centre) > STRAIGHT_BACK * self._grid.cell
         if not far or self._clear(pose[:2], centre):
@@ -254,6 +254,6 @@ class CellByCell(Replanning):
         return smooth(plan, self._grid, task, kind="taut").xy if plan.solved else straight
 
     def _clear(self, a: tuple[float, ...] | Floats, b: tuple[float, ...] | Floats) -> bool:
-        """Whether the straight line between two points keeps the grid's inflation from every obstacle."""
+        """Return whether the straight line between two points keeps the grid's inflation from every obstacle."""
         clearance = segment_clearance(self._task.world, np.array([a]), np.array([b]))[0]
         return bool(clearance >= self._grid.inflate - 1e-9)

@@ -1,10 +1,8 @@
-"""Drive a logged drive again: the motors' logged targets, open loop, in the record's world with the record's robot.
+"""Replay of a log: play the logged motor targets open loop, in the record's world with the record's robot.
 
-Nothing is planned or decided, so the replay depends on physics alone. The noise of a noisy robot is drawn again from the
-record's seed: it must turn the logged commands into the logged targets, and the logged poses into the logged estimates. The
-scans that are in the log are taken again, too, and those of a robot without a map matched.
-On the machine and with the versions that wrote a log it gives the same bits; elsewhere rounding differs, and `ROUNDING` says how
-much is allowed.
+The replay depends on physics alone. The record's seed reproduces the noise, which must turn the logged commands into the
+logged targets and the logged poses into the logged estimates. Logged scans are measured again and, for a robot without
+a map, matched. The machine and versions that wrote a log reproduce it bit for bit; `ROUNDING` is the tolerance for others.
 """
 
 from __future__ import annotations
@@ -31,37 +29,37 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine, State
 
-#: How far a replay on another machine or with other versions may be off, in metres, radians, m/s and rad/s.
+#: Tolerance of a replay on another machine or version, in metres, radians, m/s and rad/s.
 ROUNDING = 1e-3
-#: How far noise that is drawn again may be off, in metres, radians, m/s and rad/s: it takes a few dozen operations only.
+#: Tolerance of reproduced noise, in metres, radians, m/s and rad/s: it takes a few dozen operations only.
 SAME_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
 class ReplayCheck:
-    """How a replay differs from the log."""
+    """Differences between a replay and its log."""
 
-    exact: bool  # whether pose, twist and contacts are the log's, bit for bit
-    position: float  # the largest distance between replayed and logged positions [m]
-    turn: float  # the largest difference of headings [rad]
-    twist: float  # the largest difference of speeds [m/s] or yaw rates [rad/s]
-    problems: tuple[str, ...]  # why the log is not that of a drive, a sentence each
+    exact: bool  # whether pose, twist and contacts agree bit for bit
+    position: float  # largest distance between replayed and logged positions [m]
+    turn: float  # largest difference of headings [rad]
+    twist: float  # largest difference of speeds [m/s] or yaw rates [rad/s]
+    problems: tuple[str, ...]  # why the log is not that of a drive, one sentence each
 
     @property
     def sentence(self) -> str:
-        """The outcome in words."""
+        """The result in words."""
         if self.exact:
             return "replayed bit for bit"
         same = "differs" if self.problems else "replayed within rounding"
         return f"{same}: at most {self.position:.3g} m, {self.turn:.3g} rad and {self.twist:.3g} m/s or rad/s off"
 
     def as_dict(self) -> dict[str, Any]:
-        """The comparison as plain values, for JSON."""
+        """Return the comparison as plain values, for JSON."""
         return {"exact": self.exact, "position_m": self.position, "turn_rad": self.turn, "twist": self.twist}
 
 
 def replay(rollout: Rollout) -> ReplayCheck:
-    """Drive the logged targets of the motors again and compare."""
+    """Replay the logged motor targets and compare."""
     record = rollout.record
     substeps, rest = divmod(record.physics_hz, record.control_hz)
     if rest or substeps < 1:
@@ -77,7 +75,9 @@ def replay(rollout: Rollout) -> ReplayCheck:
     exact = same and np.array_equal(again.contacts, rollout.contacts)
     problems = []
     if not max(position, turn, twist) <= ROUNDING:
-        problems.append(f"replay: the logged commands lead up to {position:.3g} m and {turn:.3g} rad away from the log")
+        problems.append(
+            f"replay: the logged commands lead to poses up to {position:.3g} m and {turn:.3g} rad off the log"
+        )
     if bool(len(again.contacts)) != bool(len(rollout.contacts)) or (same and not exact):
         problems.append(
             f"replay: physics reports {len(again.contacts)} contact points, the log {len(rollout.contacts)}"
@@ -87,20 +87,20 @@ def replay(rollout: Rollout) -> ReplayCheck:
 
 
 def _other_senses(rollout: Rollout) -> Iterator[str]:
-    """What of a log is not as the seed's noise and the lidar make it: estimates, targets of the motors, scans."""
+    """Yield where estimates, motor targets or scans differ from the seed's noise and the lidar's measurements."""
     record = rollout.record
     if record.exploring and not len(rollout.scans):
-        yield "replay: the log of a robot without a map has no scans"
+        yield "replay: a log without a map must have scans"
         return
     odometry = 1.0 if record.sensing is None else record.sensing.odometry
     localiser = localiser_of(
         record.localisation, record.robot, record.noise, odometry, 1 / record.control_hz, record.task.start, record.seed
     )
     if localiser.noisy and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
-        yield "replay: actuated and estimate are missing; the log of a robot with noise has them"
+        yield "replay: actuated and estimate are missing; required with noise"
         localiser = Exact()
     per_tick = record.physics_hz // record.control_hz
-    # A period's first row is the last of the period before; a contact ends the control of the robot.
+    # A period's first row is the last row of the previous period; a contact ends control.
     touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
     rows = range(0, min(touched, len(rollout.t) - 1), per_tick)
     scans, resets = scans_of(rollout)
@@ -127,15 +127,15 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
         wrong = (np.abs(error) > SAME_NOISE).any(axis=1)
         if wrong.any():
             t = rollout.t[rows[int(wrong.argmax())]]
-            yield f"replay: {name} is not what the noise of seed {record.seed} makes of the log, from t = {t:.3f} s"
+            yield f"replay: {name} differs from the noise of seed {record.seed}, from t = {t:.3f} s"
 
 
 class Logged:
-    """The plant of a log: its true poses, whatever is commanded.
+    """Plant that returns the logged poses and ignores commands.
 
     Attributes:
-        state: where the robot is and how fast
-        actuated: the targets of the motors so far
+        state: true pose and velocity
+        actuated: the motor targets so far
     """
 
     touched = False
@@ -147,7 +147,7 @@ class Logged:
         self.state = self._state()
 
     def advance(self, step: Step, actuated: Twist) -> None:
-        """Go to the row of the next control period."""
+        """Advance to the row of the next control period."""
         self.actuated.append(actuated)
         self._row = min(self._row + self._per_tick, len(self._rollout.t) - 1)
         self.state = self._state()
@@ -157,7 +157,7 @@ class Logged:
 
 
 class Reader(Decider):
-    """Decides as a log has it, for so many control periods, and has the map forgotten when the robot did so."""
+    """Decider that reads commands from a log, and resets the map when the robot did."""
 
     def __init__(self, rollout: Rollout, periods: int, resets: Mapping[int, Callable[[Pose], None]]) -> None:
         self.step = Step()
@@ -165,7 +165,7 @@ class Reader(Decider):
         self._per_tick = rollout.record.physics_hz // rollout.record.control_hz
 
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """The logged command of a control period, or the end."""
+        """Return the logged command of a control period, or the end."""
         if tick == self._periods:
             return Ending(self._rollout.outcome)
         if tick in self._resets:
@@ -175,7 +175,7 @@ class Reader(Decider):
 
 
 def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pose], None]]]:
-    """What takes the scans of a log again, if it has any, and in which control periods the map is reset."""
+    """Return the lidar that repeats a log's scans, if there are any, and the resets of the map by control period."""
     record, lidar = rollout.record, rollout.record.robot.lidar
     if not len(rollout.scans):
         return None, {}
@@ -191,21 +191,21 @@ def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pos
 
 
 def _decided_at_the_end(rollout: Rollout, per_tick: int) -> bool:
-    """Whether the robot decided in the last row that its drive was over, after a scan; other drives end without one."""
+    """Return whether the robot ended its drive by a decision in the last row, after a scan."""
     last = len(rollout.t) - 1
     decided = rollout.outcome is Outcome.SUCCEEDED or last in rollout.scan_rows
     return len(rollout.scans) > 0 and last % per_tick == 0 and not len(rollout.contacts) and decided
 
 
 def _other_scans(rollout: Rollout, scans: npt.NDArray[np.uint16], scan_rows: npt.NDArray[np.int32]) -> Iterator[str]:
-    """The first scan of a log that is not one of those that were taken again, in a sentence."""
+    """Yield the first logged scan that differs from its repetition."""
     rows, again = rollout.scan_rows, dict(zip(scan_rows.tolist(), scans, strict=True))
     last = max(again, default=-1)
     for row in sorted({*again, *(row for row in rows.tolist() if row <= last)}):
         at = np.flatnonzero(rows == row)
         if row in again and len(at) == 1 and np.array_equal(again[row], rollout.scans[at[0]]):
             continue
-        yield f"replay: scans are not what the lidar measures from the logged poses, from t = {rollout.t[row]:.3f} s"
+        yield f"replay: scans differ from the lidar at the logged poses, from t = {rollout.t[row]:.3f} s"
         return
 
 

@@ -1,4 +1,4 @@
-"""Routes: how plans are asked for, checked, smoothed and prepared, and the guide that follows just one."""
+"""Route planning: query, check, smooth and prepare plans; the guide that follows one route."""
 
 from __future__ import annotations
 
@@ -40,67 +40,67 @@ if TYPE_CHECKING:
     from antdrive.sim.driving.movers_ahead import Zone
 
 
-KEPT = 4  # searches that are kept for repair: two margins within near and wide bounds
+KEPT = 4  # replanners kept for repair: two margins within near and wide bounds
 
 
 @dataclass(eq=False, kw_only=True)
 class RoutePlanner:
-    """Plans and prepares the routes of one drive: the first one, and those that movers or obstacles make necessary.
+    """Route planner of one drive, for the first route and all replans.
 
     Attributes:
-        rng: the random numbers of replans
-        wrong: what is wrong with the planner's first wrong plan; empty if none was
+        rng: the random stream of replans
+        plan_error: why the planner's first invalid plan is invalid; empty if none was
     """
 
     planner: Planner  # finds the paths
     planner_label: str  # its name in records
-    task: Task  # the world as the robot is told of it, the start and the goal
+    task: Task  # the world as the robot knows it, start and goal
     robot: RobotSpec  # drives the routes
     controller: PurePursuit  # follows them
-    margin: float  # distance kept free around the robot, on top of its radius [m]
-    cell: float  # side of the cells of grids [m]
+    margin: float  # clearance on top of the robot's radius [m]
+    cell: float  # side of the grid cells [m]
     smoothing: str  # how plans become routes
     hz: int  # control periods per second
     seed: int  # the seed of the drive's random numbers
-    motions: tuple[MoverMotion, ...] = ()  # the motions of the movers, for planners in space and time
-    mapped: bool = True  # whether all plans are made on the grid of the world's map
+    motions: tuple[MoverMotion, ...] = ()  # motions of the movers, for planners in space and time
+    mapped: bool = True  # whether all plans use the grid of the given map
 
     def __post_init__(self) -> None:
         self.plan_error = ""
         self.restart()
 
     def restart(self) -> None:
-        """Forget all searches, and draw the random numbers of replans from the beginning."""
+        """Discard all replanners, and restart the random stream of replans."""
         self.rng = random_stream(self.seed, "replanner")
         self._kept: dict[tuple[float, float, Bounds], tuple[Replanner, Cell, npt.NDArray[np.bool_]]] = {}
 
     @property
     def inflate(self) -> float:
-        """The distance that plans keep between the robot's centre and every surface [m]."""
+        """Distance that plans keep between the robot's centre and every surface [m]."""
         return self.robot.radius + self.margin
 
     def query(self, grid: Grid, task: Task, start_time: float = 0.0) -> Query:
-        """What the planner is asked at a time [s]."""
+        """Return the planner's query at a time [s]."""
         query = Query.between(grid, task)
         timed = bool(self.motions) or start_time
         return dataclasses.replace(query, motions=self.motions, start_time=start_time) if timed else query
 
     def plan(self, query: Query, rng: np.random.Generator, label: str = "") -> PlanResult:
-        """The planner's answer, checked."""
+        """Plan, and check the planner's answer."""
         return self.checked(query, request_plan(self.planner, query, rng, label))
 
     def checked(self, query: Query, answer: PlanResult) -> PlanResult:
-        """The answer, if it is right; else note what is wrong with it."""
+        """Return the answer if it is valid; else note the error and return an invalid plan."""
         plan = checked(query, answer)
         if plan.status is PlanStatus.INVALID:
             self.plan_error = self.plan_error or plan.reason
         return plan
 
     def around(self, task: Task, grid: Grid, discs: Sequence[Disc] = (), zone: Zone | None = None) -> PlanResult:
-        """A new plan during the drive, which keeps off discs and out of a zone.
+        """Re-plan around discs and a zone.
 
-        A planner that needs the world plans in one with more discs. Others are asked for a replanner, which is told of
-        closed cells; without a map and movers only those that have one of their own.
+        Planners that need the world plan in one with additional discs. Others use a replanner with closed cells; without a map
+        and movers only if they provide their own.
         """
         can, moving = capabilities_of(self.planner), bool(discs) or zone is not None
         if can.needs_world and (self.mapped or moving):
@@ -114,19 +114,19 @@ class RoutePlanner:
             return self.plan(query, self.rng)
         with planner_errors(self.planner):
             closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
-            # Without a map, movers change so many cells that a search is repaired no faster than made anew.
+            # Without a map, movers change so many cells that repair is no faster than a new search.
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
         answer = require_result(self.planner, answer)
-        # A replanner knows cells only, not that the robot cannot get to the first of them.
+        # A replanner knows cells only; it cannot tell that the first cell is unreachable for the robot.
         return unreachable if query.unreachable else self.checked(query, answer)
 
     def _replanner(self, query: Query, closed: npt.NDArray[np.bool_], *, kept: bool) -> Replanner:
-        """The planner's replanner, which knows of the closed cells; one that is kept for each grid, or a new one."""
+        """Return a replanner with the closed cells, kept per grid or new."""
         key = query.grid.cell, query.grid.inflate, bounds_of(query.grid)
         replanner, goal, before = self._kept.get(key, (None, None, closed)) if kept else (None, None, closed)
         if replanner is None or goal != query.goal:
             replanner, before = replanner_for(self.planner, query, self.rng), np.zeros_like(closed)
-            if kept and len(self._kept) >= KEPT:  # bounds follow a robot that has left them
+            if kept and len(self._kept) >= KEPT:  # bounds change with a robot that leaves them
                 del self._kept[next(iter(self._kept))]
         elif not self.mapped:
             replanner.change(query.grid)
@@ -139,13 +139,13 @@ class RoutePlanner:
         return replanner
 
     def prepared(self, route: Route, world: World, margin: float, *options: Any, **settings: Any) -> TrackedPath:
-        """A route that is prepared for the controller among what stands in a world."""
+        """Prepare a route for the controller, among the obstacles of a world."""
         period, tolerance = 1 / self.hz, self.task.goal_tolerance
         return self.controller.prepare(route, world, self.robot, margin, period, tolerance, *options, **settings)
 
 
 class OneRoute(RouteGuide):
-    """Follow the first route. Movers are not on its grid; a planner in space and time is given their motions."""
+    """Guide that keeps the first route. Its grid has no movers; planners in space and time get their motions."""
 
     def __init__(self, planner: RoutePlanner) -> None:
         self.log, self.walls = [], []
@@ -153,11 +153,11 @@ class OneRoute(RouteGuide):
 
     @property
     def plan_error(self) -> str:
-        """What is wrong with a plan that the planner gave; empty if nothing is."""
+        """Why the planner's plan is invalid; empty if it is valid."""
         return self._routes.plan_error
 
     def first(self) -> tuple[Grid, PlanResult]:
-        """Plan from the start; without a path if the robot has too little room there to get away along it."""
+        """Plan from the start; report no path if the start is too narrow to follow it."""
         routes = self._routes
         grid = grid_of(by_geometry(routes.task.world), routes.cell, routes.inflate)
         plan = routes.plan(routes.query(grid, routes.task), random_stream(routes.seed, "planner"), routes.planner_label)
@@ -166,13 +166,13 @@ class OneRoute(RouteGuide):
         return grid, self._drivable(grid, plan)
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
-        """Check a plan that was made elsewhere on the grid of `first`."""
+        """Check an externally made plan on the grid of `first`."""
         if plan.status is PlanStatus.INVALID:
             return grid, plan
         return grid, self._drivable(grid, self._routes.checked(self._routes.query(grid, self._routes.task), plan))
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
-        """Set out on a plan: its route, and the same prepared for the controller."""
+        """Return the route of a plan, and its path for the controller."""
         return self._prepared(grid, plan)
 
     def _prepared(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
@@ -185,7 +185,7 @@ class OneRoute(RouteGuide):
         return _tracked(Keyed((routes, grid, plan), (*contents.key, *plan_made)), routes.smoothing)
 
     def _drivable(self, grid: Grid, plan: PlanResult) -> PlanResult:
-        """The plan, without its path if the robot cannot get away from its start along it."""
+        """Return the plan, or no path if the robot cannot leave its start along it."""
         routes = self._routes
         task, robot = routes.task, routes.robot
         if not plan.solved or not is_narrow(task.world, robot, task.start):
@@ -206,19 +206,19 @@ class OneRoute(RouteGuide):
 
 @cached(16)
 def grid_of(world: Keyed[World], cell: float, inflate: float) -> Grid:
-    """The grid of a world."""
+    """Rasterise a world."""
     return rasterise(world.value, cell, inflate)
 
 
 def by_contents(grid: Grid, task: Task) -> Keyed[tuple[Grid, Task]]:
-    """A grid and a task, equal to others whose cells, numbers, walls and standing cylinders have the same bits."""
+    """Return a grid and a task as a cache key over their bits: cells, numbers, walls and standing cylinders."""
     numbers = bits(grid.cell, *grid.origin, grid.inflate, *task.start, *task.goal, task.goal_tolerance)
     cells = grid.shape, grid.free.tobytes(), grid.moves.tobytes()
     return Keyed((grid, task), (numbers, cells, by_geometry(task.world)))
 
 
 def bounds_of(grid: Grid) -> Bounds:
-    """The bounds of a grid's world, but for rounding [m]."""
+    """Return the bounds of a grid's world, except for rounding [m]."""
     rows, cols = grid.shape
     x, y = grid.origin
     half = grid.cell / 2

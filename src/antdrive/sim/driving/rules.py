@@ -20,41 +20,41 @@ from antdrive.worlds import Route, Task
 if TYPE_CHECKING:
     from antdrive.sim.driving.exploring import Exploration
 
-LOOKAHEAD = 0.4  # the speed limit leads to where the schedule is this much later [s]
-MAX_LAG = 0.5  # a robot farther behind its schedule than this is late [m]
+LOOKAHEAD = 0.4  # lookahead of the schedule's speed limit [s]
+MAX_LAG = 0.5  # a robot farther behind its schedule is late [m]
 
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """Where along its route the robot should be at each time; linear in between."""
+    """Target arc length over time, linear in between."""
 
     t: Floats  # times (N,) [s]
     arc: Floats  # distances along the route at those times (N,) [m]
 
     @classmethod
     def of(cls, plan: TimedPlan, route: Route) -> Schedule:
-        """The schedule of a timed plan, along the route through the plan's cells."""
+        """Create the schedule of a timed plan along the route through its cells."""
         covered = arc_lengths(plan.xy)
         share = covered / covered[-1] if covered[-1] > 0 else covered
         return cls(np.stack([plan.arrive, plan.leave], axis=1).ravel(), np.repeat(share * route.length, 2))
 
     def due(self, t: float) -> float:
-        """How far along the route [m] the robot should be at time `t` [s]."""
+        """Return the target arc length [m] at time `t` [s]."""
         return float(np.interp(t, self.t, self.arc))
 
     def late(self, t: float, arc: float) -> bool:
-        """Whether a robot at distance `arc` [m] at time `t` [s] is more than `MAX_LAG` behind."""
+        """Return whether a robot at `arc` [m] is more than `MAX_LAG` behind at time `t` [s]."""
         return self.due(t) - arc > MAX_LAG
 
     def speed_limit(self, t: float, arc: float) -> float:
-        """The speed [m/s] that keeps a robot at `arc` [m] from getting ahead at time `t` [s]; inf at the end."""
+        """Return the speed [m/s] that keeps a robot at `arc` [m] from getting ahead at time `t` [s]; inf at the end."""
         if t + LOOKAHEAD >= self.t[-1]:
             return math.inf
         return max(0.0, self.due(t + LOOKAHEAD) - arc) / LOOKAHEAD
 
 
 def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> Twist:
-    """A command slowed down to a speed limit on the same curve, as far as the robot can brake."""
+    """Slow a command to a speed limit on the same arc, as far as the robot can brake."""
     if command.speed <= 0:
         return command
     v = max(min(command.speed, limit), min(command.speed, last.speed - max_change))
@@ -63,24 +63,24 @@ def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> T
 
 STOPPED_SPEED = 0.01  # a robot slower than this has stopped [m/s], [rad/s]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
-GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
+GOAL_SHARE = 0.95  # a robot that avoids a mover may stop within this fraction of the goal's tolerance
 AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
-EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
+EXPLORING_LIMITERS = (*LIMITERS, "sight")  # names of the limiting rules of a robot without a map
 SIGHT_LIMIT = EXPLORING_LIMITERS.index("sight")
 
 
 class Pursuit:
-    """Follow the path. A robot that has turned for more than a full turn drives off as soon as it may.
+    """Rule: follow the path. After more than a full turn on the spot, drive off as soon as possible.
 
-    Between pillars the longest lookahead whose arc is clear depends on the heading. So a robot that turns towards its
-    carrot may find the next carrot on its other side, and turn to and fro without end.
+    Between pillars, the longest clear lookahead depends on the heading. A robot that turns towards its carrot may find the
+    next one on its other side, and turn back and forth endlessly.
     """
 
     def __init__(self, controller: PurePursuit, full_turn: int) -> None:
         self._controller, self._full_turn = controller, full_turn
 
     def apply(self, now: Moment, step: Step) -> Step:
-        """What the controller commands."""
+        """Return the controller's command."""
         last, before = now.before.command, now.before.pursuit
         if now.clock.turning <= self._full_turn:
             return Step(*self._controller.step(now.path, now.pose, last, before))
@@ -88,13 +88,13 @@ class Pursuit:
 
 
 class TurnToScan:
-    """Turn on the spot to scan, once the robot stands; stop where it has no way."""
+    """Rule: make the scan turn once the robot stands; stop where it has no path."""
 
     def __init__(self, guide: Exploration, robot: RobotSpec, hz: int) -> None:
         self._guide, self._robot, self._hz = guide, robot, hz
 
     def apply(self, now: Moment, step: Step) -> Step:
-        """The scan turn's command, or one that brakes for it."""
+        """Return the scan turn's command, or one that brakes for it."""
         scan_turn, last = self._guide.scan_turn, now.before.command
         if scan_turn is not None and not last.speed:
             turning = step.pursuit._replace(limiter=ROTATING)
@@ -105,13 +105,13 @@ class TurnToScan:
 
 
 class KeepToSchedule:
-    """Slow down to the schedule of a plan in space and time."""
+    """Rule: keep to the schedule of a plan in space and time."""
 
     def __init__(self, guide: Guide, robot: RobotSpec, hz: int) -> None:
         self._guide, self._hz, self._max_change = guide, hz, robot.max_acceleration / hz
 
     def apply(self, now: Moment, step: Step) -> Step:
-        """The command, no faster than the schedule allows."""
+        """Return the command, limited to the schedule's speed."""
         schedule = self._guide.schedule
         if schedule is None:
             return step
@@ -121,7 +121,7 @@ class KeepToSchedule:
 
 
 class Avoid:
-    """Replace the command where movers come too close. A robot that gives way at the goal brakes and stays there."""
+    """Rule: avoid movers that come too close. A robot that gives way at the goal stops and stays."""
 
     def __init__(
         self,
@@ -141,7 +141,7 @@ class Avoid:
         self._state = AvoidanceState()
 
     def apply(self, now: Moment, step: Step) -> Step:
-        """The command that avoids movers."""
+        """Return the command that avoids movers."""
         avoidance, (tick, pose, _, path, before, _) = self._avoidance, now
         last, ahead = before.command, avoidance.prediction_times
         stopping = before.avoids and self._stops_at_goal(pose, last)
@@ -149,7 +149,7 @@ class Avoid:
             if standing(now.state):
                 return step._replace(arrived=True)
             step = step._replace(command=braked(last, self._robot, self._hz))
-            # A robot that stands at the goal has arrived, so only the time until it stands matters.
+            # The robot arrives when it stands, so only the stopping time matters.
             ahead = ahead[: 2 + math.ceil(stopping_time(last, self._robot) / avoidance.step)]
         movers, radii = self._movers.predict(tick, pose[:2], ahead)
         command, avoids, self._state = avoidance.avoid(
@@ -171,7 +171,7 @@ class Avoid:
         return step._replace(command=command, pursuit=pursuit, avoids=True)
 
     def _stops_at_goal(self, pose: Pose, command: Twist) -> bool:
-        """Whether a robot that brakes now stops within the goal's tolerance."""
+        """Return whether a robot that brakes now stops within the goal's tolerance."""
         x, y, yaw = pose
         goal = self._task.goal
         distance = command.speed * abs(command.speed) / (2 * self._robot.max_acceleration)
@@ -180,17 +180,17 @@ class Avoid:
 
 
 def standing(state: State) -> bool:
-    """Whether the robot has stopped."""
+    """Return whether the robot has stopped."""
     return abs(state.speed) < STOPPED_SPEED and abs(state.yaw_rate) < STOPPED_SPEED
 
 
 def stopping_time(command: Twist, robot: RobotSpec) -> float:
-    """How long a robot takes to stop [s]."""
+    """Return the stopping time [s]."""
     return max(abs(command.speed) / robot.max_acceleration, abs(command.yaw_rate) / robot.max_yaw_acceleration)
 
 
 def braked(command: Twist, robot: RobotSpec, hz: int) -> Twist:
-    """The next command of a robot that brakes on the same curve, as far as it can slow its turn as fast."""
+    """Return the next command of a robot that brakes on the same arc, as far as its yaw rate can follow."""
     share = max(0.0, 1 - robot.max_acceleration / hz / abs(command.speed)) if command.speed else 0.0
     turning = max(abs(command.yaw_rate) * share, abs(command.yaw_rate) - robot.max_yaw_acceleration / hz, 0.0)
     return Twist(command.speed * share, math.copysign(turning, command.yaw_rate))

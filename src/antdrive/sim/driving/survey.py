@@ -1,4 +1,4 @@
-"""What a robot's lidar tells it, in the frame of its estimates: scans, movers among a given map, and a map of its own."""
+"""Lidar processing during a drive, in the frame of the estimates: scans, mover detection, and the robot's own map."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, Tr
 from antdrive.worlds import Task, Trajectories, World
 
 MAP_CELL = 0.05  # side of the map's cells [m]
-HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # hits farther away are not entered in the map [m]
-RECENT = 1.0  # scans of this time are kept where the map is made anew [s]
-PAD = 0.01  # the robot keeps this from what was hit and from what was not seen: rounding of ranges, and of cells [m]
-PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
-TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
-BLUR = 0.02  # and this much more for each metre of distance [m/m]
-SHARPEST = 0.05  # arcs of a smaller radius than this are nearly turns on the spot [m]
-FAR_AMONG_MOVERS = 15.0  # scans are matched up to this far where movers, which are no marks, hide what is near [m]
+HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # range up to which hits enter the map [m]
+RECENT = 1.0  # after a reset, scans of this time enter the new map [s]
+PAD = 0.01  # distance kept from hits and from unknown ground, for rounding of ranges and cells [m]
+PATIENCE = 3  # failed plans in a row before the map is reset
+TOLERANCE = 0.008  # clearance that a route may lose without a replan [m]
+BLUR = 0.02  # additional allowance per metre of distance [m/m]
+SHARPEST = 0.05  # arcs of a smaller radius are treated as turns on the spot [m]
+FAR_AMONG_MOVERS = 15.0  # matching range among movers, which hide near landmarks [m]
 
 
 def horizon_of(*, tracks_movers: bool) -> float:
-    """How far away a hit may be that is entered in a robot's map [m]."""
+    """Return the range up to which hits enter the robot's map [m]."""
     return HORIZON_AMONG_MOVERS if tracks_movers else HORIZON
 
 
 def turning_room(radius: float) -> float:
-    """How far around a robot ground is to be free, so that it may turn on the spot in its own sight [m].
+    """Return the radius of free ground that a turn on the spot needs under the stopping constraint [m].
 
-    Half a cell is more than the circle around a cell, by which ground that was not seen counts, stands out of it.
+    Unknown ground counts by circles around its cells; half a cell exceeds the part of such a circle outside the cell.
     """
     return radius + PAD + 0.5 * MAP_CELL
 
 
 def reset_ticks(record: DriveRecord) -> Iterator[int]:
-    """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path."""
+    """Yield the control periods in which a robot without a map reset its map: after some failed plans in a row."""
     failures = 0
     for replan in record.replans:
         if failures >= PATIENCE and replan.trigger != SCANNED:
@@ -63,20 +63,20 @@ def reset_ticks(record: DriveRecord) -> Iterator[int]:
 def table_logged(
     taken: Iterable[tuple[int, npt.NDArray[Any]]], columns: int, log: Rows, per_tick: int
 ) -> npt.NDArray[np.float32]:
-    """A table (K, columns) of a log: what was noted in control periods, each line after the row of its period."""
+    """Return a table (K, columns) of a log: lines noted in control periods, each after the row of its period."""
     kept = [(tick * per_tick, lines) for tick, lines in taken if tick * per_tick < len(log.t)]
     tables = [np.column_stack((np.full(len(lines), row), lines)) for row, lines in kept]
     return np.concatenate(tables or [np.empty((0, columns))]).astype(np.float32)
 
 
 class MoverTracking:
-    """What a robot's scans tell of movers, and the log of it.
+    """Mover tracker of a drive, with its log.
 
     Attributes:
-        tracker: finds and follows them
+        tracker: detects and tracks movers
         tick: the control period of the last scan
-        sight: the ground that its beams crossed within `reach` [m^2]
-        reach: up to where beams lie no farther apart than a cell of a map [m]
+        sight: area covered by its beams within `reach` [m^2]
+        reach: range up to which beams lie no farther apart than a map cell [m]
     """
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
@@ -97,63 +97,63 @@ class MoverTracking:
         return theirs
 
     def update_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
-        """The same for a robot that makes its own map, before the scan is entered."""
+        """Update with a scan of a robot that makes its own map, before the map takes the scan."""
         return self.read(MappedGround(seen, self._settle), pose, ranges, tick)
 
     def standing(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> Floats:
-        """A scan that was not read yet without what may move (beams,) [m]: nothing is in range there."""
+        """Return an unprocessed scan without hits on possible movers (beams,) [m]: those ranges are infinite."""
         ground = MappedGround(seen, self._settle)
         return np.where(self.tracker.suspected(ground, pose, ranges, tick / self._hz), np.inf, ranges)
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """The array `tracks` of a log (K, 7): the movers that were followed."""
+        """Return the array `tracks` of a log (K, 7)."""
         lines = (
-            (tick, np.column_stack((found.numbers, found.positions, found.velocities, found.radii)))
-            for tick, found in self._log
+            (tick, np.column_stack((movers.numbers, movers.positions, movers.velocities, movers.radii)))
+            for tick, movers in self._log
         )
         return {"tracks": table_logged(lines, 7, log, per_tick)}
 
 
 class Scan(NamedTuple):
-    """One scan."""
+    """A scan with its estimated pose."""
 
-    tick: int  # the control period in which it was taken
-    estimate: Pose  # where the robot believed it was
-    ranges: Floats  # what was measured (beams,) [m]
-    # which beams met movers that are followed (beams,); None where nobody looks for movers
+    tick: int  # the control period of the scan
+    estimate: Pose  # the estimated pose
+    ranges: Floats  # ranges (beams,) [m]
+    # which beams hit tracked movers (beams,); None without tracking
     movers: npt.NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedLidar:
-    """What a robot is surveying with."""
+    """Simulated lidar in the true world."""
 
-    scanner: Scanner  # the lidar in the true world
-    world: World  # what stands in it
-    trajectories: Trajectories | None  # the true motions of the movers; None where there are none
-    rng: np.random.Generator | None  # where the noise of ranges comes from; None: no noise
+    scanner: Scanner  # ray casting in the true world
+    world: World  # the standing obstacles
+    trajectories: Trajectories | None  # true motions of the movers; None without movers
+    rng: np.random.Generator | None  # source of range noise; None for no noise
     hz: int  # control periods per second
 
     @classmethod
     def of(
         cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int
     ) -> SimulatedLidar:
-        """A lidar in a world, whose noise is drawn from a drive's seed; it scans once in a control period at most."""
+        """Create a lidar in a world, with noise from a drive's seed and at most one scan per control period."""
         rng = random_stream(seed, "lidar") if noisy else None
         return cls(Scanner.of(lidar.at(hz), world), world, trajectories or None, rng, hz)
 
     @property
     def movers_at_start(self) -> Floats | None:
-        """Where the movers are at first, as discs (M, 3): x, y, radius [m]; None where there are none."""
+        """Positions of the movers at time 0, as discs (M, 3): x, y, radius [m]; None without movers."""
         movers = self.trajectories
         return np.column_stack((movers.positions(np.zeros(1))[0], movers.radii)) if movers else None
 
     def due(self, tick: int, last: int) -> bool:
-        """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none."""
+        """Return whether a scan is due in a control period, after one in period `last`; negative: after none."""
         return last < 0 or (tick != last and self.scanner.lidar.due(tick, self.hz))
 
     def ranges(self, tick: int, pose: Pose) -> Floats:
-        """A scan (beams,) [m]."""
+        """Return a scan (beams,) [m]."""
         movers = self.trajectories
         if not movers:
             return self.scanner.scan(pose, rng=self.rng)
@@ -161,7 +161,7 @@ class SimulatedLidar:
 
 
 class Scans:
-    """The scans of a lidar, each taken when it is due. Nothing but their ranges depends on true poses and the true world.
+    """Scans of a drive. Only their ranges depend on the true poses and the true world.
 
     Attributes:
         scans: all scans so far
@@ -172,18 +172,18 @@ class Scans:
         self._sensor = sensor
 
     def scan(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
-        """Take a scan from the true pose if one is due in a control period; the estimate, which the scan may correct."""
+        """Scan from the true pose if a scan is due; return the estimate, possibly corrected by the scan."""
         if not self._sensor.due(tick, self.scans[-1].tick if self.scans else -1):
             return estimate
         return self.read(tick, estimate, self._sensor.ranges(tick, pose))
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
-        """Keep a scan; the estimate, which it does not correct."""
+        """Store a scan; return the estimate unchanged."""
         self.scans.append(Scan(tick, estimate, ranges))
         return estimate
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """The arrays of a log that hold the scans."""
+        """Return the log's arrays of scans."""
         return scans_logged(((scan.tick, scan.ranges) for scan in self.scans), per_tick, len(log.t))
 
 
@@ -191,7 +191,7 @@ class MoverDetector(Scans):
     """Lidar-based mover detection for a robot with a map.
 
     Attributes:
-        watch: the tracks of the movers
+        tracking: the tracks of the movers
     """
 
     def __init__(self, sensor: SimulatedLidar, ground: Ground, tracking: MoverTracking) -> None:
@@ -199,22 +199,22 @@ class MoverDetector(Scans):
         self.tracking, self._ground = tracking, ground
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
-        """Keep a scan, and look for movers in it; the estimate."""
+        """Store a scan and track movers in it; return the estimate."""
         self.tracking.read(self._ground, estimate, ranges, tick)
         return super().read(tick, estimate, ranges)
 
 
 class Survey(Scans):
-    """What a robot without a map knows of the world: a map of its scans.
+    """Mapping for a robot without a map.
 
-    True poses and the true world are used for the ranges of scans, and for nothing else but this: the robot is told which of the
-    ground that it covers when it turns at the start is free. Whoever puts it down sees that.
+    True poses and the true world serve the ranges of scans, with one exception: at the start, the free ground within the
+    robot's turning circle is given.
 
     Attributes:
-        lidar: what it surveys with
-        map: what was hit, and which ground was seen free
-        whole: how many scans were entered as a whole, with the ground that is free
-        watch: what follows the movers in the scans; None: nothing does
+        lidar: the lidar
+        map: the occupancy map
+        whole: number of scans entered as a whole, with their free ground
+        tracking: the mover tracker; None without tracking
     """
 
     def __init__(
@@ -246,13 +246,13 @@ class Survey(Scans):
     def of(
         cls, robot: RobotSpec, task: Task, sensor: SimulatedLidar, *, matching: bool, tracking: MoverTracking | None
     ) -> Survey:
-        """The survey of a drive, after the first scan from the start."""
+        """Create the survey of a drive, with the first scan from the start."""
         survey = cls(sensor, robot, task.start, task.goal, matching=matching, tracking=tracking)
         survey.scan(0, task.start, task.start)
         return survey
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
-        """Enter a scan in the map; the estimated pose, which the scan may correct."""
+        """Enter a scan in the map; return the estimate, possibly corrected by scan matching."""
         if self.map.whole:
             self.whole += 1
             if self._matcher is not None:
@@ -263,7 +263,7 @@ class Survey(Scans):
         return estimate
 
     def _matched(self, matcher: ScanMatcher, estimate: Pose, ranges: Floats, tick: int) -> Pose:
-        """The estimated pose, corrected by a scan; among movers by what stands, and by nothing that slides along a wall."""
+        """Match a scan to the map; among movers use standing hits only, and drop shifts along a wall."""
         if self.tracking is None:
             return matcher.corrected(self.map, estimate, ranges)
         standing = self.tracking.standing(self.map, estimate, ranges, tick)
@@ -272,32 +272,33 @@ class Survey(Scans):
         return without_sliding(estimate, corrected, self.map.endpoints(estimate, near))
 
     def hit_within(self, points: Floats, needed: Floats, ahead: Floats) -> bool:
-        """Whether a beam of the last scan ended clearly nearer to a point of a route than the clearance that it needs."""
+        """Return whether a beam of the last scan ended clearly within the required clearance of a route point."""
         scan = self.scans[-1]
         x, y, yaw = self.lidar.pose_on(scan.estimate)
         ranges = scan.ranges if scan.movers is None else np.where(scan.movers, np.inf, scan.ranges)
         return bool(_kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, ranges))
 
     def reset(self, pose: Pose) -> None:
-        """Make the map anew of the latest scans: what was seen before may be elsewhere in a frame that drifts.
+        """Reset the map to the latest scans: older hits may be displaced by drift.
 
-        What the robot covers when it turns stays free as far as it was seen free. Hits there become ground that was not seen:
-        open to plans, but the robot does not move over it before it has looked again.
+        Ground within the turning circle stays free where it was observed as free. Hits there become unknown: open to plans, but
+        closed to motion until scanned again.
         """
         self.map = self.map.reset_around(pose[:2], self._turning_room, self._goal)
         for scan in self.scans[-self._recent :]:
             self.map.insert(scan.estimate, scan.ranges, scan.movers)
 
     def clear_distance(self, pose: Pose, speed: float, yaw_rate: float, longest: float) -> float:
-        """How far the robot can go on an arc over ground that it has seen free [m]."""
+        """Return how far the robot can drive on an arc over observed free ground [m]."""
         return clear_distance(self.map, pose, speed, yaw_rate, self._footprint, longest)
 
     def clear_turn(self, pose: Pose, yaw_rate: float, farthest: float) -> float:
-        """How far the robot can turn on the spot over ground that it has seen free [rad]."""
+        """Return how far the robot can turn on the spot over observed free ground [rad]."""
         return clear_turn(self.map, pose, yaw_rate, self._footprint, farthest)
 
     def clear_way(self, pose: Pose, twist: Twist, farthest: float, *, freespace: bool = False) -> float:
-        """How far the robot can go with a twist over ground that it has seen free [m]; for what is nearly a turn [rad]."""
+        """Return how far a twist leads over observed free ground [m], for near turns [rad]; `freespace` opens unknown ground."""
+
         if abs(twist.speed) <= SHARPEST * abs(twist.yaw_rate):
             return clear_turn(self.map, pose, twist.yaw_rate, self._footprint, farthest, freespace=freespace)
         return clear_distance(self.map, pose, *twist, self._footprint, farthest, freespace=freespace)

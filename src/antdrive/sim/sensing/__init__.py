@@ -1,4 +1,4 @@
-"""What a robot without a map has: a lidar's scans, a map made of them, odometry, and movers found in scans."""
+"""Lidar scanning, occupancy mapping, dead reckoning, scan matching and mover tracking."""
 
 import lazy_loader
 

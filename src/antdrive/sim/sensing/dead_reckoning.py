@@ -1,4 +1,4 @@
-"""A pose from wheels and a gyro alone: it starts right and drifts away from the truth."""
+"""Dead reckoning from wheels and a gyro."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from antdrive.robots.spec import SAMPLE_RATE, Odometry
 
 
 class DeadReckoning:
-    """The pose of a robot in its odometry frame, from measured speeds and yaw rates.
+    """Pose estimate in the odometry frame, integrated from measured speeds and yaw rates.
 
     Attributes:
         pose: the estimated pose: x, y [m] and yaw [rad]
 
     Args:
-        odometry: how wrong the measurements are
-        rng: where all random numbers come from: three for the drive, then two for each call of `advance`
-        start: the first pose, which the robot takes for true
+        odometry: the measurement errors
+        rng: the random stream: three numbers for the drive, then two per call of `advance`
+        start: the first pose, assumed exact
     """
 
     def __init__(self, odometry: Odometry, rng: np.random.Generator, start: Pose = (0.0, 0.0, 0.0)) -> None:
@@ -31,15 +31,15 @@ class DeadReckoning:
         self.pose = start
 
     def advance(self, speed: float, yaw_rate: float, dt: float) -> Pose:
-        """Move on by one sample, and return the estimated pose.
+        """Advance by one sample, and return the estimated pose.
 
         Args:
             speed: the true forward speed [m/s]
             yaw_rate: the true yaw rate, counter-clockwise [rad/s]
-            dt: how long the sample lasts [s]
+            dt: duration of the sample [s]
         """
         once, turn_noise = self._rng.standard_normal(2)
-        louder = 1 / math.sqrt(SAMPLE_RATE * dt)  # a short sample counts less, so it may be wrong by more
+        louder = 1 / math.sqrt(SAMPLE_RATE * dt)  # short samples average less noise
         measured = speed * (self._scale + self._odometry.speed_noise * louder * float(once))
         rate = yaw_rate * self._turn + self._bias + self._odometry.gyro_noise * louder * float(turn_noise)
         x, y, yaw = self.pose

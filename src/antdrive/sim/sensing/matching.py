@@ -1,4 +1,4 @@
-"""Where the robot must be for its scan to lie on its map: drift of odometry is taken back while the map is in sight."""
+"""Scan matching: corrects odometry drift against the robot's own map."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from antdrive.robots.lidar import Lidar
 from antdrive.sim.sensing import _kernels_matching
 from antdrive.sim.sensing.mapping import OccupancyMap
 
-BEAMS = 180  # of a scan that are matched, at most
-FAR = 8.0  # hits farther away are not matched, unless more is asked for [m]
-NEAR = 3  # how far partners are looked for, in grains of the map
-FEWEST = 25  # pairs below which a scan is not matched
-CHORD = 10  # beams between the two hits that tell how a surface lies
-LONGEST_STEP = 0.2  # hits of neighbouring beams farther apart do not belong to one surface [m]
-HELD = 0.1  # a direction is held by the scan where this share of the surfaces face it
-MOST = (0.02, 0.01)  # what one scan may correct; more is an error of the match [m], [rad]
+BEAMS = 180  # most beams of a scan that are matched
+FAR = 8.0  # default range of matched hits [m]
+NEAR = 3  # search radius for partners, in grains of the map
+FEWEST = 25  # fewest pairs of a match
+CHORD = 10  # beams between the two hits that define a surface's direction
+LONGEST_STEP = 0.2  # hits of neighbouring beams farther apart belong to different surfaces [m]
+HELD = 0.1  # a direction is constrained if this fraction of the surfaces face it
+MOST = (0.02, 0.01)  # largest correction by one scan; a larger one is a mismatch [m], [rad]
 
 
 class ScanMatcher:
-    """Corrects a pose by laying a scan on the map."""
+    """Scan matcher against an occupancy map."""
 
     def __init__(self, lidar: Lidar, far: float = FAR) -> None:
         self._lidar, self._far = lidar, far
@@ -31,7 +31,7 @@ class ScanMatcher:
         self._every = max(1, round(lidar.beams / BEAMS))
 
     def corrected(self, seen: OccupancyMap, pose: Pose, ranges: Floats) -> Pose:
-        """The pose, corrected; the pose itself where too little of the scan is on the map, or the map says too much else."""
+        """Return the corrected pose, or the pose itself if too few points match or the correction is too large."""
         lidar = self._lidar
         eye = lidar.pose_on(pose)
         first = seen.scans // seen.share % self._every
@@ -47,18 +47,18 @@ class ScanMatcher:
 
 
 def without_sliding(before: Pose, after: Pose, points: Floats) -> Pose:
-    """A corrected pose without the part of its shift that the scan cannot tell: along a wall that is all there is in sight.
+    """Remove the part of a correction that the scan does not constrain, such as a shift along the only visible wall.
 
-    The normals of the surfaces that were hit tell in which directions they hold the pose: along the eigenvectors of their mean
-    outer product whose eigenvalues are not small.
+    The normals of the hit surfaces constrain the pose along those eigenvectors of their mean outer product whose eigenvalues
+    are not small.
     """
     along = points[CHORD:] - points[:-CHORD]
     length = np.hypot(along[:, 0], along[:, 1])
     step = np.hypot(*np.diff(points, axis=0).T)
-    gaps = np.concatenate([[0], np.cumsum(~(step < LONGEST_STEP))])  # also where a point is missing
+    gaps = np.concatenate([[0], np.cumsum(~(step < LONGEST_STEP))])  # also at missing points
     flat = (gaps[CHORD:] == gaps[:-CHORD]) & (length > 0)
     tangents = along[flat] / length[flat, None]
-    single = max(0, int(np.count_nonzero(np.isfinite(points[:, 0]))) - len(tangents) - CHORD)  # on small things
+    single = max(0, int(np.count_nonzero(np.isfinite(points[:, 0]))) - len(tangents) - CHORD)  # on small objects
     count = single + len(tangents)
     if not count:
         return after

@@ -1,4 +1,4 @@
-"""What a lidar measures in a world: exact rays against the cylinders and walls that collide."""
+"""Lidar simulation: exact rays against the cylinders and walls of the physics."""
 
 from __future__ import annotations
 
@@ -9,25 +9,24 @@ from antdrive.robots.lidar import Lidar
 from antdrive.sim.sensing import _kernels_rays
 from antdrive.worlds import World
 
-RESORT = 1.0  # discs are sorted by their distance again where the lidar has gone so far [m]
+RESORT = 1.0  # discs are sorted by distance again after this displacement of the lidar [m]
 
 
 class Scanner:
-    """A lidar in a world.
+    """Lidar in a world.
 
-    Ranges follow REP 117, as the challenge's simulator does: `inf` where nothing is within the lidar's range, `-inf` where
-    something is nearer than it can measure, else the measured distance. Rays have a closed form, so without noise and
-    resolution they are exact to rounding.
+    Ranges follow REP 117, as the challenge's simulator does: `inf` if nothing is in range, `-inf` if something is too near to
+    measure, else the distance. Rays have a closed form, so without noise and resolution they are exact to rounding.
 
     Attributes:
         lidar: the lidar
 
     Args:
         lidar: the lidar
-        discs: what stands still: x, y and radius of each cylinder (N, 3) [m]
-        heights: the cylinders' heights (N,) [m]; those below the beams are not seen. None: all are seen
-        bounds: the walls' inner faces [m]; walls are always high enough. None: no walls
-        mover_heights: the heights of the movers (M,) [m]; None: all are seen
+        discs: standing cylinders: x, y and radius (N, 3) [m]
+        heights: the cylinders' heights (N,) [m]; those below the beams are invisible. None: all are visible
+        bounds: the inner faces of the walls [m], always high enough; None: no walls
+        mover_heights: the movers' heights (M,) [m]; None: all are visible
     """
 
     def __init__(
@@ -53,7 +52,7 @@ class Scanner:
 
     @classmethod
     def of(cls, lidar: Lidar, world: World) -> Scanner:
-        """The lidar in a world: its cylinders by their heights, its movers, its walls.
+        """Create the lidar in a world: its cylinders by height, its movers and its walls.
 
         Args:
             lidar: the lidar
@@ -68,24 +67,24 @@ class Scanner:
         mover_radii: Floats | None = None,
         rng: np.random.Generator | None = None,
     ) -> Floats:
-        """A scan (beams,) [m].
+        """Scan, and return the ranges (beams,) [m].
 
-        With `rng` ranges have the lidar's noise. A scan draws one number for each beam, whatever the beams meet, so that what
-        is not seen changes nothing.
+        With `rng`, ranges have the lidar's noise. Each scan draws one number per beam, whatever the beams hit, so invisible
+        objects change nothing.
 
         Args:
             pose: the robot's true pose, not the lidar's
-            mover_positions: where all movers are (M, 2) [m]
+            mover_positions: positions of all movers (M, 2) [m]
             mover_radii: their radii (M,) [m]
-            rng: where the noise comes from; None: no noise
+            rng: source of the noise; None: no noise
         """
         eye = self.lidar.pose_on(pose)
         if abs(eye[0] - self._sorted_at[0]) + abs(eye[1] - self._sorted_at[1]) > RESORT:
             self._sort(eye[:2])
         movers = self._none
         if mover_positions is not None and mover_radii is not None and len(mover_radii):
-            found = np.column_stack((mover_positions, mover_radii))
-            movers = np.ascontiguousarray((found if self._movers is None else found[self._movers]).T)
+            circles = np.column_stack((mover_positions, mover_radii))
+            movers = np.ascontiguousarray((circles if self._movers is None else circles[self._movers]).T)
         noise = self._silence if rng is None else rng.standard_normal(self.lidar.beams)
         out = np.empty(self.lidar.beams)
         _kernels_rays.scan(
@@ -94,6 +93,7 @@ class Scanner:
         return out
 
     def _sort(self, eye: Point) -> None:
-        """Put near discs first: rays that they end need not be looked at again."""
+        """Sort discs by distance, so that rays end early."""
+
         away = np.hypot(self._discs[0] - eye[0], self._discs[1] - eye[1]) - self._discs[2]
         self._discs, self._sorted_at = np.take(self._discs, np.argsort(away, kind="stable"), axis=1), eye

@@ -1,1 +1,1 @@
-"""Drives for other programs: ROS 2 messages in MCAP files and rosbag2 folders, and tables."""
+"""Exports of drives: ROS 2 messages in MCAP files and rosbag2 folders, and CSV tables."""

@@ -1,4 +1,4 @@
-"""A log, exported to what other programs read: ROS 2 messages in bags, with a layout of panels, or tables of numbers."""
+"""Export of logs to ROS 2 bags with a Foxglove layout, or to CSV tables."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ from antdrive.worlds.files.world_file import save_task
 
 LAYOUT = ".foxglove.json"
 SCENE = "3D!drive"
-MARGIN = 1.1  # how much more than the world the picture shows
-ASPECT = 0.75  # width over height of the scene's panel, at least: in a window of 1400 x 900 beside an open side bar
+MARGIN = 1.1  # shown extent relative to the world's
+ASPECT = 0.75  # least width over height of the scene's panel: a window of 1400 x 900 with an open side bar
 
 
 def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False, scans: bool = True) -> list[Path]:
-    """Export a log; the files or the folder are written whole or not at all."""
+    """Export a log atomically and return the written files or the folder."""
     if to not in EXPORTS:
         raise FieldError("to", f"unknown {to!r}; choose from {', '.join(EXPORTS)}")
     source, target = Path(log), Path(path)
     if target.suffix != ".mcap" and to == "mcap":
-        raise input_error(str(target), "name a file that ends in .mcap")
+        raise input_error(str(target), "wrong suffix; name a file that ends in .mcap")
     if target.suffix in (".mcap", ".csv") and to != "mcap":
-        kind = "; a file that ends in .mcap is made with --to mcap" if target.suffix == ".mcap" else ""
-        raise input_error(str(target), f"name a folder: {to} is several files{kind}")
+        kind = "; for one .mcap file use --to mcap" if target.suffix == ".mcap" else ""
+        raise input_error(str(target), f"name a folder: {to} writes several files{kind}")
     require_new((target, target.with_suffix(LAYOUT)), replace=replace or to != "mcap")
     return EXPORTS[to](Rollout.load(source), source, target, scans)
 
 
 def topics_of(rollout: Rollout, scans: DriveScans) -> list[Topic]:
-    """All messages of a drive. At the first stamp the fixed transforms come first, on both of their topics."""
+    """Return all topics of a drive. Static transforms come first, on /tf_static and on /tf."""
     static, few = scenery(rollout)
     many = samples(rollout, scans)
     moving = many[0]
@@ -54,7 +54,7 @@ def topics_of(rollout: Rollout, scans: DriveScans) -> list[Topic]:
 
 
 def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
-    """The files that a bag keeps inside: media type and content by name."""
+    """Return a bag's attachments: media type and content by name."""
     with tempfile.TemporaryDirectory() as folder:
         save_task(rollout.record.task, Path(folder) / "world.yaml")
         world = (Path(folder) / "world.yaml").read_bytes()
@@ -69,7 +69,7 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
 
 def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
     layout = target.with_suffix(LAYOUT)
-    with atomic_write(layout) as beside, atomic_write(target) as part:  # both or none
+    with atomic_write(layout) as beside, atomic_write(target) as part:  # both files or neither
         _write_bag(rollout, log, part, beside, again)
     return [target, layout]
 
@@ -83,7 +83,7 @@ def _to_rosbag2(rollout: Rollout, log: Path, target: Path, again: bool) -> list[
 
 
 def _write_bag(rollout: Rollout, log: Path, bag: Path, layout: Path, again: bool) -> tuple[list[Topic], dict[str, str]]:
-    """Write a bag and its layout; its topics, and what a reader of it has to know."""
+    """Write a bag and its layout and return its topics and notes."""
     scans = DriveScans.of(rollout, again=again)
     topics, notes = topics_of(rollout, scans), {"scans": scans.source}
     write_mcap(bag, topics, attachments_of(rollout, log), notes)
@@ -98,9 +98,9 @@ def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path
 
 
 def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
-    """The layout of Foxglove's and Lichtblick's panels as plain data: the scene from straight above, and curves beside it.
+    """Return a layout for Foxglove and Lichtblick: the scene in top view, with plots beside it.
 
-    Topics have settings where the programs' own would not do: without intensities scans have no colour.
+    Topics have explicit settings if the defaults fail: scans without intensities would have no colour.
     """
     layout: dict[str, Any] = json.loads(Path(__file__).with_name("layout.json").read_text(encoding="utf-8"))
     x0, y0, x1, y1 = rollout.record.world.bounds
@@ -108,13 +108,13 @@ def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
     low, high = corners.min(axis=0), corners.max(axis=0)
     wide, tall = (high - low).tolist()
     camera = layout["configById"][SCENE]["cameraState"]
-    camera["distance"] = MARGIN * max(wide / ASPECT, tall)  # how much is shown from bottom to top [m]
+    camera["distance"] = MARGIN * max(wide / ASPECT, tall)  # shown height [m]
     camera["targetOffset"] = [*((low + high) / 2).tolist(), 0]
     return layout
 
 
 def write_tables(rollout: Rollout, folder: Path) -> None:
-    """Write drive.csv with a line for each row of the log, plan.csv with the routes, and contacts.csv."""
+    """Write drive.csv with a line per row of the log, plan.csv with the routes, and contacts.csv."""
     _write_table(folder / "drive.csv", *_drive(rollout))
     plan = ((number, at, x, y) for number, (at, points) in enumerate(routes_of(rollout)) for x, y in points.tolist())
     _write_table(folder / "plan.csv", ("route", "from_s", "x_m", "y_m"), plan)
@@ -147,7 +147,7 @@ def _write_table(path: Path, heads: Sequence[str], lines: Iterable[Sequence[Any]
         writer.writerows(lines)
 
 
-#: How to export a log, by what it becomes.
+#: Exporters by format.
 EXPORTS: Mapping[str, Callable[[Rollout, Path, Path, bool], list[Path]]] = MappingProxyType(
     {"mcap": _to_mcap, "rosbag2": _to_rosbag2, "csv": _to_csv}
 )

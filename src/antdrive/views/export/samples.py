@@ -1,4 +1,4 @@
-"""The topics with many messages: transforms, odometry, commands and numbers to plot for every row of a log, and scans."""
+"""Topics with a message per row or scan: transforms, odometry, commands, numbers and scans."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ HEADER = b"\x00\x01\x00\x00"  # CDR, little endian
 
 
 class CdrLayout:
-    """Many messages of one shape, serialised together: all hold the same texts and as many elements.
+    """Layout of messages with equal texts and lengths, serialised together.
 
-    CDR (OMG DDS-XTypes, encoding version 1, little endian) puts each number at a multiple of its own size, counted from the
-    end of a header of four bytes. So every number is at the same place in all messages, and numpy fills a column at a time.
+    CDR (OMG DDS-XTypes, encoding version 1, little endian) aligns each number to its own size, counted from the end of a
+    four-byte header. Every number has the same offset in all messages, so numpy fills one column at a time.
 
-    The methods add the message's values in their order.
+    The methods add the message's values in order.
     """
 
     def __init__(self) -> None:
@@ -31,25 +31,25 @@ class CdrLayout:
         self._numbers: dict[str, tuple[int, np.dtype[np.generic], tuple[int, ...]]] = {}
 
     def number(self, name: str, kind: str, count: int | None = None) -> None:
-        """Add a number, or numbers in a row, that differ between messages; they are 0 unless `messages` is given them."""
+        """Add a number or `count` consecutive numbers, whose values `messages` sets; the default is 0."""
         dtype = np.dtype(f"<{kind}")
         self._align(dtype.itemsize if count != 0 else 1)
         self._numbers[name] = (len(self._constant), dtype, () if count is None else (count,))
         self._constant += bytes(dtype.itemsize * (1 if count is None else count))
 
     def length(self, count: int) -> None:
-        """Add the length of a sequence whose elements follow."""
+        """Add the length of the sequence that follows."""
         self._align(4)
         self._constant += struct.pack("<I", count)
 
     def text(self, value: str) -> None:
-        """Add a text that is the same in all messages."""
+        """Add a text common to all messages."""
         content = value.encode() + b"\0"
         self.length(len(content))
         self._constant += content
 
     def messages(self, values: dict[str, npt.NDArray[np.generic]]) -> list[memoryview]:
-        """The serialised messages."""
+        """Return the serialised messages."""
         many = len(next(iter(values.values())))
         size = len(self._constant)
         buffer = np.tile(np.frombuffer(bytes(self._constant), dtype=np.uint8), (many, 1))
@@ -66,7 +66,7 @@ class CdrLayout:
 
 
 def samples(rollout: Rollout, scans: DriveScans) -> list[Topic]:
-    """The topics with a message for each row of a log or for each scan."""
+    """Return the topics with a message per row of a log or per scan."""
     stamps = nanoseconds(rollout.t)
     frames = [(ODOM, BASE), *((ODOM, mover_frame(i)) for i in range(rollout.movers.shape[1]))]
     still = np.zeros((*rollout.movers.shape[:2], 1))
@@ -88,9 +88,9 @@ def samples(rollout: Rollout, scans: DriveScans) -> list[Topic]:
 
 
 def scan_topics(rollout: Rollout, scans: DriveScans) -> list[Topic]:
-    """What the robot's lidar saw; empty where there are no scans.
+    """Return the topic of the lidar's scans; empty without scans.
 
-    Ranges are as REP 117 has them: +inf where nothing was in range, -inf where something was too near to measure.
+    Ranges follow REP 117: +inf for nothing in range, -inf for objects too near to measure.
     """
     lidar = rollout.record.robot.lidar
     if lidar is None or not len(scans.rows):
@@ -109,12 +109,12 @@ def scan_topics(rollout: Rollout, scans: DriveScans) -> list[Topic]:
 
 
 def _own_maps(rollout: Rollout) -> Floats:
-    """Where the robot's own map lies in each row, x, y [m] and yaw [rad] (N, 3): so that the robot is where it believes to be."""
+    """Return the pose of the robot's occupancy map in each row, x, y [m] and yaw [rad] (N, 3)."""
     return relative_frame(rollout.estimate, rollout.pose) if len(rollout.estimate) else np.zeros((len(rollout.t), 3))
 
 
 def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], poses: Floats) -> Topic:
-    """Messages that place frames within others."""
+    """Return messages of transforms between frames."""
     layout = CdrLayout()
     layout.length(len(frames))
     values: dict[str, Any] = {}
@@ -127,7 +127,7 @@ def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], pose
 
 
 def odometry(topic: str, child: str, stamps: Ints, pose: Floats, twist: Floats) -> Topic:
-    """Poses with speeds; covariances are 0, which ROS reads as unknown."""
+    """Return odometry messages; covariances are 0, unknown in ROS."""
     layout = CdrLayout()
     _header(layout, ODOM)
     layout.text(child)
@@ -140,21 +140,21 @@ def odometry(topic: str, child: str, stamps: Ints, pose: Floats, twist: Floats) 
 
 
 def twists(topic: str, stamps: Ints, twist: Floats) -> Topic:
-    """Speeds."""
+    """Return messages of commanded velocities."""
     layout = CdrLayout()
     layout.number("twist", "f8", 6)
     return Topic(topic, "geometry_msgs/msg/Twist", stamps, layout.messages({"twist": _twist6(twist)}))
 
 
 def numbers(topic: str, kind: str, number: str, stamps: Ints, values: Any) -> Topic:
-    """Single numbers."""
+    """Return messages of single numbers."""
     layout = CdrLayout()
     layout.number("data", number)
     return Topic(topic, kind, stamps, layout.messages({"data": values}))
 
 
 def laser_scans(topic: str, stamps: Ints, ranges: npt.NDArray[np.floating], values: dict[str, float]) -> Topic:
-    """Scans of a planar lidar."""
+    """Return scans of a planar lidar."""
     layout = CdrLayout()
     _header(layout, LIDAR)
     for name in values:
@@ -179,46 +179,46 @@ def _stamp_values(stamps: Ints, mark: str = "") -> dict[str, Any]:
 
 
 def _pose7(pose: Floats) -> Floats:
-    """Position and quaternion (N, 7) of poses in the plane (N, 3)."""
-    found = np.zeros((len(pose), 7))
-    found[:, :2] = pose[:, :2]
-    found[:, 5], found[:, 6] = np.sin(pose[:, 2] / 2), np.cos(pose[:, 2] / 2)
-    return found
+    """Convert poses in the plane (N, 3) to position and quaternion (N, 7)."""
+    poses = np.zeros((len(pose), 7))
+    poses[:, :2] = pose[:, :2]
+    poses[:, 5], poses[:, 6] = np.sin(pose[:, 2] / 2), np.cos(pose[:, 2] / 2)
+    return poses
 
 
 def _twist6(twist: Floats) -> Floats:
-    found = np.zeros((len(twist), 6))
-    found[:, 0], found[:, 5] = twist[:, 0], twist[:, 1]
-    return found
+    twists = np.zeros((len(twist), 6))
+    twists[:, 0], twists[:, 5] = twist[:, 0], twist[:, 1]
+    return twists
 
 
 LOGGED = "taken by the drive"
-TAKEN_AGAIN = "taken at export, without noise, from the logged poses; the log holds no scans"
-LEFT_OUT = "left out"
+SIMULATED = "simulated at export, without noise, from the logged poses; the log holds no scans"
+OMITTED = "omitted"
 NONE = "none; the robot has no lidar"
 
 
 class DriveScans(NamedTuple):
-    """The scans of a drive."""
+    """Scans of a drive."""
 
-    source: str  # where they come from, in words
-    rows: Ints  # of the log, at which they were taken (S,)
-    # what was measured (S, beams) [m]; infinite where nothing was in range, minus infinity where something was too near
+    source: str  # origin, in words
+    rows: Ints  # rows of the log (S,)
+    # measured ranges (S, beams) [m]; +inf for nothing in range, -inf for objects too near
     ranges: npt.NDArray[np.floating]
 
     @classmethod
     def of(cls, rollout: Rollout, *, again: bool = True) -> DriveScans:
-        """The scans of a drive."""
+        """Return the scans of a drive: logged, simulated if `again`, or none."""
         if len(rollout.scans):
             return cls(LOGGED, rollout.scan_rows.astype(np.int64), ranges_of(rollout.scans))
         if rollout.record.robot.lidar is not None and again:
-            return cls(TAKEN_AGAIN, *_taken_again(rollout))
-        source = NONE if rollout.record.robot.lidar is None else LEFT_OUT
+            return cls(SIMULATED, *_simulated(rollout))
+        source = NONE if rollout.record.robot.lidar is None else OMITTED
         return cls(source, np.empty(0, dtype=np.int64), np.empty((0, 0)))
 
 
-def _taken_again(rollout: Rollout) -> tuple[Ints, npt.NDArray[np.float32]]:
-    """The rows (S,) in which the lidar is due, and what it measures without noise from the logged poses (S, beams) [m]."""
+def _simulated(rollout: Rollout) -> tuple[Ints, npt.NDArray[np.float32]]:
+    """Return the rows of scans (S,) and noise-free ranges from the logged poses (S, beams) [m]."""
     from antdrive.sim.sensing import Scanner
 
     record, lidar = rollout.record, rollout.record.robot.lidar

@@ -1,4 +1,4 @@
-"""The topics that have few messages: the map, routes, what stands around, the robot's shape, and what happened."""
+"""Topics with few messages: map, routes, obstacles, robot description and events."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from antdrive.views.export.topics import (
 )
 from antdrive.views.scene import Scene, contact_point
 
-SPHERE, CYLINDER, LINE_STRIP = 2, 3, 4  # kinds of markers
+SPHERE, CYLINDER, LINE_STRIP = 2, 3, 4  # marker types
 KNOWN, UNSEEN, MOVING = (0.45, 0.47, 0.52, 1.0), (0.85, 0.2, 0.2, 1.0), (0.95, 0.6, 0.1, 1.0)
 TOUCHED, GOAL, WALL = (0.9, 0.0, 0.5, 1.0), (0.2, 0.7, 0.3, 0.4), (0.3, 0.32, 0.36, 1.0)
 FLAT, LINE, SPOT = 0.01, 0.05, 0.1  # height of the goal, width of a line, size of a contact [m]
 
 
 def scenery(rollout: Rollout) -> tuple[Topic, list[Topic]]:
-    """The fixed transforms as sent at the first row, for the topic /tf too; and the other topics with few messages."""
+    """Return the static transforms, sent at the first row, and the other topics with few messages."""
     start = float(rollout.t[0])
     static = _message("/tf_static", "tf2_msgs/msg/TFMessage", [start], [_static(rollout)], latched=True)
     latched: dict[str, tuple[str, Any]] = {
@@ -55,7 +55,7 @@ def _message(name: str, kind: str, times: Sequence[float], contents: Iterable[An
 
 
 def _static(rollout: Rollout) -> Any:
-    """The transforms that never change."""
+    """Return the static transforms."""
     robot, start = rollout.record.robot, float(rollout.t[0])
     x, y, yaw = rollout.record.task.frame
     placed = [(MAP, ODOM, (x, y, 0.0), yaw)]
@@ -82,13 +82,13 @@ def _static(rollout: Rollout) -> Any:
 
 
 def _maps(rollout: Rollout) -> list[Topic]:
-    """The planner's grid, once; of a robot without a map what it had seen, as that grew."""
+    """Return the planner's grid, once, or a mapless robot's growing occupancy map."""
     if not rollout.record.exploring:
-        frame, found = MAP, [planned_ground(rollout)]
+        frame, grids = MAP, [planning_grid(rollout)]
     else:
-        frame, found = ROBOT_MAP, list(known_ground(rollout)) if len(rollout.scans) else []
-    kind, times = "nav_msgs/msg/OccupancyGrid", [ground.at for ground in found]
-    return [_message("/map", kind, times, [_grid(ground, frame) for ground in found], latched=True)] if found else []
+        frame, grids = ROBOT_MAP, list(occupancy_maps(rollout)) if len(rollout.scans) else []
+    kind, times = "nav_msgs/msg/OccupancyGrid", [grid.at for grid in grids]
+    return [_message("/map", kind, times, [_grid(grid, frame) for grid in grids], latched=True)] if grids else []
 
 
 def _grid(ground: GroundGrid, frame: str) -> Any:
@@ -105,7 +105,7 @@ def _grid(ground: GroundGrid, frame: str) -> Any:
 
 
 def _routes(rollout: Rollout) -> Topic:
-    """Each route when the robot began to follow it, its points with the heading towards the next one."""
+    """Return each route at its start time, its points with the heading towards the next one."""
     frame = ROBOT_MAP if rollout.record.exploring else MAP
     times, contents = [], []
     for at, points in routes_of(rollout):
@@ -122,17 +122,17 @@ def _routes(rollout: Rollout) -> Topic:
 
 
 def routes_of(rollout: Rollout) -> Iterator[tuple[float, Floats]]:
-    """Each route with when the robot began to follow it [s], in the map's frame (N, 2) [m].
+    """Yield each route's start time [s] and points (N, 2) [m] in the map's frame.
 
-    A robot without a map plans where it believes to be: its routes lie in the frame of its own map.
+    A mapless robot's routes are in the frame of its occupancy map.
     """
-    lies = (0.0, 0.0, 0.0) if rollout.record.exploring else rollout.record.task.frame
+    frame = (0.0, 0.0, 0.0) if rollout.record.exploring else rollout.record.task.frame
     for rows, route in rollout.legs():
-        yield float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)]), world_to_map(lies, route)
+        yield float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)]), world_to_map(frame, route)
 
 
 def _standing(rollout: Rollout) -> list[Any]:
-    """Markers for the cylinders, the walls and the goal."""
+    """Return markers of cylinders, walls and goal."""
     scene, frame, at = Scene.of(rollout), rollout.record.task.frame, float(rollout.t[0])
     centres = world_to_map(frame, scene.obstacles[:, :2]).tolist()
     markers = [
@@ -153,7 +153,7 @@ def _standing(rollout: Rollout) -> list[Any]:
 
 
 def _moving(rollout: Rollout) -> list[Any]:
-    """Markers for the movers, each in its own frame, which moves."""
+    """Return markers of the movers, each in its own moving frame."""
     at, markers = float(rollout.t[0]), []
     for i, mover in enumerate(rollout.record.world.movers):
         size = (2 * mover.radius, 2 * mover.radius, mover.height)
@@ -163,7 +163,7 @@ def _moving(rollout: Rollout) -> list[Any]:
 
 
 def _contacts(rollout: Rollout) -> list[Topic]:
-    """Markers where the robot touched something, with each row's contacts; nothing without a contact."""
+    """Return markers of each row's contacts; empty without a contact."""
     scene, times, contents = Scene.of(rollout), [], []
     for row in np.unique(rollout.contacts[:, 0]).astype(int).tolist():
         things = rollout.contacts[rollout.contacts[:, 0] == row, 1].astype(int)
@@ -180,19 +180,19 @@ def _contacts(rollout: Rollout) -> list[Topic]:
 
 
 def _limiters(rollout: Rollout) -> Topic:
-    """The name of the rule that limits the speed, whenever it is another one."""
+    """Return the name of the speed-limiting rule at each change."""
     rows = np.flatnonzero(np.diff(rollout.limiter, prepend=-1.0)).tolist()
     names = [_text(rollout.record.limiters[rollout.limiter[row]]) for row in rows]
     return _message("/limiter_name", "std_msgs/msg/String", [float(rollout.t[row]) for row in rows], names)
 
 
 def _events(rollout: Rollout) -> Topic:
-    """Replans, and at last how the drive ended, in words."""
+    """Return replans and the outcome, in words."""
     record = rollout.record
-    said = [(r.t, f"replan: {r.trigger}: {'new route' if r.solved else 'no route found'}") for r in record.replans]
+    events = [(r.t, f"replan: {r.trigger}: {'new route' if r.solved else 'no route found'}") for r in record.replans]
     why = f": {record.reason}" if record.reason else ""
-    said.append((float(rollout.t[-1]), f"{record.outcome.key}: {record.outcome.value}{why}"))
-    return _message("/events", "std_msgs/msg/String", [t for t, _ in said], [_text(text) for _, text in said])
+    events.append((float(rollout.t[-1]), f"{record.outcome.key}: {record.outcome.value}{why}"))
+    return _message("/events", "std_msgs/msg/String", [t for t, _ in events], [_text(text) for _, text in events])
 
 
 def _marker(
@@ -264,22 +264,22 @@ def _turn(yaw: float) -> Any:
     return _of("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2)))
 
 
-FREE, OCCUPIED, UNKNOWN = 0, 100, -1  # as ROS has them
-PERIOD = 1.0  # between two maps of a robot that has none at first [s]
+FREE, OCCUPIED, UNKNOWN = 0, 100, -1  # values of nav_msgs/OccupancyGrid
+PERIOD = 1.0  # between two maps of a mapless robot [s]
 
 
 @dataclass(frozen=True, eq=False)
 class GroundGrid:
-    """An occupancy grid."""
+    """Occupancy grid at a time."""
 
-    at: float  # when it was known [s]
+    at: float  # time [s]
     cell: float  # side of a cell [m]
-    origin: Pose  # the pose of the lower left corner of cell (0, 0) in the grid's frame: x, y [m], yaw [rad]
+    origin: Pose  # pose of the lower left corner of cell (0, 0) in the grid's frame: x, y [m], yaw [rad]
     cells: npt.NDArray[np.int8]  # FREE, OCCUPIED or UNKNOWN (rows, cols)
 
 
-def planned_ground(rollout: Rollout) -> GroundGrid:
-    """The grid that the drive was planned on, in the frame of the map: free where the robot's centre may be."""
+def planning_grid(rollout: Rollout) -> GroundGrid:
+    """Return the planner's grid in the map's frame: free where the robot's centre may be."""
     from antdrive.worlds.grid import rasterise
 
     record = rollout.record
@@ -289,11 +289,11 @@ def planned_ground(rollout: Rollout) -> GroundGrid:
     return GroundGrid(float(rollout.t[0]), record.cell, (x, y, yaw), np.where(free, FREE, OCCUPIED).astype(np.int8))
 
 
-def known_ground(rollout: Rollout) -> Iterator[GroundGrid]:
-    """What a robot without a map had seen, in the frame of its estimated poses: at first, every second, and at last."""
+def occupancy_maps(rollout: Rollout) -> Iterator[GroundGrid]:
+    """Yield a mapless robot's occupancy map at the start, every `PERIOD` and at the end, in the frame of its estimates."""
     from antdrive.views.map_reconstruction import MapReconstruction
 
-    seen = MapReconstruction(rollout, forgetting=True, meeting=False)
+    seen = MapReconstruction(rollout, resets=True, detections=False)
     end = float(rollout.t[-1])
     times = [*np.arange(float(rollout.t[0]), end, PERIOD).tolist(), end]
     for at in times:
@@ -308,13 +308,13 @@ def known_ground(rollout: Rollout) -> Iterator[GroundGrid]:
 
 GAP = 0.005  # height of the body above the floor [m]
 WHEEL_WIDTH = 0.3  # in wheel radii
-#: How XML writes the characters that an attribute cannot hold. The standard library's function loads all of urllib.
+#: XML escapes of attributes. The standard library's function loads all of urllib.
 ESCAPES = {ord(c): f"&#{ord(c)};" for c in '&<>"\n\r\t'}
 BODY_COLOUR, WHEEL_COLOUR = "0.16 0.44 0.72 1", "0.15 0.15 0.15 1"
 
 
 def wheel_places(robot: RobotSpec) -> dict[str, tuple[float, float, float]]:
-    """Where the wheels are in the robot's frame: x, y and z [m] by link."""
+    """Return the wheels' positions in the robot's frame: x, y and z [m] by link."""
     return {
         f"{side}_wheel": (0.0, sign * robot.track / 2, robot.wheel_radius)
         for side, sign in (("left", 1), ("right", -1))
@@ -322,9 +322,9 @@ def wheel_places(robot: RobotSpec) -> dict[str, tuple[float, float, float]]:
 
 
 def description(robot: RobotSpec) -> str:
-    """The robot's shape as URDF text. The frame of the root link is on the floor, under the axle's centre.
+    """Return the robot's shape as URDF. The root link's frame is on the floor, below the axle's centre.
 
-    The body is the footprint, a cylinder or the box around it; the wheels stand inside it.
+    The body is the footprint, a cylinder or its bounding box; the wheels are inside.
     """
     body, x, y = _body(robot)
     origin = f'<origin xyz="{x!r} {y!r} {GAP + robot.height / 2!r}"/>'
@@ -349,7 +349,7 @@ def description(robot: RobotSpec) -> str:
 
 
 def _body(robot: RobotSpec) -> tuple[str, float, float]:
-    """The body's geometry, and its middle in the robot's frame, x and y [m]; a polygon is described by the box around it."""
+    """Return the body's geometry and its centre x, y [m] in the robot's frame; a polygon becomes its bounding box."""
     foot, height = robot.footprint, robot.height
     if foot.is_disc or len(foot.corners) == 1:
         x, y = foot.corners[0] if foot.corners else (0.0, 0.0)

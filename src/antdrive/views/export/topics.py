@@ -1,9 +1,8 @@
-"""ROS topics and frames of an exported drive, and the bags that hold them: an MCAP file, alone or in a rosbag2 folder.
+"""ROS topics and frames of an exported drive, and MCAP files that hold them, alone or in a rosbag2 folder.
 
-`map` is the frame of the map that the world came from, `odom` that of the world, in which the robot drives, and `base_link`
-the robot's: on the floor, under the axle's centre, x forward. `map` and `odom` are the same, unless the world file says how
-the world lies in its map. A mover i has the frame `mover_i`. The map that a robot makes itself has the frame `robot_map`, which
-lies in `odom` so that the robot is where it believes to be: with errors of its odometry, it moves.
+Frames: `map` is the source map's; `odom` is the world's, in which the robot drives; both are equal unless the world file sets
+the world's pose in its map. `base_link` is the robot's: on the floor, below the axle's centre, x forward. Mover i has
+`mover_i`. A robot's own occupancy map has `robot_map`, whose pose in `odom` changes with the error of the estimate.
 """
 
 from __future__ import annotations
@@ -27,28 +26,28 @@ MAP, ODOM, BASE, ESTIMATE, LIDAR, ROBOT_MAP = "map", "odom", "base_link", "estim
 
 
 def mover_frame(index: int) -> str:
-    """The frame of a mover."""
+    """Return the frame of a mover."""
     return f"mover_{index}"
 
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """The messages of one topic."""
+    """Messages of one topic."""
 
-    name: str  # the topic, such as /odom
-    kind: str  # the messages' type, such as nav_msgs/msg/Odometry
-    stamps: Ints  # when each message was sent (N,) [ns]
-    payloads: Payloads  # the serialised messages
-    latched: bool = False  # whether a late subscriber still gets the last message (durability transient local)
+    name: str  # topic, such as /odom
+    kind: str  # message type, such as nav_msgs/msg/Odometry
+    stamps: Ints  # times of the messages (N,) [ns]
+    payloads: Payloads  # serialised messages
+    latched: bool = False  # durability transient local: late subscribers receive the last message
 
 
 def nanoseconds(t: npt.ArrayLike) -> Ints:
-    """Times [s] as ROS counts them [ns]."""
+    """Convert times [s] to ROS stamps [ns]."""
     return np.rint(np.atleast_1d(np.asarray(t, dtype=np.float64)) * 1e9).astype(np.int64)
 
 
 def in_order(topics: Sequence[Topic]) -> list[tuple[int, int]]:
-    """All messages by time, as (topic, message); at the same time, topics keep their order."""
+    """Return all messages as (topic, message), sorted by time, then by topic."""
     stamps = np.concatenate([topic.stamps for topic in topics])
     of = np.concatenate([np.full(len(topic.stamps), i) for i, topic in enumerate(topics)])
     number = np.concatenate([np.arange(len(topic.stamps)) for topic in topics])
@@ -57,19 +56,19 @@ def in_order(topics: Sequence[Topic]) -> list[tuple[int, int]]:
 
 
 def library(name: str) -> Any:
-    """A module of rosbags or mcap, imported when it is first needed."""
-    return optional(name, "ros", "bags are written with it, tables (--to csv) without")
+    """Import a module of rosbags or mcap."""
+    return optional(name, "ros", "bags need it, tables (--to csv) do not")
 
 
 @functools.cache
 def message_types() -> Any:
-    """The message types of ROS 2 Jazzy, as rosbags has them."""
+    """Return rosbags' message types of ROS 2 Jazzy."""
     types = library("rosbags.typesys")
     return types.get_typestore(types.Stores.ROS2_JAZZY)
 
 
 VERSION = 9  # of rosbag2's metadata
-FOREVER = {"sec": 9223372036, "nsec": 854775807}  # how ROS writes "no limit"
+FOREVER = {"sec": 9223372036, "nsec": 854775807}  # ROS's "no limit"
 
 
 def write_mcap(
@@ -99,7 +98,7 @@ def write_mcap(
 
 
 def metadata(file: str, topics: Sequence[Topic], notes: Mapping[str, str]) -> str:
-    """The text of a rosbag2 folder's metadata.yaml."""
+    """Return the text of a rosbag2 folder's metadata.yaml."""
     begin = min(int(topic.stamps[0]) for topic in topics)
     end = max(int(topic.stamps[-1]) for topic in topics)
     span: dict[str, Any] = {
@@ -135,14 +134,14 @@ def metadata(file: str, topics: Sequence[Topic], notes: Mapping[str, str]) -> st
 
 
 class _WithoutAliases(yaml.SafeDumper):
-    """YAML as readers of bags know it, without references to what was written before."""
+    """YAML without anchors and aliases, which readers of bags do not support."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
 
 
 def _qos(latched: bool) -> dict[str, Any]:
-    """The quality of service that a topic was offered with."""
+    """Return a topic's offered quality of service."""
     return {
         "history": "keep_last",
         "depth": 1 if latched else 10,

@@ -1,4 +1,4 @@
-"""Worlds in the files of other programs, with what each format has no place for."""
+"""Export of worlds to SDF, map_server and MovingAI files, with a list of lost content."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SUFFIXES = (*SDF, ".yaml", ".yml", ".map")
 def write_world(
     task: Task, tasks: Mapping[str, Task], out: Path, resolution: float | None
 ) -> tuple[dict[str, Any], list[str]]:
-    """Write a world's files; facts about them, and what they have no place for."""
+    """Write a world's files and return facts about them and the content that the format cannot hold."""
     suffix, facts, lost = out.suffix.lower(), dict[str, Any](), list[str]()
     if suffix in SDF:
         export_sdf(task, out)
@@ -38,42 +38,40 @@ def write_world(
         if any(facts["corner_in_map"]):
             x, y, yaw = facts["corner_in_map"]
             turned = f", turned by {yaw:.6g} rad" if yaw else ""
-            lost.append(
-                f"its place: .map has no coordinates, and its lower left corner is at ({x:.6g}, {y:.6g}){turned}"
-            )
+            lost.append(f"its pose: .map has no coordinates; its lower left corner is at ({x:.6g}, {y:.6g}){turned}")
     else:
-        image = export_map_server(task, out, resolution=resolution, tasks=tasks, replace=True)  # as was checked
+        image = export_map_server(task, out, resolution=resolution, tasks=tasks, replace=True)  # checked by the caller
         return {"files": {"map": str(out), "image": str(image)}}, lost
     if tasks:
         facts["without_tasks"] = list(tasks)
-        lost.append(f"the tasks {', '.join(tasks)}: {suffix} has no place for them, .yaml has")
+        lost.append(f"the tasks {', '.join(tasks)}: {suffix} cannot hold tasks; use .yaml")
     return facts, lost
 
 
 def file_beside(out: Path) -> Path | None:
-    """The file that comes with the one that people name; None for a format of one file."""
+    """Return the second file of a format; None for formats with one file."""
     if out.suffix.lower() in SDF:
         return None
     return out.with_name(f"{out.name}.scen") if out.suffix.lower() == ".map" else out.with_suffix(".pgm")
 
 
 def _corner(task: Task) -> list[float]:
-    """Where a world's lower left corner, and with it that of its cells, lies in the map that it was made from."""
+    """Return the pose of a world's lower left corner in its source map: x, y [m], yaw [rad]."""
     return [float(v) for v in world_to_map(task.frame, [(*task.world.bounds[:2], 0.0)])[0]]
 
 
 def _export_movingai(task: Task, out: Path, resolution: float | None) -> dict[str, str]:
-    """Write the map and, if there is a path on its cells, the problem; the problem's file."""
+    """Write the map and, if its cells have a path, the problem; return the problem's file."""
     cells = export_movingai_map(task, out, resolution=resolution)
     start, goal = cells.cell_at(*task.start[:2]), cells.cell_at(*task.goal)
     beside = file_beside(out)
     assert beside is not None
-    beside.unlink(missing_ok=True)  # one that exists may be replaced, and would belong to another map
+    beside.unlink(missing_ok=True)  # an existing one would belong to another map
     if start is None or goal is None or not (cells.free[start] and cells.free[goal]):
         return {}
     answer = load_planner("dijkstra").plan(Query(Grid.from_free(cells.free), start, goal), np.random.default_rng(0))
     if not answer.solved:
         return {}
-    found = MapProblem(start, goal, answer.cost, f"{answer.cost:.8f}", out.name, int(answer.cost // 4))
-    export_movingai_problems([found], cells.free.shape, beside)
+    problem = MapProblem(start, goal, answer.cost, f"{answer.cost:.8f}", out.name, int(answer.cost // 4))
+    export_movingai_problems([problem], cells.free.shape, beside)
     return {"problem": str(beside)}

@@ -53,7 +53,7 @@ def test_a_map_keeps_the_other_tasks_of_its_world_and_other_formats_say_that_the
     code, out, _ = antdrive("worlds", "export", "w.yaml", "-o", "w.sdf")
     assert (code, out.splitlines()[1]) == (
         0,
-        f"  without the tasks {name}, back: .sdf has no place for them, .yaml has",
+        f"  without the tasks {name}, back: .sdf cannot hold tasks; use .yaml",
     )
 
 
@@ -128,9 +128,7 @@ def test_a_cylinder_that_was_moved_in_gazebo_is_moved_in_the_world(antdrive):
 def test_a_movingai_map_says_where_it_lay(antdrive):
     Path("w.yaml").write_text(IN_MAP)
     code, out, _ = antdrive("worlds", "export", "w.yaml", "-o", "w.map")
-    says = (
-        "  without its place: .map has no coordinates, and its lower left corner is at (12.3, -3.1), turned by 0.7 rad"
-    )
+    says = "  without its pose: .map has no coordinates; its lower left corner is at (12.3, -3.1), turned by 0.7 rad"
     assert (code, out.splitlines()[-1]) == (0, says)
     found = json.loads(antdrive("worlds", "export", "w.yaml", "-o", "w.map", "--force", "--json")[1])
     assert (found["cell"], found["corner_in_map"]) == (0.1, pytest.approx([12.3, -3.1, 0.7]))

@@ -107,7 +107,7 @@ def test_a_dynabarn_set_is_listed_as_json(antdrive, dynabarn):
 
 def test_two_worlds_of_one_name_are_refused_before_anything_is_written(refused, dynabarn):
     says = refused("worlds", "import", dynabarn("one", "one"), "-o", "twice")
-    assert "two worlds would be written to twice/one.yaml" in says
+    assert "two worlds map to twice/one.yaml" in says
     assert not Path("twice").exists()
 
 
@@ -116,12 +116,13 @@ def test_no_import_overwrites_its_source_or_an_unnamed_file(antdrive, tmp_path):
     made.write_text("type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n")
     words = ["worlds", "import", "made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5"]
     assert (
-        antdrive(*words, "-o", "made.map")[2] == "antdrive: made.map: is the file to import; give another with --out\n"
+        antdrive(*words, "-o", "made.map")[2]
+        == "antdrive: made.map: would overwrite the imported file; name another with --out\n"
     )
     assert antdrive(*words)[0] == 0
     assert load_task("made.yaml").world.name == "made"
-    assert antdrive(*words)[2] == "antdrive: made.yaml: exists; give --out to say where the world goes\n"
+    assert antdrive(*words)[2] == "antdrive: made.yaml: exists; name the world file with --out\n"
     assert antdrive(*words, "-o", "made.yaml")[0] == 0
     assert antdrive("worlds", "export", "made.yaml", "-o", "made.yaml")[2].endswith(
-        "is the world itself; choose another name\n"
+        "would overwrite the world; choose another name\n"
     )

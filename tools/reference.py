@@ -1,0 +1,340 @@
+"""Generated parts of the documents: `python -m tools.reference` writes them into their pages.
+
+A page marks such a part: the lines between `<!-- generated: NAME WORDS -->` and `<!-- end -->` are those of the
+function NAME in `GENERATED`. `--check` writes nothing and lists the pages that differ.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import inspect
+import json
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+PART = re.compile(r"^(<!-- generated: (.+?) -->\n).*?^(<!-- end -->)$", re.MULTILINE | re.DOTALL)
+Row = tuple[str, ...]
+TYPES = {"integer": "whole number", "string": "text", "boolean": "true or false", "object": "mapping"}
+SIGNS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+
+
+def cell(text: str) -> str:
+    """Return a description as one cell of a Markdown table: one line, no pipe, no emphasis, no HTML outside code."""
+    parts = re.split(r"(`[^`]*`)", " ".join(text.split()))
+    plain = [one if one.startswith("`") else re.sub(r"([*<])", r"\\\1", one) for one in parts]
+    return "".join(plain).replace("|", "\\|")
+
+
+def code(text: object) -> str:
+    """Return a text as code."""
+    return f"`{text}`"
+
+
+def table(heads: str, rows: Iterable[Row]) -> list[str]:
+    """Return a table with comma-separated heads, or no lines without rows."""
+    lines = ["| " + " | ".join(row) + " |" for row in rows]
+    head = heads.split(", ")
+    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *lines, ""] if lines else []
+
+
+def kind_of(schema: Mapping[str, Any]) -> str:
+    """Return the values that a schema allows, in words."""
+    if "$ref" in schema:
+        return str(schema["$ref"]).rpartition("/")[2].removesuffix("Entry").lower()
+    if "const" in schema:
+        return code(json.dumps(schema["const"]))
+    if "enum" in schema:
+        return " or ".join(map(code, schema["enum"]))
+    if "anyOf" in schema:
+        return ", or ".join(dict.fromkeys(kind_of(one) for one in schema["anyOf"] if one.get("type") != "null"))
+    kind = schema.get("type", "anything")
+    if kind == "array":
+        few = schema.get("minItems")
+        count = f"{few} × " if few and few == schema.get("maxItems") else ""
+        return f"list of {count}{kind_of(schema.get('items', {}))}"
+    limits = [f"{sign} {schema[key]:g}" for key, sign in SIGNS.items() if abs(schema.get(key, 1e6)) < 1e6]
+    limits += [f"like `{schema['pattern']}`"] if "pattern" in schema else []
+    return cell(TYPES.get(kind, kind) + (f" ({', '.join(limits)})" if limits else ""))
+
+
+def keys_of(schema: Mapping[str, Any]) -> list[str]:
+    """Return a table of an object's keys."""
+
+    def row(key: str, value: Mapping[str, Any]) -> Row:
+        default = "" if value.get("default") is None else code(json.dumps(value["default"]))
+        required = key in schema.get("required", [])
+        return code(key), kind_of(value), "required" if required else default, cell(value.get("description", ""))
+
+    rows = [row(key, value) for key, value in schema["properties"].items()]
+    return [" ".join(schema.get("description", "").split()), "", *table("key, value, default, meaning", rows)]
+
+
+def keys(kind: str) -> list[str]:
+    """Return the keys of a kind of file, then those of its parts."""
+    from antdrive.robots import robot_schema
+    from antdrive.runs.campaigns import campaign_schema
+    from antdrive.runs.suites import suite_schema
+    from antdrive.worlds import task_schema
+
+    known = {"world": task_schema, "robot": robot_schema, "suite": suite_schema, "campaign": campaign_schema}
+    schema: dict[str, Any] = known[kind]()
+    lines = keys_of(schema)
+    parts = [(name.removesuffix("Entry"), part) for name, part in schema.get("$defs", {}).items()]
+    for key, value in schema["properties"].items():
+        parts += [(key, part) for part in (value, value.get("items", {}), *value.get("anyOf", []))]
+    for name, part in parts:
+        if part.get("type") == "object" and part.get("properties"):
+            lines += [f"**{name.lower()}**", "", *keys_of(part)]
+    return lines
+
+
+def commands() -> list[str]:
+    """Return each command with its arguments and options, as `--help` prints them."""
+    from antdrive.cli.groups import application
+
+    command = application()
+    return list(_commands(command, command.make_context("antdrive", [], resilient_parsing=True), "##"))
+
+
+def _commands(command: Any, context: Any, level: str) -> Iterator[str]:
+    yield from (f"{level} {context.command_path}", "")
+    yield from (code(" ".join([context.command_path, *command.collect_usage_pieces(context)])), "")
+    for paragraph in (command.help or "").split("\f")[0].split("\n\n"):
+        yield from (cell(paragraph), "")
+    for kind in ("argument", "option"):
+        records = (one.get_help_record(context) for one in command.params if one.param_type_name == kind)
+        rows = [
+            (code(" ".join(record[0].split()).replace("|", "\\|")), cell(record[1])) for record in records if record
+        ]
+        yield from table(f"{kind}, meaning", rows)
+    for name in command.list_commands(context) if hasattr(command, "list_commands") else ():
+        inner = command.get_command(context, name)
+        deeper = "###" if len(context.command_path.split()) > 1 else "##"
+        yield from _commands(inner, type(context)(inner, info_name=name, parent=context), deeper)
+
+
+def exit_codes() -> list[str]:
+    """Return each exit code with its comment in the source."""
+    from antdrive.cli import exits
+
+    lines = [line.split("  # ") for line in inspect.getsource(exits).splitlines() if "  # " in line]
+    return table("exit code, meaning", [(code(value.split(" = ")[1]), meaning) for value, meaning in lines])
+
+
+def described(kind: type) -> dict[str, str]:
+    """Return the meaning of each attribute from the docstrings of a class and its bases; the class itself wins."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        section = inspect.cleandoc(vars(base).get("__doc__") or "").partition("\nAttributes:\n")[2]
+        entries = re.split(r"^    (\w+): ", re.split(r"^\S", section, flags=re.MULTILINE)[0], flags=re.MULTILINE)[1:]
+        found |= {name: " ".join(text.split()) for name, text in zip(entries[::2], entries[1::2], strict=True)}
+    return found
+
+
+def planners() -> list[str]:
+    """Return each planner with its summary, options and defaults."""
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.log.record import settings_of
+
+    def row(name: str) -> Row:
+        planner = PLANNERS[name]
+        first = " ".join(inspect.cleandoc(type(planner).__doc__ or "").partition("\n\n")[0].split())
+        options = ", ".join(code(f"{key}={value}") for key, value in settings_of(planner).items())
+        return code(name), code(type(planner).__name__), cell(first), options or "none"
+
+    return table("planner, class, summary, options", map(row, PLANNERS))
+
+
+def planner(*names: str) -> list[str]:
+    """Return a planner's known weaknesses and options, and how its variants differ.
+
+    Raises:
+        KeyError: an option has no description.
+    """
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.log.record import settings_of
+
+    first, kind = PLANNERS[names[0]], type(PLANNERS[names[0]])
+    lines: list[str] = []
+    for weakness in weaknesses_of(kind):
+        text = re.sub(r"^Known weakness(es)?(, measured)?( \(([^)]*)\))?[:.]\s*", _source, weakness)
+        text = re.sub(r"`?docs/([\w/.-]+)\.md`?", r"[\1](../../\1.md)", text)
+        lines += [f"**Known weaknesses.** {text}", ""]
+    meanings = described(kind)
+    rows = [(code(key), code(value), cell(meanings[key])) for key, value in settings_of(first).items()]
+    lines += table("option, default, meaning", rows)
+    for name in names[1:]:
+        values = {field.name: getattr(PLANNERS[name], field.name) for field in dataclasses.fields(PLANNERS[name])}
+        changed = [code(f"{key}={value}") for key, value in values.items() if value != getattr(first, key)]
+        lines += [f"`{name}` is the same planner with {', '.join(changed)}.", ""]
+    end = "" if rows else " It has no options."
+    return [*lines, f"Its class is [`{kind.__name__}`](../../reference/api/planners.md).{end}", ""]
+
+
+def weaknesses_of(kind: type) -> list[str]:
+    """Return the paragraphs of a class's docstring that begin with "Known weakness", "the same page" named."""
+    text = inspect.cleandoc(kind.__doc__ or "")
+    page = next(iter(re.findall(r"docs/papers/\w+\.md", text)), "")
+    found = [" ".join(one.split()) for one in text.split("\n\n") if one.startswith("Known weakness")]
+    return [re.sub("measured on the same page[.:]", f"measured ({page}):", one) for one in found]
+
+
+def _source(match: re.Match[str]) -> str:
+    return f"Measured in {match[4]}: " if match[4] else "Measured: " if match[2] else ""
+
+
+def controller() -> list[str]:
+    """Return each option of the controller with its default."""
+    from antdrive.robots.control.pursuit import PurePursuit
+    from antdrive.sim.log.record import settings_of
+
+    meanings = described(PurePursuit)
+    rows = [(code(key), code(value), cell(meanings[key])) for key, value in settings_of(PurePursuit()).items()]
+    return table("option, default, meaning", rows)
+
+
+def _picture(folder: str, name: str) -> str:
+    path = f"../pictures/{folder}/{name}.webp"
+    return f"![{name}]({path})" if (DOCS / "reference" / path).exists() else ""
+
+
+def worlds() -> list[str]:
+    """Return each world of the catalogue with its size, content and picture."""
+    from antdrive.worlds import list_worlds, load_task
+
+    def row(name: str) -> Row:
+        world = load_task(name).world
+        size = "\u00a0×\u00a0".join(f"{side:g}" for side in world.size) + "\u00a0m"
+        counts = str(len(world.obstacles)), str(len(world.movers))
+        return code(name), _picture("worlds", name), size, *counts, cell(world.source or "")
+
+    return table("world, picture, size, cylinders, movers, source", map(row, list_worlds()))
+
+
+def robots() -> list[str]:
+    """Return each robot of the catalogue with its footprint, limits, lidar and source."""
+    from antdrive.robots import list_robots, load_robot
+    from antdrive.robots.card import footprint_text
+
+    def row(name: str) -> Row:
+        robot = load_robot(name)
+        lidar = robot.lidar
+        sensor = f"{lidar.rate:g} Hz, {lidar.max_range:g} m" if lidar else "none"
+        top = f"{robot.max_speed:g} m/s, {robot.max_yaw_rate:g} rad/s"
+        after = re.split(r"[:;(]|\. |, (?=[a-z\d])", " ".join((robot.source or "").split()))[0]
+        return (
+            code(name),
+            _picture("robots", name),
+            cell(footprint_text(robot)),
+            top,
+            sensor,
+            cell(after.strip().removeprefix("After ")),
+        )
+
+    return table("robot, picture, footprint, top speeds, lidar, source", map(row, list_robots()))
+
+
+def arrays() -> list[str]:
+    """Return name, shape, dtype and content of each array of a log."""
+    import numpy as np
+
+    from antdrive.sim.log.rollout import FORMS, Rollout
+
+    rows, contents = [], described(Rollout)
+    for name, (_, dtype) in FORMS.items():
+        shape = re.search(r"\((T|N|K|P|S)[\w, ]*\)", contents[name])
+        if shape:
+            rows.append((code(name), shape[0], np.dtype(dtype).name, cell(contents[name])))
+    return table("array, shape, dtype, content", rows)
+
+
+def record() -> list[str]:
+    """Return every key of a log's record with its type; keys of nested records are dotted."""
+    from antdrive.sim.log import record as records
+
+    def rows(kind: type, prefix: str = "") -> Iterator[Row]:
+        for field in dataclasses.fields(kind):
+            name, of = f"{prefix}{field.name}", str(field.type)
+            yield code(name), json_type(of), cell(described(kind)[field.name])
+            inner = re.search(r"\b(\w+Record)\b", of)
+            if inner:
+                yield from rows(getattr(records, inner[1]), f"{name}[]." if of.startswith("tuple") else f"{name}.")
+
+    return table("key, JSON, content", rows(records.DriveRecord))
+
+
+def json_type(annotation: str) -> str:
+    """Return the JSON type of a field."""
+    kind = annotation.removesuffix(" | None")
+    words = {"str": "text", "float": "number", "int": "whole number", "bool": "true or false"}
+    plain = "list" if kind.startswith("tuple") else "text" if "Outcome" in kind else "object"
+    return words.get(kind, plain) + (" or null" if annotation.endswith(" | None") else "")
+
+
+def outcomes() -> list[str]:
+    """Return every outcome of a drive."""
+    from antdrive.sim.log.outcome import Outcome
+
+    codes = {Outcome.SUCCEEDED: "0 if the log proves it, else 1"}
+    rows = [(code(one.key), one.value, codes.get(one, "1")) for one in Outcome]
+    return table("outcome, sentence, exit code", rows)
+
+
+def metrics() -> list[str]:
+    """Return every metric."""
+    from antdrive.sim.log.metrics import METRICS
+
+    rows = [(code(one.name), one.unit, one.better, cell(one.definition)) for one in METRICS.values()]
+    return table("metric, unit, better, definition", rows)
+
+
+#: What writes each part, by its name.
+GENERATED: dict[str, Callable[..., list[str]]] = {
+    "arrays": arrays, "commands": commands, "controller": controller, "exit-codes": exit_codes, "keys": keys,
+    "metrics": metrics, "outcomes": outcomes, "planner": planner, "planners": planners, "record": record,
+    "robots": robots, "worlds": worlds,
+}  # fmt: skip
+
+
+def written(text: str) -> str:
+    """Return a page with its generated parts as they should be."""
+
+    def part(match: re.Match[str]) -> str:
+        name, *words = match[2].split()
+        lines = "\n".join(GENERATED[name](*words)).strip("\n")
+        return f"{match[1]}\n{lines}\n\n{match[3]}"
+
+    return PART.sub(part, text)
+
+
+def pages() -> list[Path]:
+    """Return the pages with generated parts."""
+    found = [path for path in sorted(DOCS.rglob("*.md")) if not {"_build", "_gallery"} & set(path.parts)]
+    return [path for path in found if PART.search(path.read_text(encoding="utf-8"))]
+
+
+def main(words: list[str]) -> int:
+    """Write or check the generated parts."""
+    from antdrive.base.atomic import atomic_write
+
+    parser = argparse.ArgumentParser(prog="python -m tools.reference", description="Generate parts of pages.")
+    parser.add_argument("--check", action="store_true", help="write nothing, list pages that differ")
+    check = parser.parse_args(words).check
+    stale = [path for path in pages() if written(path.read_text(encoding="utf-8")) != path.read_text(encoding="utf-8")]
+    for path in stale:
+        sys.stdout.write(f"{path.relative_to(ROOT)}{' differs' if check else ''}\n")
+        if not check:
+            text = written(path.read_text(encoding="utf-8"))
+            with atomic_write(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+    return 1 if check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
