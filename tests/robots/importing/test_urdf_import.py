@@ -133,15 +133,15 @@ def limited(tmp_path, words):
         ('velocity="200"', "max_speed", 6.6, "computed: the velocity limit of joint wheel_left_joint, 200 rad/s, times"),
         ('velocity="200"', "max_yaw_rate", 3.14, "assumed: half a turn a second; the velocity limit of joint"),
         ('velocity="400"', "max_speed", 0.5,
-         "assumed: the velocity limit of joint wheel_left_joint, 400 rad/s would be 13.2 m/s, above the 10 m/s that "
-         "a robot's file may say, and is not used"),
+         "assumed: the velocity limit of joint wheel_left_joint, 400 rad/s would be 13.2 m/s, above the 10 m/s limit of "
+         "robot files, not used"),
         ('velocity="400"', "max_wheel_speed", 400.0, "read: the velocity limit of joint wheel_left_joint, 400 rad/s"),
         ('velocity="99999"', "max_wheel_speed", 18.182,
          "assumed: 1.2 times the speeds' requirement; the velocity limit of joint wheel_left_joint, 99999 rad/s is above the "
          "10000 rad/s limit of robot files, not used"),
         ("", "max_speed", 0.5, "assumed: the file has no limit"),
         ('effort="0.3"', "wheel_torque", 0.3, "read: the effort limit of joint wheel_left_joint, 0.3 N m"),
-        ('effort="0.0001"', "wheel_torque", 0.066, "assumed: 4 times the torque for 1 m/s2; the effort limit of joint wheel_left"),
+        ('effort="0.0001"', "wheel_torque", 0.066, "assumed: 4 times the torque for 1 m/s2; the effort limit of joint wheel_lef"),
         ('effort="1e6"', "wheel_torque", 1e6, "read: the effort limit of joint wheel_left_joint, 1000000 N m"),
         ("", "wheel_torque", 0.066, "assumed: 4 times the torque for 1 m/s2"),
         ('effort="0.01"', "max_acceleration", 0.545455, "computed: 0.9 times the limit of motors and grip"),
@@ -347,7 +347,7 @@ def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path):
     path = changed(
         tmp_path, "waffle.urdf", ("<gazebo>", roller + "<gazebo>"), ("<left_joint>wheel_left_joint</left_joint>", "")
     )
-    with pytest.raises(InputError, match="carry 1 rollers, such as roller_joint"):
+    with pytest.raises(InputError, match="have 1 rollers, such as roller_joint"):
         import_urdf(path)
 
 
