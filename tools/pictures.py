@@ -20,13 +20,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from antdrive.views.film.options import FilmOptions
-
 from antdrive.robots import list_robots
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.film.comparison_film import SplitScreen
+from antdrive.views.film.film_options import FilmOptions
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.video import STILLS, film, still

@@ -294,9 +294,42 @@ def metrics() -> list[str]:
     return table("metric, unit, better, definition", rows)
 
 
+def composition() -> list[str]:
+    """Return the parts of drives of each kind, as `compose` chooses them."""
+    from antdrive.sim.compose import compose
+    from antdrive.sim.policy import Perception
+    from antdrive.sim.scenario import Scenario
+
+    kinds: dict[str, tuple[str, str, dict[str, Any]]] = {
+        "mapped, nothing moves": ("forest", "astar", {}),
+        "mapped, noise": ("forest", "astar", {"noise": 1.0}),
+        "among movers": ("plaza-moving", "astar", {}),
+        "movers by lidar": ("plaza-moving", "astar", {"perception": Perception(kind="lidar")}),
+        "planner in space and time": ("plaza-moving", "sipp", {}),
+        "cell by cell": ("plaza-moving", "mmas-dstar", {}),
+        "mapless": ("forest", "astar", {"robot": "jackal", "map": "none"}),
+        "mapless, odometry": ("forest", "astar", {"robot": "jackal", "map": "none", "localisation": "matching"}),
+        "mapless among movers": ("plaza-moving", "astar", {"robot": "jackal", "map": "none"}),
+    }
+
+    def row(kind: str) -> Row:
+        world, name, settings = kinds[kind]
+        parts = compose(Scenario.of(world, name, **settings))
+        scan = getattr(parts.scan, "__self__", None)
+        rules = ", ".join(code(type(rule).__name__) for rule in parts.rules)
+        return kind, *map(_class, (parts.localiser, scan, parts.guide)), rules
+
+    return table("drive, localiser, scans, guide, rules in their order", map(row, kinds))
+
+
+def _class(part: object) -> str:
+    return "–" if part is None else code(type(part).__name__)
+
+
 #: What writes each part, by its name.
 GENERATED: dict[str, Callable[..., list[str]]] = {
-    "arrays": arrays, "commands": commands, "controller": controller, "exit-codes": exit_codes, "keys": keys,
+    "arrays": arrays, "commands": commands, "composition": composition, "controller": controller,
+    "exit-codes": exit_codes, "keys": keys,
     "metrics": metrics, "outcomes": outcomes, "planner": planner, "planners": planners, "record": record,
     "robots": robots, "worlds": worlds,
 }  # fmt: skip

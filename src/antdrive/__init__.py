@@ -1,6 +1,6 @@
-"""Drive planned grid paths in physics: plan, drive, certify, film."""
+"""Plan robot paths, drive them in physics, certify and film the drives."""
 
 import lazy_loader
 
-# The public names and their types are listed in __init__.pyi; each is imported when it is first used.
+# Public names and their types are listed in __init__.pyi; each is imported on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

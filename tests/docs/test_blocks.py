@@ -54,6 +54,21 @@ def test_every_block_has_somebody_who_runs_it():
     assert faults == []
 
 
+def wide(page, block):
+    """The lines of code that are wider than 80 columns, and lines of output wider than 100."""
+    outputs = block.language in ("console", "text")
+    code = [line for line in block.text.splitlines() if not outputs or line.startswith("$ ")]
+    output = block.text.splitlines() if outputs else []
+    lines = [line for line in code if len(line.removeprefix("$ ")) > 80] + [line for line in output if len(line) > 100]
+    return [f"{page}:{block.line}: {line}" for line in lines]
+
+
+def test_code_fits_80_columns_and_output_100():
+    shown = [(page, block) for page, block in BLOCKS if not block.language.startswith("{")]
+    drawn = [(page, block) for page, block in BLOCKS if block.language.startswith("{drawn}")]
+    assert [line for page, block in shown + drawn for line in wide(page, block)] == []
+
+
 def code_of(text):
     """The kind of each block of code in Markdown, fenced, indented or in a list, and the number of its first line."""
     blocks = [token for token in MarkdownIt().parse(text) if token.type in ("fence", "code_block") and token.map]

@@ -23,6 +23,7 @@ from antdrive.sim.log.record import MarginRecord, SensingRecord
 from antdrive.sim.log.rollout import ARRAYS, SENSED
 from tests.records import made_up_record
 from tools.reference import GENERATED, pages, written
+from tools.rooms import PICTURE, drawn
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -53,6 +54,10 @@ def test_every_variable_that_the_code_reads_is_explained():
 def test_generated_parts_of_pages_are_up_to_date():
     stale = [page.name for page in pages() if written(page.read_text()) != page.read_text()]
     assert stale == [], "run `python -m tools.reference`"
+
+
+def test_the_picture_of_the_rooms_is_up_to_date():
+    assert PICTURE.read_text() == drawn(), "run `python -m tools.rooms`"
 
 
 def test_every_generated_part_stands_on_a_page():

@@ -50,7 +50,7 @@ def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive, suite):
     suite.write_text(SUITE + HIT)
     code, out, _ = antdrive("accept", "a.drive.yaml", "--only", "hit", "--film", "never", "--results", "first")
     assert code == 1
-    assert "not accepted, because the drive is not what the test expects" in out
+    assert "not accepted, because the drive misses the test's expectations" in out
     assert not (suite.parent / "baselines").exists()
     assert Path("first/a/hit-0/overview.png").is_file()
     code, out, _ = antdrive("check", "a.drive.yaml::hit", "--json", "--film", "never", "--results", "res")

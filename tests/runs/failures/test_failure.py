@@ -118,7 +118,7 @@ def test_a_run_that_ends_otherwise_is_the_failure_itself(case, small_run, collid
 def test_what_no_other_world_repeats_is_said_in_one_line(case, small_run):
     accepted(case, small_run, line=0.2)
     with pytest.raises(
-        InputError, match=r"a\.drive\.yaml::small\[0\]: end_m: .* 0\.2 m apart.*; no other world repeats that"
+        InputError, match=r"a\.drive\.yaml::small\[0\]: end_m: .* 0\.2 m apart.*; another world cannot repeat that"
     ):
         bound_broken_in(case, small_run)
 

@@ -44,20 +44,20 @@ def test_a_drive_is_compared_with_a_baseline_beside_the_tests_file(drive, small_
 def test_each_drive_of_a_test_has_a_name(drive, small_task):
     drive(small_task, "astar", baseline=False)
     drive(small_task, "astar", name="second", baseline=False, expect={"duration_s": "< 60"})
-    with pytest.raises(FieldError, match="give each of its drives a name"):
+    with pytest.raises(FieldError, match="give each drive its own name"):
         drive(small_task, "astar", name="second", baseline=False)
 
 
 @pytest.mark.parametrize("beside", [{"planner": "aco-han"}, {"robot": "jackal"}, {"seed": 1}, {"nonsense": 3}])
 def test_a_scenario_takes_no_settings_beside_it(drive, small_task, beside):
     (key,) = beside
-    with pytest.raises(FieldError, match=f"{key}: a scenario has its own; change it with"):
+    with pytest.raises(FieldError, match=f"{key}: is part of the scenario; change it with"):
         drive(Scenario.of(small_task, "astar"), baseline=False, **beside)
 
 
 @pytest.mark.parametrize("demand", [{"tolerance": {"duration_s": 1}}, {"trajectory": "exact"}])
 def test_what_needs_a_baseline_is_refused_without_one(drive, small_task, demand):
-    with pytest.raises(FieldError, match=f"{next(iter(demand))}: there is no baseline to compare with"):
+    with pytest.raises(FieldError, match=f"{next(iter(demand))}: needs a baseline"):
         drive(small_task, "astar", baseline=False, **demand)
 
 

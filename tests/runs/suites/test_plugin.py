@@ -145,7 +145,7 @@ def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted):
     found.assert_outcomes(failed=1, deselected=1)
     found.stdout.fnmatch_lines([
         "duration_s: * s, in the baseline * s: * s longer, tolerance * s",
-        "the drives part at t = * s, at (*, 1.00) instead of (*, 1.00); *; at most * m apart",
+        "the drives diverge at t = * s, at (*, 1.00) instead of (*, 1.00); *; at most * m apart",
         "changed since the baseline: robot",
         "repeat: antdrive check 'a.drive.yaml::clear[[]0]'",
         "        antdrive run small.yaml --planner astar --robot slow.yaml --seed 0",
@@ -386,7 +386,7 @@ def test_the_summary_says_which_failed_drives_have_no_film(project, monkeypatch)
     assert [path.parent.name for path in (project.path / "results").rglob("film.mp4")] == ["clear-0"]
     done.stdout.fnmatch_lines([
         "film: */results/a/clear-0/film.mp4",
-        "film: none, because this run has made 10; antdrive check 'a.drive.yaml::clear[[]1[]]' makes it",
-        "2 more failed drives have no film; the command that repeats a drive makes it, --drive-film always makes all",
+        "film: omitted after 10 films; make it with antdrive check 'a.drive.yaml::clear[[]1[]]'",
+        "2 more failed drives have no film; repeat a drive to film it, or use --drive-film always to film all",
     ])  # fmt: skip
     assert not list((project.path / "temporary").glob("antdrive-films-*"))

@@ -182,11 +182,11 @@ def touched(gap, row=400, at=400):
 
 
 def test_a_contact_is_felt_where_the_closed_form_is_within_12_mm():
-    only_beyond(0.012, touched, "readings disagree: physics reports a contact at row")
+    only_beyond(0.012, touched, "checks disagree: physics reports a contact at row")
     assert says(touched(0.01), "physics reports 1 contact points, the first at t = 1.667 s")
     for at, near in ((398, False), (399, True), (401, True), (402, False)):
-        assert says(touched(0.001, at=at), "readings disagree: physics reports a contact at row") is not near
-    assert not says(touched(0.001, row=0, at=0), "readings disagree: physics reports a contact at row")
+        assert says(touched(0.001, at=at), "checks disagree: physics reports a contact at row") is not near
+    assert not says(touched(0.001, row=0, at=0), "checks disagree: physics reports a contact at row")
     assert certify(touched(0.01)).contacts == 1
 
 

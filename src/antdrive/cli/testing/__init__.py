@@ -1,6 +1,6 @@
-"""The pytest plugin: suites, the fixture `drive`, and what they print."""
+"""The pytest plugin: suites, the fixture `drive`, and their reports."""
 
 import lazy_loader
 
-# What this package offers is listed, with its types, in __init__.pyi; each name is imported when first used.
+# Public names and their types are listed in __init__.pyi; each is imported on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Drive a test's scenario, evaluate it, and say what came out: the core of the pytest plugin and of `antdrive check`."""
+"""Evaluation of drives against tests and baselines, for the pytest plugin and `antdrive check`."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
 from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, write_artefacts, write_traceback
 
-#: Which baselines are written: none, only those that are missing, or all.
+#: Baselines to write: none, only missing ones, or all.
 Update: TypeAlias = Literal["", "new", "all"]
-#: The outcomes of a test that could not be judged: what people wrote is wrong, or antdrive is.
+#: Outcomes of a test that could not be evaluated: invalid input or internal error.
 INVALID_INPUT, INTERNAL_ERROR = "wrong_input", "internal_error"
 
 
 @dataclass(frozen=True, kw_only=True)
 class CheckResult:
-    """What came out of a test.
+    """Result of a test.
 
     Attributes:
-        address: the test, as commands name it
-        passed: whether nothing is wrong
-        case: the test's name in its baseline; empty if it has none
-        outcome: how the run ended, such as succeeded
+        address: the test's name in commands
+        passed: whether the test passed
+        case: the test's name in its baseline; empty without one
+        outcome: the run's outcome, such as succeeded
         certified: whether the drive is certified collision-free
-        faults: why the test fails, a sentence each
-        gains: what is better than in the baseline, a sentence each
-        details: what explains the faults, a sentence each
-        accepted: what was done to the baseline: written, renewed, unchanged, or nothing
-        commands: how to repeat the test
-        files: what was written about it, by name
-        unfilmed: whether it failed and has no film, because the run has made `MOST_FILMS` already
-        metrics: the drive's metrics, as far as it has them; empty if the robot did not drive
+        faults: reasons for failing, one sentence each
+        gains: improvements over the baseline, one sentence each
+        details: explanations of the faults, one sentence each
+        accepted: change of the baseline: written, renewed, unchanged, or empty
+        commands: commands that repeat the test
+        files: written files by name
+        unfilmed: whether the test failed and has no film because `MOST_FILMS` exist
+        metrics: the drive's finite metrics; empty if the robot did not drive
         digest: `Rollout.drive_digest`; empty if the robot did not drive
-        wall_s: how long the test took [s]
+        wall_s: duration of the test [s]
     """
 
     address: str
@@ -72,35 +72,35 @@ class CheckResult:
 
     @property
     def message(self) -> str:
-        """Everything about a failed test, in lines."""
+        """Faults, details, commands and files of a failed test, one per line."""
         lines = [*self.faults, *self.details]
         lines += [f"{'repeat:' if k == 0 else '       '} {command}" for k, command in enumerate(self.commands)]
         lines += [f"{name}: {path}" for name, path in self.files.items()]
         if self.unfilmed:
-            lines.append(f"film: none, because this run has made {MOST_FILMS}; {self.commands[0]} makes it")
+            lines.append(f"film: omitted after {MOST_FILMS} films; make it with {self.commands[0]}")
         return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:
-        """The result as plain values, for JSON."""
+        """Return the result as plain values for JSON."""
         return dataclasses.asdict(self)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """What a drive is judged by, and where its results go."""
+    """Criteria for a drive, and the destination of its results."""
 
-    address: str  # the test, as commands name it
+    address: str  # the test's name in commands
     name: str  # the test's name in its baseline
-    demands: Demands  # what the test demands
-    baseline: Path | None  # the file of its baseline; None: it has none
-    commands: tuple[str, ...]  # how to repeat the test
-    accept: str  # the command that accepts the drive
-    update: Update = ""  # which baselines to write
-    folder: Path | None = None  # where logs, pictures and films of the test are written; None: nowhere
-    results: Results | None = None  # which of them are written; None: none
+    demands: Demands
+    baseline: Path | None  # file of the baseline; None: compare with none
+    commands: tuple[str, ...]  # commands that repeat the test
+    accept: str  # command that accepts the drive
+    update: Update = ""  # baselines to write
+    folder: Path | None = None  # for the test's logs, figures and films; None: write nothing
+    results: Results | None = None  # selection of what to write; None: nothing
 
     def evaluate(self, run: Run) -> CheckResult:
-        """Judge a run."""
+        """Evaluate a run."""
         started, path, accepted = time.perf_counter(), self.baseline, ""
         baseline = None if path is None or self.update == "all" else Baseline.own(path, self.name)
         if path is not None and baseline is None:
@@ -111,11 +111,11 @@ class Check:
         files, unfilmed = dict[str, str](), False
         try:
             files, unfilmed = self._written(run, evaluation, baseline)
-        except Exception as error:  # a picture of a planner's odd answer may fail in many ways
+        except Exception as error:  # drawing an invalid plan may fail in many ways
             if evaluation.passed:
                 raise
-            said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-            details.append(f"results: {said}")  # which must not hide the faults
+            message = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+            details.append(f"results: {message}")  # must not hide the faults
         rollout, wall = run.rollout, run.plan.wall_s
         return CheckResult(
             address=self.address,
@@ -136,7 +136,7 @@ class Check:
         )
 
     def failed_early(self, outcome: str, fault: str, error: BaseException) -> CheckResult:
-        """The result of a test that an error ended; its results are where the error arose, unless the input was wrong."""
+        """Return the result of a test ended by an error, with a traceback file unless the input was invalid."""
         files: dict[str, str] = {}
         details: tuple[str, ...] = ()
         if self.folder is not None:
@@ -159,19 +159,19 @@ class Check:
         )
 
     def _without_baseline(self, run: Run, path: Path) -> tuple[Evaluation, str]:
-        """Judge a run by its demands alone, and write its baseline if asked to and if it fulfils them; what was written."""
+        """Evaluate a run without a baseline. Write one if requested and the demands are met; return what was written."""
         faults, accepted = list(unmet_demands(run, self.demands)), ""
         if not self.update:
             remedy = "" if faults else f"; accept this drive with {self.accept}"
             faults.append(f"baseline: {shown_path(path)} is missing{remedy}")
         elif faults:
-            faults.append("baseline: not accepted, because the drive is not what the test expects")
+            faults.append("baseline: not accepted, because the drive misses the test's expectations")
         else:
             accepted = Baseline.of(run, self.name).renew(path)
         return Evaluation(tuple(faults)), accepted
 
     def _written(self, run: Run, evaluation: Evaluation, baseline: Baseline | None) -> tuple[dict[str, str], bool]:
-        """What was written about a test, by name, and whether it failed and only its film is missing."""
+        """Write a test's files. Return them by name, and whether a film was omitted."""
         if self.folder is None or self.results is None:
             return {}, False
         remove_artefacts(self.folder)
@@ -186,8 +186,8 @@ class Check:
 
 
 def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check:
-    """How a suite's test is judged, with the command that names it alone."""
-    # The commands must work in the folder where pytest was started, and in its rootdir, to which its own names of tests relate.
+    """Return the check of a suite's test, with the command that runs only this test."""
+    # Commands must work in the working directory; pytest's test names are relative to its rootdir.
     anywhere = results is not None and results.root.resolve() != Path.cwd().resolve()
     address = f"{case.suite}::{case.id}" if anywhere else case.address
     return Check(
@@ -208,8 +208,8 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
 
     Args:
         case: the test
-        update: which baselines to write
-        results: where logs, pictures and films are written; None: nowhere
+        update: baselines to write
+        results: destination of logs, figures and films; None: write nothing
 
     Raises:
         InputError: the suite, a file that it names, or the baseline is wrong.
@@ -224,7 +224,7 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
 
 
 def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
-    """The result of a test; it fails where it cannot be judged, so that one broken test hides no other."""
+    """Return the result of a test; errors become failures, so that a broken test does not stop the others."""
     raised: Exception
     try:
         return check_case(case, update=update, results=results)
@@ -232,9 +232,9 @@ def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> 
         outcome, fault, raised = INVALID_INPUT, str(case.error(error.key, error.problem)), error
     except InputError as error:
         key, mark, problem = str(error).partition(": ")
-        of_the_suite = mark and key in ScenarioEntry.model_fields  # found only in the run, such as too small a cell
+        of_the_suite = mark and key in ScenarioEntry.model_fields  # detected during the run, such as a cell too small
         outcome, fault, raised = INVALID_INPUT, str(case.error(key, problem)) if of_the_suite else str(error), error
-    except Exception as error:  # people's planners and robots are code too
+    except Exception as error:  # user planners may raise anything
         outcome, fault, raised = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}", error
     return _check_of(case, update, results).failed_early(outcome, fault, raised)
 
@@ -242,15 +242,15 @@ def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> 
 def check_cases(
     cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "", results: Results | None = None
 ) -> Iterator[CheckResult]:
-    """Drive and evaluate many tests; the results come as they are made, in the order of the tests, and do not depend on `jobs`.
+    """Drive and evaluate many tests. Yield the results in the order of the tests; they do not depend on `jobs`.
 
     A test that cannot be judged, because its suite, a file or its baseline is wrong, fails with that as its fault.
 
     Args:
         cases: the tests
         jobs: number of processes
-        update: which baselines to write
-        results: where logs, pictures and films are written; None: nowhere
+        update: baselines to write
+        results: destination of logs, figures and films; None: write nothing
     """
     with tempfile.TemporaryDirectory(prefix="antdrive-films-") as places:
         limited = results and dataclasses.replace(results, places=Path(places))
@@ -271,20 +271,20 @@ def _check_in_turn(
             if done.died:
                 fault = f"internal error: {done.died}"
                 yield _check_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
-            elif isinstance(done.value, str):  # the suite has changed since it was read
+            elif isinstance(done.value, str):  # the suite changed after loading
                 yield _check_of(case, update, results).failed_early(INVALID_INPUT, done.value, InputError(done.value))
             else:
                 yield done.value
 
 
 def _check_by_name(folder: str, update: Update, results: Results | None, name: tuple[str, str]) -> CheckResult | str:
-    """The result of a test that another process names; a text says why there is no such test any more."""
+    """Return the result of a test named by another process, or an error message if the test was removed."""
     os.chdir(folder)
     suite, test = name
     try:
-        found = next((case for case in load_suite(suite) if case.id == test), None)
+        case = next((case for case in load_suite(suite) if case.id == test), None)
     except InputError as error:
         return str(error)
-    if found is None:
-        return f"{suite}: has no test {test} any more"
-    return _check_or_fail(found, update, results)
+    if case is None:
+        return f"{suite}: test {test} was removed during the run"
+    return _check_or_fail(case, update, results)

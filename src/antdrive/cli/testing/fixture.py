@@ -1,4 +1,4 @@
-"""Drives within tests in Python: the fixture `drive`, and assertions about runs."""
+"""Drives in Python tests: the fixture `drive`, and assertions on runs."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from antdrive.worlds import Task, list_worlds
 
 
 class DriveFailure(AssertionError):
-    """A drive is not as its test demands; the message says why.
+    """A drive fails its test; the message states the reasons.
 
     Attributes:
-        result: what came out of the test
+        result: the result of the test
     """
 
     def __init__(self, result: CheckResult) -> None:
@@ -36,26 +36,25 @@ class DriveFailure(AssertionError):
         self.result = result
 
     def __reduce__(self) -> tuple[type[DriveFailure], tuple[CheckResult]]:
-        return type(self), (self.result,)  # by default it would be made again from its message alone
+        return type(self), (self.result,)  # the default would pickle the message only
 
 
 class DriveFixture:
-    """What the fixture `drive` gives to a test: call it to drive a scenario and compare it with its baseline.
+    """Value of the fixture `drive`: call it to drive a scenario and compare it with its baseline.
 
     >>> def test_mine(drive):
     ...     drive("forest", planner=MyPlanner(), seed=1, expect={"min_clearance_m": ">= 0.05"})
 
-    The baseline is `baselines/MODULE/TEST.json` beside the test's file. A test that drives more than once names its drives.
+    The baseline is `baselines/MODULE/TEST.json` next to the test's file. A test with several drives names each.
 
     Args:
         file: the test's file
         test: the test's name in the file, such as test_mine[3]
-        address: the test as pytest names it, relative to its rootdir
-        repeat: the test as commands name it, where these would not work in every folder in which people may call them; by
-            default the address
-        update: which baselines to write
-        results: where logs, pictures and films are written; None: nowhere
-        report: is called with what came out of each drive
+        address: pytest's node id of the test, relative to its rootdir
+        repeat: the test's name in commands, if it differs from the address
+        update: baselines to write
+        results: destination of logs, figures and films; None: write nothing
+        report: called with the result of each drive
     """
 
     def __init__(
@@ -87,33 +86,33 @@ class DriveFixture:
         baseline: bool = True,
         **settings: Any,
     ) -> Run:
-        """Drive, and compare with the demands and the baseline.
+        """Drive a scenario and compare it with the demands and the baseline.
 
         Args:
             world: a scenario (then all settings are its own), a task, a world of the catalogue, or a world file relative to
                 the test's file
             planner: a planner's name, or a planner; by default ants
             robot: a robot, a robot of the catalogue, or a robot file relative to the test's file; by default turtlebot
-            name: of the drive, where a test drives more than once
-            expect: outcome, certified, and bounds such as {"min_clearance_m": ">= 0.05"}
-            tolerance: by how much metrics may be worse than in the baseline
-            trajectory: how far from the baseline's line the robot may be [m], or "exact"
-            baseline: whether there is a baseline to compare with
+            name: name of the drive, if the test has several
+            expect: outcome, certified, and bounds on metrics such as {"min_clearance_m": ">= 0.05"}
+            tolerance: allowed degradation of metrics from the baseline
+            trajectory: allowed distance from the baseline's trajectory [m], or "exact"
+            baseline: whether to compare with a baseline
             settings: further settings of `Scenario.of`, such as seed, noise and margin
 
         Raises:
-            DriveFailure: the drive is not as demanded, or worse than its baseline.
-            InputError: the world, the planner or the robot is wrong.
-            FieldError: a setting is wrong, or two drives of a test have the same name.
+            DriveFailure: the drive misses a demand or is worse than its baseline.
+            InputError: the world, the planner or the robot is invalid.
+            FieldError: a setting is invalid, or two drives of a test have the same name.
         """
         __tracebackhide__ = True
         demands = Demands.of(expect or {}, tolerance or {}, trajectory)
         if not baseline:
             for key, value in (("tolerance", tolerance), ("trajectory", trajectory)):
                 if value:
-                    raise FieldError(key, "there is no baseline to compare with; leave it out, or baseline=False")
+                    raise FieldError(key, "needs a baseline; omit it, or omit baseline=False")
         if name in self._names:
-            raise FieldError("name", f"this test has already driven {name!r}; give each of its drives a name")
+            raise FieldError("name", f"{name!r} is used twice in this test; give each drive its own name")
         self._names.add(name)
         run = self.run(world, planner, robot, **settings)
         whole = f"{self._test}-{name}" if name else self._test
@@ -150,14 +149,14 @@ class DriveFixture:
             settings: further settings of `Scenario.of`, such as seed, noise and margin
 
         Raises:
-            InputError: the world, the planner or the robot is wrong.
-            FieldError: a setting is wrong.
+            InputError: the world, the planner or the robot is invalid.
+            FieldError: a setting is invalid.
         """
         if isinstance(world, Scenario):
             beside = {"planner": planner, "robot": robot, **settings}
             given = [key for key, value in beside.items() if key in settings or value is not None]
             if given:
-                raise FieldError(given[0], "a scenario has its own; change it with dataclasses.replace")
+                raise FieldError(given[0], "is part of the scenario; change it with dataclasses.replace")
             return drive_scenario(world)
         planner = "ants" if planner is None else planner
         robot = "turtlebot" if robot is None else robot
@@ -166,28 +165,28 @@ class DriveFixture:
         return drive_scenario(Scenario.of(place, planner, body, **settings))
 
     def baseline_path(self, name: str) -> Path:
-        """The baseline of a drive.
+        """Return the baseline file of a drive.
 
         Args:
-            name: the test's name, and that of the drive where it has one
+            name: the test's name, with the drive's name if it has one
         """
         return self._file.parent / BASELINES / self._file.stem / f"{file_name(name)}.json"
 
     def _beside(self, name: str | Path, known: Mapping[str, Path]) -> str | Path:
-        """A name of the catalogue, or the path of a file beside the test's file where there is one."""
+        """Return a catalogue name, or the path of a file next to the test's file if it exists."""
         beside = self._file.parent / name
         return beside if str(name) not in known and beside.exists() else name
 
 
 def assert_collision_free(run: Run | Rollout, clearance: float = 0.0) -> None:
-    """Assert that a drive is certified collision-free, with some clearance.
+    """Assert that a drive is certified collision-free with a clearance.
 
     Args:
         run: a run, or the log of one
-        clearance: the least distance to everything that must be proved, between the log's rows, too [m]
+        clearance: least distance to obstacles to be proved, between the log's rows as well [m]
 
     Raises:
-        AssertionError: it is not; the message names what was touched or passed too near, where and when.
+        AssertionError: it is not; the message names the obstacle, place and time.
     """
     __tracebackhide__ = True
     rollout = run.rollout if isinstance(run, Run) else run
@@ -215,7 +214,7 @@ def assert_reached_goal(run: Run) -> None:
         run: the run
 
     Raises:
-        AssertionError: it did not; the message says how the run ended.
+        AssertionError: it did not; the message states the outcome.
     """
     __tracebackhide__ = True
     if run.outcome is not Outcome.SUCCEEDED and not run.outcome.with_contact:

@@ -1,6 +1,6 @@
-"""The pytest plugin: suites, `*.drive.yaml`, are collected, and tests have the fixture `drive`.
+"""pytest plugin: collects suites (`*.drive.yaml`) and provides the fixture `drive`.
 
-Importing it must cost nothing: a run of pytest that collects no suite and uses no fixture imports nothing else of antdrive.
+It must be cheap to import: a pytest run without suites and drives imports nothing else of antdrive.
 """
 
 from __future__ import annotations
@@ -20,37 +20,37 @@ if TYPE_CHECKING:
     from antdrive.views.artefacts import Results
 
 SUFFIX = ".drive.yaml"
-WORKER_KEY = "antdrive_unused"  # under which a process of xdist hands over the baselines that no test uses
+WORKER_KEY = "antdrive_unused"  # key for unused baselines reported by xdist workers
 
-_DROVE = pytest.StashKey[list[Any]]()  # the results of a test's drives
-FILMS_KEY = "antdrive_films"  # under which a process of xdist is told where films are counted
-_PLACES = pytest.StashKey[str]()  # the folder in which films of failed drives are counted
-_UNUSED = pytest.StashKey[set[str]]()  # the baselines that no test uses
-_COMPILED = pytest.StashKey[bool]()  # whether the kernels were compiled, or found to be
+_RESULTS = pytest.StashKey[list[Any]]()  # results of a test's drives
+FILMS_KEY = "antdrive_films"  # key for the film counting folder passed to xdist workers
+_FILM_COUNT = pytest.StashKey[str]()  # folder in which films of failed drives are counted
+_UNUSED = pytest.StashKey[set[str]]()  # unused baselines
+_COMPILED = pytest.StashKey[bool]()  # whether the kernels are compiled
 _LISTENER = pytest.StashKey["_Listener"]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options `--drive-*`."""
     group = parser.getgroup("antdrive", "drives (antdrive)")
-    group.addoption("--drive-update", action="store_true", help="write the baselines of drives that are as expected")
-    group.addoption("--drive-update-new", action="store_true", help="write the baselines that are missing")
-    group.addoption("--drive-strict", action="store_true", help="fail if there are baselines that belong to no test")
+    group.addoption("--drive-update", action="store_true", help="write baselines of drives that meet expectations")
+    group.addoption("--drive-update-new", action="store_true", help="write missing baselines")
+    group.addoption("--drive-strict", action="store_true", help="fail on unused baselines")
     group.addoption(
         "--drive-results",
         metavar="FOLDER",
-        help="where logs, pictures and films of failed drives are written; by default in the user's cache",
+        help="folder for logs, figures and films of failed drives (default: user cache)",
     )
     group.addoption(
         "--drive-film",
         choices=("never", "failed", "always"),
         default="failed",
-        help="of which drives a film is made (default: failed)",
+        help="drives to film (default: failed)",
     )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Begin the lists of this run."""
+    """Initialise the records of this run."""
     config.stash[_UNUSED], config.stash[_LISTENER] = set(), _Listener()
     config.pluginmanager.register(config.stash[_LISTENER], "antdrive-listener")
 
@@ -61,10 +61,10 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> DriveSuite
 
 
 class DriveSuite(pytest.File):
-    """A suite as pytest collects it."""
+    """A suite as a pytest collector."""
 
     def collect(self) -> Iterator[DriveItem]:
-        """One item for each scenario and seed."""
+        """Yield one item per scenario and seed."""
         from antdrive.base.errors import InputError
         from antdrive.cli.testing.unused import unused_of_suite
         from antdrive.runs.suites.names import check_names
@@ -78,7 +78,7 @@ class DriveSuite(pytest.File):
             raise self.CollectError(str(error)) from None
         self.config.stash[_UNUSED].update(str(path) for path in unused_of_suite(self.path, cases))
         for case in cases:
-            # Given as text, pytest takes [0] for a parameter, as it does when it reads the id back for --lf.
+            # A node id given as text makes pytest parse [0] as a parameter, as it does for --lf.
             yield DriveItem.from_parent(self, name=case.id, nodeid=f"{self.nodeid}::{case.id}", case=case)
 
 
@@ -105,7 +105,7 @@ class DriveItem(pytest.Item):
             raise DriveFailure(result)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """The message alone, where a drive or what people wrote is wrong; else the traceback."""
+        """Return only the message of a failed drive or invalid input, otherwise the traceback."""
         from antdrive.base.errors import InputError
         from antdrive.cli.testing.fixture import DriveFailure
 
@@ -114,7 +114,7 @@ class DriveItem(pytest.Item):
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
-        """The suite, the line of the scenario, and the test's name."""
+        """Return the suite, the scenario's line and the test's name."""
         line = self.case.document.lines.get(("scenarios", self.case.name))
         return self.path, None if line is None else line - 1, self.case.id
 
@@ -123,7 +123,7 @@ class DriveItem(pytest.Item):
 def drive(request: pytest.FixtureRequest) -> DriveFixture:
     """Drive scenarios and compare them with their baselines: `drive("forest", planner=MyPlanner(), seed=1)`.
 
-    It fails the test unless the drive is as demanded and not worse than its baseline; `drive.run(...)` only drives.
+    The test fails if the drive misses a demand or is worse than its baseline; `drive.run(...)` only drives.
     """
     from antdrive.cli.testing.fixture import DriveFixture
 
@@ -142,7 +142,7 @@ def drive(request: pytest.FixtureRequest) -> DriveFixture:
 
 
 def compile_first(config: pytest.Config) -> None:
-    """Compile the kernels before the first drive of an installation, and say so."""
+    """Compile the kernels before the first drive of an installation and report it."""
     if _COMPILED in config.stash:
         return
     config.stash[_COMPILED] = True
@@ -151,28 +151,28 @@ def compile_first(config: pytest.Config) -> None:
     def say(text: str) -> None:
         capture = config.pluginmanager.getplugin("capturemanager")
         with capture.global_and_fixture_disabled() if capture else contextlib.nullcontext():
-            print(f"\nantdrive: {text}", file=sys.stderr, flush=True)  # noqa: T201 - in a process of xdist, too
+            print(f"\nantdrive: {text}", file=sys.stderr, flush=True)  # noqa: T201 - also in xdist workers
 
     compile_once(say)
 
 
 def note(item: pytest.Item, result: CheckResult) -> None:
-    """Remember what came out of a drive, for reports."""
+    """Record a drive's result for reports."""
     from antdrive.cli.testing.session_summary import properties
 
-    item.stash.setdefault(_DROVE, []).append(result)
+    item.stash.setdefault(_RESULTS, []).append(result)
     item.user_properties.extend(properties(result))
 
 
 def update_of(config: pytest.Config) -> Update:
-    """Which baselines this run of pytest writes."""
+    """Return which baselines this pytest run writes."""
     if config.getoption("drive_update"):
         return "all"
     return "new" if config.getoption("drive_update_new") else ""
 
 
 def results_of(config: pytest.Config) -> Results:
-    """Where this run of pytest writes logs, pictures and films."""
+    """Return where this pytest run writes logs, figures and films."""
     from antdrive.views.artefacts import Results, default_folder
 
     given = config.getoption("drive_results")
@@ -181,34 +181,34 @@ def results_of(config: pytest.Config) -> Results:
 
 
 def counting_folder(config: pytest.Config) -> str:
-    """The folder in which all processes of this run of pytest count the films of failed drives."""
-    if _PLACES not in config.stash:
+    """Return the folder in which all processes of this pytest run count films of failed drives."""
+    if _FILM_COUNT not in config.stash:
         import tempfile
 
-        told = getattr(config, "workerinput", {}).get(FILMS_KEY)
-        config.stash[_PLACES] = told or tempfile.mkdtemp(prefix="antdrive-films-")
-    return config.stash[_PLACES]
+        shared = getattr(config, "workerinput", {}).get(FILMS_KEY)
+        config.stash[_FILM_COUNT] = shared or tempfile.mkdtemp(prefix="antdrive-films-")
+    return config.stash[_FILM_COUNT]
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """Tell a process of xdist where films are counted."""
+    """Pass the film counting folder to an xdist worker."""
     node.workerinput[FILMS_KEY] = counting_folder(node.config)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Remove the folder in which films were counted."""
-    if _PLACES in config.stash and not hasattr(config, "workerinput"):
+    """Remove the film counting folder."""
+    if _FILM_COUNT in config.stash and not hasattr(config, "workerinput"):
         import shutil
 
-        shutil.rmtree(config.stash[_PLACES], ignore_errors=True)
+        shutil.rmtree(config.stash[_FILM_COUNT], ignore_errors=True)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Look for baselines of tests that are gone, in modules that were collected as a whole."""
+    """Find baselines of removed tests in fully collected modules."""
     if any("::" in str(word) for word in config.args) or config.getoption("lf", False):
-        return  # not all tests of a module are among the items
+        return  # modules are partly collected
     modules: dict[Path, set[str]] = {}
     for item in items:
         if not isinstance(item, DriveItem):
@@ -218,15 +218,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         from antdrive.cli.testing.unused import unused_of_module
 
         for path, names in modules.items():
-            config.stash[_UNUSED].update(str(found) for found in unused_of_module(path, names))
+            config.stash[_UNUSED].update(map(str, unused_of_module(path, names)))
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Any:
-    """Add pictures to the page of pytest-html, where it is installed."""
+    """Add figures to the pytest-html report, if installed."""
     report = yield
-    if call.when == "call" and _DROVE in item.stash and item.config.pluginmanager.hasplugin("html"):
-        _add_extras(report, item.stash[_DROVE])
+    if call.when == "call" and _RESULTS in item.stash and item.config.pluginmanager.hasplugin("html"):
+        _add_extras(report, item.stash[_RESULTS])
     return report
 
 
@@ -248,15 +248,15 @@ def _add_extras(report: Any, results: list[CheckResult]) -> None:
 
 
 class _Listener:
-    """Keeps what reports tell of drives; with xdist they come from other processes.
+    """Collector of drives in test reports, which come from other processes under xdist.
 
     Attributes:
-        told: the properties of reports that tell of drives
-        passed: the tests that passed, each with the names of its drives that have baselines
+        drives: properties of reports with drives
+        passed: passed tests, each with the names of its drives that have baselines
     """
 
     def __init__(self) -> None:
-        self.told: list[Any] = []
+        self.drives: list[Any] = []
         self.passed: dict[str, set[str]] = {}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -265,11 +265,11 @@ class _Listener:
         if report.passed:
             self.passed[report.nodeid] = {str(value) for name, value in report.user_properties if name == "drive.case"}
         if any(name == "drive.test" for name, _ in report.user_properties):
-            self.told.append(report.user_properties)
+            self.drives.append(report.user_properties)
 
 
-def _gone_drives(config: pytest.Config) -> Iterator[Path]:
-    """The baselines of drives that tests of this run, which passed, no longer make."""
+def _removed_drives(config: pytest.Config) -> Iterator[Path]:
+    """Yield baselines without a drive in the passed tests of this run."""
     modules: dict[Path, dict[str, set[str]]] = {}
     for nodeid, drives in config.stash[_LISTENER].passed.items():
         file, _, name = nodeid.partition("::")
@@ -284,32 +284,32 @@ def _gone_drives(config: pytest.Config) -> Iterator[Path]:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any, error: Any) -> None:
-    """Take over what a process of xdist has found."""
+    """Collect the unused baselines of an xdist worker."""
     node.config.stash[_UNUSED].update(getattr(node, "workeroutput", {}).get(WORKER_KEY, ()))
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Fail for unused baselines if asked to; in a process of xdist, hand them over."""
+    """Fail on unused baselines if requested; in an xdist worker, report them to the controller."""
     config = session.config
-    found = config.stash[_UNUSED]
+    unused = config.stash[_UNUSED]
     if hasattr(config, "workeroutput"):
-        config.workeroutput[WORKER_KEY] = sorted(found)
+        config.workeroutput[WORKER_KEY] = sorted(unused)
         return
-    found.update(map(str, _gone_drives(config)))
-    if found and config.getoption("drive_strict") and session.exitstatus == pytest.ExitCode.OK:
+    unused.update(map(str, _removed_drives(config)))
+    if unused and config.getoption("drive_strict") and session.exitstatus == pytest.ExitCode.OK:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Say what was driven, on the terminal and in the file that GITHUB_STEP_SUMMARY names."""
-    told, found = config.stash[_LISTENER].told, config.stash[_UNUSED]
+    """Summarise the drives on the terminal and in the file named by GITHUB_STEP_SUMMARY."""
+    reported, found = config.stash[_LISTENER].drives, config.stash[_UNUSED]
     unused = sorted(found)
-    if not (told or unused):
+    if not (reported or unused):
         return
     from antdrive.cli.testing.session_summary import add_to_page, drives_in, lines
 
-    drives = [drive for properties in told for drive in drives_in(properties)]
+    drives = [drive for properties in reported for drive in drives_in(properties)]
     terminalreporter.section("drives")
     for line in lines(drives, unused, config.getoption("drive_strict")):
         terminalreporter.write_line(line)
@@ -317,5 +317,5 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 
 def _name_in_file(item: pytest.Item) -> str:
-    """A test's name within its file, such as TestDoors.test_open[3]."""
+    """Return a test's name in its file, such as TestDoors.test_open[3]."""
     return item.nodeid.partition("::")[2].replace("::", ".")

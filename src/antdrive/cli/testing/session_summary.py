@@ -1,4 +1,4 @@
-"""What a run of pytest says at its end about drives, on the terminal and as Markdown."""
+"""Summary of a test run's drives for the terminal, Markdown and JUnit."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Any
 from antdrive.base.atomic import atomic_write
 from antdrive.cli.testing.evaluation import CheckResult
 
-#: The metrics that a test report gets.
+#: Metrics in test reports.
 SHOWN = ("min_clearance_m", "duration_s", "driven_length_m")
 
 
 def properties(result: CheckResult) -> list[tuple[str, str]]:
-    """What a test report says about a drive, as names and texts; JUnit files hold them."""
+    """Return a drive's properties in test reports and JUnit files, as names and texts."""
     facts = {
         "test": result.address,
         "case": result.case,
@@ -36,21 +36,21 @@ def properties(result: CheckResult) -> list[tuple[str, str]]:
 
 
 def drives_in(properties: Iterable[tuple[str, Any]]) -> Iterator[dict[str, str]]:
-    """The drives that a test report tells of; each begins with its test."""
-    found: dict[str, str] = {}
+    """Yield the drives in a test report's properties; each begins with its test."""
+    drive: dict[str, str] = {}
     for name, value in properties:
         if name == "drive.test":
-            if found:
-                yield found
-            found = {}
+            if drive:
+                yield drive
+            drive = {}
         if name.startswith("drive."):
-            found[name.removeprefix("drive.")] = str(value)
-    if found:
-        yield found
+            drive[name.removeprefix("drive.")] = str(value)
+    if drive:
+        yield drive
 
 
 def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bool) -> Iterator[str]:
-    """What the terminal shows: baselines written, drives better than theirs, results, unused baselines."""
+    """Yield the terminal's lines: written baselines, improvements, results, unused baselines."""
     failed = sum(drive["passed"] == "false" for drive in drives)
     if drives:
         yield f"{len(drives) - failed} of {len(drives)} drives passed"
@@ -68,17 +68,17 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
 
 
 def unused_lines(unused: Sequence[str], strict: bool) -> Iterator[str]:
-    """A line for each baseline that belongs to no test."""
+    """Return one line per unused baseline."""
     return (f"{'FAILED: ' if strict else ''}unused baseline: {path}; remove it" for path in unused)
 
 
 def films_omitted(count: int, option: str) -> str:
-    """That failed drives have no film, because a run makes no more than a few, and what makes them."""
-    return f"{count} more failed drives have no film; the command that repeats a drive makes it, {option} makes all"
+    """Return a line about failed drives without a film, and how to make the films."""
+    return f"{count} more failed drives have no film; repeat a drive to film it, or use {option} to film all"
 
 
 def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
-    """A summary for the page of a CI run."""
+    """Return a Markdown summary for a CI run."""
     failed = [drive for drive in drives if drive["passed"] == "false"]
     text = [f"### Drives: {len(drives) - len(failed)} of {len(drives)} passed", ""]
     if failed:
@@ -104,7 +104,7 @@ def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
 
 
 def save_junit(results: Sequence[CheckResult], path: Path) -> None:
-    """Write the results of suites as JUnit XML, with the same properties as pytest's."""
+    """Write results as JUnit XML, with the same properties as pytest."""
     import xml.etree.ElementTree as ET
 
     failed = sum(not result.passed for result in results)
@@ -116,9 +116,9 @@ def save_junit(results: Sequence[CheckResult], path: Path) -> None:
         file, _, name = result.address.rpartition("::")
         words = {"classname": file.replace("/", "."), "name": name, "time": f"{result.wall_s:.3f}"}
         test = ET.SubElement(suite, "testcase", words)
-        told = ET.SubElement(test, "properties")
+        entries = ET.SubElement(test, "properties")
         for key, value in properties(result):
-            ET.SubElement(told, "property", {"name": key, "value": _plain(value)})
+            ET.SubElement(entries, "property", {"name": key, "value": _plain(value)})
         if not result.passed:
             failure = ET.SubElement(test, "failure", {"message": _plain(result.faults[0])})
             failure.text = "\n".join(map(_plain, result.message.splitlines()))
@@ -127,7 +127,7 @@ def save_junit(results: Sequence[CheckResult], path: Path) -> None:
 
 
 def add_to_page(drives: Iterable[Mapping[str, str]], unused: Sequence[str], say: Callable[[str], None]) -> None:
-    """Add a summary to the page of a CI run, the file that GITHUB_STEP_SUMMARY names, if any; say what is wrong with it."""
+    """Append the summary to the file named by GITHUB_STEP_SUMMARY, if any. `say` reports write errors."""
     if page := os.environ.get("GITHUB_STEP_SUMMARY"):
         try:
             with open(page, "a", encoding="utf-8") as file:
@@ -141,5 +141,5 @@ def _plain(text: str) -> str:
 
 
 def _cell(text: str) -> str:
-    """A text that Markdown shows as it is."""
-    return re.sub(r"[&<>|`*_~\[\]\\@#]", lambda found: f"&#{ord(found[0])};", _plain(text))
+    """Escape a text for Markdown."""
+    return re.sub(r"[&<>|`*_~\[\]\\@#]", lambda match: f"&#{ord(match[0])};", _plain(text))

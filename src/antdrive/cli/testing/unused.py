@@ -1,4 +1,4 @@
-"""Baselines that belong to no test."""
+"""Detection of unused baselines."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from antdrive.runs.suites.suite import BASELINES, SUFFIX, SuiteCase, baseline_fo
 
 
 def unused_beside(words: Sequence[str]) -> list[str]:
-    """The baselines beside the suites that words name which belong to no test, as people name them."""
+    """Return the unused baselines of the named suites."""
     suites = dict.fromkeys(case.suite for case in select(words))
     return sorted({shown_path(path) for suite in suites for path in unused_of_suite(suite, load_suite(suite))})
 
 
 def unused_of_suite(suite: Path, cases: Iterable[SuiteCase]) -> Iterator[Path]:
-    """The baselines in a suite's folder that belong to none of its tests, and those of suites and modules that are gone."""
-    suite = suite.resolve()  # as the tests' own paths are
+    """Yield a suite's unused baselines, and baselines of removed suites and modules."""
+    suite = suite.resolve()  # like the tests' paths
     used = {case.baseline_path for case in cases if case.entry.baseline}
     if not suite.with_name(
         suite.name.removesuffix(SUFFIX) + ".py"
-    ).exists():  # else they share it: see unused_of_module
+    ).exists():  # otherwise they share the folder: see unused_of_module
         yield from (path for path in _files(baseline_folder(suite)) if path not in used)
     for folder in sorted((suite.parent / BASELINES).glob("*/")):
         owners = (suite.parent / f"{folder.name}{SUFFIX}", suite.parent / f"{folder.name}.py")
@@ -32,7 +32,7 @@ def unused_of_suite(suite: Path, cases: Iterable[SuiteCase]) -> Iterator[Path]:
 
 
 def unused_of_module(module: Path, tests: Iterable[str]) -> Iterator[Path]:
-    """The baselines in the folder of a module of tests that belong to none of its tests."""
+    """Yield the unused baselines of a test module."""
     names = tuple(tests)
     for path, case in _of_module(module):
         if not any(_belongs(case, name) for name in names):
@@ -40,7 +40,7 @@ def unused_of_module(module: Path, tests: Iterable[str]) -> Iterator[Path]:
 
 
 def unused_drives_of_module(module: Path, drives: Mapping[str, Collection[str]]) -> Iterator[Path]:
-    """The baselines in the folder of a module of tests that belong to drives which their tests no longer make."""
+    """Yield a test module's baselines of removed drives."""
     for path, case in _of_module(module):
         owners = [name for name in drives if _belongs(case, name)]
         if owners and case not in drives[max(owners, key=len)]:
@@ -48,18 +48,18 @@ def unused_drives_of_module(module: Path, drives: Mapping[str, Collection[str]])
 
 
 def _belongs(case: str, test: str) -> bool:
-    """Whether a baseline is that of a test's only drive, or of a drive that has a name."""
+    """Return whether a baseline belongs to a test, to its only drive or a named one."""
     return case == test or case.startswith(f"{test}-")
 
 
 def _of_module(module: Path) -> Iterator[tuple[Path, str]]:
-    """The baselines in a module's folder, each with the name that it holds; without those of a suite of the same name."""
+    """Yield the baselines of a test module with the names they hold, except those of a suite of the same name."""
     beside = module.resolve().with_suffix(SUFFIX)
     used: set[Path] = set()
     if beside.exists():
         try:
             used = {case.baseline_path for case in load_suite(beside)}
-        except InputError:  # is told where the suite is collected
+        except InputError:  # reported when the suite is collected
             return
     for path in _files(module.parent / BASELINES / module.stem):
         if path.resolve() in used:

@@ -106,9 +106,9 @@ class GaHan(ViaPointPlanner):
     random. The defaults are those of the thesis. `field` counts the chromosomes of the last population that
     pass each cell.
 
-    Known weakness, measured (docs/benchmarks.md): the first feasible line must be found by chance. Among many
-    obstacles no line over so few via points may exist, or none is drawn: the status is then `STOPPED`. With a
-    quarter of the cells blocked, 6 of 10 runs find a line on 20 x 20 cells, and none on 50 x 50.
+    Known weakness, measured (docs/notebook/planner-quality.md): the first feasible line must be found by chance.
+    Among many obstacles no line over so few via points may exist, or none is drawn: the status is then `STOPPED`.
+    With a quarter of the cells blocked, 6 of 10 runs find a line on 20 x 20 cells, and none on 50 x 50.
 
     Attributes:
         population: number of chromosomes

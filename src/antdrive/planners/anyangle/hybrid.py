@@ -37,9 +37,9 @@ class Hybrid(ViaPointPlanner):
     and counts and `field` describe first the ants, then the chromosomes. The history's best is always the length
     of the line to drive.
 
-    Known weakness, measured (docs/benchmarks.md): the line stays in the ants' corridor, which may not be the
-    best. With a quarter of 100 x 100 cells blocked, its cells are 3.6 per cent longer than the shortest path in
-    the median and 7.5 at worst; among cylinders 0.0 and 1.2.
+    Known weakness, measured (docs/notebook/planner-quality.md): the line stays in the ants' corridor, which may
+    not be the best. With a quarter of 100 x 100 cells blocked, its cells are 3.6 per cent longer than the
+    shortest path in the median and 7.5 at worst; among cylinders 0.0 and 1.2.
 
     Attributes:
         iterations: total of ant iterations and generations

@@ -147,10 +147,10 @@ class Tangent(GridPlanner):
     world, so it may find a path that the grid is too coarse for. `cells` are then the cells under the path, and
     `cost` is infinite. Ends below the clearance connect through the centres of their cells, as for all planners.
 
-    Known weaknesses, measured (docs/benchmarks.md): the path grazes discs at exactly the clearance, which leaves
-    a driving robot no margin. The number of tangents grows with the square of the number of discs. Among 400
-    discs a plan takes 23 to 52 ms, in a building of 11,937 cylinders 0.69 s; there, planning on a grid of 480,000
-    cells takes less than 10 ms.
+    Known weaknesses, measured (docs/notebook/planner-quality.md): the path grazes discs at exactly the clearance,
+    which leaves a driving robot no margin. The number of tangents grows with the square of the number of discs.
+    Among 400 discs a plan takes 23 to 52 ms, in a building of 11,937 cylinders 0.69 s; there, planning on a grid
+    of 480,000 cells takes less than 10 ms.
 
     Attributes:
         bulge: maximum distance of the driven polyline's corners from an arc [m]

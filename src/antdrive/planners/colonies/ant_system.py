@@ -39,9 +39,9 @@ class AntSystem(Colony):
     on its arcs. The defaults are those of ibraheem2016. suganthi2019 uses beta 1 and heuristic "step"; lee2008
     uses 500 ants, beta 2 and evaporation 0.01.
 
-    Known weaknesses, measured (docs/benchmarks.md): ants die in dead ends, as in the papers. With a quarter
-    of the cells blocked, 6 of 10 runs cross 50 x 50 cells, with paths twice as long as the shortest, and none
-    crosses 100 x 100. With `backtrack` and `shortcut` all arrive.
+    Known weaknesses, measured (docs/notebook/planner-quality.md): ants die in dead ends, as in the papers. With a
+    quarter of the cells blocked, 6 of 10 runs cross 50 x 50 cells, with paths twice as long as the shortest, and
+    none crosses 100 x 100. With `backtrack` and `shortcut` all arrive.
 
     Attributes:
         alpha: the exponent of the pheromone
@@ -279,9 +279,9 @@ class MaxMinAnts(AntSystem):
     backtrack out of them. Cutting tours short replaces the paper's local search; evaporation and schedule are
     those of the paper with local search.
 
-    Known weakness, measured (docs/benchmarks.md): paths get longer with the grid's size. With a quarter of the
-    cells blocked, 10 of 10 are the shortest at 20 x 20; at 50 x 50 they are 0.4 per cent longer in the median and
-    2.6 at worst, at 100 x 100 1.4 and 3.8.
+    Known weakness, measured (docs/notebook/planner-quality.md): paths get longer with the grid's size. With a
+    quarter of the cells blocked, 10 of 10 are the shortest at 20 x 20; at 50 x 50 they are 0.4 per cent longer in
+    the median and 2.6 at worst, at 100 x 100 1.4 and 3.8.
 
     Attributes:
         evaporation: rho; the paper retains 0.8 with local search

@@ -44,9 +44,9 @@ class MergingAnts(MaxMinAnts):
 
     These rules are antdrive's own; no paper describes them.
 
-    Known weaknesses, measured (docs/benchmarks.md): a path is only as good as the ants' pieces. Among cylinders on
-    200 x 200 cells it is up to 0.2 per cent longer than the shortest, and up to 0.7 per cent after replans from
-    kept trails. On 100 x 100 cells it takes 95 to 233 ms, A* 0.07 to 0.17 ms.
+    Known weaknesses, measured (docs/notebook/planner-quality.md): a path is only as good as the ants' pieces.
+    Among cylinders on 200 x 200 cells it is up to 0.2 per cent longer than the shortest, and up to 0.7 per cent
+    after replans from kept trails. On 100 x 100 cells it takes 95 to 233 ms, A* 0.07 to 0.17 ms.
 
     Attributes:
         ants: ants that follow trails

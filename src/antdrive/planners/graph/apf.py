@@ -22,9 +22,10 @@ class PotentialField(GridPlanner):
     cannot cycle, as every step descends. The paper gives no values for the gains and d0; these defaults
     arrive most often among random cylinders.
 
-    Known weaknesses, measured (docs/benchmarks.md): local minima. In forests of cylinders 9 of 10 runs arrive
-    on 20 x 20 cells and 2 of 10 on 50 x 50 and on 100 x 100; with a quarter of single cells blocked, 1 of
-    10 and none. An obstacle near the goal shifts the minimum away from it (`tests/planners/graph/test_apf.py`).
+    Known weaknesses, measured (docs/notebook/planner-quality.md): local minima. In forests of cylinders 9 of 10
+    runs arrive on 20 x 20 cells and 2 of 10 on 50 x 50 and on 100 x 100; with a quarter of single cells blocked,
+    1 of 10 and none. An obstacle near the goal shifts the minimum away from it
+    (`tests/planners/graph/test_apf.py`).
 
     `d` is the distance from the cell's centre to the nearest cylinder, less the grid's inflation; on a grid
     without a world, to the centre of the nearest blocked cell. Walls do not repel.

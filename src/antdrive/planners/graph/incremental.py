@@ -230,8 +230,9 @@ class IncrementalPlanner(GridPlanner):
 class DStar(IncrementalPlanner):
     """The shortest path over the grid's moves by basic D* (Stentz 1994), repaired when the map changes.
 
-    Known weakness, measured (docs/benchmarks.md): the search is not directed. A first plan on 200 x 200 cells
-    among discs takes 4.4 ms, four times as long as with D* Lite; the median repair takes 43 us against 30.
+    Known weakness, measured (docs/notebook/planning-speed.md): the search is not directed. A first plan on 200 x
+    200 cells among discs takes 4.4 ms, four times as long as with D* Lite; the median repair takes 43 us against
+    30.
     """
 
     def replanner(self, query: Query, rng: np.random.Generator) -> DStarSearch:
@@ -267,9 +268,9 @@ class DStarSearch(IncrementalSearch):
 class DStarLite(IncrementalPlanner):
     """The shortest path over the grid's moves by D* Lite (Koenig & Likhachev 2002), repaired when the map changes.
 
-    Known weakness, measured (docs/benchmarks.md): some repairs cost nearly as much as a new search. On 200 x 200
-    cells among discs one repair in a hundred takes 0.66 ms or more, a plan from scratch 1.0 ms; with D* one in
-    a hundred takes 0.12 ms or more.
+    Known weakness, measured (docs/notebook/planning-speed.md): some repairs cost nearly as much as a new search.
+    On 200 x 200 cells among discs one repair in a hundred takes 0.66 ms or more, a plan from scratch 1.0 ms; with
+    D* one in a hundred takes 0.12 ms or more.
     """
 
     def replanner(self, query: Query, rng: np.random.Generator) -> DStarLiteSearch:

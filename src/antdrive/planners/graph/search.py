@@ -16,8 +16,8 @@ UNREACHABLE = "no sequence of allowed moves leads from the start to the goal"
 class Dijkstra(GridPlanner):
     """The shortest path over the grid's moves, by Dijkstra's algorithm.
 
-    Known weakness, measured (docs/benchmarks.md): the search is not directed; on 100 x 100 cells among cylinders
-    it takes three times as long as A*. Its paths share A*'s weakness.
+    Known weakness, measured (docs/notebook/planner-quality.md): the search is not directed; on 100 x 100 cells
+    among cylinders it takes three times as long as A*. Its paths share A*'s weakness.
     """
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:

@@ -34,9 +34,9 @@ class SafeIntervals(GridPlanner):
 
     The motions are those of the query; without any, the path is the shortest. The plan is a `TimedPlan`.
 
-    Known weaknesses, measured (docs/benchmarks.md): all motions must be known in advance, and the effort grows
-    with their number. Among 40 movers in circles the median plan takes 43 ms on 50 x 50 cells and 92 ms on
-    200 x 200, among 10 of them 12 and 30 ms.
+    Known weaknesses, measured (docs/notebook/planning-speed.md): all motions must be known in advance, and the
+    effort grows with their number. Among 40 movers in circles the median plan takes 43 ms on 50 x 50 cells and 92
+    ms on 200 x 200, among 10 of them 12 and 30 ms.
 
     Attributes:
         speed: the robot's speed on every move [m/s]

@@ -1,4 +1,4 @@
-"""The runs of a campaign: what each depends on, as the campaign calls it, its key, and the command that repeats it alone."""
+"""Runs of a campaign: configuration, seed, key, and the command that repeats one alone."""
 
 from __future__ import annotations
 
@@ -18,44 +18,44 @@ from antdrive.sim.policy import usual_perception
 from antdrive.sim.scenario import Scenario, identity_text
 from antdrive.worlds import Task
 
-KEY_DIGITS = 32  # hexadecimal digits of a key: two runs of a billion have the same one with probability 1e-21
+KEY_DIGITS = 32  # hexadecimal digits of a key; two of 10^9 runs collide with probability 1e-21
 
 
 @dataclass(frozen=True, eq=False)
 class NamedTask:
-    """A world with start and goal, as a campaign calls it."""
+    """A world with start and goal, under the campaign's names."""
 
-    world: str  # what the campaign calls the world
-    name: str  # what the campaign calls start and goal
+    world: str  # the world's name in the campaign
+    name: str  # the task's name in the campaign
     task: Task  # the task
-    catalogue: str | None  # the world's name in the catalogue, if the task is the one of the catalogue
-    place: Location  # where the campaign names the world
-    others: Mapping[str, Task] = field(default_factory=dict)  # the other tasks that the world's file lists, by name
+    catalogue: str | None  # the world's name in the catalogue, if the task is the catalogue's
+    place: Location  # location of the world in the campaign
+    others: Mapping[str, Task] = field(default_factory=dict)  # the world file's other tasks, by name
 
 
 @dataclass(frozen=True, eq=False)
 class PlannerVariant:
     """A planner with options."""
 
-    label: str  # what tables call it, such as "aco-han ants=50"
-    name: str  # its registered name; for people's own code the file's or module's name and that of the class
-    source: str  # what `load_planner` takes for it
-    word: str  # what commands within the campaign's folder call it
-    file: Path | None  # its file; None: it is registered or in a module
-    version: str  # what its code is
-    given: Mapping[str, Any]  # the options that the campaign sets
-    options: Mapping[str, Any]  # all its options as plain values
+    label: str  # its name in tables, such as "aco-han ants=50"
+    name: str  # its registered name; for custom code the name of the file or module and that of the class
+    source: str  # argument of `load_planner`
+    word: str  # its name in commands run in the campaign's folder
+    file: Path | None  # its file; None if registered or in a module
+    version: str  # version of its code
+    given: Mapping[str, Any]  # options that the campaign sets
+    options: Mapping[str, Any]  # all options as plain values
 
 
 @dataclass(frozen=True, eq=False)
 class NamedRobot:
-    """A robot as a campaign and its commands call it."""
+    """A robot under its names in the campaign and its commands."""
 
     robot: RobotSpec  # the robot
-    name: str  # what tables call it: its own name, or its file where another robot of the campaign has that name, too
+    name: str  # its name in tables: its own, or its file if another robot has the same name
     content: str  # its canonical hash
-    word: str  # what commands call it
-    file: Path | None  # its file; None: it is of the catalogue
+    word: str  # its name in commands
+    file: Path | None  # its file; None: a robot of the catalogue
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +64,12 @@ class NamedSettings:
 
     # fields of `Scenario` by name; the margin may be "auto", and perception None until the world is known
     fields: Mapping[str, Any]
-    columns: Mapping[str, Any]  # what tables say of them, by column
-    words: tuple[str, ...] | None  # the words of `antdrive run` for them; None where it has no flags for all
-    place: Location  # where in the campaign the settings are written
+    columns: Mapping[str, Any]  # values of the setting columns
+    words: tuple[str, ...] | None  # words for `antdrive run`; None if it lacks an option for one of them
+    place: Location  # location of the settings in the campaign
 
     def among(self, movers: bool) -> NamedSettings:
-        """The settings with what robots perceive in a world with movers, or without; so keys name what is driven."""
+        """Return the settings with the default perception in a world with or without movers, so that keys include it."""
         if self.fields["perception"] is not None:
             return self
         fields = {**self.fields, "perception": usual_perception(self.fields["map"], movers)}
@@ -78,16 +78,16 @@ class NamedSettings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SweepCase:
-    """A configuration: all that the runs of a campaign depend on which differ in their seeds alone.
+    """A configuration: a run's setup without its seed.
 
     Attributes:
         place: the world with start and goal
-        world_hash: the canonical hash of the task
+        world_hash: canonical hash of the task
         planner: the planner with its options
         robot: the robot
-        settings: how it drives
-        words: the words of the command that repeats a run, without its seed; None where no command can
-        calibration: what the margin "auto" was chosen by; None: not chosen yet, or the margin is a number
+        settings: the settings of the drive
+        words: the command that repeats a run, without its seed; None if no command can
+        calibration: calibration of the margin "auto"; None: not calibrated yet, or the margin is a number
     """
 
     place: NamedTask
@@ -99,14 +99,14 @@ class SweepCase:
     calibration: Calibration | None = None
 
     def scenario(self, seed: int, margin: float | None = None) -> Scenario:
-        """The scenario of a run.
+        """Return the scenario of a run.
 
         Args:
             seed: the run's seed
-            margin: a margin instead of the campaign's [m]
+            margin: overrides the campaign's margin [m]
 
         Raises:
-            InputError: there is no such planner or option here, such as one of a package that is not installed.
+            InputError: the planner or an option is unknown, for example because its package is not installed.
             FieldError: a setting is out of range, or the robot does not fit at the start.
         """
         fields, source = self.settings.fields, self.planner.source
@@ -125,9 +125,9 @@ class SweepCase:
 
     @property
     def identity(self) -> str:
-        """The text that keys are made from: everything that the runs depend on but the seed."""
+        """The text behind a run's key: the configuration."""
         planner = self.planner
-        # People's own planners change more often than antdrive.
+        # Custom planners change more often than antdrive.
         own = {} if planner.name in PLANNERS else {"planner_version": planner.version}
         return identity_text(
             self.world_hash, planner.name, planner.options, self.robot.content, self.settings.fields, **own
@@ -138,9 +138,9 @@ class Job(NamedTuple):
     """One run of a campaign.
 
     Attributes:
-        key: the run's name: a hash of everything that it depends on
-        case: everything that it depends on but the seed
-        seed: the seed of all its random numbers
+        key: the run's name, a hash of its configuration and seed
+        case: its configuration
+        seed: seed of all its random numbers
     """
 
     key: str
@@ -149,5 +149,5 @@ class Job(NamedTuple):
 
 
 def run_key(identity: str, seed: int) -> str:
-    """The key of a run: a SHA-256, cut to 32 hexadecimal digits."""
+    """Return the key of a run: a SHA-256, cut to 32 hexadecimal digits."""
     return hashlib.sha256(f"{identity}\n{seed}".encode()).hexdigest()[:KEY_DIGITS]

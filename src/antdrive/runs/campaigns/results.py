@@ -1,4 +1,4 @@
-"""The results of campaigns' folders: as a table to read, in the canonical form that repetitions share, for statistics."""
+"""Results of a campaign's folder: as a table, in canonical form, and for statistics."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ MEDIANS = {
 
 @dataclass(frozen=True, eq=False)
 class SweepResults:
-    """What came out of a campaign.
+    """The results of a campaign.
 
     Attributes:
         folder: the campaign's folder
-        table: an Arrow table with a row for each run that is done, in the campaign's order
-        size: how many runs the campaign has
-        made: how many of them were made by the call that returned this
-        notes: what people should know who go on with a campaign, a sentence each
+        table: Arrow table with a row for each finished run, in the campaign's order
+        size: number of runs of the campaign
+        made: number of runs made by the call that returned this
+        notes: remarks for continuing the campaign, a sentence each
     """
 
     folder: Path
@@ -48,7 +48,7 @@ class SweepResults:
 
     @property
     def complete(self) -> bool:
-        """Whether all runs of the campaign are done."""
+        """Whether all runs of the campaign are finished."""
         return len(self.table) == self.size
 
     @property
@@ -58,32 +58,32 @@ class SweepResults:
 
     @property
     def succeeded(self) -> int:
-        """How many runs stopped at the goal, certified."""
+        """The number of runs that stopped at the goal, certified."""
         return sum(self.table["succeeded"].to_pylist())
 
     @property
     def outcomes(self) -> dict[str, int]:
-        """How many runs ended in which way, the most frequent first."""
+        """The number of runs by outcome, the most frequent first."""
         return dict(Counter(self.table["outcome"].to_pylist()).most_common())
 
     def medians(self) -> Iterator[tuple[str, ...]]:
-        """Rows of a table: for each planner how many runs succeeded, and median and extremes of `MEDIANS` in them."""
+        """Yield a table row for each planner: its successes, and median and extremes of `MEDIANS` in them."""
         rows = [row for row in self.table.select(["planner", "succeeded", *MEDIANS]).to_pylist() if row["succeeded"]]
         for planner in dict.fromkeys(row["planner"] for row in rows):
             own = [row for row in rows if row["planner"] == planner]
             cells = []
             for name, unit in MEDIANS.items():
-                found = np.array([row[name] for row in own], dtype=float) * (1000.0 if unit.endswith(" ms") else 1.0)
-                cells.append(f"{np.median(found):.3g} ({found.min():.3g} to {found.max():.3g})")
+                values = np.array([row[name] for row in own], dtype=float) * (1000.0 if unit.endswith(" ms") else 1.0)
+                cells.append(f"{np.median(values):.3g} ({values.min():.3g} to {values.max():.3g})")
             yield planner, str(len(own)), *cells
 
     def pandas(self) -> Any:
-        """The table as a pandas DataFrame; needs pandas."""
+        """Return the table as a pandas DataFrame; needs pandas."""
         return self.table.to_pandas()
 
 
 def read_results(folder: str | Path) -> SweepResults:
-    """What has come out of a campaign so far, also while it runs and after it was killed.
+    """Read the results of a campaign so far, even while it runs or after it was killed.
 
     Args:
         folder: the campaign's folder
@@ -96,9 +96,9 @@ def read_results(folder: str | Path) -> SweepResults:
 
 
 def canonical_table(folder: str | Path) -> pyarrow.Table:
-    """The part of the results that every repetition of the campaign shares, sorted by key.
+    """Return the part of the results that every repetition of the campaign reproduces, sorted by key.
 
-    Wall-clock times and the number of attempts are left out. Processes, machines, order and interruptions do not show.
+    Wall-clock times and attempts are omitted. Processes, machines, order and interruptions leave no trace.
 
     Args:
         folder: the campaign's folder
@@ -109,7 +109,7 @@ def canonical_table(folder: str | Path) -> pyarrow.Table:
 
 
 def canonical_bytes(folder: str | Path) -> bytes:
-    """The canonical table as bytes in Arrow's stream format, for comparisons.
+    """Return the canonical table in Arrow's stream format, for comparisons.
 
     Args:
         folder: the campaign's folder
@@ -125,7 +125,7 @@ Columns = Mapping[str, Sequence[Any]]
 
 
 def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Sequence[str]) -> tuple[RunTable, int]:
-    """The runs that are done so far, and how many of the chosen ones the campaigns have."""
+    """Return the finished runs that match a selection, and how many matching runs the campaigns have."""
     base, names = common_folder(folders), _names(folders)
     tables: dict[str, RunTable] = {}
     missing: dict[str, Columns] = {}
@@ -134,7 +134,7 @@ def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Seque
         tables[name] = RunTable(done)
     table = merged(tables)
     if not len(table):
-        raise FieldError("runs", "none; the campaign has no finished run")
+        raise FieldError("runs", "none; the campaign has no finished runs")
     table, left = _chosen(table, missing, where)
     if planners:
         table = table.of_planners(planners)
@@ -142,12 +142,12 @@ def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Seque
 
 
 def common_folder(folders: Sequence[Path]) -> Path:
-    """The folder to which the logs of all campaigns are relative: the campaign's own if there is one."""
+    """Return the common parent of the campaigns' folders, to which logs are relative; a single one is its own."""
     return Path(os.path.commonpath([folder.resolve() for folder in folders]))
 
 
 def _names(folders: Sequence[Path]) -> list[str]:
-    """Names that tell the folders apart: the last part of their paths, or the paths."""
+    """Return distinct names of the folders: the last part of each path, or the paths."""
     whole = [folder.resolve() for folder in folders]
     for folder in folders:
         if whole.count(folder.resolve()) > 1:
@@ -157,7 +157,7 @@ def _names(folders: Sequence[Path]) -> list[str]:
 
 
 def _of_one(folder: Path, base: Path) -> tuple[dict[str, list[Any]], dict[str, list[Any]]]:
-    """The columns of the runs that are done, and those of the campaign's other runs, which say what they are."""
+    """Return the columns of a campaign's finished runs, and the grid columns of its other runs."""
     arrow = parquet_library()
     columns = read_results(folder).table.to_pydict()
     done = set(columns["key"])
@@ -172,7 +172,7 @@ def _of_one(folder: Path, base: Path) -> tuple[dict[str, list[Any]], dict[str, l
 def _chosen(
     table: RunTable, missing: Mapping[str, Columns], where: Mapping[str, str]
 ) -> tuple[RunTable, dict[str, Columns]]:
-    """The runs with the wanted values, and the missing ones that may have them: only what a run is can be known of these."""
+    """Select the runs with the wanted values, and the missing runs as far as their grid columns decide."""
     left: dict[str, Columns] = {
         folder: {**columns, FOLDER: [folder] * len(columns["key"])} for folder, columns in missing.items()
     }
@@ -187,7 +187,7 @@ def _chosen(
 
 
 def _count(left: Mapping[str, Columns], table: RunTable, planners: Sequence[str]) -> int:
-    """How many runs are left to do, of some planners only if they are named."""
+    """Count the missing runs, of some planners only if they are named."""
     if not planners:
         return sum(len(columns["key"]) for columns in left.values())
     labels = set(table.texts("planner"))

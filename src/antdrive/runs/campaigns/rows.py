@@ -1,7 +1,7 @@
-"""The columns of a campaign's table, and the row of one run.
+"""Columns of a campaign's table, and the row of one run.
 
-A run's row has two parts. What the run is comes from the campaign (`grid_row`), so that labels are always those of the
-present campaign. What came out of it is written once, when it ends (`run_row`, `crash_row`).
+A row has two parts. The grid part (`grid_row`) comes from the current campaign, so labels are up to date. The result
+part is written once, when the run ends (`run_row`, `failed_row`).
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from antdrive.sim.settings import SETTING_COLUMNS
 if TYPE_CHECKING:
     import pyarrow
 
-CRASHED = "crashed"  # the outcome of a run whose process died, or in which antdrive itself failed
-PLANNER_FAULT = "planner_fault"  # the outcome of a run whose planner raised something
-TOO_SLOW = "too_slow"  # the outcome of a run that was ended because it took longer than the campaign's limit
-#: The columns that differ between repetitions of the same run; the canonical table is without them.
+CRASHED = "crashed"  # outcome of a run whose process died, or in which antdrive raised an error
+PLANNER_FAULT = "planner_fault"  # outcome of a run whose planner raised an error
+TOO_SLOW = "too_slow"  # outcome of a run killed after the campaign's run_limit
+#: Columns that differ between repetitions of a run; the canonical table omits them.
 NOT_CANONICAL = (*WALL_CLOCK, "attempts")
 VERSIONS = ("antdrive", "numpy", "pybullet", "numba")
-BATCH = 50_000  # rows that are plain Python at a time
-OPTION = "option."  # what the names of columns with a planner's option begin with
-#: What a run is, besides its options: the column's name and its type.
+BATCH = 50_000  # rows held as Python objects
+OPTION = "option."  # prefix of the columns of a planner's options
+#: Grid columns besides options: name and type.
 GRID: Mapping[str, str] = {
     "key": "string",
     "world": "string",
@@ -45,7 +45,7 @@ GRID: Mapping[str, str] = {
     **SETTING_COLUMNS,
     "command": "string",
 }
-#: What came out of a run: the column's name and its type.
+#: Result columns: name and type.
 RESULT: Mapping[str, str] = {
     "key": "string",
     "outcome": "string",
@@ -66,7 +66,7 @@ RESULT: Mapping[str, str] = {
 
 
 def grid_row(job: Job) -> dict[str, Any]:
-    """What a run is, by column."""
+    """Return the grid columns of a run."""
     case, planner, robot, fields = job.case, job.case.planner, job.case.robot, job.case.settings.fields
     x0, y0, x1, y1 = case.place.task.world.bounds
     margin = case.calibration.margin if case.calibration else fields["margin"]
@@ -91,7 +91,7 @@ def grid_row(job: Job) -> dict[str, Any]:
 
 
 def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
-    """What came out of a run that ended by itself, by column."""
+    """Return the result columns of a run that ended by itself."""
     log, plan = run.rollout, run.plan
     row = _empty(key) | {
         "outcome": run.outcome.key,
@@ -114,12 +114,12 @@ def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
 
 
 def failed_row(key: str, outcome: str, reason: str) -> dict[str, Any]:
-    """The row of a run that did not end by itself."""
+    """Return the row of a run that did not end by itself."""
     return _empty(key) | {"outcome": outcome, "succeeded": False, "reason": reason}
 
 
 def too_slow_row(key: str, limit: float) -> dict[str, Any]:
-    """The row of a run that was ended because it took too long."""
+    """Return the row of a run killed after its limit."""
     return failed_row(key, TOO_SLOW, f"took longer than the campaign's run_limit of {limit:g} s")
 
 
@@ -127,19 +127,19 @@ def _empty(key: str) -> dict[str, Any]:
     return {**dict.fromkeys(RESULT), "key": key, **_version_columns(), "attempts": 1}
 
 
-@functools.cache  # looking versions up takes milliseconds
+@functools.cache  # reading the versions takes milliseconds
 def _version_columns() -> dict[str, str]:
-    found = versions()
-    return {f"version.{name}": found[name] for name in VERSIONS}
+    current = versions()
+    return {f"version.{name}": current[name] for name in VERSIONS}
 
 
 def result_table(rows: Sequence[Mapping[str, Any]]) -> pyarrow.Table:
-    """What came out of some runs as an Arrow table."""
+    """Return the results of some runs as an Arrow table."""
     return parquet_library().Table.from_pylist(list(rows), schema=_schema(RESULT))
 
 
 def grid_table(jobs: Sequence[Job]) -> pyarrow.Table:
-    """What the runs of a campaign are as an Arrow table, with a column for each option that the campaign sets."""
+    """Return the grid of a campaign as an Arrow table, with a column for each option that the campaign sets."""
     arrow, schema = parquet_library(), _schema(GRID)
     batches = (jobs[first : first + BATCH] for first in range(0, len(jobs), BATCH))
     tables = [arrow.Table.from_pylist([grid_row(job) for job in batch], schema=schema) for batch in batches]
@@ -153,7 +153,7 @@ def grid_table(jobs: Sequence[Job]) -> pyarrow.Table:
 
 
 def _alike(values: list[Any]) -> list[Any]:
-    """The values of a column, all of one type: numbers as they are, mixtures with text as text."""
+    """Give the values of a column one type: numbers stay, mixtures with text become text."""
     kinds = {type(value) for value in values if value is not None}
     if kinds <= {int, float}:
         return [float(value) if float in kinds and value is not None else value for value in values]
@@ -167,5 +167,5 @@ def _schema(columns: Mapping[str, str]) -> pyarrow.Schema:
 
 
 def result_schema() -> pyarrow.Schema:
-    """The Arrow schema of what comes out of runs."""
+    """Return the Arrow schema of results."""
     return _schema(RESULT)

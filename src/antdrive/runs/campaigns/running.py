@@ -18,19 +18,19 @@ from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
 
 Keep: TypeAlias = Literal["none", "failed", "all"]
-LOGS = "rollouts"  # the folder with the logs that are kept
+LOGS = "rollouts"  # folder of the kept logs
 
 
 @dataclass(frozen=True, eq=False)
 class Finished:
-    """What a worker hands back about a run."""
+    """A worker's result of a run."""
 
-    row: dict[str, Any]  # what came out of it, by column
-    # the log as bytes, if it is to be kept and the worker does not share the campaign's folder
+    row: dict[str, Any]  # the result columns
+    # the log as bytes, if it is kept and the worker does not share the campaign's folder
     log: bytes | None = None
 
 
-#: What workers do with a run; whatever goes wrong in it stands in the row.
+#: The work on a run; errors end up in its row.
 Work: TypeAlias = Callable[[Job], Finished]
 
 
@@ -39,10 +39,10 @@ class Driving:
     """Plan, drive and certify a run."""
 
     keep: Keep = "none"  # which runs' logs are kept
-    folder: str | None = None  # the campaign's folder, where logs are written; None: they are handed back
+    folder: str | None = None  # the campaign's folder for the logs; None: they are returned
 
     def __call__(self, job: Job) -> Finished:
-        """Make the run. What its planner raises, and what antdrive itself raises, is the run's result, not the campaign's end."""
+        """Make the run. An error of the planner or of antdrive is the run's result and does not end the campaign."""
         try:
             done = run(prepare(job))
         except InputError:
@@ -68,12 +68,12 @@ class Driving:
 
 
 def prepare(job: Job) -> Scenario:
-    """The scenario of a run. What runs in the same world can share within a process belongs here."""
+    """Return the scenario of a run. Anything that runs in the same world can share within a process belongs here."""
     return job.case.scenario(job.seed)
 
 
 def log_path(key: str) -> str:
-    """Where the log of a run is, relative to the campaign's folder."""
+    """Return the path of a run's log, relative to the campaign's folder."""
     return f"{LOGS}/{key[:2]}/{key}.npz"
 
 
@@ -83,7 +83,7 @@ def _bytes_of(log: Rollout) -> bytes:
 
 
 def finished_of(done: Done[Job, Finished], limit: float | None) -> Finished:
-    """What a pool says of a run, as a row, also where its process died or was ended for the `limit` [s]."""
+    """Return a pool's result as a row, even if the process died or was killed after `limit` [s]."""
     if not done.died:
         assert done.result is not None
         row, log = done.result.row, done.result.log

@@ -1,14 +1,14 @@
-"""A campaign's folder: what is to be run, what came out so far, and a table of both.
+"""A campaign's folder: its grid, the results so far, and a table of both.
 
     manifest.json   the campaign as written, its size and hash, the versions of the latest command
-    grid.parquet    a row for each run: what it is
-    parts/          what came out of runs: a file for every few seconds, merged from time to time
+    grid.parquet    a row for each run: its configuration and seed
+    parts/          results: a file for every few seconds, merged from time to time
     rollouts/       the logs that are kept
     worlds/, robots/  files for the commands that repeat runs
-    runs.parquet    the table of all runs that are done, written when a command begins and when it ends
+    runs.parquet    the table of all finished runs, written at the start and the end of a command
 
-Every file is written under another name, brought to the disk and then renamed, so that a process that is killed leaves no
-half of one. A run that was made twice stands in two parts; the table has it once.
+Every file is written under a temporary name, synced to the disk and renamed, so a killed process leaves no partial
+file. A run made twice is in two parts, but only once in the table.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 
 MANIFEST, GRID_FILE, PARTS, TABLE = "manifest.json", "grid.parquet", "parts", "runs.parquet"
 FLUSH_EVERY = 2.0  # finished runs are written at least this often [s]
-TRIES = 100  # at reading parts that another process merges meanwhile
+TRIES = 100  # at reading parts while another process merges them
 MOST_PARTS = 200  # more are merged into one
-UNFINISHED = ".new-"  # what the names of files begin with that are being written
+UNFINISHED = ".new-"  # prefix of temporary files
 
 
 class Store:
@@ -52,14 +52,14 @@ class Store:
         self._parts = len(parts_in(folder))
 
     def begin(self, manifest: Mapping[str, Any], grid: pyarrow.Table) -> None:
-        """Write what is to be run."""
+        """Write the manifest and the grid."""
         write_table(grid, self.folder / GRID_FILE)
         text = json.dumps(manifest, indent=1, ensure_ascii=False)
         write_text(self.folder / MANIFEST, text + "\n")
-        write_table(joined(self.folder), self.folder / TABLE)  # until there is another one at the end
+        write_table(joined(self.folder), self.folder / TABLE)  # until the final one replaces it
 
     def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
-        """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds, if `tick` is called that often."""
+        """Keep a run's result; it is on the disk after `FLUSH_EVERY` seconds if `tick` is called as often."""
         if log is not None:
             try:
                 with atomic_write(self.folder / row["rollout"]) as part:
@@ -70,12 +70,12 @@ class Store:
         self.tick()
 
     def tick(self) -> None:
-        """Write what came out of runs, if that was not done for `FLUSH_EVERY` seconds."""
+        """Write the pending results if the last write is `FLUSH_EVERY` seconds ago."""
         if time.monotonic() - self._written > FLUSH_EVERY:
             self.flush()
 
     def flush(self) -> None:
-        """Write what came out of runs since the last time."""
+        """Write the pending results."""
         self._written = time.monotonic()
         if self._rows:
             write_table(result_table(self._rows), self.folder / PARTS / _part_name())
@@ -85,7 +85,7 @@ class Store:
             self.merge()
 
     def merge(self) -> None:
-        """Make one part of all of them. The old ones go when the new one is on the disk."""
+        """Merge all parts into one. The old ones are deleted once the new one is on the disk."""
         old = parts_in(self.folder)
         if len(old) > 1:
             write_table(_results(self.folder), self.folder / PARTS / _part_name())
@@ -94,7 +94,7 @@ class Store:
         self._parts = 1
 
     def drop(self, keys: Set[str]) -> None:
-        """Forget what came out of some runs, so that they are made again."""
+        """Delete the results of some runs, so that they are made again."""
         old, table = parts_in(self.folder), _results(self.folder)
         names = table["key"].to_pylist()
         for i, path in enumerate(table["rollout"].to_pylist()):
@@ -108,7 +108,7 @@ class Store:
         self._parts = 1
 
     def finish(self) -> pyarrow.Table:
-        """Write everything, merge the parts, and write the table; the table."""
+        """Write everything, merge the parts, write the table and return it."""
         self.flush()
         self.merge()
         table = joined(self.folder)
@@ -118,41 +118,41 @@ class Store:
 
 @contextmanager
 def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
-    """A context with a campaign's folder for this process alone."""
+    """Open a campaign's folder for this process alone."""
     with results_folder.opened(Path(folder), MANIFEST, kind="a campaign") as path:
         (path / PARTS).mkdir(exist_ok=True)
         for left in (*path.glob(f"{UNFINISHED}*"), *(path / PARTS).glob(f"{UNFINISHED}*")):
-            left.unlink(missing_ok=True)  # of a process that was killed
+            left.unlink(missing_ok=True)  # of a killed process
         yield Store(path)
 
 
 def outcomes_in(folder: Path) -> dict[str, str]:
-    """How each run ended that was ever made in a folder, by key, also of campaigns that have changed since."""
+    """Return the outcome of every run ever made in a folder, by key, even if the campaign has changed since."""
     results = _results(folder)
     return dict(zip(results["key"].to_pylist(), results["outcome"].to_pylist(), strict=True))
 
 
 def former_grid(folder: Path) -> pyarrow.Table | None:
-    """What the runs were of the campaign that a folder held before; None if it held none."""
+    """Return the grid of the folder's previous campaign; None if there is none."""
     return _read(folder / GRID_FILE) if (folder / GRID_FILE).exists() else None
 
 
 def read_manifest(folder: str | Path) -> dict[str, Any]:
-    """The manifest of a campaign's folder."""
+    """Read the manifest of a campaign's folder."""
     path = Path(folder) / MANIFEST
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise input_error(str(folder), f"no {MANIFEST} in this folder; antdrive sweep writes it") from None
+        raise input_error(str(folder), f"no {MANIFEST} here; antdrive sweep writes it") from None
     except (OSError, ValueError) as error:
         raise input_error(str(path), f"cannot be read ({error})") from None
-    if not isinstance(found, dict) or type(found.get("size")) is not int:
-        raise input_error(str(path), "is no manifest of a campaign; antdrive sweep writes a new one")
-    return found
+    if not isinstance(data, dict) or type(data.get("size")) is not int:
+        raise input_error(str(path), "not a campaign's manifest; antdrive sweep writes a new one")
+    return data
 
 
 def joined(folder: Path) -> pyarrow.Table:
-    """A row for each run of the campaign that is done, in the campaign's order."""
+    """Return a row for each finished run of the campaign, in the campaign's order."""
     grid, results = _read(folder / GRID_FILE), _results(folder)
     places = {key: i for i, key in enumerate(results["key"].to_pylist())}
     keys = grid["key"].to_pylist()
@@ -168,7 +168,7 @@ def joined(folder: Path) -> pyarrow.Table:
 
 
 def _rows(table: pyarrow.Table, numbers: list[int]) -> pyarrow.Table:
-    """Some rows of a table, in this order; none where there are none."""
+    """Return some rows of a table, in this order."""
     arrow = parquet_library()
     return table.take(arrow.array(numbers, type=arrow.int64()))
 
@@ -178,7 +178,7 @@ def _after(names: Sequence[str], name: str) -> int:
 
 
 def write_table(table: pyarrow.Table, path: Path) -> None:
-    """Write an Arrow table as Parquet, whole or not at all, and onto the disk."""
+    """Write an Arrow table as Parquet, atomically and synced to the disk."""
     parquet_library()
     import pyarrow.parquet
 
@@ -195,7 +195,7 @@ def write_table(table: pyarrow.Table, path: Path) -> None:
 
 
 def parts_in(folder: Path) -> list[Path]:
-    """The parts in a campaign's folder, in the order in which they were written."""
+    """List the parts in a campaign's folder, in the order of writing."""
     return sorted(path for path in (folder / PARTS).glob("*.parquet") if not path.name.startswith(UNFINISHED))
 
 
@@ -204,7 +204,7 @@ def _part_name() -> str:
 
 
 def _tables(folder: Path) -> list[pyarrow.Table]:
-    """The parts of a folder, also while another process merges them."""
+    """Read the parts of a folder, even while another process merges them."""
     for _ in range(TRIES):
         tables = []
         for path in parts_in(folder):
@@ -213,14 +213,14 @@ def _tables(folder: Path) -> list[pyarrow.Table]:
             except InputError:
                 if path.exists():
                     raise
-                break  # it was merged into another one since it was listed
+                break  # merged into another one since it was listed
         else:
             return tables
     raise input_error(str(folder / PARTS), "changes faster than it can be read; try again")
 
 
 def _results(folder: Path) -> pyarrow.Table:
-    """What came out of all runs that were ever made in a folder, each once: a run that did not crash counts first."""
+    """Return the results of all runs ever made in a folder, each once; a run that did not crash takes precedence."""
     arrow, schema = parquet_library(), result_schema()
     tables = _tables(folder)
     table = arrow.concat_tables(tables) if tables else schema.empty_table()
@@ -233,7 +233,7 @@ def _results(folder: Path) -> pyarrow.Table:
 
 
 def _cast(table: pyarrow.Table, schema: pyarrow.Schema) -> pyarrow.Table:
-    """A table with the present columns: those that a part of another version lacks are null."""
+    """Cast a table to the current columns; columns missing from another version are null."""
     arrow = parquet_library()
     if table.schema.equals(schema):
         return table
@@ -252,5 +252,5 @@ def _read(path: Path) -> pyarrow.Table:
     except FileNotFoundError:
         raise input_error(str(path), "no such file; antdrive sweep writes it") from None
     except (OSError, arrow.ArrowException) as error:
-        remedy = "; without this file its runs are made again" if path.parent.name == PARTS else ""
+        remedy = "; delete the file to repeat its runs" if path.parent.name == PARTS else ""
         raise input_error(str(path), f"cannot be read as Parquet ({error}){remedy}") from None

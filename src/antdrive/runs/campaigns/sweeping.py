@@ -1,4 +1,4 @@
-"""Run a campaign into a folder: what is there is kept, what is missing is run."""
+"""Run a campaign into a folder: keep existing results, make the missing runs."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ OUTCOMES = (*(one.key for one in Outcome), PLANNER_FAULT, CRASHED, TOO_SLOW)
 
 @dataclass(frozen=True, eq=False)
 class MissingRuns:
-    """What is to be done."""
+    """The runs to make."""
 
-    jobs: tuple[Job, ...]  # the runs to make, in the campaign's order
-    discarded: frozenset[str]  # the keys of those among them whose present results are to be discarded
+    jobs: tuple[Job, ...]  # runs to make, in the campaign's order
+    discarded: frozenset[str]  # keys of those whose present results are discarded
 
 
 def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, again: Sequence[str]) -> MissingRuns:
-    """The runs that a folder lacks, and those that are asked for again."""
+    """Return the runs that a folder lacks, and those to repeat."""
     planners = dict.fromkeys(name for job in jobs for name in (job.case.planner.label, job.case.planner.name))
     for word in again:
         if word not in planners and word not in OUTCOMES:
@@ -62,7 +62,7 @@ def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, agai
 
 
 def changed_planners(jobs: Sequence[Job], folder: Path) -> Iterator[str]:
-    """A sentence for each planner whose earlier runs were made with another version of it, and do not count any more."""
+    """Yield a sentence for each planner whose earlier runs are obsolete because its version changed."""
     former = former_grid(folder)
     if former is None or "planner_version" not in former.column_names:
         return
@@ -76,7 +76,7 @@ def changed_planners(jobs: Sequence[Job], folder: Path) -> Iterator[str]:
     )
     for (planner, version), count in old.items():
         runs = "1 run" if count == 1 else f"{count} runs"
-        yield f"{runs} of {planner} came from {version}; {now[planner]} is here now, and makes them anew"
+        yield f"{runs} of {planner} came from {version}; {now[planner]} repeats them"
 
 
 def sweep(
@@ -92,22 +92,22 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     work: Work | None = None,
 ) -> SweepResults:
-    """Make all runs of a campaign that its folder does not hold yet. Whatever ends it, the same call goes on later.
+    """Make all missing runs of a campaign. After an interruption, the same call resumes it.
 
     Args:
         campaign: a campaign, its file, or plain data with the keys of such a file
-        folder: where results are kept
-        expansion: the campaign's runs, where they are known already
-        jobs: number of processes; None: one per core; 0: this process, which a run that crashes then ends
-        dask: the cluster that makes the runs instead: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
-        keep: which runs' logs are kept: none, failed or all; None: as the campaign says
-        retry_crashed: whether runs are made again that crashed
-        again: planners, by label or name, and outcomes whose runs are made again; their present results are discarded
-        progress: is called at first and after each run with the numbers of runs that are done and of all
-        work: what is done with each run; None: it is driven
+        folder: the folder of results
+        expansion: the campaign's runs, if known
+        jobs: number of processes; None: one per core; 0: this process, which a crashing run ends
+        dask: a cluster to run on: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
+        keep: which runs' logs are kept: none, failed or all; None: the campaign's choice
+        retry_crashed: whether to repeat crashed runs
+        again: planners, by label or name, and outcomes whose runs are repeated; their present results are discarded
+        progress: called at the start and after each run with the numbers of finished and of all runs
+        work: the work on each run; None: drive it
 
     Raises:
-        InputError: something in the campaign is wrong, another process writes into the folder, or the scheduler is gone.
+        InputError: the campaign is invalid, another process writes into the folder, or the scheduler is gone.
     """
     campaign = campaign_of(campaign)
     _check(campaign, jobs, dask, keep)
@@ -123,7 +123,7 @@ def sweep(
         _begin(store, campaign, expansion, all_jobs)
         made, before, size = 0, len(all_jobs) - len(missing.jobs), len(all_jobs)
         report(before, size)
-        # Workers of another machine hand logs back; those of this one write them.
+        # Workers on other machines return logs; local ones write them.
         shared = None if dask is not None and not dask.startswith("local:") else str(store.folder.resolve())
         driving = Driving(keep or campaign.entry.rollouts, shared)
         try:
@@ -140,7 +140,7 @@ def sweep(
 
 
 def _check(campaign: Campaign, jobs: int | None, dask: str | None, keep: str | None) -> None:
-    """Refuse, before any work, what a caller cannot mean."""
+    """Reject invalid arguments before any work."""
     if jobs is not None and (not isinstance(jobs, int) or jobs < 0):
         raise FieldError("jobs", f"must be a number of processes, or 0 for this process, got {jobs!r}")
     if keep is not None and keep not in get_args(Keep):
@@ -153,7 +153,7 @@ def _check(campaign: Campaign, jobs: int | None, dask: str | None, keep: str | N
 def _runs(
     todo: Sequence[Job], work: Work, jobs: int | None, dask: str | None, **watched: Any
 ) -> Iterator[Iterator[Done[Job, Finished]]]:
-    """A context in which the runs are made, by processes of this machine or on a cluster."""
+    """Run the work on this machine or on a cluster."""
     if dask is not None:
         from antdrive.runs.cluster import run_on_cluster
 
@@ -165,7 +165,7 @@ def _runs(
 
 
 def calibrated(jobs: Iterable[Job]) -> list[Job]:
-    """The runs, with a margin for those that leave it to be chosen; each robot and its settings are calibrated once."""
+    """Return the runs with calibrated margins in place of "auto"; each robot and its settings are calibrated once."""
     chosen: dict[str, Calibration] = {}
     cases: dict[int, SweepCase] = {}
     for job in jobs:
@@ -179,14 +179,14 @@ def calibrated(jobs: Iterable[Job]) -> list[Job]:
 
 
 def campaign_of(campaign: Campaign | str | os.PathLike[str] | Mapping[str, Any]) -> Campaign:
-    """A campaign from whatever stands for it."""
+    """Return a campaign from any of its forms."""
     if isinstance(campaign, Campaign):
         return campaign
     return make_campaign(campaign) if isinstance(campaign, Mapping) else load_campaign(campaign)
 
 
 def _begin(store: Store, campaign: Campaign, expansion: Expansion, jobs: Sequence[Job]) -> None:
-    """Write what is to be run: the manifest, the grid, and the worlds and robots that commands name."""
+    """Write the manifest, the grid, and the worlds and robots that commands name."""
     keys = "\n".join(sorted(job.key for job in jobs))
     manifest = {
         "schema": 1,

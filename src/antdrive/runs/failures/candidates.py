@@ -1,4 +1,4 @@
-"""Candidate scenarios of a shrinking: each runs at most once, within a time budget, and a journal records the answers."""
+"""Candidate scenarios for a minimal reproducer: each runs at most once, within a time budget; a journal keeps answers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.files.world_file import task_to_dict
 
-JOURNAL_EVERY = 2.0  # the journal is written at most this often, apart from its last state [s]
+JOURNAL_EVERY = 2.0  # shortest interval between writes of the journal, except the last [s]
 
 
 class OutOfTimeError(Exception):
@@ -35,7 +35,7 @@ class OutOfTimeError(Exception):
 
 
 def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = True) -> Failure | None:
-    """How a scenario fails when it is run; None if it does not, or cannot be run at all."""
+    """Run a scenario and return its failure; None if it does not fail or cannot be run."""
     try:
         if drive:
             return failure_of(run(scenario), bound)
@@ -48,10 +48,10 @@ def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = 
 
 
 def room_in(scenario: Scenario, failure: Failure) -> float | None:
-    """The clearance with which a path exists in the world of a failing scenario [m]; None where none does.
+    """Return the clearance with which a path exists in the world of a failing scenario [m]; None if none exists.
 
-    That is the clearance that the scenario claims and, where the planner found no path, a cell's side more if a path exists
-    with that: then the grid is no excuse. In worlds of more than `MOST_OBSTACLES` it is not looked for.
+    It is the clearance that the scenario claims. If the planner found no path, one cell more if a path exists with that,
+    so the failure is not due to the grid. Worlds of more than `MOST_OBSTACLES` are not checked.
     """
     task, claimed = scenario.task, scenario.inflate
     if len(task.world.obstacles) > MOST_OBSTACLES:
@@ -61,14 +61,14 @@ def room_in(scenario: Scenario, failure: Failure) -> float | None:
 
 
 class CandidateRunner:
-    """Runs candidates and says which of them fail in one given way, in worlds that leave as much room.
+    """Runs candidates and finds those that fail in one given way, in worlds with as much room.
 
-    The answers depend on the candidates alone, not on time, processes, or what a journal already knew.
+    The answers depend on the candidates alone, not on time, processes or the journal.
 
     Attributes:
-        stage: what is being tried, for the progress
-        made: how many candidates were run so far
-        recalled: the candidates whose answers came from an earlier session's journal
+        stage: name of the current pass, for the progress
+        made: number of candidates run so far
+        recalled: candidates whose answers came from an earlier session's journal
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class CandidateRunner:
         self._latest: tuple[str, Rollout | None] | None = None
 
     def first(self, candidates: Iterable[Scenario | None]) -> Scenario | None:
-        """The first candidate that fails in the wanted way; None if there is none. Candidates that are None are left out."""
+        """Return the first candidate that fails in the wanted way, or None; skip candidates that are None."""
         waiting = (candidate for candidate in candidates if candidate is not None)
         while batch := list(itertools.islice(waiting, self._jobs)):
             keys = [_digest(changeable(candidate)) for candidate in batch]
@@ -112,20 +112,20 @@ class CandidateRunner:
         return None
 
     def rollout(self, scenario: Scenario) -> Rollout | None:
-        """The drive of a scenario that is known to fail; None if it fails before it drives."""
+        """Return the drive of a scenario known to fail; None if it fails before driving."""
         key = _digest(changeable(scenario))
         if self._latest is None or self._latest[0] != key:
             self._latest = key, Attempt.of(scenario).rollout
         return self._latest[1]
 
     def forget(self) -> None:
-        """Drop all answers, also those of the journal."""
+        """Drop all answers, including the journal's."""
         self._answers.clear()
         self._known, self._latest = frozenset(), None
         self.save()
 
     def close(self) -> None:
-        """End the processes, and write the journal."""
+        """End the processes and write the journal."""
         self._pool.close()
         self.save()
 
@@ -154,17 +154,17 @@ class CandidateRunner:
         drive = self._wanted.outcome not in {outcome.key for outcome in ENDED_BY.values()}
         tried = functools.partial(failure_in, bound=self._bound, drive=drive)
         if len(candidates) == 1 or not is_importable_elsewhere(candidates[0].planner):
-            found = [tried(candidate) for candidate in candidates]
+            failures = [tried(candidate) for candidate in candidates]
         else:
-            found = list(self._pool.results(tried, candidates))
+            failures = list(self._pool.results(tried, candidates))
         return (
             failure == self._wanted and (self._room is None or feasible(candidate.task, self._room))
-            for candidate, failure in zip(candidates, found, strict=True)
+            for candidate, failure in zip(candidates, failures, strict=True)
         )
 
 
 def changeable(scenario: Scenario) -> Mapping[str, Any]:
-    """What shrinking may change in a scenario, as plain values."""
+    """Return everything in a scenario that shrinking may change, as plain values."""
     return {
         "task": task_to_dict(scenario.task),
         "unseen": [dataclasses.astuple(disc) for disc in scenario.unseen],
@@ -175,13 +175,13 @@ def changeable(scenario: Scenario) -> Mapping[str, Any]:
 
 
 def identity_of(scenario: Scenario) -> str:
-    """A text that is the same for scenarios that agree in everything."""
+    """Return a text that is equal for equal scenarios."""
     fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
     return _digest(settings_of({**fields, "planner": _text_of(scenario.planner)}))
 
 
 def _text_of(planner: Planner) -> str:
-    """A planner as text; one whose class has no text of its own would be told by its address, which no other process repeats."""
+    """Return a planner as text; without a `repr` of its own by class and attributes, as an address differs per process."""
     kind = type(planner)
     if kind.__repr__ is not object.__repr__:
         return repr(planner)
@@ -193,10 +193,10 @@ def _digest(value: Any) -> str:
 
 
 def _read(journal: Path | None, header: str) -> dict[str, bool]:
-    """The answers of an earlier session about the same failure; none if there was no such session."""
+    """Read an earlier session's answers about the same failure; empty without such a session."""
     try:
-        found = json.loads(journal.read_text(encoding="utf-8")) if journal is not None else {}
-        answers = found["answers"] if found.get("header") == header else {}
+        data = json.loads(journal.read_text(encoding="utf-8")) if journal is not None else {}
+        answers = data["answers"] if data.get("header") == header else {}
     except (OSError, ValueError, AttributeError, KeyError):
         return {}
     return {str(key): value is True for key, value in answers.items()} if isinstance(answers, dict) else {}

@@ -1,4 +1,4 @@
-"""Delta debugging: the items of a list that are needed to keep a property.
+"""Delta debugging: the items of a list needed to keep a property.
 
 A. Zeller, R. Hildebrandt, *Simplifying and isolating failure-inducing input*, IEEE TSE 28, 2002.
 """
@@ -15,7 +15,7 @@ Item = TypeVar("Item")
 def one_minimal(
     items: Sequence[Item], first: Callable[[Iterable[Sequence[Item]]], Sequence[Item] | None]
 ) -> Sequence[Item]:
-    """A sublist that keeps the property and loses it with any single one of its items."""
+    """Return a sublist that keeps the property and loses it without any single one of its items."""
     kept, parts = list(items), 2
     if kept and first([[]]) is not None:
         return []
@@ -26,7 +26,7 @@ def one_minimal(
             kept, parts = list(subset), 2
             continue
         complements = [list(itertools.chain(*chunks[:i], *chunks[i + 1 :])) for i in range(len(chunks))]
-        rest = first(complements) if parts > 2 else None  # of two chunks, the complements are the chunks
+        rest = first(complements) if parts > 2 else None  # the complements of two chunks are the chunks
         if rest is not None:
             kept, parts = list(rest), max(parts - 1, 2)
         elif parts >= len(kept):
@@ -37,6 +37,6 @@ def one_minimal(
 
 
 def _split(items: list[Item], parts: int) -> list[list[Item]]:
-    """Consecutive pieces of nearly equal length."""
+    """Split items into consecutive pieces of nearly equal length."""
     cuts = [round(i * len(items) / parts) for i in range(parts + 1)]
     return [items[a:b] for a, b in itertools.pairwise(cuts) if a < b]

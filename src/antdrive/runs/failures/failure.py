@@ -1,4 +1,4 @@
-"""What a failure is, and when two runs fail in the same way."""
+"""Failures of runs, and their equality."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ _BOUND = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|==)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[e
 
 
 def parse_bound(text: str) -> Bound:
-    """The bound in a text such as "min_clearance_m < 0.02".
+    """Parse a bound such as "min_clearance_m < 0.02".
 
     Args:
         text: metric, relation and number
 
     Raises:
-        FieldError: it is not of that form, or there is no such metric.
+        FieldError: the form is invalid, or the metric unknown.
     """
-    found = _BOUND.fullmatch(text)
-    if found is None or not math.isfinite(float(found[3])):
+    match = _BOUND.fullmatch(text)
+    if match is None or not math.isfinite(float(match[3])):
         raise FieldError("--while", f"write METRIC < NUMBER, with <, <=, >, >= or ==; got {text!r:.60}")
-    if found[1] not in METRICS:
-        raise FieldError("--while", f"unknown metric {found[1]!r:.60}; {suggest(found[1], METRICS)}")
-    if found[1] in WALL_CLOCK:
-        raise FieldError("--while", f"{found[1]} depends on the machine and its load; a bound on it does not repeat")
-    return Bound(found[1], found[2], float(found[3]))
+    if match[1] not in METRICS:
+        raise FieldError("--while", f"unknown metric {match[1]!r:.60}; {suggest(match[1], METRICS)}")
+    if match[1] in WALL_CLOCK:
+        raise FieldError("--while", f"{match[1]} depends on the machine and its load; choose a metric that repeats")
+    return Bound(match[1], match[2], float(match[3]))
 
 
 @dataclass(frozen=True)
@@ -48,12 +48,12 @@ class Failure:
     """How a run failed. Two runs fail in the same way if their failures are equal.
 
     Attributes:
-        outcome: the key of the run's outcome, such as collided; succeeded for a drive that ends at the goal but is
-            not certified or crosses a bound; planner_error where the planner raised something
-        touched: what was touched first: cylinder, unseen cylinder, mover, wall, or nothing
-        cause: for contacts with cylinders that the planner knew of and with walls, the cause that took most of the
-            margin until then (a key of `antdrive.sim.log.margin.CAUSES`); else what the run's reason says, without its
-            numbers; for a refused certificate the check that refused it; for a bound, the bound
+        outcome: key of the run's outcome, such as collided; succeeded for a drive that reaches the goal but is not
+            certified or crosses a bound; planner_error if the planner raised an error
+        touched: thing of the first contact: cylinder, unseen cylinder, mover, wall, or nothing
+        cause: for contacts with walls and known cylinders, the largest contribution to the lost margin until then (a
+            key of `antdrive.sim.log.margin.CAUSES`); for a refused certificate the failed check; for a bound the bound;
+            else the run's reason without its numbers
     """
 
     outcome: str
@@ -70,11 +70,11 @@ class Failure:
 
 
 def failure_of(done: Run, bound: Bound | None = None) -> Failure | None:
-    """How a run failed; None if it did not.
+    """Return how a run failed; None if it did not.
 
     Args:
         done: the run
-        bound: what counts as failure; None: everything but a certified success
+        bound: the condition that counts as failure; None: anything but a certified success
     """
     rollout = done.rollout
     touched = NOTHING if rollout is None else first_contact_kind(rollout)
@@ -93,15 +93,15 @@ def failure_of(done: Run, bound: Bound | None = None) -> Failure | None:
 
 
 def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
-    """What counts as failing where a test's drive ends as expected but breaks a bound of the test or of its baseline.
+    """Return the bound to shrink for, if a test's drive ends as expected but breaks a bound of the test or its baseline.
 
-    None where it breaks none: then the run itself is the failure, or there is none.
+    None if it breaks none: then the run itself is the failure, or there is none.
     """
     rollout, demands = done.rollout, case.demands
     if rollout is None or done.outcome is not demands.outcome:
         return None
-    if (found := _first_broken(demands.bounds, rollout)) is not None:
-        return found
+    if (broken := _first_broken(demands.bounds, rollout)) is not None:
+        return broken
     if not case.entry.baseline or any(unmet_demands(done, demands)):
         return None
     baseline = Baseline.own(case.baseline_path, case.id)
@@ -109,10 +109,10 @@ def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
     if baseline is None or not faults:
         return None
     same = baseline.outcome is done.outcome and baseline.line
-    found = _first_broken(limits(demands, baseline), rollout) if same else None
-    if found is None and done.succeeded:
-        raise input_error(case.address, f"{faults[0]}; no other world repeats that, so there is nothing to shrink")
-    return found
+    broken = _first_broken(limits(demands, baseline), rollout) if same else None
+    if broken is None and done.succeeded:
+        raise input_error(case.address, f"{faults[0]}; another world cannot repeat that, so shrinking is impossible")
+    return broken
 
 
 def _first_broken(bounds: Iterable[Bound], rollout: Rollout) -> Bound | None:
@@ -122,12 +122,12 @@ def _first_broken(bounds: Iterable[Bound], rollout: Rollout) -> Bound | None:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """What came of an attempt to run a scenario.
+    """The result of running a scenario.
 
     Attributes:
         scenario: the scenario
-        run: its run; None where the planner raised something
-        error: what it raised; None where it did not
+        run: its run; None if the planner raised an error
+        error: the planner's error, if any
     """
 
     scenario: Scenario
@@ -149,23 +149,23 @@ class Attempt:
 
     @property
     def fingerprint(self) -> str:
-        """The attempt in one text: the same wherever the run is the same bit for bit, or the planner raises the same."""
+        """A text that is equal if two runs are bitwise equal, or the planner raises the same error."""
         if self.run is None:
             return without_numbers(str(self.error))
         return f"{self.run.outcome.key}: {self.run.reason}" if self.run.rollout is None else self.run.rollout.digest
 
     def failure(self, bound: Bound | None = None) -> Failure | None:
-        """How it failed, as `failure_of` says; what a planner raises is a failure, whatever the bound."""
+        """Return how it failed, by `failure_of`; an error of the planner is a failure, whatever the bound."""
         return failure_of_planner(self.error) if self.run is None else failure_of(self.run, bound)
 
 
 def failure_of_planner(error: PlannerError | None) -> Failure:
-    """The failure of a run that ended because the planner raised something."""
+    """Return the failure of a run that ended in an error of the planner."""
     return Failure(RAISED, NOTHING, without_numbers(str(error)))
 
 
 def without_numbers(text: str) -> str:
-    """A reason without what differs from world to world: its numbers, and the names of single obstacles."""
+    """Remove from a reason what differs between worlds: numbers, and the names of single obstacles."""
     masked = re.sub(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
     masked = re.sub(r"the (?:left|lower|right|upper) wall|(?:obstacles|movers|unseen)\[#\]", "#", masked)
     return re.sub(r" at \(#, #\)(?: with radius #)?", "", masked)

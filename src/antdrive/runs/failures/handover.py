@@ -1,4 +1,4 @@
-"""Failures handed over: world files, robot files and a suite that expects each scenario to fail as it did."""
+"""Failing scenarios as files: worlds, robots and a suite that expects each to fail in the same way."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from antdrive.sim.pipeline import Run
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import save_task
 
-#: Settings that a failing test names even at their defaults, so that it stays the same test when defaults change.
+#: Settings written even at their defaults, so that the test survives a change of defaults.
 PINNED = ("smoothing", "margin", "noise")
 
 
@@ -42,11 +42,11 @@ class Handover:
     """A failing run under a name.
 
     Attributes:
-        name: the scenario's name in the suite, and that of its world file
+        name: name of the scenario in the suite, and of its world file
         failed: the attempt that failed
         bound: the metric's bound that it crosses, if that is its failure
-        note: what people should know about it; may be empty
-        planner: the planner in the words of the suite, such as {file: ../mine.py, name: Mine}; None: by its name
+        note: remark for readers; may be empty
+        planner: the planner as the suite writes it, such as {file: ../mine.py, name: Mine}; None: by its name
     """
 
     name: str
@@ -57,10 +57,10 @@ class Handover:
 
 
 def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
-    """Write a suite, and beside it the worlds, and the robots that are not in the catalogue.
+    """Write a suite, its worlds, and the robots that are not in the catalogue.
 
-    The suite has no baselines: it holds as long as the scenarios fail as they did. A scenario whose planner raises something
-    is expected to succeed, because no outcome says so; its test fails until the planner is mended.
+    The suite has no baselines: it passes as long as the scenarios fail in the same way. A scenario whose planner raises an
+    error is expected to succeed, as no outcome covers errors; its test fails until the planner is fixed.
 
     Args:
         path: the suite's file; its name ends in .drive.yaml
@@ -93,7 +93,7 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
 
 
 def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
-    """A scenario as plain data with the keys of a suite, without its world and what is expected."""
+    """Return a scenario as plain data with the keys of a suite, without its world and expectations."""
     return {
         "robot": robot,
         "planner": planner_words(scenario),
@@ -106,17 +106,14 @@ def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
 def planner_beside(
     case: SuiteCase | None, own: str | None, scenario: Scenario, folder: Path
 ) -> str | dict[str, Any] | None:
-    """The planner of a test, or of a log whose own class is named, in the words of a suite in a folder; None if registered."""
+    """Return the planner of a test or a log as a suite in `folder` writes it; None if it is registered."""
     if case is not None:
         return _planner_moved(case.entry.planner, case.suite.parent, folder)
     return None if own is None else _planner_moved(planner_words(scenario, own), Path.cwd(), folder.absolute())
 
 
 def _planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> str | dict[str, Any] | None:
-    """The words of a suite for a planner in a file or module of people's own, as a suite in another folder writes them.
-
-    None for a registered planner.
-    """
+    """Rewrite a suite's entry of a custom planner for a suite in another folder; None for a registered planner."""
     if not is_own_entry(given):
         return None
     words = {"name": given} if isinstance(given, str) else dict(given)
@@ -129,7 +126,7 @@ def _planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> 
 
 
 def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
-    """What a suite expects of a scenario that is to fail as it did."""
+    """Return the suite's expectation for a scenario that fails as it did."""
     expected: dict[str, Any] = {"outcome": failed.outcome.key}
     if failed.outcome is Outcome.SUCCEEDED:
         expected["certified"] = failed.succeeded
@@ -143,7 +140,7 @@ def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
 
 
 def suite_elsewhere(suite: Path) -> list[str]:
-    """The fingerprints of a suite's scenarios, run in other processes; a fault of a file stands for one."""
+    """Return the fingerprints of a suite's scenarios, run in other processes; an invalid file gives its message."""
     with Pool(2) as pool:
         return list(pool.results(functools.partial(_fingerprint_from, suite.resolve()), range(len(load_suite(suite)))))
 
@@ -156,7 +153,7 @@ def _fingerprint_from(suite: Path, index: int) -> str:
 
 
 def renamed(scenario: Scenario, name: str, note: str = "") -> Scenario:
-    """The scenario with another name of its world, and a note where the world comes from."""
+    """Return the scenario with its world renamed, and a note added to the world's source."""
     task = scenario.task
     source = "; ".join(part for part in (task.world.source, note) if part) if note else task.world.source
     world = dataclasses.replace(task.world, name=name, source=source)
@@ -164,12 +161,12 @@ def renamed(scenario: Scenario, name: str, note: str = "") -> Scenario:
 
 
 def scenario_name(text: str) -> str:
-    """A name that a suite takes for a scenario."""
+    """Turn a text into a valid name of a scenario."""
     return file_name(text, ascii_only=True).lstrip("_.-")[:90] or "failure"
 
 
 def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
-    """The fingerprints of scenarios that are run in other processes."""
+    """Return the fingerprints of scenarios run in other processes."""
     with Pool(2) as pool:
         return list(pool.results(_fingerprint, scenarios))
 
@@ -179,7 +176,7 @@ def _fingerprint(scenario: Scenario) -> str:
 
 
 def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str, Any]:
-    """A scenario's planner in the words of a suite: its name, with the options that differ from those of that name."""
+    """Return a planner as a suite writes it: its name, with the options that differ from its defaults."""
     name = own or scenario.planner_label
     planner: Any = scenario.planner
     usual: Any = load_planner(own) if own else list_planners().get(name)
@@ -188,7 +185,7 @@ def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str,
 
 
 def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:
-    """The robot's name in the catalogue, or the file beside the suite that is written for it."""
+    """Return a robot's name in the catalogue; write any other beside the suite and return its path."""
     if robot.name in list_robots() and load_robot(robot.name) == robot:
         return robot.name
     plain = file_name(robot.name)

@@ -1,6 +1,6 @@
-"""The search for worlds of a few cylinders in which a configuration fails, within a budget of runs.
+"""Search for worlds of a few cylinders in which a configuration fails, within a budget of runs.
 
-The next world is any at random, or the one of many in which a rehearsal without physics comes closest to a contact.
+The next world is random, or the one of many in which a rehearsal without physics comes closest to a contact.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from antdrive.sim.pipeline import plan
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Disc, Task, World
 
-# The arena, in radii of the robot. Cylinders are centred between start and goal, at any distance from the side walls.
+# The arena, in radii of the robot. Cylinders lie between start and goal, at any distance from the side walls.
 LENGTH, WIDTH = 24.0, 12.0
-END = 2.5  # from the start and the goal to the walls behind them
+END = 2.5  # from start and goal to the walls behind them
 FREE = 5.5  # from the end walls to the centre of any cylinder
 RADII = (0.3, 1.5)
 CELL = 0.75
@@ -44,14 +44,14 @@ CELL = 0.75
 
 @dataclass(frozen=True)
 class WorldSpace:
-    """All worlds of so many cylinders in a rectangle that is crossed along its middle; its size is that of the robot.
+    """All worlds with a given number of cylinders in a rectangle scaled by the robot's radius.
 
-    A point of the space holds x, y and radius of each cylinder, each from 0 to 1. Lengths are in whole millimetres, or in
-    hundredths of the robot's radius where the robot is small.
+    A point of the space holds x, y and radius of each cylinder, each from 0 to 1. Lengths are rounded to millimetres, or
+    to 0.01 mm for small robots. The robot crosses the rectangle along its middle.
 
     Attributes:
         count: number of cylinders
-        robot_radius: radius of the robot, which all lengths are multiples of [m]
+        robot_radius: radius of the robot, the unit of all lengths [m]
 
     Raises:
         FieldError: no cylinder, or a radius that is not positive.
@@ -72,7 +72,7 @@ class WorldSpace:
         return 3 * self.count
 
     def task(self, point: Floats, name: str) -> Task:
-        """The world of a point (D,), with start and goal."""
+        """Return the world of a point (D,), with start and goal."""
         r = self.robot_radius
         length, width = self._metres(LENGTH * r), self._metres(WIDTH * r)
         low, high = self._range
@@ -98,41 +98,41 @@ class WorldSpace:
         return round(value, 3 if self.robot_radius >= 0.1 else 5)
 
 
-REHEARSED = 24  # worlds that the guided search rehearses for each that it runs
-PATIENCE = 3.0  # a rehearsal ends after so many times the time that the route takes at full speed, and SETTLING
+REHEARSED = 24  # rehearsed worlds for each run of the guided search
+PATIENCE = 3.0  # a rehearsal's time limit, in multiples of the route's time at full speed, plus SETTLING
 SETTLING = 5.0  # [s]
-STANDING = 1e-3  # a robot that was told to stop has stopped at this speed [m/s]
+STANDING = 1e-3  # below this speed the robot stands [m/s]
 
-#: Draws a scenario; None where the world is of no use.
+#: Draws a scenario; None if the world is unusable.
 Draw: TypeAlias = Callable[[], Scenario | None]
 
 
 def random_world(draw: Draw) -> Scenario | None:
-    """The next world, as it comes."""
+    """Draw the next world at random."""
     return draw()
 
 
 def guided_world(draw: Draw) -> Scenario | None:
-    """Of `REHEARSED` random worlds, the one in which the rehearsed drive comes closest to a contact.
+    """Draw `REHEARSED` random worlds and return the one whose rehearsed drive comes closest to a contact.
 
-    The winner of the UAV testing competition of 2025 chooses its tests in this way, with a simulator of low fidelity
-    before each run of the real one (*Pseudo-random UAV test generation using low-fidelity path simulator*, 2025).
+    The winner of the UAV testing competition 2025 selects tests this way, with a low-fidelity simulator before each real run
+    (*Pseudo-random UAV test generation using low-fidelity path simulator*, 2025).
     """
     drawn = [scenario for scenario in (draw() for _ in range(REHEARSED)) if scenario is not None]
     return min(drawn, key=rehearsed_clearance, default=None)
 
 
-#: The methods of search by name.
+#: Search methods by name.
 METHODS: Mapping[str, Callable[[Draw], Scenario | None]] = MappingProxyType(
     {"guided": guided_world, "random": random_world}
 )
 
 
 def rehearsed_clearance(s: Scenario) -> float:
-    """The least clearance of a scenario's drive if its wheels did exactly as told, without movers [m].
+    """Return the least clearance of a drive whose wheels execute commands exactly, without movers [m].
 
-    The noise is that of the real run; infinite where no path is planned, minus infinity where the planner raises
-    something: that is a failure as well.
+    The noise is that of the real run. Infinite if no path is planned; minus infinity if the planner raises an error, as
+    that is a failure.
     """
     try:
         grid, answer = plan(s)
@@ -150,35 +150,35 @@ def rehearsed_clearance(s: Scenario) -> float:
 
 
 class Rehearsing(Decider):
-    """Follows a path with the controller alone, until the robot stands at its end."""
+    """Follows a path with the controller alone until the robot stands at its end."""
 
     def __init__(self, path: TrackedPath, controller: PurePursuit) -> None:
         self.step = Step()
         self._path, self._controller = path, controller
 
     def decide(self, tick: int, pose: Pose, state: State) -> None:
-        """The controller's command."""
+        """Set the controller's command."""
         self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
 
     def gives_up(self, state: State) -> Ending | None:
-        """The end of a robot that stands at the end of the path."""
+        """End the drive if the robot stands at the end of the path."""
         there = self.step.pursuit.arc > self._path.length - self._path.goal_distance
         return Ending(Outcome.SUCCEEDED) if there and abs(state.speed) < STANDING else None
 
 
 def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
-    """A pose after driving with a twist for a time [s]."""
+    """Return a pose after driving with a twist for a time [s]."""
     x, y, yaw = pose
     middle = yaw + twist.yaw_rate * time / 2
     way = twist.speed * time
     return x + way * math.cos(middle), y + way * math.sin(middle), math.remainder(yaw + twist.yaw_rate * time, math.tau)
 
 
-POINTS = 60  # of a line, at equal distances along it
+POINTS = 60  # of a line, equally spaced
 
 
 def driven_line(rollout: Rollout) -> Floats:
-    """The line that was driven up to the first contact, as `POINTS` points (N, 2) at equal distances along it [m]."""
+    """Return the driven line up to the first contact, as `POINTS` equally spaced points (N, 2) [m]."""
     end = int(rollout.contacts[0, 0]) + 1 if len(rollout.contacts) else len(rollout.t)
     xy = rollout.pose[:end, :2]
     along = arc_lengths(xy)
@@ -187,7 +187,7 @@ def driven_line(rollout: Rollout) -> Floats:
 
 
 def line_distance(one: Floats, other: Floats) -> float:
-    """The mean distance between the points of two lines (N, 2) and (M, 2) that dynamic time warping pairs [m]."""
+    """Return the mean distance between points of two lines (N, 2), (M, 2) paired by dynamic time warping [m]."""
     apart = np.hypot(one[:, None, 0] - other[None, :, 0], one[:, None, 1] - other[None, :, 1])
     rows, columns = apart.shape
     cost = np.full((rows + 1, columns + 1), np.inf)
@@ -202,23 +202,23 @@ def line_distance(one: Floats, other: Floats) -> float:
 
 
 def is_new(line: Floats, others: Sequence[Floats], least: float) -> bool:
-    """Whether a line is farther than a distance from all others."""
+    """Return whether a line is farther than `least` from all others."""
     return all(line_distance(line, other) > least for other in others)
 
 
-TRIES = 1000  # worlds that are drawn for one run; those without a path are not driven
+TRIES = 1000  # worlds drawn for one run; those without a path are not driven
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """A world in which the set-up fails.
+    """A world in which the configuration fails.
 
     Attributes:
-        scenario: the set-up in that world
+        scenario: the configuration in that world
         failure: how it fails
-        line: the line that was driven until then (N, 2) [m]; (0, 2) if nothing was driven
-        number: which run of the search found it, counted from 1
-        is_new: whether it differs from all that were found before; `antdrive.runs.failures.hunt` defines it
+        line: the driven line (N, 2) [m]; (0, 2) if nothing was driven
+        number: number of the run in the search, from 1
+        is_new: whether it differs from all earlier findings; see `antdrive.runs.failures.hunt.is_new`
         fingerprint: the run in one text, see `antdrive.runs.failures.failure.Attempt`
     """
 
@@ -235,9 +235,9 @@ class Hunt:
     """The result of a search for failures.
 
     Attributes:
-        findings: the failures in the order in which they were found
-        runs: how many runs were made
-        driven: in how many of them the robot drove; in the others the planner found no path, or raised something
+        findings: the failures in the order of discovery
+        runs: number of runs
+        driven: number of runs in which the robot drove; in the others the planner found no path or raised an error
         interrupted: whether Ctrl-C ended the search
     """
 
@@ -248,7 +248,7 @@ class Hunt:
 
     @property
     def distinct(self) -> tuple[Finding, ...]:
-        """The failures that differ from all that were found before them."""
+        """The failures that differ from all earlier ones."""
         return tuple(finding for finding in self.findings if finding.is_new)
 
 
@@ -261,22 +261,22 @@ def find_failures(
     obstacles: int = 10,
     progress: Callable[[int, int], None] | None = None,
 ) -> Hunt:
-    """Look for worlds of a few cylinders in which a set-up fails although a path exists.
+    """Search for worlds of a few cylinders in which a configuration fails although a path exists.
 
-    Only worlds are tried in which the exact shortest path keeps the clearance that the set-up claims: the robot's radius and
-    the margin. A run that finds no path on its grid counts as a failure only if a path exists with a cell's side more
-    clearance than that. A planner that raises something has failed, too.
+    In every world tried, the exact shortest path keeps the claimed clearance: the robot's radius and the margin. A run that
+    finds no path on its grid is a failure only if a path exists with one cell more clearance. A planner that raises an error
+    has failed.
 
     Args:
-        setup: planner, robot and settings; its own world does not matter
-        budget: the number of runs
-        seed: the seed of the search; the seed of each run is its number
+        setup: planner, robot and settings; its world is ignored
+        budget: number of runs
+        seed: seed of the search; the seed of each run is its number
         method: guided or random
-        obstacles: cylinders in each world
-        progress: is called after each run with the numbers of runs and of different failures so far
+        obstacles: number of cylinders in each world
+        progress: called after each run with the numbers of runs and of distinct failures so far
 
     Raises:
-        FieldError: an unknown method, or a number of cylinders or runs that is out of range.
+        FieldError: the method is unknown, or a number of cylinders or runs out of range.
     """
     if method not in METHODS:
         raise FieldError("method", f"unknown {method!r:.40}; choose from {', '.join(METHODS)}")
@@ -302,7 +302,7 @@ def find_failures(
 
 
 def _next_world(space: WorldSpace, rng: np.random.Generator, method: str, setup: Scenario, name: str) -> Scenario:
-    """The set-up in the next world, which has a path with the clearance that the set-up claims."""
+    """Return the configuration in the next world that has a path with the claimed clearance."""
 
     def draw() -> Scenario | None:
         task = space.task(rng.random(space.dimensions), name)
@@ -317,13 +317,11 @@ def _next_world(space: WorldSpace, rng: np.random.Generator, method: str, setup:
         scenario = METHODS[method](draw)
         if scenario is not None:
             return scenario
-    raise FieldError(
-        "obstacles", f"no world of {space.count} cylinders with a path was found in {TRIES} draws; use fewer"
-    )
+    raise FieldError("obstacles", f"no world of {space.count} cylinders with a path in {TRIES} draws; use fewer")
 
 
 def _failure(done: Attempt) -> Failure | None:
-    """How a run failed; None if it did not, or if the world leaves it no room."""
+    """Return how a run failed; None if it did not, or if the world leaves it no room."""
     failure = done.failure()
     if failure is None or failure.outcome != Outcome.NO_PATH.key:
         return failure

@@ -1,4 +1,4 @@
-"""The ways in which a failing scenario is made simpler. Each proposes candidates, the simplest first."""
+"""Passes that simplify a failing scenario. Each proposes candidates, the simplest first."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from antdrive.worlds import Disc, Mover, Wandering
 
 Item = TypeVar("Item")
 
-NOISES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # fractions of the scenario's own
-SEEDS = 10  # the simplest seeds are those below this
-BEFORE = (1.0, 2.0, 4.0, 8.0, 16.0)  # how long before the failure a nearer start may lie [s]
-BEYOND = (0.5, 1.0, 2.0, 4.0, 8.0)  # how far beyond the failure, along the route, a nearer goal may lie [m]
-INWARDS = (1.0, 0.75, 0.5, 0.25)  # fractions of the way that a wall can be moved inwards
-FEW, MANY = 2, 8  # of MANY obstacles or fewer, each single one and each pair is tried
-DIGITS = (0, 1, 2, 3)  # behind the decimal point; radii and angles keep at least one
+NOISES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # fractions of the scenario's noise
+SEEDS = 10  # the simplest seeds are below this
+BEFORE = (1.0, 2.0, 4.0, 8.0, 16.0)  # time from a nearer start to the failure [s]
+BEYOND = (0.5, 1.0, 2.0, 4.0, 8.0)  # distance along the route from the failure to a nearer goal [m]
+INWARDS = (1.0, 0.75, 0.5, 0.25)  # fractions of the possible inward shift of a wall
+FEW, MANY = 2, 8  # with at most MANY obstacles, try each single one and each pair
+DIGITS = (0, 1, 2, 3)  # decimal places; radii and angles keep at least one
 
 
 def nearest(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with the 1, 2, 4, ... obstacles that are nearest to the drive, as many as suffice."""
+    """Keep the 1, 2, 4, ... obstacles nearest to the drive, as many as needed."""
     discs, order = scenario.task.world.obstacles, _by_distance(scenario, runner)
     counts = itertools.takewhile(lambda count: count < len(discs), (2**k for k in itertools.count()))
     fewer = (with_obstacles(scenario, _at(discs, order[:count])) for count in counts)
@@ -40,7 +40,7 @@ def nearest(scenario: Scenario, runner: CandidateRunner) -> Scenario:
 
 
 def obstacles(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with the obstacles that the failure needs."""
+    """Keep the obstacles that the failure needs."""
     discs, order = scenario.task.world.obstacles, _by_distance(scenario, runner)
     scenario = _needed(scenario, order, lambda s, kept: with_obstacles(s, _at(discs, kept)), runner)
     discs = scenario.task.world.obstacles
@@ -51,29 +51,29 @@ def obstacles(scenario: Scenario, runner: CandidateRunner) -> Scenario:
 
 
 def movers(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with the movers that the failure needs."""
+    """Keep the movers that the failure needs."""
     return _needed(scenario, scenario.task.world.movers, with_movers, runner)
 
 
 def unseen(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with the unseen obstacles that the failure needs."""
+    """Keep the unseen obstacles that the failure needs."""
     return _needed(scenario, scenario.unseen, with_unseen, runner)
 
 
 def start(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with the start moved along the drive, towards the failure."""
+    """Move the start along the drive, towards the failure."""
     return runner.first(_with_seeds(_nearer_starts(scenario, runner.rollout(scenario)))) or scenario
 
 
 def goal(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with the goal moved along the route, towards the failure."""
+    """Move the goal along the route, towards the failure."""
     return runner.first(_nearer_goals(scenario, runner.rollout(scenario))) or scenario
 
 
 def bounds(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with walls moved inwards, by whole cells, so that the grid stays where it is.
+    """Move walls inwards by whole cells, so that the grid stays in place.
 
-    Cylinders that a moved wall would cut or leave outside go.
+    Cylinders that a moved wall would cut or leave outside are removed.
     """
     for side in range(4):
         scenario = runner.first(_walled(scenario, side, b) for b in _tighter(scenario, side)) or scenario
@@ -81,26 +81,26 @@ def bounds(scenario: Scenario, runner: CandidateRunner) -> Scenario:
 
 
 def noise(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with the least noise: none, or a tenth to nine tenths of its own."""
+    """Use the least noise: none, or a tenth to nine tenths of the scenario's."""
     levels = [float(f"{scenario.noise * share:.2g}") for share in NOISES]
     return runner.first(_varied(scenario, noise=level) for level in levels if level < scenario.noise) or scenario
 
 
 def seed(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with the simplest seed."""
+    """Use the simplest seed."""
     most = SEEDS if _is_random(scenario) else 1
     return runner.first(_varied(scenario, seed=n) for n in range(min(most, scenario.seed))) or scenario
 
 
 def time_limit(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario without a time limit of its own."""
+    """Drop the scenario's own time limit."""
     task = dataclasses.replace(scenario.task, time_limit=None)
     free = _varied(scenario, time_limit=None, task=task)
     return scenario if free == scenario else runner.first([free]) or scenario
 
 
 def digits(scenario: Scenario, runner: CandidateRunner) -> Scenario:
-    """The scenario with its positions and radii rounded to fewer digits: all at once, then one by one."""
+    """Round positions and radii to fewer digits: all at once, then one by one."""
     for count in DIGITS:
         whole = _all_rounded(scenario, count)
         if whole == scenario or runner.first([whole]) is not None:
@@ -116,7 +116,7 @@ def digits(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     return scenario
 
 
-#: The passes with their names, in their order. Nearer ends come first, because they shorten every later trial.
+#: The passes in their order. Nearer starts and goals come first, as they shorten every later run.
 PASSES: tuple[tuple[str, Callable[[Scenario, CandidateRunner], Scenario]], ...] = (
     ("start", start),
     ("goal", goal),
@@ -135,17 +135,17 @@ PASSES: tuple[tuple[str, Callable[[Scenario, CandidateRunner], Scenario]], ...] 
 
 
 def with_obstacles(scenario: Scenario, discs: Sequence[Disc]) -> Scenario | None:
-    """The scenario with other obstacles; None if that is impossible."""
+    """Return the scenario with other obstacles; None if it is invalid."""
     return _varied_world(scenario, obstacles=tuple(discs))
 
 
 def with_movers(scenario: Scenario, kept: Sequence[Mover]) -> Scenario | None:
-    """The scenario with other movers; None if that is impossible."""
+    """Return the scenario with other movers; None if it is invalid."""
     return _varied_world(scenario, movers=tuple(kept))
 
 
 def with_unseen(scenario: Scenario, discs: Sequence[Disc], **world: Any) -> Scenario | None:
-    """The scenario with other unseen obstacles, and fields of its world changed; None if that is impossible."""
+    """Return the scenario with other unseen obstacles and changed fields of its world; None if it is invalid."""
     fewer = _varied(scenario, unseen=tuple(discs))
     return fewer if fewer is None or not world else _varied_world(fewer, **world)
 
@@ -156,7 +156,7 @@ def _needed(
     make: Callable[[Scenario, Sequence[Item]], Scenario | None],
     runner: CandidateRunner,
 ) -> Scenario:
-    """The scenario with those of some items that the failure needs, by delta debugging."""
+    """Return the scenario with the items that the failure needs, by delta debugging."""
 
     def first(lists: Iterable[Sequence[Item]]) -> Sequence[Item] | None:
         tried: list[tuple[Scenario | None, Sequence[Item]]] = []
@@ -166,23 +166,23 @@ def _needed(
                 tried.append((make(scenario, some), some))
                 yield tried[-1][0]
 
-        found = runner.first(candidates())
-        return None if found is None else next(some for candidate, some in tried if candidate is found)
+        match = runner.first(candidates())
+        return None if match is None else next(some for candidate, some in tried if candidate is match)
 
     kept = one_minimal(items, first)
     return scenario if len(kept) == len(items) else make(scenario, kept) or scenario
 
 
 def _is_random(scenario: Scenario) -> bool:
-    """Whether a run depends on its seed."""
+    """Return whether a run depends on its seed."""
     wandering = any(isinstance(mover, Wandering) and mover.seed is None for mover in scenario.task.world.movers)
     return scenario.noise > 0 or wandering or capabilities_of(scenario.planner).iterative
 
 
 def _with_seeds(candidates: Iterable[Scenario | None]) -> Iterator[Scenario | None]:
-    """Each candidate with its own seed and, where chance plays a part, with the simplest seeds.
+    """Yield each candidate with its own seed and, if the run is random, with the simplest seeds.
 
-    A failure by chance goes with everything that changes when the chance is drawn; with another seed it comes back.
+    Any change redraws the random numbers, so a random failure vanishes; another seed may bring it back.
     """
     for candidate in candidates:
         yield candidate
@@ -191,12 +191,12 @@ def _with_seeds(candidates: Iterable[Scenario | None]) -> Iterator[Scenario | No
 
 
 def _at(discs: Sequence[Disc], indices: Iterable[int]) -> list[Disc]:
-    """The obstacles at some indices, in the order of the world."""
+    """Return the obstacles at some indices, in the order of the world."""
     return [discs[i] for i in sorted(indices)]
 
 
 def _by_distance(scenario: Scenario, runner: CandidateRunner) -> list[int]:
-    """The indices of the obstacles, those nearest to the drive and to the rest of its route first."""
+    """Return the indices of the obstacles, sorted by distance to the drive and the rest of its route."""
     discs, rollout = scenario.task.world.obstacles, runner.rollout(scenario)
     if rollout is None or not discs:
         return list(range(len(discs)))
@@ -207,7 +207,7 @@ def _by_distance(scenario: Scenario, runner: CandidateRunner) -> list[int]:
 
 
 def _rest_of_route(rollout: Rollout, row: int) -> Floats:
-    """What remains of the last route (N, 2) [m] from the point on that is nearest to the robot in a row."""
+    """Return the rest of the last route (N, 2) [m] from the point nearest to the robot at a row."""
     _, route = rollout.legs()[-1]
     at = rollout.pose[row, :2]
     feet = np.array([nearest_on_route(at[None], route[k : k + 2])[0] for k in range(len(route) - 1)])
@@ -216,14 +216,14 @@ def _rest_of_route(rollout: Rollout, row: int) -> Floats:
 
 
 def _failing_row(rollout: Rollout) -> int:
-    """The row of the first contact, else that of the least clearance, else the last."""
+    """Return the row of the first contact, else of the least clearance, else the last."""
     if len(rollout.contacts):
         return int(rollout.contacts[0, 0])
     return int(rollout.clearance.argmin()) if rollout.outcome.key == "succeeded" else len(rollout.t) - 1
 
 
 def _nearer_starts(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scenario | None]:
-    """The scenario, started from poses of its drive before it failed, the latest first."""
+    """Yield the scenario started from poses of its drive before the failure, the latest first."""
     if rollout is None:
         return
     for before in BEFORE:
@@ -234,7 +234,7 @@ def _nearer_starts(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scen
 
 
 def _nearer_goals(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scenario | None]:
-    """The scenario with goals on its route beyond the failure, the nearest first."""
+    """Yield the scenario with goals on its route beyond the failure, the nearest first."""
     if rollout is None:
         return
     rest = _rest_of_route(rollout, _failing_row(rollout))
@@ -246,7 +246,7 @@ def _nearer_goals(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scena
 
 
 def _tighter(scenario: Scenario, side: int) -> Iterator[Bounds]:
-    """Bounds with one wall moved inwards by whole cells, the tightest first."""
+    """Yield bounds with one wall moved inwards by whole cells, the tightest first."""
     task, now = scenario.task, scenario.task.world.bounds
     cell = scenario.cell or task.cell
     axis, low = side % 2, side < 2
@@ -261,11 +261,11 @@ def _tighter(scenario: Scenario, side: int) -> Iterator[Bounds]:
 
 
 def _walled(scenario: Scenario, side: int, bounds: Bounds) -> Scenario | None:
-    """The scenario with other bounds, of which one side differs, and the cylinders that stand as whole as before."""
+    """Return the scenario with one wall moved, and the cylinders that remain as whole as before."""
     axis, low, before = side % 2, side < 2, scenario.task.world.bounds[side]
 
     def stands(disc: Disc) -> bool:
-        """Whether a cylinder stays whole, or reaches into the room as one that the wall has always cut."""
+        """Return whether a cylinder stays whole, or the old wall cut it already."""
         centre = (disc.x, disc.y)[axis]
         from_old, from_new = ((centre - wall) * (1 if low else -1) for wall in (before, bounds[side]))
         return from_new >= (disc.radius if from_old >= disc.radius else -disc.radius)
@@ -302,12 +302,12 @@ def _disc_rounded(index: int) -> Callable[[Scenario, int], Scenario | None]:
 
 
 def _roundings(scenario: Scenario) -> list[Callable[[Scenario, int], Scenario | None]]:
-    """What is rounded by itself: start and goal, and each obstacle."""
+    """Return the separate roundings: start and goal, and each obstacle."""
     return [_ends_rounded, *map(_disc_rounded, range(len(scenario.task.world.obstacles)))]
 
 
 def _varied_world(scenario: Scenario, **changes: Any) -> Scenario | None:
-    """The scenario with fields of its world changed; None if no world, task or start can be so."""
+    """Return the scenario with changed fields of its world; None if it is invalid."""
     try:
         world = dataclasses.replace(scenario.task.world, **changes)
     except FieldError:

@@ -1,4 +1,4 @@
-"""From a log's record back to the scenario that was driven."""
+"""Rebuild a driven scenario from the record of its log."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ Settings = TypeVar("Settings", PurePursuit, Avoidance, ReplanPolicy)
 
 
 def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenario:
-    """The scenario that a log's record describes. It gives the same drive, bit for bit, with the same versions.
+    """Return the scenario of a log's record. With the same versions it gives the same drive, bit for bit.
 
     Args:
         record: the record of a log
-        planner: the planner that was used; FILE.py:CLASS or MODULE:CLASS: people's own, with the record's settings; None: the
-            registered one of the record's name, with the record's settings
+        planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the registered
+            planner of the record's name, with the record's settings
 
     Raises:
-        InputError: the planner or the controller is not one that can be found by its name, or has settings of its own.
+        InputError: the planner or controller cannot be found by its name, or has custom settings.
     """
     name = record.planner.name
     if isinstance(planner, str):
@@ -37,7 +37,9 @@ def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenar
     elif planner is None:
         name, planner = _planner(name, record.planner.settings)
     if record.controller.name != PurePursuit.__name__:
-        raise InputError(f"record.controller.name: {record.controller.name!r:.60} cannot be rebuilt, only PurePursuit")
+        raise InputError(
+            f"record.controller.name: {record.controller.name!r:.60} cannot be rebuilt; only PurePursuit can"
+        )
     try:
         return Scenario(task=record.task, planner=planner, planner_name=name, robot=record.robot, **_fields(record))
     except FieldError as error:
@@ -45,7 +47,7 @@ def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenar
 
 
 def _fields(record: DriveRecord) -> dict[str, Any]:
-    """The settings that a record holds, by field."""
+    """Return a record's settings, by field."""
     fields = {name: getattr(record, name) for name in SETTINGS if hasattr(record, name)}
     fields |= record.settings or {}
     if record.sensing is not None:
@@ -67,13 +69,13 @@ def _fields(record: DriveRecord) -> dict[str, Any]:
 
 
 def _planner(name: str, settings: Mapping[str, Any]) -> tuple[str, Planner]:
-    """The registered name and the planner of a record's name, which may be that of a planner's class."""
+    """Return the registered name and the planner of a record's name, which may be that of its class."""
     known = list_planners()
     if name not in known:
         of_class = [key for key, planner in known.items() if type(planner).__name__ == name]
         if not of_class:
             raise InputError(
-                f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; say where its class is "
+                f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; name its class "
                 f"(--planner FILE.py:CLASS), or register it under the entry point antdrive.planners"
             )
         name = of_class[0]
@@ -81,24 +83,24 @@ def _planner(name: str, settings: Mapping[str, Any]) -> tuple[str, Planner]:
 
 
 def _own_planner(words: str, name: str, settings: Mapping[str, Any]) -> Planner:
-    """The planner of people's own file or module that a record names by its class."""
+    """Return the custom planner that a record names by its class."""
     if record_name(words) not in (words, name):
         raise InputError(f"planner: the log's planner is {name!r:.60}, not {record_name(words)!r:.60}")
     if not is_user_code(words):
         raise InputError(
-            f"planner: write FILE.py:CLASS or MODULE:CLASS, got {words!r:.60}; registered ones need no words"
+            f"planner: write FILE.py:CLASS or MODULE:CLASS, got {words!r:.60}; omit it for registered planners"
         )
     return load_planner(words, **_options(user_object(words), settings))
 
 
 def _options(kind: Any, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """A planner's options as they were."""
+    """Return a planner's options as they were."""
     hints = typing.get_type_hints(kind)
     return {key: _restored(hints.get(key), value) for key, value in settings.items()}
 
 
 def _settings(kind: type[Settings], values: Mapping[str, Any] | None, key: str) -> Settings | None:
-    """The record of settings, with the infinite numbers that JSON cannot hold."""
+    """Return a record of settings, with infinite numbers restored from null."""
     if values is None:
         return None
     fields = {field.name: field for field in dataclasses.fields(kind)}
@@ -110,5 +112,5 @@ def _settings(kind: type[Settings], values: Mapping[str, Any] | None, key: str) 
 
 
 def _restored(hint: Any, value: Any) -> Any:
-    """A setting as it was: null stands for "no limit" where a number cannot be left out."""
+    """Restore a setting: null means infinity if the field is a number."""
     return math.inf if value is None and hint is float else value

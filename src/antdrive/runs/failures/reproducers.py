@@ -1,4 +1,4 @@
-"""What is handed over about the failures that a search found: each repeated, shrunk, and in a suite."""
+"""Minimal reproducers of failures: shrunk, written as a suite, and repeated in another process."""
 
 from __future__ import annotations
 
@@ -19,17 +19,16 @@ SUITE = "failures.drive.yaml"
 
 @dataclass(frozen=True, eq=False)
 class Reproducer:
-    """A failure as it is handed over."""
+    """A minimal reproducer of a failure."""
 
     name: str  # its name in the suite, and of its world
-    finding: Finding  # the failure as it was found
-    small: Attempt  # what came of the small scenario
-    # whether the found scenario, and the small one as it is read from its files, gave the same bits in another
-    # process
+    finding: Finding  # the original failure
+    small: Attempt  # run of the minimal scenario
+    # whether the original and the minimal scenario, the latter read from its files, repeat bitwise in another process
     repeats: bool
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
+        """Return plain values, for JSON."""
         return {
             "name": self.name,
             "run": self.finding.number,
@@ -43,9 +42,9 @@ class Reproducer:
 def write_reproducers(
     hunt: Hunt, folder: Path, *, seconds: float = 20.0, progress: Callable[[float], None] | None = None
 ) -> list[Reproducer]:
-    """Shrink the different failures of a search, write them, and run what was written again in another process.
+    """Shrink the distinct failures of a search, write them as a suite with worlds, and repeat them in another process.
 
-    A suite and the worlds are written. Ctrl-C ends the shrinking; what is not shrunk by then is handed over as it was found.
+    Ctrl-C ends the shrinking; the remaining failures are written unshrunk.
     """
     small: list[Attempt] = []
     for k, finding in enumerate(hunt.distinct):
@@ -59,9 +58,9 @@ def write_reproducers(
         if progress is not None:
             progress((k + 1) / (len(hunt.distinct) + 1))
     suite = _write(small, hunt.distinct, folder)
-    found, written = run_elsewhere([finding.scenario for finding in hunt.distinct]), suite_elsewhere(suite)
+    originals, written = run_elsewhere([finding.scenario for finding in hunt.distinct]), suite_elsewhere(suite)
     return [
-        Reproducer(_name(k), finding, done, _repeats(finding, done, found[k], written[k]))
+        Reproducer(_name(k), finding, done, _repeats(finding, done, originals[k], written[k]))
         for k, (finding, done) in enumerate(zip(hunt.distinct, small, strict=True))
     ]
 
@@ -70,16 +69,16 @@ def _name(index: int) -> str:
     return f"failure-{index + 1}"
 
 
-def _repeats(finding: Finding, small: Attempt, found_elsewhere: str, small_elsewhere: str) -> bool:
-    """Whether a failure and its small scenario gave the same bits in another process, and fail in the same way."""
-    same = (found_elsewhere, small_elsewhere) == (finding.fingerprint, small.fingerprint)
+def _repeats(finding: Finding, small: Attempt, original_elsewhere: str, small_elsewhere: str) -> bool:
+    """Return whether a failure and its minimal scenario repeat bitwise in another process and fail in the same way."""
+    same = (original_elsewhere, small_elsewhere) == (finding.fingerprint, small.fingerprint)
     return same and small.failure() == finding.failure
 
 
 def write_reproducer(
     shrunk: Shrunk, name: str, folder: Path, *, bound: Bound | None, planner: str | Mapping[str, Any] | None
 ) -> tuple[Attempt, Path, bool]:
-    """Write the suite of one small failure; the failure, the suite, and whether that gives the same in another process."""
+    """Write the suite of one minimal scenario; return its run, the suite, and whether it repeats in another process."""
     note = f"shrunk from {shrunk.original.task.world.name}: {shrunk.summary}"
     small = Attempt.of(renamed(shrunk.scenario, name, note))
     handover = Handover(name, small, bound, shrunk.failure.sentence, planner)
@@ -89,7 +88,7 @@ def write_reproducer(
 
 
 def _write(small: Sequence[Attempt], findings: Sequence[Finding], folder: Path) -> Path:
-    """Write the suite and the worlds of failures; the suite's path."""
+    """Write the suite and the worlds of failures; return the suite's path."""
     pairs = enumerate(zip(small, findings, strict=True))
     handovers = [Handover(_name(k), done, note=finding.failure.sentence) for k, (done, finding) in pairs]
     return write_suite(folder / SUITE, handovers)

@@ -1,4 +1,4 @@
-"""The smallest scenario that still fails in the same way."""
+"""Shrink a failing scenario to a minimal reproducer."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from antdrive.runs.failures.passes import PASSES
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim.scenario import Scenario
 
-ROUNDS = 20  # far more than were ever needed; a pass can undo nothing, so rounds end by themselves
+ROUNDS = 20  # far above any need: passes undo nothing, so rounds end by themselves
 
 
 @dataclass(frozen=True)
 class Shrunk:
-    """A failing scenario, made small.
+    """A failing scenario and its minimal reproducer.
 
     Attributes:
-        original: the scenario as it was given
-        scenario: the smallest one that was found to fail in the same way
+        original: the given scenario
+        scenario: the smallest known scenario that fails in the same way
         failure: how both fail
-        complete: whether every pass came to its end; else the time was over, and going on may make it smaller
+        complete: whether every pass finished; else the time ran out, and resuming may shrink further
         runs: number of candidates run in this session
-        recalled: how many answers came from the journal of an earlier session
+        recalled: number of answers from the journal of an earlier session
     """
 
     original: Scenario
@@ -50,7 +50,7 @@ class Shrunk:
 
     @property
     def summary(self) -> str:
-        """What became smaller, in words."""
+        """The reductions, in words."""
         before, after = self.original, self.scenario
         parts = []
         for name, old, new in (
@@ -74,24 +74,24 @@ def shrink(
     jobs: int = 1,
     progress: Callable[[str, int], None] | None = None,
 ) -> Shrunk:
-    """Make a failing scenario small: fewer obstacles and movers, less noise, a nearer start, fewer digits.
+    """Shrink a failing scenario: fewer obstacles and movers, less noise, a nearer start, fewer digits.
 
-    After every accepted step the run fails as it did at first: same outcome, same kind of thing touched, same cause. If at
-    first a path with the claimed clearance existed, the exact shortest one says so of every accepted world, too. When
-    it has come to its end, the failure vanishes with any single obstacle, mover or unseen obstacle that is left. The
-    result depends on the scenario alone, unless the time is over before.
+    Every accepted step fails in the same way: same outcome, same kind of thing touched, same cause. If a path with the
+    claimed clearance existed at first, one exists in every accepted world, by the exact shortest path. On completion the
+    failure vanishes without any single remaining obstacle, mover or unseen obstacle. The result depends on the scenario
+    alone, unless the time runs out.
 
     Args:
         scenario: a scenario that fails
-        bound: what counts as failure; None: everything but a certified success
+        bound: the condition that counts as failure; None: anything but a certified success
         seconds: time after which no further candidate is run [s]
-        journal: a file that remembers which candidates failed, so that a later call goes on where this one stopped
-        jobs: processes; the result does not depend on it
-        progress: is called with the name of the pass and the number of candidates that were run so far
+        journal: a file with the candidates' results, so that a later call resumes
+        jobs: number of processes; the result does not depend on it
+        progress: called with the name of the pass and the number of candidates run so far
 
     Raises:
         InputError: the scenario does not fail.
-        PlannerError: the planner raised something, and a bound is what counts.
+        PlannerError: the planner raised an error, and a bound is given.
     """
     first = Attempt.of(scenario)
     if first.error is not None and bound is not None:
@@ -106,7 +106,7 @@ def shrink(
     )  # fmt: skip
     try:
         small, complete = _smallest(scenario, runner)
-        if runner.recalled and failure_in(small, bound) != failure:  # the journal is older than the planner's code
+        if runner.recalled and failure_in(small, bound) != failure:  # the planner's code has changed since
             runner.forget()
             small, complete = _smallest(scenario, runner)
     finally:
@@ -115,7 +115,7 @@ def shrink(
 
 
 def _smallest(scenario: Scenario, runner: CandidateRunner) -> tuple[Scenario, bool]:
-    """What all passes make of a scenario, again and again until none changes anything; whether they came that far."""
+    """Repeat all passes until none changes anything; return the scenario and whether they finished."""
     small = scenario
     try:
         for _ in range(ROUNDS):

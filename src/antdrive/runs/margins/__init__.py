@@ -1,1 +1,1 @@
-"""Margins chosen by calibration: how near a robot comes to obstacles that its plan keeps at the margin's distance."""
+"""Margins by calibration: predicted loss of clearance in drives that plan with a margin."""

@@ -1,7 +1,7 @@
-"""The margin for a robot: the least that a prediction from short drives allows, chosen once and kept in the cache folder.
+"""Choice of a robot's margin: the least that short calibration drives allow, cached.
 
-A calibration drives the same courses with the same seeds wherever it runs, so its result does not depend on whether it was
-found in the cache or on the number of processes. `find_margin` searches among whole drives instead.
+Every calibration drives the same courses with the same seeds, so its result depends neither on the cache nor on the
+number of processes. `find_margin` searches with whole drives instead.
 """
 
 from __future__ import annotations
@@ -28,40 +28,39 @@ from antdrive.sim.log.record import MarginRecord
 from antdrive.sim.pipeline import Run
 from antdrive.sim.scenario import LossFactors, MarginChoice, Scenario
 
-PROBABILITY = 1e-3  # of a drive along a course that loses more than predicted
-RESERVE = 0.01  # part of the margin that the predicted loss leaves [m]
-TAIL = 0.2  # fraction of the drives, those with the largest losses, that the tail is fitted to
-FIRST_GUESS = 0.05  # the margin that is tried first [m]
-SHAPES = (-0.5, 0.0)  # of the tail: from a bounded one to an exponential one
+PROBABILITY = 1e-3  # that a drive along a course loses more than predicted
+RESERVE = 0.01  # part of the margin beyond the predicted loss [m]
+TAIL = 0.2  # fraction of the drives, those with the largest losses, used to fit the tail
+FIRST_GUESS = 0.05  # first margin tried [m]
+SHAPES = (-0.5, 0.0)  # shapes of the tail, from bounded to exponential
 CLOSE = 0.006  # the search ends when the least margin is known to this [m]
 STEP = 0.001  # margins are multiples of this [m]
-ROUNDS = 12  # margins that are tried at most
-MOST = 0.5, 2.0  # no margin above the larger of these is tried [m], [radii of the robot]
+ROUNDS = 12  # most margins tried
+MOST = 0.5, 2.0  # upper limit of the margin, the larger of the two [m], [radii of the robot]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """A margin that was chosen by calibration, and what it rests on."""
+    """A margin chosen by calibration, and its evidence."""
 
-    margin: float  # the least margin whose predicted loss leaves the reserve [m]
-    # the predicted loss with this margin: no more than a fraction `probability` of drives is expected to lose
-    # more [m]
+    margin: float  # least margin whose predicted loss leaves the reserve [m]
+    # predicted loss with this margin; at most a fraction `probability` of drives is expected to lose more [m]
     loss: float
-    largest: float  # the largest loss among the calibration's drives with this margin [m]
-    reserve: float  # part of the margin that is left beyond the predicted loss, at least [m]
-    probability: float  # of a drive along a course of the calibration that loses more than `loss`
-    drives: int  # how many drives the prediction rests on
-    key: str  # the conditions that it holds for, see `calibration_key`
+    largest: float  # largest loss in the calibration's drives with this margin [m]
+    reserve: float  # least part of the margin beyond the predicted loss [m]
+    probability: float  # that a drive along a course of the calibration loses more than `loss`
+    drives: int  # number of drives behind the prediction
+    key: str  # see `calibration_key`
 
     __pydantic_config__ = STRICT
 
 
 def predicted_loss(losses: Sequence[float], probability: float = PROBABILITY) -> float:
-    """The loss that a further drive exceeds with a given probability [m]; infinite if a loss is.
+    """Predict the loss that a further drive exceeds with a given probability [m]; infinite if a loss is.
 
-    What losses exceed a high threshold by is taken to have a generalised Pareto distribution (Pickands 1975; Balkema & de
-    Haan 1974), fitted by probability-weighted moments (Hosking & Wallis 1987). Its shape is kept between that of a bounded and
-    that of an exponential tail, the limit for sums of many small errors. At least the largest loss that occurred is predicted.
+    Excesses over a high threshold follow a generalised Pareto distribution (Pickands 1975; Balkema & de Haan 1974), fitted
+    by probability-weighted moments (Hosking & Wallis 1987). Its shape is limited to between a bounded and an exponential
+    tail, the limit for sums of many small errors. The prediction is at least the largest loss observed.
     """
     ordered = np.sort(np.asarray(losses, dtype=np.float64))
     tail = round(TAIL * len(ordered))
@@ -85,18 +84,21 @@ def predicted_loss(losses: Sequence[float], probability: float = PROBABILITY) ->
 def least_margin(
     losses_with: Callable[[float], Sequence[Loss]], key: str, radius: float, reserve: float = RESERVE
 ) -> Calibration:
-    """The least margin whose predicted loss leaves a reserve, to within `CLOSE`.
+    """Find the least margin whose predicted loss leaves a reserve, to within `CLOSE`.
 
-    The loss depends on the margin: with more of it a robot cuts corners more and drives faster. So margins are tried, each
-    next one where the room that was left by the last ones, as a line, is the reserve.
+    The loss depends on the margin: with a larger one a robot cuts corners more and drives faster. Each next margin is
+    where a line through the last results meets the reserve.
     """
     most = max(MOST[0], MOST[1] * radius)
     margin, calibration = FIRST_GUESS, None
-    unsafe, safe = (-1.0, -math.inf), (math.inf, math.inf)  # the margins next to the least one, and what they spare
+    unsafe, safe = (
+        (-1.0, -math.inf),
+        (math.inf, math.inf),
+    )  # the margins on either side of the least one, and their spare room
     for _ in range(ROUNDS):
         losses = losses_with(margin)
-        # A footprint never loses more than the disc around it, so what bounds the one bounds the other. The losses of a
-        # rectangle depend on how it stands to the pillars, and spread far more than those of the disc.
+        # The footprint never loses more than the disc around it, so the disc's bound also holds for the footprint. The losses
+        # of a rectangle depend on its orientation to the pillars and scatter far more than the disc's.
         loss = min(predicted_loss([each.footprint for each in losses]), predicted_loss([each.disc for each in losses]))
         spare = margin - loss - reserve
         if spare < 0:
@@ -121,7 +123,7 @@ def least_margin(
 
 
 def _next_margin(unsafe: tuple[float, float], safe: tuple[float, float], most: float) -> float:
-    """The margin to try next, from the largest unsafe and the least safe one with what they spare beyond the reserve [m]."""
+    """Return the margin to try next, from the largest unsafe and the least safe one with their spare room [m]."""
     (low, lacking), (high, spare) = unsafe, safe
     if math.isinf(high):
         wanted = low - 1.5 * lacking + CLOSE / 2 if math.isfinite(lacking) else 2 * low
@@ -133,16 +135,16 @@ def _next_margin(unsafe: tuple[float, float], safe: tuple[float, float], most: f
     return min(most, round(math.ceil(max(0.0, wanted) / STEP) * STEP, 9))
 
 
-DRIVES = 80  # courses that each margin is tried on
-JOBS = 2  # processes at most
+DRIVES = 80  # courses for each margin
+JOBS = 2  # most processes
 
 
 def choose_margin(
     conditions: LossFactors, *, jobs: int = JOBS, progress: Callable[[int, float], None] | None = None
 ) -> Calibration:
-    """The least margin whose predicted loss leaves the reserve: from the cache, or calibrated now and cached.
+    """Return the least margin whose predicted loss leaves the reserve, from the cache or by a new calibration.
 
-    Movers are no part of the prediction.
+    The prediction ignores movers.
     """
     calibration = known_margin(conditions)
     if calibration is None:
@@ -155,19 +157,19 @@ def choose_margin(
 
 
 def with_chosen_margin(scenario: Scenario, progress: Callable[[int, float], None] | None = None) -> Scenario:
-    """The scenario with the least margin whose predicted loss leaves a reserve.
+    """Return the scenario with the least margin whose predicted loss leaves a reserve.
 
-    Short drives of its robot predict the loss, once; the cache keeps the result. Movers are no part of it.
+    Short drives of its robot predict the loss once, and the cache keeps the result. Movers are ignored.
 
     Args:
-        scenario: the scenario; its own margin does not count
-        progress: is called after each of these drives with their number so far and the margin that is tried [m]
+        scenario: the scenario; its own margin is ignored
+        progress: called after each drive with the number of drives so far and the margin tried [m]
     """
     return with_margin_of(scenario, choose_margin(scenario.loss_factors, progress=progress))
 
 
 def with_margin_of(scenario: Scenario, calibration: Calibration) -> Scenario:
-    """The scenario with the margin of a calibration for its conditions."""
+    """Return the scenario with the margin of a calibration."""
     record = MarginRecord(
         loss_m=calibration.loss,
         reserve_m=calibration.reserve,
@@ -179,7 +181,7 @@ def with_margin_of(scenario: Scenario, calibration: Calibration) -> Scenario:
 
 
 def known_margin(conditions: LossFactors) -> Calibration | None:
-    """The calibration in the cache; None where there is none, or only a damaged one."""
+    """Return the calibration in the cache; None if it is missing or damaged."""
     path = _path(calibration_key(conditions))
     if path is None:
         return None
@@ -193,7 +195,7 @@ def known_margin(conditions: LossFactors) -> Calibration | None:
 def _driving(
     conditions: LossFactors, pool: Pool, progress: Callable[[int, float], None] | None
 ) -> Callable[[float], list[Loss]]:
-    """A function that drives every course with a margin and returns the losses."""
+    """Return a function that drives every course with a margin and returns the losses."""
     done = 0
 
     def losses_with(margin: float) -> list[Loss]:
@@ -217,7 +219,7 @@ def _keep(calibration: Calibration) -> None:
         with atomic_write(path) as temporary:
             temporary.write_bytes(_adapter().dump_json(calibration, indent=1))
     except (InputError, OSError):
-        return  # a full disk costs the next run a calibration, nothing else
+        return  # a full disk only costs the next run a calibration
 
 
 def _path(key: str) -> Path | None:
@@ -235,14 +237,14 @@ MARGIN_HEADS = ("margin m", "driven", "no path", "least room left m", "failed")
 
 @dataclass(frozen=True)
 class MarginResult:
-    """All drives with one margin, up to the first that failed."""
+    """All drives with one margin, up to the first failure."""
 
-    margin: float  # the margin that was tried [m]
+    margin: float  # the margin tried [m]
     drives: int  # number of drives
-    impassable: int  # number of worlds that this margin closes; they are not counted as drives
-    # the seed of the drive that failed: no success, not certified, or too little clearance left; or None
+    impassable: int  # number of worlds that this margin closes, not counted as drives
+    # seed of the failed drive: no success, not certified, or too little clearance left; None if none failed
     failed: int | None
-    left: float  # the least clearance of all drives [m]
+    left: float  # least clearance of all drives [m]
 
     @property
     def safe(self) -> bool:
@@ -251,7 +253,7 @@ class MarginResult:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """A row of a table, under `MARGIN_HEADS`."""
+        """The row of the table, under `MARGIN_HEADS`."""
         left = f"{self.left:.4f}" if self.drives else "-"
         failed = "" if self.failed is None else f"seed {self.failed}"
         return f"{self.margin:.3f}", str(self.drives), str(self.impassable), left, failed
@@ -267,7 +269,7 @@ def find_margin(
 ) -> Iterator[MarginResult]:
     """Search by bisection for the smallest margin with which the drives of all seeds succeed.
 
-    Results come as they are made; the smallest safe margin is the answer.
+    Yield the results as they are made; the smallest safe margin is the answer.
     """
     if not 0 < resolution < most:
         raise FieldError("resolution", f"must be greater than 0 and less than {most:g}, got {resolution:g}")
@@ -275,7 +277,7 @@ def find_margin(
     low, high = (
         0,
         math.ceil(most / resolution),
-    )  # in steps: the answer is at least low; high is safe or closes all worlds
+    )  # in steps; the answer is at least low; high is safe or closes all worlds
     result = _try_margin(high * resolution, drive, hardest_first, reserve)
     yield result
     if result.failed is not None:
@@ -293,7 +295,7 @@ def find_margin(
 def _try_margin(
     margin: float, drive: Callable[[float, int], Run], hardest_first: list[int], reserve: float
 ) -> MarginResult:
-    """Drive with one margin until a drive fails; a seed that fails moves to the front of `hardest_first`."""
+    """Drive with one margin until a drive fails; move a failing seed to the front of `hardest_first`."""
     left, drives, impassable = math.inf, 0, 0
     for seed in hardest_first:
         run = drive(margin, seed)

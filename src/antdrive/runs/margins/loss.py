@@ -1,4 +1,4 @@
-"""One drive of a calibration: a random course, and how much of the margin a drive along it uses up."""
+"""Margin loss of a calibration drive along a random course."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ from antdrive.worlds.grid import DIRECTIONS
 
 CELLS = (0.5, 1.5)  # smallest and largest cell, in radii of the robot
 PILLARS = (0.2, 2.0)  # smallest and largest radius of a pillar, in radii of the robot
-SECONDS, RADII = 2.5, 8.0  # a course is as long as the robot drives at full speed in this time, plus this many radii
-SPACING = 1.0  # between the pillars along a leg, on average, in radii of the robot
-LEFT_OUT = (0.0, 0.5)  # least and largest fraction of the pillars that a course does without
-ROUNDING = 1e-6  # pillars stand farther by this than the distance that planning keeps [m]
-TOLERANCE = 0.5  # of the goal, plus the robot's radius: arriving is not what a course tests [m]
-HEADINGS = (6, 7, 0, 1, 2)  # from south by way of east to north, as indices of DIRECTIONS: a course never turns back
+SECONDS, RADII = 2.5, 8.0  # length of a course: this time at full speed plus this many radii
+SPACING = 1.0  # mean distance between pillars along a leg, in radii of the robot
+LEFT_OUT = (0.0, 0.5)  # least and largest fraction of omitted pillars
+ROUNDING = 1e-6  # extra distance of the pillars beyond the planning distance [m]
+TOLERANCE = 0.5  # of the goal, plus the robot's radius; a course does not test arriving [m]
+HEADINGS = (6, 7, 0, 1, 2)  # indices of DIRECTIONS from south via east to north: a course never turns back
 
 
 def course(robot: RobotSpec, inflate: float, rng: np.random.Generator) -> Task:
-    """A task with a path that bends between pillars, each of which stands at the distance `inflate` from the path.
+    """Return a task with a path that bends between pillars at the distance `inflate` from it.
 
-    The path leads through cells, and planning with that distance finds it or a shorter one.
+    The path leads through cells; planning with that distance finds it or a shorter one.
     """
     cell = robot.radius * float(rng.uniform(*CELLS))
     cells = _bends(cell, SECONDS * robot.max_speed + RADII * robot.radius, rng)
@@ -57,7 +57,7 @@ def course(robot: RobotSpec, inflate: float, rng: np.random.Generator) -> Task:
 
 
 def _bends(cell: float, length: float, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-    """The cells (N, 2) of straight legs, step by step, with bends of 45 and 90 degrees between them."""
+    """Draw the cells (N, 2) of straight legs with bends of 45 and 90 degrees between them."""
     cells, covered, heading = [(0, 0)], 0.0, HEADINGS.index(0)
     while covered < length:
         row, col = DIRECTIONS[HEADINGS[heading]]
@@ -71,7 +71,7 @@ def _bends(cell: float, length: float, rng: np.random.Generator) -> npt.NDArray[
 
 
 def _beside(cells: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """The two cells beside each diagonal step (N, 2), which must be free, too."""
+    """Return the two cells beside each diagonal step (N, 2), which must be free."""
     before, after = cells[:-1], cells[1:]
     diagonal = (before != after).all(axis=1)
     (row, col), (next_row, next_col) = before[diagonal].T, after[diagonal].T
@@ -79,7 +79,7 @@ def _beside(cells: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
 
 
 def _pillars(line: Floats, free: Floats, radius: float, distance: float, rng: np.random.Generator) -> tuple[Disc, ...]:
-    """Cylinders along a line (N, 2) that stand at a distance from it, and at no less from the points `free` (M, 2)."""
+    """Draw cylinders at a distance from a line (N, 2), and no nearer to the points `free` (M, 2)."""
     left_out, found = rng.uniform(*LEFT_OUT), []
     smallest, largest = (math.log(radius * share) for share in PILLARS)
     for at, away, factor in _places(line, radius, rng):
@@ -92,7 +92,7 @@ def _pillars(line: Floats, free: Floats, radius: float, distance: float, rng: np
 
 
 def _places(line: Floats, radius: float, rng: np.random.Generator) -> Iterator[tuple[Floats, float, float]]:
-    """Where pillars may touch the surroundings of a line: a point, a direction, and how many distances away from it."""
+    """Yield where pillars may touch a line's clearance zone: a point, a direction, and a multiple of the distance."""
     steps = np.diff(line, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
     for i, step in enumerate(steps):
@@ -108,24 +108,24 @@ def _places(line: Floats, radius: float, rng: np.random.Generator) -> Iterator[t
 
 
 def _distance(point: Floats, line: Floats) -> float:
-    """The distance of a point (2,) from a line (N, 2) [m]."""
+    """Return the distance of a point (2,) from a line (N, 2) [m]."""
     steps, to = np.diff(line, axis=0), point - line[:-1]
     share = np.clip((to * steps).sum(axis=1) / (steps**2).sum(axis=1), 0.0, 1.0)
     return float(np.hypot(*(to - share[:, None] * steps).T).min())
 
 
-METHOD = 3  # to be counted up when courses, statistic or search change, so that older results are not used
+METHOD = 3  # increment when courses, statistics or search change, to invalidate cached results
 
 
 class Loss(NamedTuple):
-    """How much of the margin a drive used up."""
+    """Margin used up by a drive."""
 
     footprint: float  # by the robot's footprint [m]
-    disc: float  # by the smallest disc around it, for which plans are made; never less than by the footprint [m]
+    disc: float  # by its smallest enclosing disc, which plans use; at least the footprint's loss [m]
 
 
 def calibration_key(conditions: LossFactors) -> str:
-    """The SHA-256 of conditions, and of the versions of the code that the loss depends on."""
+    """Return the SHA-256 of the loss factors and of the versions of the code that the loss depends on."""
     facts = dataclasses.asdict(conditions)
     for label in ("name", "source"):
         del facts["robot"][label]
@@ -135,11 +135,10 @@ def calibration_key(conditions: LossFactors) -> str:
 
 
 def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
-    """How much of the margin a drive along a random course uses up; infinite where it does not reach the goal.
+    """Return the margin that a drive along a random course uses up; infinite if it misses the goal.
 
-    A loss is the margin minus the least distance from an obstacle that a certificate would prove. It exceeds the margin where
-    the drive could not be certified. That of the footprint is negative where the footprint always was farther from
-    obstacles than the disc that the plan was made for.
+    A loss is the margin minus the least clearance that a certificate would prove. It exceeds the margin if the drive could
+    not be certified. The footprint's loss is negative if the footprint stayed farther from obstacles than the planned disc.
     """
     c, robot = conditions, conditions.robot
     task = course(robot, robot.radius + margin, random_stream(seed, "course"))
@@ -158,7 +157,7 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
 
 
 def least_bound(log: Drive, radius: float, clearance: Floats) -> float:
-    """The clearance from standing obstacles that is certain at and between all rows of a drive [m]."""
+    """Return the certain clearance from static obstacles at and between all rows of a drive [m]."""
     dt, speed = np.diff(log.t), np.abs(log.twist)
     speed = np.maximum(speed[:-1], speed[1:])
     turned = np.abs(wrap_angle(np.diff(log.pose[:, 2])))

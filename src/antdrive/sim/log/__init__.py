@@ -1,1 +1,1 @@
-"""The log of a drive and everything computed from it alone."""
+"""Logs of drives, with metrics, certificate and consistency checks computed from them alone."""

@@ -1,14 +1,14 @@
-"""Certify from a drive's log that nothing was touched: three readings that must agree. Needs numpy alone.
+"""Certificate: proof from a drive's log alone that nothing was touched. Three checks must agree; numpy suffices.
 
-1. PyBullet's contacts of the chassis, at every physics step.
-2. The distance between footprint and obstacles in closed form at every logged pose, computed here independently.
-3. A bound on what can happen between two logged poses. No point of the footprint moves farther than the axle's centre
+1. PyBullet's contacts of the chassis at every physics step.
+2. The closed-form distance between footprint and obstacles at every logged pose, computed here independently.
+3. A bound between two logged poses. No point of the footprint moves farther than the axle's centre
    travels plus the footprint's radius times the turn, so the clearance in between is at least
    (c_i + c_{i+1} - travel) / 2. For a mover its own travel is added; where the mover teleports, the bound is
    min(c_i, c_{i+1}) - travel.
 
-Movers must be where the record's task and seed put them. Further checks look for a log that was changed or does not
-describe one drive; each is a function `_check_...` that gives a sentence for every fault.
+Movers must follow the record's task and seed. Further checks detect logs that were changed or do not describe one drive;
+each is a function `_check_...` that yields a sentence per error.
 """
 
 from __future__ import annotations
@@ -35,42 +35,41 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.limits import MAX_NEAR_DISTANCES
 from antdrive.worlds.trajectories import Trajectories
 
-SAME_CLEARANCE = 1e-9  # closed-form distances, computed twice, agree to this [m]
-# Contact points describe the pose before a step, and a robot pushes some millimetres into what it hits. Physics and
-# closed form disagree if a contact is reported with more clearance than this [m].
+SAME_CLEARANCE = 1e-9  # tolerance of closed-form distances that are computed twice [m]
+# Contact points describe the pose before a step, and a robot sinks some millimetres into what it hits. A contact reported
+# with more clearance than this contradicts closed form [m].
 CONTACT_SLACK = 0.012
-# Physics reports surfaces that are no farther apart than 0.1 mm, rounded up here, and those with a force [m].
+# Physics reports surfaces up to 0.1 mm apart, rounded up here, and those with a force [m].
 TOUCHING = 2e-4
 START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the task's start [m], [rad]
-# How far poses may differ from where measured speeds lead: in one step, and over some seconds, where errors would add up
-# but rounding does not. Genuine drives stay below 0.07 mm in a step and below 0.6 mm plus 1 % of the way in any window.
-STEP_SLIP, STEP_SLIP_TURN = 0.001, 0.002  # [m], [rad], of steps at USUAL_HZ or finer; more at lower rates
+# Tolerance of poses relative to integrated measured speeds: per step, and over some seconds, where errors would add up but
+# rounding does not. Genuine drives stay below 0.07 mm per step and 0.6 mm plus 1 % of the distance in any window.
+STEP_SLIP, STEP_SLIP_TURN = 0.001, 0.002  # [m], [rad], per step at USUAL_HZ or finer; more at lower rates
 USUAL_HZ = 240
 DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.004, 0.015, 0.05  # [m], fraction of the distance covered, [rad]
 DRIFT_WINDOWS = (0.25, 1.0, 4.0)  # [s]
-# A robot that gains speed slides aside, depending on its heading, because the solver works out friction along the world's x
-# and y one after the other: at up to 0.33 of what it gains in a physics step. Where commands change by more than the wheels'
-# grip gives in a physics step, the wheels spin; it then slides at 0.19 of what it gains in a control period, for the share of
-# the time in which they spin.
+# A robot that gains speed slides sideways, depending on its heading, because the solver treats friction along the world's x
+# and y in turn: at up to 0.33 of its gain per physics step. Where commands change faster than the wheels' grip allows,
+# the wheels spin; the robot then slides at 0.19 of its gain per control period, for the fraction of time in which they spin.
 SKID, SPINNING = 0.4, 0.25
 GRAVITY = 9.81  # [m/s^2]
-SAFE_GRIP = 0.75  # a robot that uses more of its grip may slide farther than that
-BLOCK = 60  # rows for which the discs that may be nearest are found at once
-NOWHERE = 0.001  # a robot that never was farther from its start went nowhere [m]
-BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good has not moved farther than this [m]
+SAFE_GRIP = 0.75  # a robot that uses more of its grip may slide farther
+BLOCK = 60  # rows that share one search for the nearest discs
+NOWHERE = 0.001  # a robot that stays within this distance of its start went nowhere [m]
+BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good moves less [m]
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What the log proves.
+    """Collision certificate of a log.
 
     Attributes:
-        certified: whether robot and obstacles, standing or moving, provably never touched and all readings agree
+        certified: whether robot and obstacles, standing or moving, provably never touched and all checks agree
         contacts: number of PyBullet's contact points with cylinders, movers and walls
-        min_clearance: the least closed-form clearance at the logged poses [m]; NaN for a log of wrong shape
-        bound: the clearance that is certain between the logged poses, too [m]; NaN for a log of wrong shape
-        problems: why the drive is not certified, a sentence each
-        moved: how far from its first position the robot got [m]; NaN for a log of wrong shape
+        min_clearance: least closed-form clearance at the logged poses [m]; nan for a log of wrong shape
+        bound: proven clearance between the logged poses [m]; nan for a log of wrong shape
+        problems: why the drive is not certified, one sentence each
+        moved: largest distance of the robot from its first position [m]; nan for a log of wrong shape
     """
 
     certified: bool
@@ -89,7 +88,7 @@ class Certificate:
 
     @property
     def sentence(self) -> str:
-        """The verdict with the distances that it rests on."""
+        """Statement with its distances."""
         least, bound = in_metres(self.min_clearance), in_metres(self.bound)
         return f"{self.statement}: least clearance {least}, between steps at least {bound}"
 
@@ -106,7 +105,7 @@ class Certificate:
         return card("", self.statement, facts)
 
     def as_dict(self) -> dict[str, Any]:
-        """The certificate as plain values, for JSON."""
+        """Return the certificate as plain values, for JSON."""
         return {
             "certified": self.certified,
             "contacts": self.contacts,
@@ -118,12 +117,12 @@ class Certificate:
 
 
 def in_metres(value: float) -> str:
-    """A distance as text, to a tenth of a millimetre, and finer for distances that would read as 0."""
+    """Format a distance to a tenth of a millimetre; finer below that."""
     return f"{value:.4f} m" if abs(value) >= 5e-5 or value == 0 else f"{value:.1e} m"
 
 
 def certify(rollout: Rollout) -> Certificate:
-    """Check from the log alone whether the robot and obstacles never touched."""
+    """Certify from the log alone that robot and obstacles never touched."""
     touched = len(rollout.contacts)
     problems = rollout.problems()
     if problems:
@@ -139,7 +138,7 @@ def certify(rollout: Rollout) -> Certificate:
     clearance = np.minimum(still, moving.min(axis=1, initial=math.inf))
     bound = float(_between_steps(rollout, movers, still, moving).min())
     problems = [*_check_digest(rollout), *_check_times(rollout)]
-    rollout = dataclasses.replace(rollout, t=_clock(rollout))  # other checks count rows, whatever times were logged
+    rollout = dataclasses.replace(rollout, t=_clock(rollout))  # further checks use nominal times
     problems = [
         *_check_agreement(rollout, clearance, bound),
         *problems,
@@ -157,16 +156,16 @@ def certify(rollout: Rollout) -> Certificate:
 
 
 def closed_form_clearance(rollout: Rollout) -> Floats:
-    """The distance from the footprint to the nearest cylinder, mover or wall at each logged pose, shape (T,) [m].
+    """Return the distance from the footprint to the nearest cylinder, mover or wall at each logged pose, shape (T,) [m].
 
-    The code shares nothing with the compiled geometry that the drive uses, so that one checks the other.
+    It shares no code with the compiled geometry of the drive, so that each checks the other.
     """
     still, moving = _clearances(rollout)
     return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
 
 
 def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
-    """The distances from the footprint to the nearest cylinder or wall (T,) and to each mover (T, M) [m]."""
+    """Return the distances from the footprint to the nearest cylinder or wall (T,) and to each mover (T, M) [m]."""
     foot, world = rollout.record.robot.footprint, rollout.record.world
     half = np.array([foot.half_length, foot.half_width])
     rounding, sides = foot.rounding, max(1, len(foot.corners))
@@ -203,9 +202,9 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
 
 
 def _polygon_to_points(corners: tuple[Point, ...], points: npt.NDArray[np.complex128]) -> Floats:
-    """The distance from a convex polygon to points x + iy (...) in its frame, negative within it [m].
+    """Return the distance from a convex polygon to points x + iy (...) in its frame, negative within it [m].
 
-    Each point is looked at from each edge, turned so that the edge lies along the real axis and the inside is to the left.
+    Each point is rotated into the frame of each edge: the edge along the real axis, the inside to the left.
     """
     here = np.array([complex(*corner) for corner in corners])
     if len(here) == 1:
@@ -218,7 +217,7 @@ def _polygon_to_points(corners: tuple[Point, ...], points: npt.NDArray[np.comple
 
 
 def _polygon_to_walls(corners: tuple[Point, ...], pose: Floats, bounds: Bounds) -> Floats:
-    """The distance from a polygon at each pose (T, 3) to the left, right, lower and upper wall, shape (T, 4) [m]."""
+    """Return the distance from a polygon at each pose (T, 3) to the left, right, lower and upper wall, shape (T, 4) [m]."""
     here = np.array([complex(*corner) for corner in corners])
     placed = (pose[:, 0] + 1j * pose[:, 1])[:, None] + np.exp(1j * pose[:, 2])[:, None] * here
     xmin, ymin, xmax, ymax = bounds
@@ -228,14 +227,14 @@ def _polygon_to_walls(corners: tuple[Point, ...], pose: Floats, bounds: Bounds) 
 
 
 def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.NDArray[np.int64], Floats]]:
-    """Rows (B,), some at a time, and the discs (N, 3) one of which is the nearest to the footprint in each of them."""
+    """Yield blocks of rows (B,) with the discs (N, 3) that may be nearest to the footprint there."""
     if not len(discs):
         return
     count = 0
     for first in range(0, len(places), BLOCK):
         block = places[first : first + BLOCK]
         spread = float(np.hypot(*(block - block[0]).T).max())
-        # Between the centre's distance and the footprint's lies no more than its radius.
+        # The distances of centre and footprint differ by at most the radius.
         away = np.hypot(discs[:, 0] - block[0, 0], discs[:, 1] - block[0, 1]) - discs[:, 2]
         near = discs[away <= away.min() + 2 * spread + radius + SAME_CLEARANCE]
         count += len(block) * len(near)
@@ -249,7 +248,7 @@ def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.
 
 
 def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving: Floats) -> Floats:
-    """A lower bound of the clearance between each row and the next, shape (T - 1,) [m]; of one row, its clearance."""
+    """Return a lower bound of the clearance between consecutive rows, shape (T - 1,) [m]; for one row, its clearance."""
     if len(still) < 2:
         return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
     radius = rollout.record.robot.footprint.radius
@@ -269,44 +268,44 @@ def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving
 
 
 def _clock(rollout: Rollout) -> Floats:
-    """The times that the rows must have, shape (T,) [s]."""
+    """Return the nominal times of the rows, shape (T,) [s]."""
     return np.asarray(np.arange(len(rollout.t)) / rollout.record.physics_hz)
 
 
 def _check_agreement(rollout: Rollout, clearance: Floats, bound: float) -> Iterator[str]:
-    """Physics, closed form and bound must agree that there is clearance at every moment."""
+    """Check that physics, closed form and bound agree on positive clearance at every moment."""
     touched, least = len(rollout.contacts), float(clearance.min())
     if touched:
         step = int(rollout.contacts[0, 0])
         yield f"physics reports {touched} contact points, the first at t = {rollout.t[step]:.3f} s"
         if float(clearance[max(0, step - 1) : step + 2].min()) > CONTACT_SLACK:
             yield (
-                f"readings disagree: physics reports a contact at row {step}, "
+                f"checks disagree: physics reports a contact at row {step}, "
                 f"closed form a clearance of {clearance[step]:.4f} m"
             )
     if not least > 0:
         at = float(rollout.t[clearance.argmin()])
         yield f"closed form: the robot overlaps an obstacle by {in_metres(-least)} at t = {at:.3f} s"
         if not touched:
-            yield "readings disagree: closed form finds an overlap, physics reports no contact"
+            yield "checks disagree: closed form finds an overlap, physics reports no contact"
     elif not bound > 0:
         yield f"between two logged poses a contact cannot be ruled out (bound {bound:.4f} m)"
 
 
 def _check_digest(rollout: Rollout) -> Iterator[str]:
-    """The log must still be as it was saved."""
+    """Check that the log is unchanged since it was saved."""
     if rollout.record.digest is not None and rollout.record.digest != rollout.digest:
         yield "digest: the log was changed after it was written"
 
 
 def _check_times(rollout: Rollout) -> Iterator[str]:
-    """Rows must be at the physics rate."""
+    """Check that rows are at the physics rate."""
     if not np.array_equal(rollout.t, _clock(rollout)):
         yield f"t: the rows are not at {rollout.record.physics_hz} Hz"
 
 
 def _check_clearances(rollout: Rollout, clearance: Floats) -> Iterator[str]:
-    """Logged clearances must be those of the logged poses."""
+    """Check that logged clearances are those of the logged poses."""
     error = np.abs(rollout.clearance - clearance)
     if not error.max() <= SAME_CLEARANCE:
         at = int(error.argmax())
@@ -317,7 +316,7 @@ def _check_clearances(rollout: Rollout, clearance: Floats) -> Iterator[str]:
 
 
 def _check_movers(rollout: Rollout, movers: Trajectories) -> Iterator[str]:
-    """Movers must be where the record's task and seed put them."""
+    """Check that movers follow the record's task and seed."""
     if not movers:
         return
     error = np.abs(rollout.movers - movers.positions(_clock(rollout))).max(axis=2)
@@ -327,7 +326,7 @@ def _check_movers(rollout: Rollout, movers: Trajectories) -> Iterator[str]:
 
 
 def _check_start(rollout: Rollout) -> Iterator[str]:
-    """The drive must begin at the task's start, and headings be angles from -pi to pi."""
+    """Check that the drive begins at the task's start, and that headings are from -pi to pi."""
     if np.abs(rollout.pose[:, 2]).max() > math.pi + SAME_CLEARANCE:
         yield "pose: headings must be from -pi to pi"
     pose, start = rollout.pose[0], rollout.record.task.start
@@ -336,7 +335,7 @@ def _check_start(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_motion(rollout: Rollout) -> Iterator[str]:
-    """Poses must follow from the measured speeds, up to the first contact, which may throw the robot."""
+    """Check that poses follow from the measured speeds up to the first contact, which may throw the robot."""
     end = len(rollout.t)
     if len(rollout.contacts):
         end = max(1, int(rollout.contacts[0, 0]))
@@ -344,8 +343,8 @@ def _check_motion(rollout: Rollout) -> Iterator[str]:
         return
     pose, twist, dt = rollout.pose[:end], rollout.twist[:end], np.diff(rollout.t[:end])
     turned = wrap_angle(np.diff(pose[:, 2]))
-    # Physics computes the new speed first, then moves with it along the old heading (semi-implicit Euler). The speed is
-    # measured along the new heading, which sees a part of it.
+    # Physics computes the new speed first, then moves with it along the old heading (semi-implicit Euler). The measured speed
+    # is the component along the new heading.
     covered = twist[1:, 0] * dt / np.maximum(np.cos(turned), 0.5)
     slip = np.diff(pose[:, 0] + 1j * pose[:, 1]) - np.exp(1j * pose[:-1, 2]) * covered
     slip_turn = turned - twist[1:, 1] * dt
@@ -357,7 +356,7 @@ def _check_motion(rollout: Rollout) -> Iterator[str]:
     for seconds in DRIFT_WINDOWS:
         rows = min(len(slip), max(1, round(seconds * rollout.record.physics_hz)))
         drift, turn, distance = (windowed(values, rows) for values in (slip, slip_turn, np.abs(covered)))
-        # A robot gains or loses twice its highest speed at most before its slides begin to cancel out.
+        # A robot gains or loses at most twice its top speed before its slides begin to cancel out.
         changing = min(seconds + 1 / rollout.record.control_hz, 2 * robot.max_speed / robot.max_acceleration)
         allowed = max(DRIFT, sliding * changing) + share * distance.real
         wrong[: len(drift)] |= (np.abs(drift) > allowed) | (np.abs(turn) > DRIFT_TURN)
@@ -369,7 +368,7 @@ def _check_motion(rollout: Rollout) -> Iterator[str]:
 
 
 def _sliding_speed(record: DriveRecord) -> float:
-    """How fast a robot may slide aside while it speeds up or brakes [m/s]."""
+    """Return how fast a robot may slide sideways while it speeds up or brakes [m/s]."""
     robot, grip = record.robot, record.robot.wheel_friction * GRAVITY
     slides = SKID * robot.max_acceleration / record.physics_hz
     change = robot.max_acceleration / record.control_hz
@@ -379,7 +378,7 @@ def _sliding_speed(record: DriveRecord) -> float:
 
 
 def _grip_warning(robot: RobotSpec) -> str:
-    """What a robot's file says of its grip, if braking in a bend needs more than there is; else empty."""
+    """Return a warning if braking in a bend needs more grip than the robot's file provides; else empty."""
     used = math.hypot(robot.max_acceleration, robot.max_lateral_acceleration) / (robot.wheel_friction * GRAVITY)
     if used <= SAFE_GRIP:
         return ""
@@ -390,7 +389,7 @@ def _grip_warning(robot: RobotSpec) -> str:
 
 
 def _check_outcome(rollout: Rollout) -> Iterator[str]:
-    """The outcome must be that of the first contact, or of a robot that stands at the goal."""
+    """Check that the outcome is that of the first contact, or that the robot stands at the goal."""
     outcome, contacts, task = rollout.outcome, len(rollout.contacts), rollout.record.task
     if outcome.with_contact != bool(contacts):
         yield f"outcome: {outcome.key}, with {contacts} contacts"
@@ -410,7 +409,7 @@ def _check_outcome(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_contacts(rollout: Rollout) -> Iterator[str]:
-    """Each contact must be with an obstacle that is there, and be what physics can report."""
+    """Check that contacts are with obstacles in reach, and physically possible."""
     contacts = rollout.contacts
     if not len(contacts):
         return
@@ -429,16 +428,16 @@ def _check_contacts(rollout: Rollout) -> Iterator[str]:
     for obstacle in np.unique(first[:, 1]).astype(int).tolist():
         if gaps[obstacle] > CONTACT_SLACK:
             yield (
-                f"readings disagree: physics reports a contact with obstacle {obstacle} at row {row}, "
+                f"checks disagree: physics reports a contact with obstacle {obstacle} at row {row}, "
                 f"closed form a clearance of {gaps[obstacle]:.4f} m"
             )
 
 
 def _approach(rollout: Rollout) -> Floats:
-    """How much nearer to each contact's obstacle the robot can come in the step of the contact (K,) [m].
+    """Return how much nearer to each contact's obstacle the robot can come in the step of the contact (K,) [m].
 
-    Physics finds distances before a step, and stops in it whatever would otherwise overlap at its end. So surfaces with a force
-    may be apart by what the robot's speed before that step, which includes sliding aside, and the mover's travel cover.
+    Physics measures distances before a step and prevents overlaps at its end. Surfaces with a force may therefore be apart by
+    the robot's motion, including sideways slip, plus the mover's travel.
     """
     record, contacts = rollout.record, rollout.contacts
     row = contacts[:, 0].astype(np.int64)
@@ -456,7 +455,7 @@ def _approach(rollout: Rollout) -> Floats:
 
 
 def _gaps(rollout: Rollout) -> Floats:
-    """The distance from the footprint to each cylinder, mover and wall, numbered as in contacts, shape (T, N) [m]."""
+    """Return the distance from the footprint to each cylinder, mover and wall, numbered as contacts, shape (T, N) [m]."""
     world, foot = rollout.record.world, rollout.record.robot.footprint
     discs = np.tile(world.discs, (len(rollout.pose), 1, 1))
     radii = np.array([mover.radius for mover in world.movers])
@@ -479,7 +478,7 @@ def _gaps(rollout: Rollout) -> Floats:
 
 
 def _check_blocked(rollout: Rollout) -> Iterator[str]:
-    """A blocked drive ends with searches that found no route, and a mover stood still since the first of them."""
+    """Check that a blocked drive ends with failed searches, and that a mover stood still since the first of them."""
     if rollout.outcome is not Outcome.BLOCKED:
         return
     failed = list(itertools.takewhile(lambda replan: not replan.solved, reversed(rollout.record.replans)))

@@ -1,7 +1,7 @@
-"""What a log's own record says about its rows, and its plan about itself: limits, commands, noise, outcome, route, replans.
+"""Consistency of a log: rows against the record, plan against itself. Limits, commands, noise, outcome, route, replans.
 
-Each check is a function that yields a sentence for every fault. Tolerances are some times what genuine drives show, over
-the catalogue's worlds and robots and generated worlds, with every planner, with and without noise, collided drives up to the
+Each check is a function that yields a sentence per error. Tolerances are multiples of what genuine drives show, over the
+catalogue's worlds and robots and generated worlds, with every planner, with and without noise; collided drives up to the
 contact.
 """
 
@@ -20,19 +20,17 @@ from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.route import end_reach, longest_line
 
-NEAR = 1.5  # cells between a route's end and a point that has room, at most
-JUST_ROOM = 1e-6  # a goal with no more room than the inflation and this may count as one with too little [m]
-ROUTE_SLACK = (
-    0.012  # smoothed routes keep the inflation, replans are logged rounded to 0.1 mm; the rest is allowance [m]
-)
-SAME_LENGTH = 1e-6  # lengths that are computed twice agree to this share
-AWAY_TIME = 0.5  # a robot is no farther off its route than its radius and what it drives in this time [s]
-POINT_SPACING = 0.05  # of the points of a route whose clearance is looked at [m]
+NEAR = 1.5  # most cells between a route's end and a point with room
+JUST_ROOM = 1e-6  # a goal with at most this much more room than the inflation may count as too narrow [m]
+ROUTE_SLACK = 0.012  # smoothed routes keep the inflation; logged replans are rounded to 0.1 mm [m]
+SAME_LENGTH = 1e-6  # relative tolerance of lengths that are computed twice
+AWAY_TIME = 0.5  # largest deviation from the route: the radius plus the travel in this time [s]
+POINT_SPACING = 0.05  # spacing of the route points whose clearance is checked [m]
 
 
 def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
-    """Every way in which the plan contradicts the world, itself or the rows."""
-    if rollout.record.exploring:  # its plans are right for what the robot had seen, in the frame of its odometry
+    """Yield every contradiction of the plan with the world, itself or the rows."""
+    if rollout.record.exploring:  # its plans refer to the robot's own map, in the frame of its odometry
         yield from _check_movers_known(rollout)
         yield from _check_replans(rollout)
         return
@@ -45,12 +43,12 @@ def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
 
 
 def _by_cells(rollout: Rollout) -> bool:
-    """Whether the planner decided anew at every cell, so that its first route need not reach the goal."""
+    """Return whether the planner decided cell by cell, so that its first route need not reach the goal."""
     return any(replan.trigger == DECISION for replan in rollout.record.replans)
 
 
 def _check_routes(rollout: Rollout) -> Iterator[str]:
-    """Routes must lie in the world, keep off what stands still, and lead from the start to the goal."""
+    """Check that routes lie in the world, avoid standing obstacles, and lead from the start to the goal."""
     record, route = rollout.record, rollout.route
     task, near = record.task, NEAR * record.cell
     if len(route) < 2:
@@ -71,16 +69,16 @@ def _check_routes(rollout: Rollout) -> Iterator[str]:
 
 
 def _short_of_goal(rollout: Rollout) -> float:
-    """How far from the goal the route may end [m]: a goal with too little room is not reached itself."""
+    """Return how far from the goal the route may end [m]: a goal in a narrow place is not reached itself."""
     task, near = rollout.record.task, NEAR * rollout.record.cell
     room = float(_room(rollout, np.array([task.goal]))[0])
     return max(near, task.goal_tolerance) if room < rollout.record.inflate + JUST_ROOM else near
 
 
 def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
-    """A route keeps the inflation from what stands still; on leaving a tight start, only what the start itself has.
+    """Check that a route keeps the inflation from standing obstacles; near a narrow start, the room of the start.
 
-    A replan begins wherever the robot is, also beside a mover, and its first leg need not keep more from other obstacles.
+    A replan begins anywhere, even beside a mover, so its first leg may pass closer to other obstacles.
     """
     record = rollout.record
     arc = arc_lengths(route)
@@ -99,7 +97,7 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
 
 
 def _room(rollout: Rollout, points: Floats) -> Floats:
-    """The distances of points (N, 2) [m] from what stands still and was known (N,) [m]."""
+    """Return the distances of points (N, 2) [m] from known standing obstacles (N,) [m]."""
     world = rollout.record.task.world
     xmin, ymin, xmax, ymax = world.bounds
     room = np.minimum(points - (xmin, ymin), (xmax, ymax) - points).min(axis=1)
@@ -112,7 +110,7 @@ def _room(rollout: Rollout, points: Floats) -> Floats:
 
 
 def _check_cells(rollout: Rollout) -> Iterator[str]:
-    """Cells must be neighbours on the grid, and lead from near the start to near the goal."""
+    """Check that cells are neighbours on the grid, and lead from near the start to near the goal."""
     record, cells = rollout.record, rollout.cells
     xmin, ymin, xmax, ymax = record.world.bounds
     rows, cols = math.ceil((ymax - ymin) / record.cell) + 1, math.ceil((xmax - xmin) / record.cell) + 1
@@ -128,7 +126,7 @@ def _check_cells(rollout: Rollout) -> Iterator[str]:
 
 
 def _leads(rollout: Rollout) -> tuple[float, float]:
-    """The distances of the first cell from the start and of the last from the goal [m]; 0 without cells."""
+    """Return the distances of the first cell from the start and of the last from the goal [m]; 0 without cells."""
     record, cells = rollout.record, rollout.cells
     if not len(cells):
         return 0.0, 0.0
@@ -138,7 +136,7 @@ def _leads(rollout: Rollout) -> tuple[float, float]:
 
 
 def _check_lengths(rollout: Rollout) -> Iterator[str]:
-    """The plan's length must be that of its cells, and no shorter than what is shortest."""
+    """Check that the plan's length is that of its cells, and not below the shortest."""
     plan, cell, task = rollout.record.plan, rollout.record.cell, rollout.record.task
     length = polyline_length(rollout.cells) * cell
     slack = SAME_LENGTH * max(1.0, length)
@@ -160,7 +158,7 @@ def _check_lengths(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_movers_known(rollout: Rollout) -> Iterator[str]:
-    """What was known of movers, and how they were avoided, is recorded where there are movers, and nowhere else."""
+    """Check that perception and avoidance are recorded among movers only."""
     record = rollout.record
     watching = record.perception is not None and record.perception.kind == "lidar"
     moving = bool(record.world.movers) or watching
@@ -178,7 +176,7 @@ def _check_movers_known(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_replans(rollout: Rollout) -> Iterator[str]:
-    """Replans must happen during the drive, where the robot is, and with a policy for them."""
+    """Check that replans happen during the drive, at the robot, and with a policy."""
     record, near = rollout.record, NEAR * rollout.record.cell
     if record.replans and record.replanning is None:
         yield "record.replans: must be empty, since record.replanning is null"
@@ -195,7 +193,7 @@ def _check_replans(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_followed(rollout: Rollout, end: int) -> Iterator[str]:
-    """In a world without movers, the robot must stay near its route."""
+    """Check that the robot stays near its route in a world without movers."""
     record = rollout.record
     if record.world.movers or len(rollout.route) < 2:
         return
@@ -212,27 +210,27 @@ def _check_followed(rollout: Rollout, end: int) -> Iterator[str]:
         yield f"route: the robot is {best.max():.3g} m off it at t = {t:.3f} s"
 
 
-OVERSHOOT = 0.03  # measured speeds exceed limits and targets by at most this share; genuine drives: 0.2 %
-MATCHED = 0.075, 0.02  # how far a scan may be laid wrong on the map: three grains of it [m], two corrections [rad]
-STILL = 0.02  # and by this, which matters for very slow robots [m/s], [rad/s]
-SIGMAS = 8.0  # noise stays within so many standard deviations; genuine drives: 4.2
-ACCELERATION_WINDOW, HARDER = 0.25, 1.5  # [s], times the robot's limit; genuine drives: 1.16
-SLOWEST_PHYSICS = 60  # at a lower rate robots jolt, and poses do not follow from the speeds [Hz]
-EXACT = 1e-6  # commands keep their limits to this share
-# How far the way by measured speeds may differ from the way by the motors' targets, over some seconds; motors are late by
-# a few periods, which shows while speeds change. Genuine drives in 0.25 s: 2.1 mm and 0.011 rad.
+OVERSHOOT = 0.03  # measured speeds exceed limits and targets by at most this fraction; genuine drives: 0.2 %
+MATCHED = 0.075, 0.02  # largest mismatch of a scan: three grains of the map [m], two corrections [rad]
+STILL = 0.02  # absolute tolerance, for very slow robots [m/s], [rad/s]
+SIGMAS = 8.0  # bound of noise in standard deviations; genuine drives: 4.2
+ACCELERATION_WINDOW, HARDER = 0.25, 1.5  # window [s], multiple of the robot's limit; genuine drives: 1.16
+SLOWEST_PHYSICS = 60  # at a lower rate robots jerk, and poses do not follow from the speeds [Hz]
+EXACT = 1e-6  # relative tolerance of commands at their limits
+# Tolerance between the distances by measured speeds and by motor targets over some seconds; motors lag by a few periods while
+# speeds change. Genuine drives in 0.25 s: 2.1 mm and 0.011 rad.
 FOLLOW_WINDOWS = (0.25, 1.0, 4.0)  # [s]
-FOLLOW, FOLLOW_TURN, FOLLOW_SHARE = 0.01, 0.05, 0.02  # [m], [rad], fraction of the way
-LATE = 2.0  # periods of control and of physics by which motors are late, at most
-GRIP = 0.8  # wheels with less friction slide, the more the less
+FOLLOW, FOLLOW_TURN, FOLLOW_SHARE = 0.01, 0.05, 0.02  # [m], [rad], fraction of the distance
+LATE = 2.0  # largest lag of the motors, in periods of control and of physics
+GRIP = 0.8  # wheels with less friction slide
 AFTER_CONTACT = 0.5  # a drive ends this long after the first contact [s]
-STUCK_TIME = 8.0  # without progress for so long, a robot is stuck [s]
-STUCK_SHARE = 0.25  # a stuck robot gets no farther in that time than this share of what it could drive
-STOPPED = 0.02  # a robot at the end of its route stands: it is slower than this [m/s], [rad/s]
+STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
+STUCK_SHARE = 0.25  # a stuck robot covers at most this fraction of its possible travel in that time
+STOPPED = 0.02  # a robot that stands is slower than this [m/s], [rad/s]
 
 
 def inconsistencies(rollout: Rollout) -> Iterator[str]:
-    """Every way in which the rows before the first contact contradict the record."""
+    """Yield every contradiction of the rows before the first contact with the record."""
     end = len(rollout.t)
     if len(rollout.contacts):
         end = max(1, int(rollout.contacts[0, 0]))
@@ -247,7 +245,7 @@ def inconsistencies(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_record(rollout: Rollout) -> Iterator[str]:
-    """Margin, inflation and the rates must fit each other."""
+    """Check that margin, inflation and rates fit each other."""
     record = rollout.record
     if not abs(record.inflate - record.robot.radius - record.margin) <= EXACT:
         yield (
@@ -261,7 +259,7 @@ def _check_record(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_speeds(rollout: Rollout, end: int) -> Iterator[str]:
-    """Measured speeds and their changes must be within the robot's limits, but for slip."""
+    """Check that measured speeds and their changes are within the robot's limits, except for slip."""
     record, robot, twist = rollout.record, rollout.record.robot, rollout.twist[:end]
     more = SIGMAS * robot.noise.slip * record.noise
     wheels = _wheels(twist, robot.track)
@@ -276,7 +274,7 @@ def _check_speeds(rollout: Rollout, end: int) -> Iterator[str]:
             yield f"twist: {what} of {values[row]:.4g} {unit} at t = {rollout.t[row]:.3f} s; the robot's limit is {limit:.4g}"
     back = max(1, round(ACCELERATION_WINDOW * record.physics_hz))
     if len(twist) > back:
-        window = back / record.physics_hz + 1 / record.control_hz  # commands change at once, period by period
+        window = back / record.physics_hz + 1 / record.control_hz  # commands change in steps, period by period
         changes = np.abs(twist[back:] - twist[:-back])
         rim = more * robot.max_speed
         for k, (what, limit, slack) in enumerate(
@@ -291,7 +289,7 @@ def _check_speeds(rollout: Rollout, end: int) -> Iterator[str]:
 
 
 def _check_commands(rollout: Rollout, end: int) -> Iterator[str]:
-    """Commands must be within the robot's limits, one for each control period, and none in row 0."""
+    """Check that commands are within the robot's limits, constant within control periods, and 0 in row 0."""
     record, robot, command = rollout.record, rollout.record.robot, rollout.command
     limits = np.array([robot.max_speed, robot.max_yaw_rate])
     if not (np.abs(command) <= limits * (1 + EXACT)).all():
@@ -305,7 +303,7 @@ def _check_commands(rollout: Rollout, end: int) -> Iterator[str]:
             yield f"{name}: changes within a control period, at row {int(changed[(changed % period) > 0][0]) + 1}"
     steps = np.abs(np.diff(np.concatenate([np.zeros((1, 2)), command[1:end:period]]), axis=0))
     most = HARDER * np.array([robot.max_acceleration, robot.max_yaw_acceleration]) / record.control_hz
-    # Avoidance, and a robot at the edge of its sight, slow down along the same curve: the yaw rate falls with the speed at once.
+    # Avoidance and the stopping constraint slow down on the same arc: the yaw rate falls with the speed at once.
     if record.task.world.movers or record.exploring:
         most[1] = np.inf
     if not (steps <= most + EXACT).all():
@@ -314,7 +312,7 @@ def _check_commands(rollout: Rollout, end: int) -> Iterator[str]:
 
 
 def _check_actuated(rollout: Rollout, end: int) -> Iterator[str]:
-    """The targets of the motors must be the delayed commands, but for slip of the wheels."""
+    """Check that motor targets are the delayed commands, except for wheel slip."""
     record, robot = rollout.record, rollout.record.robot
     noise = robot.noise.scaled(record.noise)
     rows = len(rollout.t)
@@ -336,7 +334,7 @@ def _check_actuated(rollout: Rollout, end: int) -> Iterator[str]:
 
 
 def _check_targets(rollout: Rollout, end: int) -> Iterator[str]:
-    """Measured speeds must follow the targets of the motors."""
+    """Check that measured speeds follow the motor targets."""
     record, robot = rollout.record, rollout.record.robot
     targets = rollout.actuated if len(rollout.actuated) else rollout.command
     if len(targets) != len(rollout.t) or end < 3:
@@ -361,13 +359,13 @@ def _check_targets(rollout: Rollout, end: int) -> Iterator[str]:
 
 
 def windowed(values: Floats, rows: int) -> Floats:
-    """The sum over each window of a number of values, (N - rows + 1,)."""
+    """Return the sum over each window of `rows` values, (N - rows + 1,)."""
     total = np.concatenate(([0], np.cumsum(values)))
     return np.asarray(total[rows:] - total[:-rows])
 
 
 def _check_estimate(rollout: Rollout) -> Iterator[str]:
-    """The estimated pose must be as near to the true one as pose fixes and odometry keep it."""
+    """Check that the estimate is as near to the true pose as pose fixes and odometry keep it."""
     if not len(rollout.estimate):
         return
     if rollout.record.localisation != "fixes":
@@ -375,7 +373,7 @@ def _check_estimate(rollout: Rollout) -> Iterator[str]:
         return
     robot = rollout.record.robot
     noise = robot.noise.scaled(rollout.record.noise)
-    # Twenty fixes after an error of odometry the filter has corrected it, see MIN_GAIN.
+    # The filter corrects an odometry error within twenty fixes, see MIN_GAIN.
     odometry = 20 * SIGMAS * (noise.slip + noise.encoder) / noise.pose_rate * robot.max_speed
     off = rollout.estimate - rollout.pose
     far = float(np.hypot(off[:, 0], off[:, 1]).max())
@@ -386,12 +384,12 @@ def _check_estimate(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_unfixed_estimate(rollout: Rollout) -> Iterator[str]:
-    """Without pose fixes the estimate must be the pose, or drift from it no faster than the documented odometry."""
+    """Check that the estimate without pose fixes is the pose, or drifts no faster than documented odometry."""
     record = rollout.record
     off = rollout.estimate - rollout.pose
     apart, turned = np.hypot(off[:, 0], off[:, 1]), np.abs(wrap_angle(off[:, 2]))
     if record.localisation == "true":
-        # A row between two control periods keeps the error of the one before, which is none.
+        # A row between two control periods keeps the error of the earlier one, which is none.
         if apart.max() > EXACT or turned.max() > EXACT:
             yield "estimate: must be the pose where the robot is localised without error"
         return
@@ -411,10 +409,10 @@ def _check_unfixed_estimate(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_end(rollout: Rollout) -> Iterator[str]:
-    """The drive must end when its outcome says."""
+    """Check that the drive ends as its outcome says."""
     record, end = rollout.record, float(rollout.t[-1])
     period = 1 / record.control_hz
-    # A planner may give a wrong plan on the way, too: then the drive ends with that attempt.
+    # An invalid replan ends the drive as well.
     wrong_replan = bool(record.replans) and not record.replans[-1].solved and rollout.outcome is Outcome.INVALID_PLAN
     if rollout.outcome in (Outcome.NO_PATH, Outcome.STOPPED, Outcome.INVALID_PLAN) and not wrong_replan:
         yield f"outcome: {rollout.outcome.key} ends a run before the robot drives, but the log has rows"
@@ -431,7 +429,7 @@ def _check_end(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_stuck(rollout: Rollout) -> Iterator[str]:
-    """A stuck robot stands off the goal, at the end of its route, or has made no progress for some time."""
+    """Check that a stuck robot stands off the goal at the end of its route, or has made no progress for some time."""
     record, task, last = rollout.record, rollout.record.task, rollout.pose[-1, :2]
     left = math.dist(last, task.goal)
     stands = bool((np.abs(rollout.twist[-1]) <= STOPPED).all())
@@ -446,6 +444,7 @@ def _check_stuck(rollout: Rollout) -> Iterator[str]:
 
 
 def _wheels(twist: Floats, track: float) -> Floats:
-    """The speeds of the left and right wheel over the floor (T, 2) [m/s]."""
+    """Return the speeds of the left and right wheel over the floor (T, 2) [m/s]."""
+
     rim = twist[:, 1] * track / 2
     return np.stack([twist[:, 0] - rim, twist[:, 0] + rim], axis=1)

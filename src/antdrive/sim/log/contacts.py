@@ -1,13 +1,13 @@
-"""Attribute each contact of a drive to the robot or to a mover, from the log.
+"""Attribution of contacts to the robot or to a mover, from the log.
 
-Contact points belong to one touch, that of the first obstacle among them, until half a second passes without contact:
-what the robot is pushed into is part of the push. The outcome of a touch is
+Contact points within half a second of each other form one touch, attributed to the first obstacle: whatever the robot is
+pushed into is part of the push. The outcome of a touch is
 
-- `HIT_BY_TELEPORT` if the mover's loop has just teleported it, and its surface then was no farther from the robot's
-  than the robot's braking distance (0 for a standing robot), so that the robot could not have stopped;
-- `HIT_WHILE_STANDING` if the obstacle is a mover, and just before the contact no point of the robot moved faster than
-  0.02 m/s, nor faster than the mover;
-- `COLLIDED` otherwise, as always with walls and cylinders that stand still.
+- `HIT_BY_TELEPORT` if the mover has just teleported to within the robot's braking distance (0 for a standing robot), so that
+  the robot could not stop;
+- `HIT_WHILE_STANDING` if the obstacle is a mover and, just before the contact, no point of the robot moved faster than
+  0.02 m/s or faster than the mover;
+- `COLLIDED` otherwise, as always with walls and standing cylinders.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from antdrive.robots.spec import Footprint
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 
-STANDING_SPEED = 0.02  # no point of a standing robot moves faster [m/s]
-TOUCH_GAP = 0.5  # contacts that are farther apart in time belong to different touches [s]
-TELEPORT_SLACK = 0.01  # physics reports a contact at the mover's position one step earlier, up to this far off [m]
+STANDING_SPEED = 0.02  # highest speed of any point of a standing robot [m/s]
+TOUCH_GAP = 0.5  # contacts farther apart in time are different touches [s]
+TELEPORT_SLACK = 0.01  # physics reports a contact at the mover's previous position, up to this far off [m]
 
 
 class Touch(NamedTuple):
-    """One meeting of the robot with an obstacle."""
+    """Touch of the robot and an obstacle."""
 
-    step: int  # the row at which the touch began
+    step: int  # first row of the touch
     obstacle: int  # index of the obstacle: cylinders, then movers, then walls
     outcome: Outcome  # COLLIDED, HIT_WHILE_STANDING or HIT_BY_TELEPORT
 
 
 def touches_of(rollout: Rollout) -> list[Touch]:
-    """The touches of a logged drive, in the order of time."""
+    """Return the touches of a logged drive in temporal order."""
     if not len(rollout.contacts):
         return []
     record, movers = rollout.record, rollout.trajectories()
@@ -58,7 +58,7 @@ def touches_of(rollout: Rollout) -> list[Touch]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Attribution:
-    """The rows of a drive, to see who caused a contact."""
+    """Rows of a drive, as needed to attribute contacts."""
 
     pose: Floats
     twist: Floats
@@ -71,17 +71,17 @@ class Attribution:
     deceleration: float
 
     def touches(self, contacts: Floats) -> list[Touch]:
-        """The touches among contact points, in the order of time."""
-        found: list[Touch] = []
+        """Return the touches among contact points in temporal order."""
+        touches: list[Touch] = []
         last = -math.inf
         for step, obstacle in contacts[:, :2].astype(np.int64).tolist():
             if step - last > TOUCH_GAP * self.hz:
-                found.append(Touch(step, obstacle, self._outcome(step, obstacle - self.discs)))
+                touches.append(Touch(step, obstacle, self._outcome(step, obstacle - self.discs)))
             last = step
-        return found
+        return touches
 
     def _outcome(self, step: int, mover: int) -> Outcome:
-        """The outcome of a touch; `mover` is outside 0 to M - 1 for what stands still."""
+        """Return the outcome of a touch; `mover` is outside 0 to M - 1 for standing obstacles."""
         if not 0 <= mover < self.movers.shape[1]:
             return Outcome.COLLIDED
         if self._teleported(step, mover):
@@ -95,7 +95,7 @@ class Attribution:
         return Outcome.COLLIDED
 
     def _teleported(self, step: int, mover: int) -> bool:
-        """Whether the mover appeared nearer than the robot could stop, and the robot has not had time to."""
+        """Return whether the mover appeared within the braking distance, and the robot had no time to stop."""
         jumped = np.flatnonzero(self.jumps[:step, mover])
         if not len(jumped):
             return False
@@ -107,7 +107,7 @@ class Attribution:
 
 
 def _gap(footprint: Footprint, pose: Any, centre: Any, radius: float) -> float:
-    """The distance from a footprint to a disc, 0 or less where they overlap [m]."""
+    """Return the distance from a footprint to a disc, 0 or less where they overlap [m]."""
     dx, dy, yaw = centre[0] - pose[0], centre[1] - pose[1], pose[2]
     if footprint.corners:
         place = math.cos(yaw) * dx + math.sin(yaw) * dy, math.cos(yaw) * dy - math.sin(yaw) * dx

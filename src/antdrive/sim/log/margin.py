@@ -1,6 +1,6 @@
-"""The safety margin: what a drive used it up for.
+"""Margin budget: how a drive used up its safety margin.
 
-Planners keep the disc around the robot `margin` metres away from every surface. A drive comes closer, for several reasons.
+Planners keep the disc around the robot `margin` metres from every surface. Drives come closer for several reasons.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds import point_clearance
 
-#: The causes of a loss of margin, with what each of them is.
+#: Causes of a loss of margin, with descriptions.
 CAUSES: dict[str, str] = {
     "rounding": "the route comes closer to obstacles than planned, where start and goal are no cell centres",
     "cutting": "the robot leaves the route to the inside of a corner",
@@ -27,52 +27,52 @@ CAUSES: dict[str, str] = {
     "localisation": "the estimated pose is wrong",
 }
 CORNER = 0.3  # a bend of the route by at least this angle is a corner [rad]
-NEAR_CORNER = 0.6  # leaving the route within this distance of a corner is cutting [m]
-REACTION = 0.25  # the controller has answered slip that is older than this [s]
+NEAR_CORNER = 0.6  # deviations within this distance of a corner are cutting [m]
+REACTION = 0.25  # the controller has corrected slip older than this [s]
 
 
 @dataclass(frozen=True)
 class Contribution:
-    """The part of the margin that one cause took, at the place where it took most."""
+    """Loss of margin by one cause, at the place of its maximum."""
 
     cause: str  # a key of `CAUSES`
-    metres: float  # the largest loss [m]; 0 if the cause never brought the robot closer to an obstacle than planned
-    t: float  # when the loss was largest [s]
-    x: float  # where [m]
-    y: float  # where [m]
-    at_tightest: float  # the loss, or the gain where negative, at the place where the robot had least clearance [m]
+    metres: float  # largest loss [m]; 0 if the cause never brought the robot closer than planned
+    t: float  # time of the largest loss [s]
+    x: float  # its position [m]
+    y: float  # [m]
+    at_tightest: float  # loss, or negative gain, at the place of least clearance [m]
 
 
 @dataclass(frozen=True)
 class Budget:
-    """A drive's safety margin, broken down by cause. Clearances are those of the disc around the robot."""
+    """Safety margin of a drive, broken down by cause. Clearances are those of the disc around the robot."""
 
-    margin: float  # the margin that was planned with [m]
-    left: float  # the least clearance that was left of it [m]
-    t: float  # when that was [s]
-    x: float  # where [m]
-    y: float  # where [m]
-    # one for each of `CAUSES`, in that order; their `at_tightest` add up to margin - left
+    margin: float  # planned margin [m]
+    left: float  # least remaining clearance [m]
+    t: float  # its time [s]
+    x: float  # its position [m]
+    y: float  # [m]
+    # one per cause, in the order of `CAUSES`; their `at_tightest` add up to margin - left
     contributions: tuple[Contribution, ...]
 
     @property
     def largest(self) -> Contribution:
-        """The contribution of the cause that took most."""
+        """Contribution of the cause that took most."""
         return max(self.contributions, key=lambda part: part.metres)
 
     def as_dict(self) -> dict[str, Any]:
-        """The budget as plain values, for JSON."""
+        """Return the budget as plain values, for JSON."""
         return {**dataclasses.asdict(self), "largest": self.largest.cause}
 
 
 def budget(rollout: Rollout) -> Budget:
     """Break a drive's safety margin down by cause.
 
-    At each row, margin - clearance is the sum of three losses. The first is at the route's point nearest to the
-    estimated pose, where the route itself may be closer to obstacles than the margin (rounding). The second is from
-    that point to the estimated pose: cutting near corners, else tracking, but slip as far as the robot is closer to an
-    obstacle than its last commands would have brought it. The third is from the estimated to the true pose
-    (localisation). Cylinders that the planner did not know of are left out.
+    At each row, margin - clearance is the sum of three losses. The first is at the route's point nearest to the estimate, where
+    the route itself may be closer to obstacles than the margin (rounding). The second lies between that point and the
+    estimate: cutting near corners, else tracking. Slip is the part by which the robot is closer to an obstacle than its
+    last commands would have brought it. The third lies between the estimate and the true pose (localisation). Unseen
+    cylinders are omitted.
     """
     margin = rollout.record.margin
     true = np.ascontiguousarray(rollout.pose[:, :2])
@@ -109,7 +109,7 @@ def budget(rollout: Rollout) -> Budget:
 
 
 def _as_commanded(rollout: Rollout) -> Floats:
-    """Where the robot would be at each row, (T, 2) [m], if it had done as commanded over the last `REACTION` seconds."""
+    """Return the positions (T, 2) [m] of a robot that had followed the commands of the last `REACTION` seconds exactly."""
     dt = 1.0 / rollout.record.physics_hz
     back = min(round(REACTION / dt), len(rollout.t) - 1)
     turned = np.concatenate(([0.0], np.cumsum(rollout.command[1:, 1] * dt)))
@@ -127,7 +127,7 @@ def _as_commanded(rollout: Rollout) -> Floats:
 
 
 def _near_corner(points: Floats, route: Floats) -> npt.NDArray[np.bool_]:
-    """Whether points (T, 2) are near a corner of a route (N, 2), shape (T,)."""
+    """Return whether points (T, 2) are near a corner of a route (N, 2), shape (T,)."""
     steps = np.diff(route, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
     turn = np.abs(wrap_angle(np.diff(heading)))

@@ -1,6 +1,6 @@
-"""Metrics of a drive, from its log alone. Each is one function with one definition, and has its unit in its name.
+"""Metrics of a drive, computed from its log alone. Names end in the unit.
 
-A new metric is a function and a row of the table at the end, `METRICS`.
+To add a metric, write a function and a row of the table `METRICS` at the end.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 
 BARN_SPEED = 2.0  # the challenge's reference speed [m/s]
-BARN_CLOCK = 0.1  # the challenge's clock starts when the robot is this far from its start [m]
-JERK_WINDOW = 0.1  # measured speed is averaged over this long before it is differentiated [s]
-WALL_CLOCK = ("plan_s", "drive_wall_s")  # metrics that no repetition reproduces
-AVOIDING = "avoid"  # the name in `record.limiters` of the rule that avoids movers
+BARN_CLOCK = 0.1  # the challenge's clock starts at this distance from the start [m]
+JERK_WINDOW = 0.1  # averaging time of the measured speed before differentiation [s]
+WALL_CLOCK = ("plan_s", "drive_wall_s")  # metrics that differ between repetitions
+AVOIDING = "avoid"  # name of the avoidance rule in `record.limiters`
 
 
 Better: TypeAlias = Literal["lower", "higher", "neither"]
@@ -33,39 +33,38 @@ Better: TypeAlias = Literal["lower", "higher", "neither"]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How much worse a metric may become before a comparison with an earlier drive fails."""
+    """Allowed deterioration of a metric relative to an earlier drive."""
 
     absolute: float = 0.0  # in the metric's unit
-    relative: float = 0.0  # a share of the earlier value; the two allowances add up
+    relative: float = 0.0  # fraction of the earlier value; both allowances add up
 
     def allowed(self, earlier: float) -> float:
-        """The allowance, in the metric's unit."""
+        """Return the allowance, in the metric's unit."""
         return self.absolute + self.relative * abs(earlier)
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that describes a drive. Call it with a rollout."""
+    """Metric of a drive, called with a rollout."""
 
-    unit: str  # the unit of the number; "1" for a ratio or a count
-    function: Callable[[Rollout], float]  # computes the number from a rollout
-    better: Better = "neither"  # whether a lower or a higher number is better, or neither
-    # how much worse than in an earlier drive it may be; None where it is not to be compared, as with wall-clock
-    # times
+    unit: str  # unit; "1" for a ratio or a count
+    function: Callable[[Rollout], float]  # the metric's function
+    better: Better = "neither"  # whether lower or higher is better, or neither
+    # allowed deterioration; None for metrics that are not compared, such as wall-clock times
     tolerance: Tolerance | None = None
 
     @property
     def name(self) -> str:
-        """The metric's key in `METRICS`, in JSON and in reports."""
+        """Key in `METRICS`, in JSON and in reports."""
         return self.function.__name__
 
     @property
     def definition(self) -> str:
-        """What the number is, in words."""
+        """Definition in words."""
         return " ".join((inspect.getdoc(self.function) or "").split())
 
     def __call__(self, rollout: Rollout | None) -> float:
-        """The number for one drive."""
+        """Return the metric of one drive."""
         return self.function(_driven(rollout))
 
 
@@ -76,24 +75,24 @@ def _driven(rollout: Rollout | None) -> Rollout:
 
 
 def path_length_m(rollout: Rollout) -> float:
-    """Length of the planned path: of its cells, or of the line of an any-angle planner."""
+    """Length of the planned path: of its cells, or of an any-angle planner's line."""
     return rollout.record.plan.length_m
 
 
 def route_length_m(rollout: Rollout) -> float:
-    """Length of the first route that the robot was to follow."""
+    """Length of the first route."""
     return polyline_length(rollout.route)
 
 
 def driven_length_m(rollout: Rollout) -> float:
-    """Distance that the axle's centre travelled."""
+    """Distance travelled by the axle's centre."""
     return polyline_length(rollout.pose[:, :2])
 
 
 def gap_to_grid_optimum(rollout: Rollout) -> float:
     """Planned length over the shortest path on the same grid, minus 1; below 0 where an any-angle line is shorter.
 
-    Only with the map: not a number for a robot without one, whose first plan is made before it has seen the world.
+    Not a number for a robot without a map, whose first plan precedes its knowledge of the world.
     """
     if rollout.record.exploring:
         return math.nan
@@ -101,7 +100,7 @@ def gap_to_grid_optimum(rollout: Rollout) -> float:
 
 
 def gap_to_euclidean_optimum(rollout: Rollout) -> float:
-    """Length of the route over the exact shortest path among the inflated discs, minus 1. Only with the map, too."""
+    """Length of the route over the exact shortest path among the inflated discs, minus 1; not a number without a map."""
     if rollout.record.exploring:
         return math.nan
     return _over(route_length_m(rollout), rollout.record.plan.euclidean_optimum_m)
@@ -116,7 +115,7 @@ def spl(rollout: Rollout) -> float:
 
 
 def barn(rollout: Rollout) -> float:
-    """The BARN challenge's score: OT / clip(arrival, 2 OT, 8 OT), where OT = optimum / 2 m/s; at most 0.5.
+    """BARN challenge score: OT / clip(arrival, 2 OT, 8 OT), where OT = optimum / 2 m/s; at most 0.5.
 
     A drive without success scores 0.
     """
@@ -128,34 +127,34 @@ def barn(rollout: Rollout) -> float:
 
 
 def min_clearance_m(rollout: Rollout) -> float:
-    """Least distance between the robot's surface and that of an obstacle or wall."""
+    """Least distance between the surfaces of the robot and an obstacle or wall."""
     return float(rollout.clearance.min())
 
 
 def mean_clearance_m(rollout: Rollout) -> float:
-    """Mean over time of the distance between the robot's surface and the nearest obstacle or wall."""
+    """Time average of the distance between the robot's surface and the nearest obstacle or wall."""
     return float(rollout.clearance.mean())
 
 
 def tracking_error_max_m(rollout: Rollout) -> float:
-    """Largest distance of the axle's centre from the route that was followed at the time."""
+    """Largest distance of the axle's centre from the current route."""
     return float(tracking_error(rollout).max())
 
 
 def tracking_error_p95_m(rollout: Rollout) -> float:
-    """95th percentile over time of the distance of the axle's centre from the route that was followed at the time."""
+    """95th percentile over time of the distance of the axle's centre from the current route."""
     return float(np.percentile(tracking_error(rollout), 95))
 
 
 def duration_s(rollout: Rollout) -> float:
-    """Simulated time of the drive."""
+    """Duration of the drive in simulated time."""
     return float(rollout.t[-1])
 
 
 def arrival_s(rollout: Rollout) -> float:
-    """Simulated time by the BARN challenge's clock: from 0.1 m off the start until first within the goal's tolerance.
+    """Arrival by the BARN challenge's clock: simulated time from 0.1 m off the start until first within the goal's tolerance.
 
-    It is infinite if the robot never gets there.
+    Infinite if the robot never gets there.
     """
     task = rollout.record.task
     xy = rollout.pose[:, :2]
@@ -197,27 +196,28 @@ def jerk_rms(rollout: Rollout) -> float:
 
 
 def contacts_driving(rollout: Rollout) -> float:
-    """Number of times that the robot touched something while it drove."""
+    """Count of touches caused by the driving robot."""
     return _touches(rollout, Outcome.COLLIDED)
 
 
 def contacts_standing(rollout: Rollout) -> float:
-    """Number of times that a mover hit the robot while it stood still."""
+    """Count of hits by a mover while the robot stood still."""
     return _touches(rollout, Outcome.HIT_WHILE_STANDING)
 
 
 def contacts_teleported(rollout: Rollout) -> float:
-    """Number of times that a mover teleported onto the robot, or nearer than the robot could stop."""
+    """Count of teleports of a mover onto the robot, or within its braking distance."""
     return _touches(rollout, Outcome.HIT_BY_TELEPORT)
 
 
 def replans(rollout: Rollout) -> float:
-    """Number of searches for a new route while driving."""
+    """Count of searches for a new route during the drive."""
     return float(len(rollout.record.replans))
 
 
 def avoiding_s(rollout: Rollout) -> float:
-    """Simulated time for which the robot gave way to movers."""
+    """Time during which the robot avoided movers, simulated."""
+
     limiters = rollout.record.limiters
     if AVOIDING not in limiters:
         return 0.0
@@ -225,14 +225,14 @@ def avoiding_s(rollout: Rollout) -> float:
 
 
 def explored_m2(rollout: Rollout) -> float:
-    """Ground within the walls that the lidar of a robot without a map saw, from the true poses, in cells of 0.1 m.
+    """Ground within the walls that a mapless robot's lidar observed from the true poses, in cells of 0.1 m.
 
-    A cell counts if the beam nearest to its middle in direction got farther, however far away it is: the ground on the robot's
-    own map is less, since there beams must not be farther apart than its cells. Not a number for a robot that had a map.
+    A cell counts if the beam nearest to its centre in direction reached beyond it, at any range. The robot's own map holds
+    less, since its beams must not be farther apart than a cell. Not a number for a robot with a map.
     """
     if not (rollout.record.exploring and len(rollout.scans)):
         return math.nan
-    from antdrive.sim.log.sights import seen_ground  # its kernels; collecting tests needs the names of metrics only
+    from antdrive.sim.log.sights import seen_ground  # imported here, because it loads kernels
 
     seen, cell = seen_ground(rollout)
     return float(np.count_nonzero(seen)) * cell**2
@@ -264,12 +264,12 @@ _TABLE = (
     Metric("m^2", explored_m2),
 )
 
-#: Every metric by its name, with unit and definition.
+#: Metrics by name.
 METRICS: Mapping[str, Metric] = MappingProxyType({metric.name: metric for metric in _TABLE})
 
 
 def measure(rollout: Rollout | None) -> dict[str, float]:
-    """Every metric of a drive by its name.
+    """Return all metrics of a drive by name.
 
     Raises:
         FieldError: there is no rollout, because the run ended before the robot drove.
@@ -279,19 +279,19 @@ def measure(rollout: Rollout | None) -> dict[str, float]:
 
 
 def succeeded(rollout: Rollout) -> bool:
-    """Whether the robot stopped at the goal in time and without contact."""
+    """Return whether the robot stopped at the goal in time and without contact."""
     return rollout.outcome is Outcome.SUCCEEDED
 
 
 def tracking_error(rollout: Rollout) -> Floats:
-    """The distance of the axle's centre from the route that is followed at each row, shape (T,) [m]."""
+    """Return the distance of the axle's centre from the current route at each row, shape (T,) [m]."""
     xy = rollout.pose[:, :2]
     legs = rollout.legs()
     return np.concatenate([np.hypot(*(nearest_on_route(xy[rows], route) - xy[rows]).T) for rows, route in legs])
 
 
 def nearest_on_route(points: Floats, route: Floats) -> Floats:
-    """The point of a route (N, 2) nearest to each of the points (T, 2), shape (T, 2) [m]."""
+    """Return the point of a route (N, 2) nearest to each of the points (T, 2), shape (T, 2) [m]."""
     a, along = route[:-1], np.diff(route, axis=0)
     length2 = (along**2).sum(axis=1)
     nearest = np.empty((len(points), 2))

@@ -1,4 +1,4 @@
-"""How a run can end."""
+"""Outcomes of a run."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from antdrive.base.errors import FieldError
 
 
 class Outcome(enum.Enum):
-    """How a run ended. The value is the sentence shown to people.
+    """Outcome of a run. The value is the sentence shown to users.
 
-    The first contact ends a drive, and the outcome says who caused the contact; `antdrive.sim.log.contacts` has the
-    exact rule. `COLLIDED` is the robot's own doing, also when a mover comes towards the driving robot. The planner is
-    not blamed for `HIT_WHILE_STANDING` and `HIT_BY_TELEPORT`, but neither is a success, and no drive with a contact is
-    certified. `BLOCKED` means that movers closed every way and stood still until the robot's patience was over
-    (`ReplanPolicy.patience`). `NO_PATH`, `STOPPED` and `INVALID_PLAN` end a run before the robot drives, so that there is
-    no rollout; but a wrong plan on the way ends the drive, as `INVALID_PLAN` too, and its log has the rows until then.
+    The first contact ends a drive, and the outcome says who caused it; `antdrive.sim.log.contacts` has the exact rule.
+    `COLLIDED` is the robot's own doing, even if a mover comes towards the driving robot. `HIT_WHILE_STANDING` and
+    `HIT_BY_TELEPORT` are no fault of the planner, but no success either; no drive with a contact is certified. `BLOCKED`: movers
+    closed every route and stood still until the robot's patience (`ReplanPolicy.patience`) was over. `NO_PATH`, `STOPPED` and
+    `INVALID_PLAN` end a run before the robot drives, without a rollout. An invalid replan ends the drive as `INVALID_PLAN`,
+    with the rows until then.
 
-    `antdrive run` exits with 0 if the run ended with `SUCCEEDED` and the drive is certified, else with 1.
+    `antdrive run` exits with 0 if the outcome is `SUCCEEDED` and the drive is certified, else with 1.
     """
 
     SUCCEEDED = "stopped at the goal without contact"
@@ -33,7 +33,7 @@ class Outcome(enum.Enum):
 
     @property
     def key(self) -> str:
-        """The word for this outcome in logs, JSON and tables, such as `timed_out`."""
+        """Word for this outcome in logs, JSON and tables, such as `timed_out`."""
         return self.name.lower()
 
     @property
@@ -43,13 +43,13 @@ class Outcome(enum.Enum):
 
     @classmethod
     def from_key(cls, key: str) -> Outcome:
-        """The outcome with this key.
+        """Return the outcome with this key.
 
         Args:
             key: a word such as `timed_out`
 
         Raises:
-            FieldError: there is no such outcome.
+            FieldError: the outcome is unknown.
         """
         known = {outcome.key: outcome for outcome in cls}
         if key not in known:

@@ -1,8 +1,7 @@
-"""The record of a drive: everything a log holds beside its arrays, key by key, and what it is about, as hashes.
+"""Record of a drive: everything in a log beside its arrays, and its hashes.
 
-The record is stored as JSON. It is validated in one place, `DriveRecord.from_json`, so that no reader meets a missing
-key or an impossible value. `docs/reference/rollout-format.md` describes every key. Names and sources do not count in
-hashes of worlds and robots, and neither does the form of a file: what is compared is what the file means.
+The record is stored as JSON and validated in one place, `DriveRecord.from_json`. `docs/reference/rollout-format.md`
+describes every key. Hashes of worlds and robots omit names, sources and the form of files: they cover the meaning.
 """
 
 from __future__ import annotations
@@ -34,28 +33,28 @@ from antdrive.worlds.world import Disc, Task, World
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-#: The version of the log's format.
+#: Version of the log's format.
 SCHEMA = 2
 
-#: The highest rate of physics or control that a log can have [Hz].
+#: Highest rate of physics or control in a log [Hz].
 MAX_HZ = 10_000
 
-#: The largest margin and inflation that a log can have [m].
+#: Largest margin and inflation in a log [m].
 MAX_MARGIN = 1000.0
 
 MARGIN_ROUNDING = 1e-9  # [m]
 
-#: The trigger of a replan by a planner that decides anew at every cell.
+#: Trigger of replans by planners that decide cell by cell.
 DECISION = "decision"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComponentRecord:
-    """A part of the scenario that has a name and settings.
+    """Named part of the scenario with its settings.
 
     Attributes:
         name: the registered name of the planner, or the class of a planner or controller
-        settings: every setting by its name, as it was in force; null stands for "no limit"
+        settings: every effective setting by name; null means "no limit"
     """
 
     name: str
@@ -64,16 +63,16 @@ class ComponentRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class PlanRecord:
-    """The plan's size beside the shortest paths that are possible.
+    """Size of the plan beside the shortest possible paths.
 
     Attributes:
-        cost_m: length of the planned cells, along the grid's eight directions [m]; null where the grid has no path and
-            an any-angle planner found one beside it
-        length_m: length of the planned line, of an any-angle planner's own line where it has one [m]
+        cost_m: length of the planned cells along the grid's eight directions [m]; null where the grid has no path, but an
+            any-angle planner found one
+        length_m: length of the planned line, or of an any-angle planner's own line [m]
         grid_optimum_m: length of the shortest path on the same grid [m]; null if there is none
         euclidean_optimum_m: length of the shortest path among the inflated discs, without a grid [m]; null if there
             is none
-        work: the planner's effort, in units of `work_unit`
+        work: the planner's effort, in `work_unit`
         work_unit: what `work` counts, such as "cells expanded"
     """
 
@@ -90,13 +89,12 @@ class PlanRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class SmoothingRecord:
-    """How the planned cells became the route.
+    """Smoothing of the planned cells into the route.
 
     Attributes:
-        asked: the smoothing that was requested: none, taut or clearance
-        made: the smoothing of the route that was driven; plans in space and time are not smoothed, and a smoothing
-            that fails is given up
-        note: why a smoothing was given up, in words; may be empty
+        asked: the requested smoothing: none, taut or clearance
+        made: the smoothing of the driven route; none for plans in space and time, and where the requested one failed
+        note: why the smoothing failed; may be empty
     """
 
     asked: str
@@ -106,11 +104,11 @@ class SmoothingRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class PerceptionRecord:
-    """What the robot knew of movers while it drove.
+    """Perception of movers.
 
     Attributes:
         kind: positions, velocities, motions or lidar
-        range_m: how far the robot perceived movers [m]; null if without limit
+        range_m: the range of perception [m]; null if unlimited
     """
 
     kind: str
@@ -119,12 +117,12 @@ class PerceptionRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class ReplanRecord:
-    """One search for a new route while driving.
+    """Search for a new route during the drive.
 
     Attributes:
-        t: when the new route was looked for [s]
-        trigger: what set off the search, in words
-        solved: whether a new route was found; else the robot kept the old one
+        t: time of the search [s]
+        trigger: its cause, in words
+        solved: whether a route was found; else the robot kept the old one
         cost_m: length of the new plan's cells [m]; null without one
         work: the planner's effort, in units of `plan.work_unit`
         route: points (x, y) of the new route [m], rounded to 0.1 mm; empty without one
@@ -145,10 +143,10 @@ class ReplanRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class SensingRecord:
-    """What the robot knew of the world and of its own pose.
+    """Knowledge of the world and of the robot's pose.
 
     Attributes:
-        map: given, or none: then it knew what its lidar had seen
+        map: given, or none: only the observations of its lidar
         localisation: fixes, odometry, matching or true
         odometry: the factor on the errors of odometry
     """
@@ -164,13 +162,13 @@ class SensingRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class MarginRecord:
-    """How `--margin auto` chose the margin.
+    """Choice of the margin by `--margin auto`.
 
     Attributes:
-        loss_m: how much of the margin a drive was predicted to use up [m]; no part of it are movers
-        reserve_m: what the predicted loss was to leave of the margin, at least [m]
-        probability: of a larger loss than predicted, for a drive along a course of the calibration
-        drives: number of drives that the prediction rests on
+        loss_m: predicted loss of margin in a drive [m], without movers
+        reserve_m: least margin that was to remain after the predicted loss [m]
+        probability: probability of a larger loss, for a drive along a course of the calibration
+        drives: number of drives behind the prediction
     """
 
     loss_m: float
@@ -184,7 +182,7 @@ class MarginRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class TimesRecord:
-    """Wall-clock times. They differ between repetitions, so the digest does not cover them.
+    """Wall-clock times, which the digest omits because they differ between repetitions.
 
     Attributes:
         plan_s: planning before the drive [s]
@@ -197,7 +195,7 @@ class TimesRecord:
     replans_s: tuple[float, ...]
 
 
-#: A key that came later is left out where it says nothing, so that older logs and hashes stay as they are.
+#: Fields added later are omitted at their default, so older logs and hashes stay valid.
 LATER = {"omit_if_default": True}
 
 
@@ -213,42 +211,42 @@ def _to_outcome(value: Any) -> Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveRecord:
-    """What a log says beside its arrays: the scenario, the plan, and how the drive ended.
+    """Record of a log: the scenario, the plan, and how the drive ended.
 
     Attributes:
-        schema: the version of the format, 2
-        task: the world, start and goal that planner and controller knew, in the form of a world file
-        unseen: cylinders {x, y, radius, height} [m] that also stood in the world, unknown to planner and controller
-        seed: the seed that all of the run's random numbers follow from
+        schema: version of the format, 2
+        task: the world, start and goal known to planner and controller, in the form of a world file
+        unseen: cylinders {x, y, radius, height} [m] in the driven world, unknown to planner and controller
+        seed: the seed of all random numbers
         planner: the planner and its settings
-        plan: the plan's size beside the shortest paths that are possible
-        robot: the robot's specification, with the keys of `RobotSpec`: footprint, drive, limits and noise; `footprint.corners`
-            only where it is a polygon or beside the axle
+        plan: the plan's size beside the shortest possible paths
+        robot: the robot's specification, with the keys of `RobotSpec`: footprint, drive, limits and noise;
+            `footprint.corners` only for a polygon or a footprint off the axle
         controller: the controller and its settings
         smoothing: how the planned cells became the route
-        perception: what the robot knew of movers; null in a world without movers, unless its lidar looked for them
-        avoidance: the settings of `Avoidance` as they were in force; null if the robot did not avoid movers
-        replanning: the settings of `ReplanPolicy`; null without movers, or if the robot was never to replan
-        replans: every search for a new route while driving, in the order of time
-        limiters: names of the rules that can limit the robot's speed; the array `limiter` holds indices into them
+        perception: perception of movers; null in a world without movers, unless the lidar searched for them
+        avoidance: effective settings of `Avoidance`; null without avoidance
+        replanning: the settings of `ReplanPolicy`; null without movers or without replanning
+        replans: the searches for a new route during the drive, in temporal order
+        limiters: names of the rules that can limit the speed; the array `limiter` holds indices into them
         noise: the factor on the robot's documented noise; 0 is a perfect robot
-        margin: clearance that was planned with on top of the robot's radius [m]
-        margin_choice: how the margin was chosen; the key is left out where it was given as a number
-        inflate: the robot's radius plus the margin: how far planners keep the robot's centre from every surface [m]
+        margin: planned clearance on top of the robot's radius [m]
+        margin_choice: choice of the margin; omitted where it was given as a number
+        inflate: radius plus margin: the distance that plans keep between the robot's centre and every surface [m]
         cell: grid resolution of the plan [m]
         physics_hz: rate of the physics and of the log's rows [Hz]
         control_hz: rate of control [Hz]
-        time_limit: simulated time that was allowed [s]
+        time_limit: allowed simulated time [s]
         outcome: how the drive ended, such as succeeded, collided or timed_out
-        reason: details of the outcome, in words; may be empty
+        reason: details of the outcome; may be empty
         versions: versions of antdrive, Python and the packages that computed the drive
-        sensing: what the robot knew of the world and of its pose; the key is left out where that is the map and pose fixes
-        settings: settings that no other key holds, by name; the key is left out where all have their defaults
+        sensing: knowledge of the world and of the pose; omitted for a given map and pose fixes
+        settings: settings without another key, by name; omitted where all have their defaults
         times: wall-clock times, not covered by the digest
-        digest: the SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
+        digest: SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
     Raises:
-        FieldError: a value that no drive can have.
+        FieldError: a value is invalid.
     """
 
     __pydantic_config__ = STRICT
@@ -314,13 +312,13 @@ class DriveRecord:
 
     @property
     def world(self) -> World:
-        """The world as it was driven in: the task's, with the unseen cylinders after the known ones."""
+        """Driven world: the task's, with the unseen cylinders after the known ones."""
         world = self.task.world
         return dataclasses.replace(world, obstacles=world.obstacles + self.unseen) if self.unseen else world
 
     @classmethod
     def held(cls, setting: str) -> bool:
-        """Whether a key of the record's own holds a setting."""
+        """Return whether a key of the record holds a setting."""
         return any(setting in {field.name for field in dataclasses.fields(kind)} for kind in (cls, SensingRecord))
 
     @property
@@ -330,19 +328,19 @@ class DriveRecord:
 
     @property
     def localisation(self) -> str:
-        """How the robot knew its pose: fixes, odometry, matching or true."""
+        """Localisation: fixes, odometry, matching or true."""
         return "fixes" if self.sensing is None else self.sensing.localisation
 
     def as_dict(self) -> dict[str, Any]:
-        """The record as plain values, for JSON."""
+        """Return the record as plain values, for JSON."""
         values: dict[str, Any] = plain_value(self)
         return values
 
     def to_json(self, *, without: Sequence[str] = ()) -> str:
-        """The record as JSON text, the keys sorted.
+        """Return the record as JSON text with sorted keys.
 
         Args:
-            without: keys to leave out
+            without: keys to omit
 
         Raises:
             ValueError: a number that is not finite.
@@ -352,38 +350,38 @@ class DriveRecord:
 
     @classmethod
     def from_json(cls, text: str) -> DriveRecord:
-        """The record in a JSON text.
+        """Read the record from a JSON text.
 
         Args:
-            text: what `to_json` wrote
+            text: the text of `to_json`
 
         Raises:
-            FieldError: a key is missing or unknown, or a value is impossible.
+            FieldError: a key is missing or unknown, or a value is invalid.
         """
         try:
-            found = json.loads(text, parse_constant=_refuse_constant)
-            _require_shallow(found)
+            content = json.loads(text, parse_constant=_refuse_constant)
+            _require_shallow(content)
         except (RecursionError, ValueError) as error:
             problem = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise FieldError("record", f"not JSON: {problem}") from None
-        if not isinstance(found, dict) or found.get("schema") != SCHEMA:
-            schema = found.get("schema") if isinstance(found, dict) else found
+        if not isinstance(content, dict) or content.get("schema") != SCHEMA:
+            schema = content.get("schema") if isinstance(content, dict) else content
             raise FieldError("record.schema", f"this version reads schema {SCHEMA}, found {_shown(schema)}")
         try:
             record = _adapter().validate_json(text)
-            record.to_json()  # settings of any kind hold nothing that JSON cannot
+            record.to_json()  # refuses settings that JSON cannot hold
         except ValidationError as error:
             raise _field_error(error.errors(include_url=False)[0]) from None
         except (RecursionError, OverflowError, ValueError) as error:
             raise FieldError("record", str(error)) from None
-        lacking = _missing_key(record.as_dict(), found)
+        lacking = _missing_key(record.as_dict(), content)
         if lacking:
             raise FieldError(f"record{lacking}", "missing; a log that antdrive wrote has it")
         return record
 
 
 def _require_shallow(value: Any) -> None:
-    """Refuse values that are nested deeper than those of any file; readers that follow them would run out of stack."""
+    """Refuse values nested deeper than those of any file, which would exhaust the stack of readers."""
     layer = [value]
     for _ in range(MAX_DEPTH):
         layer = [v for outer in layer for v in _inner(outer) if isinstance(v, dict | list)]
@@ -397,9 +395,9 @@ def _inner(value: Any) -> Iterable[Any]:
 
 
 def _missing_key(written: Any, found: Any) -> str:
-    """The first key that `written` has and `found` lacks, as a path; empty if there is none.
+    """Return the path of the first key in `written` that `found` lacks; empty if there is none.
 
-    A key that a record could do without, because it has a default, is missed like any other: a log says everything.
+    Keys with a default are required as well: a log is complete.
     """
     if isinstance(written, dict) and isinstance(found, dict):
         for key, value in written.items():
@@ -414,7 +412,7 @@ def _missing_key(written: Any, found: Any) -> str:
 
 
 def plain_value(value: Any) -> Any:
-    """A value as JSON can hold it: records become mappings, arrays and tuples lists, other objects text."""
+    """Convert a value for JSON: records become mappings, arrays and tuples lists, other objects text."""
     if isinstance(value, Outcome):
         return value.key
     if isinstance(value, Task):
@@ -436,7 +434,7 @@ def _says_nothing(field: dataclasses.Field[Any], value: Any) -> bool:
 
 
 def settings_of(values: Any) -> dict[str, Any]:
-    """Settings as the record keeps them: plain values, with null for an infinite number, which is "no limit"."""
+    """Convert settings to plain values, with null for an infinite number, which means "no limit"."""
 
     def finite(value: Any) -> Any:
         if isinstance(value, dict):
@@ -445,19 +443,19 @@ def settings_of(values: Any) -> dict[str, Any]:
             return [finite(inner) for inner in value]
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    found = finite(plain_value(values))
-    assert isinstance(found, dict)
-    return found
+    plain = finite(plain_value(values))
+    assert isinstance(plain, dict)
+    return plain
 
 
 def changes(values: Any, usual: Any) -> dict[str, Any]:
-    """The fields of a record that differ from those of another one of its class."""
+    """Return the fields of a record that differ from another record of its class."""
     names = (field.name for field in dataclasses.fields(values) if field.init)
     return {name: getattr(values, name) for name in names if getattr(values, name) != getattr(usual, name)}
 
 
 def finite_or_none(value: float) -> float | None:
-    """The number, or None where it is infinite or not a number."""
+    """Return the number, or None if it is infinite or nan."""
     return value if math.isfinite(value) else None
 
 
@@ -477,7 +475,7 @@ def _refuse_constant(name: str) -> NoReturn:
 
 
 def _field_error(fault: ErrorDetails) -> FieldError:
-    """The key and the problem of a fault that pydantic found, with what would be right."""
+    """Convert an error of pydantic to its key and a sentence with the valid values."""
     key = "record" + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])
     if fault["type"] == "missing":
         name = str(fault["loc"][-1])
@@ -491,21 +489,21 @@ def _field_error(fault: ErrorDetails) -> FieldError:
     error = fault["ctx"]["error"]
     if isinstance(error, FieldError):
         return error.under(key)
-    # A world file's error is text: the name of the file, here the key itself, then often a key within the file.
+    # The text of a world file's error begins with the file's name, here the key itself, often followed by a key in the file.
     text = str(error).removeprefix("task: ")
     inner = re.match(r"(\w[\w.\[\]]*): (.*)", text)
     return FieldError(f"{key}.{inner[1]}", inner[2]) if inner else FieldError(key, text)
 
 
 def _shown(value: Any) -> str:
-    """A value of JSON, cut to a length that fits a line."""
+    """Return a JSON value cut to fit a line."""
     try:
         return json.dumps(value)[:40]
     except (ValueError, RecursionError):
         return "a number too long"
 
 
-#: The keys of a record that say how the drive was planned and driven.
+#: Keys of the record that describe how the drive was planned and driven.
 DRIVEN_WITH = (
     *("seed", "planner", "controller", "perception", "avoidance", "replanning"),
     *("noise", "margin", "cell", "physics_hz", "control_hz", "time_limit"),
@@ -514,9 +512,9 @@ LABELS = ("name", "source")
 
 
 def hashes_of(record: DriveRecord) -> dict[str, str]:
-    """The SHA-256 of the world with start and goal, of the robot, and of the settings that a record holds.
+    """Return the SHA-256 of the record's world with start and goal, of its robot, and of its settings.
 
-    Each is that of JSON with sorted keys and Python's default separators; `docs/explanation/certificate.md` describes them.
+    Each covers JSON with sorted keys and Python's default separators; `docs/explanation/certificate.md` describes them.
     """
     values = record.as_dict()
     parts = {
@@ -532,16 +530,16 @@ def hashes_of(record: DriveRecord) -> dict[str, str]:
 
 
 def canonical_hash(value: Task | RobotSpec) -> str:
-    """The SHA-256 of a world with start and goal, or of a robot: the one that `hashes_of` finds in the log of its drives."""
+    """Return the SHA-256 of a world with start and goal, or of a robot, as `hashes_of` finds it in logs."""
     return _sha256(_meaning(value))
 
 
 def differences(record: DriveRecord, *, task: Task | None = None, robot: RobotSpec | None = None) -> Iterator[str]:
-    """What in a record is not as in the given world and robot, a sentence each."""
-    for name, found, wanted in (("world", record.task, task), ("robot", record.robot, robot)):
+    """Yield a sentence for a record's differences from a given world and robot."""
+    for name, recorded, wanted in (("world", record.task, task), ("robot", record.robot, robot)):
         if wanted is None:
             continue
-        logged, given = _meaning(found), _meaning(wanted)
+        logged, given = _meaning(recorded), _meaning(wanted)
         keys = [key for key in sorted({*logged, *given}) if logged.get(key) != given.get(key)]
         if keys:
             yield f"{name}: the log is about another one; its {', '.join(keys)} {'differ' if keys[1:] else 'differs'}"

@@ -1,9 +1,8 @@
-"""The log of one drive: everything that metrics, certificates, figures and films read.
+"""Rollout: the log of one drive, which metrics, certificates, figures and films read.
 
-The file is a `.npz` archive that numpy reads without pickles: one member for each array, and the member `record`, a JSON
-text. `docs/reference/rollout-format.md` describes the format. Anybody may have written a log: sizes are checked before
-anything is read, and every failure is one line. Ranges of a lidar are whole millimetres, with two numbers for what was not
-measured.
+The file is a `.npz` archive without pickles: one member per array, and the member `record`, a JSON text;
+`docs/reference/rollout-format.md` describes the format. Files may come from anyone: sizes are checked before reading, and
+every error is one line. Lidar ranges are whole millimetres, with two codes for missing ranges.
 """
 
 from __future__ import annotations
@@ -36,14 +35,14 @@ from antdrive.worlds.trajectories import Trajectories
 
 Archive: TypeAlias = zipfile.ZipFile
 
-MAX_BYTES = 1 << 29  # of all members together, and of one array, when unpacked; an hour of a drive takes 0.1 GB
+MAX_BYTES = 1 << 29  # unpacked size of all members and of one array; an hour of a drive takes 0.1 GB
 MAX_MEMBERS = 64
 LONGEST_PROBLEM = 300  # characters of a message
 
 
 @contextmanager
 def guarded_log(path: str | Path) -> Iterator[Archive]:
-    """The archive of a log; whatever goes wrong inside becomes one line that names the file."""
+    """Open the archive of a log; every error inside becomes one line that names the file."""
     try:
         with open(path, "rb", opener=_without_waiting) as raw:
             kind = os.fstat(raw.fileno())
@@ -68,13 +67,13 @@ def guarded_log(path: str | Path) -> Iterator[Archive]:
     except RecursionError:
         raise _problem(path, "not a rollout (nested too deeply)") from None
     except Exception as error:
-        # Archives and headers of strangers fail in many ways: zlib and LZMA errors, unknown versions, syntax errors.
+        # Foreign archives and headers fail in many ways: zlib and LZMA errors, unknown versions, syntax errors.
         lines = (getattr(error, "strerror", None) or str(error)).splitlines()
         raise _problem(path, f"not a rollout ({lines[0] if lines else type(error).__name__})") from None
 
 
 def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
-    """An array of a log, without pickles and only as large as its member."""
+    """Read an array of a log, without pickles and only as large as its member."""
     if f"{name}.npy" not in archive.namelist():
         raise KeyError(f"{name} is not a file in the archive")
     info = archive.getinfo(f"{name}.npy")
@@ -93,7 +92,7 @@ def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
 
 
 def _without_waiting(path: str, flags: int) -> int:
-    """Open a file; a pipe without a writer would wait for ever."""
+    """Open a file without waiting for the writer of a pipe."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
@@ -117,15 +116,15 @@ def _more(found: int, wanted: int) -> str:
 
 
 def _problem(path: str | Path, text: str) -> InputError:
-    """An error on one line that is not too long."""
+    """Return an error of one line, cut to a length."""
     return input_error(str(path), text if len(text) <= LONGEST_PROBLEM else f"{text[:LONGEST_PROBLEM]}...")
 
 
 MAX_ROWS = 20_000_000  # a day at 240 Hz
-MAX_VALUE = 1e12  # of any number in the arrays; sums and squares of greater ones lose all meaning
+MAX_VALUE = 1e12  # largest number in the arrays; sums and squares of larger ones lose all precision
 MAX_RECORD = 32_000_000  # characters of the record; a world of 20,000 cylinders takes 2 million
-ROWS, NOISY = "rows", "rows or none"  # in shapes: the rows of the log; as many, or none for a perfect robot
-#: The shape of each array, None for any length, and its dtype.
+ROWS, NOISY = "rows", "rows or none"  # lengths in shapes: the log's rows; the log's rows, or none for a perfect robot
+#: Shape and dtype of each array; None for any length.
 FORMS: Mapping[str, tuple[tuple[int | str | None, ...], str]] = MappingProxyType(
     {
         "t": ((ROWS,), "<f8"),
@@ -149,14 +148,14 @@ FORMS: Mapping[str, tuple[tuple[int | str | None, ...], str]] = MappingProxyType
 
 
 def _none_of(name: str) -> Callable[[], npt.NDArray[Any]]:
-    """What makes an array that holds nothing."""
+    """Return a factory of the empty array."""
     shape, dtype = FORMS[name]
     return lambda: np.empty([n if isinstance(n, int) else 0 for n in shape], dtype=dtype)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rollout:
-    """The log of one drive. Each of its T rows is a physics step; row 0 is the start, before the first step.
+    """Log of one drive. Each of its T rows is a physics step; row 0 is the start, before the first step.
 
     Attributes:
         t: simulated time (T,) [s]
@@ -173,16 +172,15 @@ class Rollout:
         estimate: the estimated pose (T, 3) of a noisy robot, x, y [m] and yaw [rad]; (0, 3) for a perfect robot
         actuated: forward speed [m/s] and yaw rate [rad/s] that the motors of a noisy robot were set to (T, 2), after
             delay and slip; (0, 2) for a perfect robot, whose motors are set to `command`
-        scans: the lidar's ranges of a robot that uses it, since it has no map or looks for movers (S, beams) [mm]; 0 where
-            nothing was in range, 1 where something was too near to measure. This array and the next two are left out of files
-            and of the digest where they are empty
+        scans: lidar ranges of a robot without a map or with lidar perception (S, beams) [mm]; 0 where nothing was in range, 1
+            where something was too near to measure. This array and the next three are omitted from files and from the digest
+            where they are empty
         scan_rows: the row of each scan (S,)
-        seen: what plans on the way were made around, as discs (K, 4): the row of the plan, x, y and radius [m], in the frame of
-            the estimated poses
-        tracks: the movers that a robot which looks for them with its lidar followed (K, 7): the row of the scan, the mover's
-            number in the order in which they were found, x, y [m], velocity along x and y [m/s] and radius [m], in the frame of
+        seen: the discs behind each replan (K, 4): the row of the plan, x, y and radius [m], in the frame of the estimates
+        tracks: the movers tracked by lidar (K, 7): the row of the scan, the mover's number in the order of detection, x, y [m],
+            velocity along x and y [m/s] and radius [m], in the frame of the estimates
             the estimated poses; left out as the three above are
-        record: everything else: scenario, plan and outcome
+        record: the scenario, the plan and the outcome
     """
 
     t: Floats
@@ -210,26 +208,26 @@ class Rollout:
 
     @property
     def digest(self) -> str:
-        """The SHA-256 of all that a repetition must reproduce: every array and the record without wall-clock times.
+        """SHA-256 of everything that a repetition must reproduce: the arrays, and the record without wall-clock times.
 
         For each array, in the order of this class, the hash takes the line "name dtype shape" and the bytes in C order;
-        at last the record's JSON text, without `digest` and `times`.
+        then the record's JSON text, without `digest` and `times`.
         """
         return self._hash(self.record.to_json(without=("digest", "times")))
 
     @property
     def drive_digest(self) -> str:
-        """The SHA-256 of what was driven, whatever it was driven with: every array, the outcome and the replans.
+        """SHA-256 of the robot's behaviour alone: every array, the outcome and the replans.
 
-        It is computed as `digest` is, with the record reduced to the keys `outcome` and `replans`. Two drives with other
-        settings or versions have the same one if the robot did the same, bit for bit.
+        It is computed as `digest`, with the record reduced to the keys `outcome` and `replans`. It is equal for drives with
+        different settings or versions if the robot did the same, bit for bit.
         """
         record = self.record
         others = [entry.name for entry in dataclasses.fields(record) if entry.name not in ("outcome", "replans")]
         return self._hash(record.to_json(without=others))
 
     def _hash(self, record: str) -> str:
-        """The SHA-256 of every array and of a JSON text."""
+        """Return the SHA-256 of every array and of a JSON text."""
         sha = hashlib.sha256()
         for name in self._written:
             array = np.ascontiguousarray(getattr(self, name))
@@ -240,11 +238,11 @@ class Rollout:
 
     @property
     def _written(self) -> tuple[str, ...]:
-        """The arrays that files and digests hold."""
+        """Names of the arrays in files and digests."""
         return ARRAYS + tuple(name for name in SENSED if np.size(getattr(self, name)))
 
     def legs(self) -> list[tuple[slice, Floats]]:
-        """The routes (N, 2) [m] that were followed, each with its rows: the first route, then one for each replan."""
+        """Return the followed routes (N, 2) [m] with their rows: the first route, then one per replan."""
         renewals = [replan for replan in self.record.replans if replan.solved]
         routes = [self.route, *(np.array(replan.route, dtype=np.float64) for replan in renewals)]
         begins = np.searchsorted(self.t, [replan.t - 1e-9 for replan in renewals]).tolist()
@@ -252,7 +250,7 @@ class Rollout:
         return [(slice(*rows), route) for rows, route in zip(ends, routes, strict=True)]
 
     def trajectories(self) -> Trajectories:
-        """The movers as functions of time, from the record's world and seed.
+        """Return the movers as functions of time, from the record's world and seed.
 
         Raises:
             InputError: a mover finds no free cell to start from.
@@ -261,18 +259,18 @@ class Rollout:
         return Trajectories.of(self.record.world, task.start[:2], self.record.seed)
 
     def save(self, path: str | Path) -> Path:
-        """Write the log with its digest, whole or not at all.
+        """Write the log with its digest, atomically.
 
         Args:
             path: the file to write, by custom with the suffix .npz
 
         Raises:
             InputError: the file cannot be written.
-            FieldError: the record holds what no log can, such as a world without a name.
+            FieldError: the record is invalid, such as a world without a name.
         """
         target = Path(path)
         text = dataclasses.replace(self.record, digest=self.digest).to_json()
-        DriveRecord.from_json(text)  # a log that could not be read again is not written
+        DriveRecord.from_json(text)  # a log must be readable
         with atomic_write(target) as temporary, temporary.open("wb") as file:
             np.savez_compressed(file, record=np.array(text), **{name: getattr(self, name) for name in self._written})
         return target
@@ -282,8 +280,8 @@ class Rollout:
         """Read a log.
 
         Raises:
-            InputError: there is no such file, it is not a rollout, it was written by a later version, or an array or
-                a key of the record is missing or impossible.
+            InputError: the file is missing or no rollout, a later version wrote it, or an array or a key of the record is missing
+                or invalid.
         """
         with guarded_log(path) as archive:
             there = [name for name in SENSED if f"{name}.npy" in archive.namelist()]
@@ -294,7 +292,7 @@ class Rollout:
         return loaded
 
     def problems(self) -> list[str]:
-        """What the arrays of no drive can look like: a sentence for each array of wrong shape or kind."""
+        """Return a sentence for each array of wrong shape, kind or value."""
         return list(self._array_problems())
 
     def _array_problems(self) -> Iterator[str]:
@@ -335,7 +333,7 @@ class Rollout:
             yield f"limiter: must hold indices into the {names} of record.limiters, found {self.limiter.max()}"
 
     def _scan_problems(self, rows: int) -> Iterator[str]:
-        """Scans of another number of beams than the robot has, or at no row of the log."""
+        """Yield errors of scans: wrong numbers of beams, or rows outside the log."""
         lidar, at = self.record.robot.lidar, self.scan_rows
         if len(self.scans) and (lidar is None or self.scans.shape[1:] != (lidar.beams,)):
             yield f"scans: must have the {lidar.beams if lidar else 0} beams of the robot's lidar, found {self.scans.shape}"
@@ -350,7 +348,7 @@ class Rollout:
                 yield f"{name}: must be at rows from 0 to {rows - 1}, in order"
 
     def _work_problems(self, rows: int) -> Iterator[str]:
-        """Too many distances to compute when the log is checked, or too many steps of wanderers, drawn one by one."""
+        """Yield errors of logs that are too expensive to check: too many distances, or too many steps of wanderers."""
         world = self.record.world
         things = len(world.obstacles) + len(world.movers)
         if rows * things > MAX_LOG_DISTANCES:
@@ -382,14 +380,14 @@ class Rollout:
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
 
 
-#: The names of the arrays that only logs of robots which use their lidar hold, in the order of the digest, after the others.
+#: Names of the arrays that only lidar logs hold, in the order of the digest, after the others.
 SENSED = ("scans", "scan_rows", "seen", "tracks")
-#: The names of the arrays of every log, in the order of the digest.
+#: Names of the arrays of every log, in the order of the digest.
 ARRAYS = tuple(name for name in FORMS if name not in SENSED)
 
 
 def read_record(path: str | Path) -> DriveRecord:
-    """The record of a log, without its arrays."""
+    """Read the record of a log, without its arrays."""
     with guarded_log(path) as archive:
         return _record_in(archive)
 
@@ -414,24 +412,25 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
     return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
 
 
-NOTHING, TOO_NEAR = 0, 1  # nothing was in range; something was nearer than the lidar measures
+NOTHING, TOO_NEAR = 0, 1  # codes for no hit in range, and for a hit too near to measure
 
 
 def millimetres(ranges: Floats) -> npt.NDArray[np.uint16]:
-    """Ranges as the log keeps them: 0 where nothing was in range, 1 where something was too near to measure."""
+    """Encode ranges for the log: 0 where nothing was in range, 1 where something was too near to measure."""
     missing = np.where(ranges < 0, TOO_NEAR, NOTHING)
     kept = np.where(np.isfinite(ranges), np.clip(np.round(ranges * 1000.0), TOO_NEAR + 1, 65535), missing)
     return kept.astype(np.uint16)
 
 
 def ranges_of(scans: npt.NDArray[np.uint16]) -> Floats:
-    """Ranges [m] out of a log, as the scanner gave them but for the rounding."""
+    """Decode logged ranges [m]."""
     ranges: Floats = np.where(scans == NOTHING, np.inf, np.where(scans == TOO_NEAR, -np.inf, scans / 1000.0))
     return ranges
 
 
 def scans_logged(taken: Iterable[tuple[int, Floats]], per_tick: int, rows: int) -> dict[str, npt.NDArray[np.generic]]:
-    """The arrays `scans` and `scan_rows` of a log."""
+    """Return the arrays `scans` and `scan_rows` of a log."""
+
     kept = [(tick * per_tick, ranges) for tick, ranges in taken if tick * per_tick < rows]
     return {
         "scans": millimetres(np.array([ranges for _, ranges in kept]) if kept else np.empty((0, 0))),

@@ -1,6 +1,6 @@
-"""What the scans of a log say: which ground was seen, and when each obstacle and mover first was, from the true poses.
+"""Visibility from a log's scans and true poses: observed ground, and the first sighting of obstacles and movers.
 
-The log alone is read, and no map is made, so that none of this depends on where the robot believed to be.
+Only the log is read, without mapping, so results do not depend on the robot's estimates.
 """
 
 from __future__ import annotations
@@ -19,46 +19,46 @@ from antdrive.sim.log import _kernels_sights as kernels
 from antdrive.sim.log.record import finite_or_none
 from antdrive.sim.log.rollout import Rollout, ranges_of
 
-PASSED = 0.5  # the robot passed what its surface came this near to [m]
-CELL = 0.1  # side of the cells in which seen ground is counted [m]
-MOST_CELLS = 4_000_000  # of those; in a larger world they are larger
-COUNTED_RATE = 10.0  # scans a second that seen ground is counted of [Hz]
-ROUNDING = 0.0015  # of a range in a log, and what is left over [m]
+PASSED = 0.5  # the robot passes objects within this distance of its surface [m]
+CELL = 0.1  # side of the cells of observed ground [m]
+MOST_CELLS = 4_000_000  # cell limit; larger worlds get larger cells
+COUNTED_RATE = 10.0  # scans per second that count for observed ground [Hz]
+ROUNDING = 0.0015  # rounding of logged ranges, with a reserve [m]
 
 
 class Beams(NamedTuple):
-    """A scan as it lay in the world."""
+    """Scan in the world frame."""
 
-    eye: Floats  # the lidar's true x, y [m] and yaw [rad] (3,)
-    first: float  # the direction of the first beam, from the lidar's heading [rad]
-    reaches: Floats  # how far each beam got (beams,) [m]: to what it met, or to the lidar's range
+    eye: Floats  # true pose of the lidar: x, y [m] and yaw [rad] (3,)
+    first: float  # direction of the first beam relative to the lidar's heading [rad]
+    reaches: Floats  # length of each beam (beams,) [m], up to a hit or the lidar's range
 
 
 class Sighting(NamedTuple):
-    """A cylinder or a mover, when it was first seen, and when the robot was nearest to it."""
+    """First sighting and nearest approach of a cylinder or mover."""
 
-    obstacle: int  # its place in `record.world.obstacles`; that of a mover in `record.world.movers`
-    seen_at: float  # when a beam first met it [s]; infinite if none did
-    seen_from: float  # how far its surface was from the footprint then [m]; not a number if it was never seen
-    nearest_at: float  # when the robot was nearest [s]
-    nearest: float  # how far the surface was from the footprint then [m]
-    touched: bool  # whether the robot touched it, or a mover touched the robot
+    obstacle: int  # index in `record.world.obstacles`, or for a mover in `record.world.movers`
+    seen_at: float  # time of the first hit [s]; infinite if never hit
+    seen_from: float  # distance of its surface from the footprint then [m]; nan if never hit
+    nearest_at: float  # time of the nearest approach [s]
+    nearest: float  # distance of its surface from the footprint then [m]
+    touched: bool  # whether the robot touched it, or a mover the robot
     mover: bool = False  # whether it is a mover
-    # when the robot first followed a mover, as far as `tracks` tell [s]; infinite if it never did
+    # time at which `tracks` first hold the mover [s]; infinite if never
     tracked_at: float = math.inf
 
     @property
     def passed(self) -> bool:
-        """Whether it was touched, or the robot came within 0.5 m of it."""
+        """Whether it was touched, or the robot came within 0.5 m."""
         return self.touched or self.nearest <= PASSED
 
     @property
     def name(self) -> str:
-        """What people call it."""
+        """Name in messages."""
         return f"{'mover' if self.mover else 'obstacle'} {self.obstacle}"
 
     def as_dict(self) -> dict[str, Any]:
-        """The sighting as plain values, for JSON; what never was is null."""
+        """Return the sighting as plain values, for JSON; infinite values are null."""
         return {
             "mover" if self.mover else "obstacle": self.obstacle,
             "seen_s": finite_or_none(self.seen_at),
@@ -71,7 +71,7 @@ class Sighting(NamedTuple):
 
 
 def lidar_of(rollout: Rollout) -> Lidar:
-    """The lidar that took a log's scans."""
+    """Return the lidar of a log's scans."""
     lidar = rollout.record.robot.lidar
     if lidar is None or not len(rollout.scans):
         raise ValueError("the log has no scans")
@@ -79,7 +79,7 @@ def lidar_of(rollout: Rollout) -> Lidar:
 
 
 def beams_of(rollout: Rollout, k: int) -> Beams:
-    """A scan of a log where it was taken."""
+    """Return a scan of a log in the world frame."""
     lidar, ranges = lidar_of(rollout), ranges_of(rollout.scans[k])
     reaches = np.where(np.isposinf(ranges), lidar.max_range, np.maximum(ranges, 0.0))
     x, y, yaw = rollout.pose[rollout.scan_rows[k]].tolist()
@@ -87,19 +87,19 @@ def beams_of(rollout: Rollout, k: int) -> Beams:
 
 
 def meet(rollout: Rollout, k: int, met: Floats) -> None:
-    """Note which cylinders a scan is the first to meet."""
+    """Note the cylinders that a scan hits first."""
     _meet(rollout, k, rollout.record.world.discs, met)
 
 
 def _meet(rollout: Rollout, k: int, discs: Floats, met: Floats) -> None:
-    """Note which discs (N, 3) a scan is the first to meet."""
+    """Note the discs (N, 3) that a scan hits first."""
     lidar, (eye, first, reaches) = lidar_of(rollout), beams_of(rollout, k)
     slack, now = 4 * lidar.sigma + lidar.resolution / 2 + ROUNDING, float(rollout.t[rollout.scan_rows[k]])
     kernels.first_meetings(eye, first, lidar.spacing, lidar.full_circle, reaches, discs, slack, now, met)
 
 
 def first_meetings(rollout: Rollout) -> Floats:
-    """When a beam first met each cylinder of `record.world.obstacles` (N,) [s]; infinite where none did."""
+    """Return the first hit of each cylinder of `record.world.obstacles` (N,) [s]; infinite where there is none."""
     met = np.full(len(rollout.record.world.obstacles), math.inf)
     for k in range(len(rollout.scans)):
         if np.isfinite(met).all():
@@ -109,34 +109,34 @@ def first_meetings(rollout: Rollout) -> Floats:
 
 
 def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
-    """First sight and nearest approach of every cylinder, those that the robot came nearest to first."""
+    """Return the sightings of all cylinders, nearest first."""
     touched = set(rollout.contacts[:, 1].astype(int).tolist())
-    found = [
+    cylinders = [
         _sighting(rollout, j, first, rollout.pose, disc, touched=j in touched)
         for j, (first, disc) in enumerate(zip(met.tolist(), rollout.record.world.discs, strict=True))
     ]
-    return sorted(found, key=lambda sight: (not sight.touched, sight.nearest))
+    return sorted(cylinders, key=lambda sight: (not sight.touched, sight.nearest))
 
 
 def mover_sightings(rollout: Rollout) -> list[Sighting]:
-    """First sight and nearest approach of every mover, in the order of the world."""
+    """Return the sightings of all movers, in the order of the world."""
     record, rows = rollout.record, rollout.scan_rows
     radii = np.array([mover.radius for mover in record.world.movers])
     met = np.full(len(radii), math.inf)
     for k, row in enumerate(rows.tolist()):
         _meet(rollout, k, np.column_stack((rollout.movers[row], radii)), met)
     touched = set((rollout.contacts[:, 1].astype(int) - len(record.world.obstacles)).tolist())
-    found = []
+    movers = []
     for j, (first, followed) in enumerate(zip(met.tolist(), tracked_rows(rollout), strict=True)):
         poses, disc = rollout.pose.copy(), np.array([0.0, 0.0, radii[j]])
-        poses[:, :2] -= rollout.movers[:, j]  # as the mover sees the robot
+        poses[:, :2] -= rollout.movers[:, j]  # relative to the mover
         at = float(rollout.t[followed[0]]) if len(followed) else math.inf
-        found.append(_sighting(rollout, j, first, poses, disc, touched=j in touched, mover=True, tracked_at=at))
-    return found
+        movers.append(_sighting(rollout, j, first, poses, disc, touched=j in touched, mover=True, tracked_at=at))
+    return movers
 
 
 def _sighting(rollout: Rollout, j: int, first: float, poses: Floats, disc: Floats, **more: Any) -> Sighting:
-    """What is first met at a time [s], if the robot's poses (T, 3) are seen from where a disc (3,) has its place."""
+    """Return a sighting, first hit at `first` [s], from the robot's poses (T, 3) relative to a disc (3,)."""
     shape, row, away = kernel_shape(rollout.record.robot.footprint), np.zeros(1, dtype=np.int64), np.empty(1)
 
     def approach(some: Floats) -> tuple[int, float]:
@@ -152,9 +152,9 @@ def _sighting(rollout: Rollout, j: int, first: float, poses: Floats, disc: Float
 
 
 def tracked_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
-    """The rows in which the middle of a track lay in each mover, in the order of the world.
+    """Return the rows with a track centred in each mover, in the order of the world.
 
-    Tracks lie in the frame of the estimated pose, so they are laid as they lay from the robot.
+    Tracks lie in the frame of the estimates and are transformed to the true poses.
     """
     rows = rollout.tracks[:, 0].astype(np.int64)
     believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
@@ -166,7 +166,7 @@ def tracked_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
 
 
 def passed(rollout: Rollout) -> list[Sighting]:
-    """What the robot touched or came within 0.5 m of, cylinders and movers, in the order in which it was nearest to them."""
+    """Return the sightings of touched or passed cylinders and movers, in the order of nearest approach."""
     if not len(rollout.scans):
         return []
     everything = sightings(rollout, first_meetings(rollout)) + mover_sightings(rollout)
@@ -177,10 +177,10 @@ def passed(rollout: Rollout) -> list[Sighting]:
 
 
 def seen_ground(rollout: Rollout) -> tuple[npt.NDArray[np.bool_], float]:
-    """Which cells of the ground within the walls the lidar saw (rows, cols), from the lower left on, and their side [m].
+    """Return the cells within the walls that the lidar observed (rows, cols), from the lower left, and their side [m].
 
-    A cell was seen if the beam that was nearest to its middle in direction got farther than the middle. Ten scans a second
-    count, and the last.
+    A cell is observed if the beam nearest to its centre in direction reached beyond the centre. Ten scans per second count,
+    and the last one.
     """
     lidar = lidar_of(rollout)
     x0, y0, x1, y1 = rollout.record.world.bounds

@@ -1,4 +1,4 @@
-"""Random numbers of a run: one seed, and a stream of its own for each purpose."""
+"""Random streams of a run: one seed, one stream per purpose."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ import numpy as np
 
 
 def random_stream(seed: int, purpose: str) -> np.random.Generator:
-    """The random stream of a purpose; another purpose's draws do not change it."""
+    """Return the random stream of a purpose; streams of different purposes are independent."""
     return np.random.default_rng([seed, zlib.crc32(purpose.encode())])
