@@ -175,7 +175,7 @@ def test_charts_are_svg_with_a_curve_for_each_planner(summary):
     charts = campaign_charts(summary, styles)
     assert [chart.title for chart in charts] == [
         "Performance profile: driven length", "Performance profile: planning time", "Distribution: duration",
-        "Distribution: planning time", "By size of the world: planning time", "By size of the world: gap to grid optimum",
+        "Distribution: planning time", "By world size: planning time", "By world size: gap to grid optimum",
         "ants by ants: planning time", "ants by ants: gap to grid optimum",
     ]  # fmt: skip
     for chart in charts:
@@ -195,7 +195,7 @@ def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths
     for areas, says in (([4.0, 9.0, 400.0], "area of the world"), ([4.0] * 3, "shortest path on the grid")):
         columns["area_m2"] = [areas[int(world[-1]) % 3] for world in columns["world"]]
         charts = campaign_charts(summarise(RunTable(columns), title="t", metrics=[]), label_styles("ab", "ab"))
-        (chart,) = (chart for chart in charts if chart.title.startswith("By size"))
+        (chart,) = (chart for chart in charts if chart.title.startswith("By world size"))
         assert f"by {says}" in chart.note
         assert "12 instances" in chart.note
         assert ("(4, 4, 4 from" in chart.note) == ("area" in says)

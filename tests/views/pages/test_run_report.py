@@ -185,7 +185,7 @@ def test_without_a_log_a_drive_is_a_claim(small_run, tmp_path):
     text = reported(tmp_path / "runs", tmp_path)
     assert "0 / 1" in text
     assert "succeeded, claimed" in text
-    assert "Claimed by result.json: there is no log." in text
+    assert "Claimed by result.json, without a log." in text
 
 
 def test_only_films_of_the_folder_and_of_this_log_are_shown(small_run, tmp_path):

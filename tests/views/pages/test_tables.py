@@ -70,7 +70,7 @@ def test_markdown_lists_failures_with_their_commands_and_stays_short(tmp_path):
     text = write_campaign_report(summary, tmp_path, tmp_path / "t.md")[0].read_text()
     assert len(text.encode()) < 60_000
     failed = int((~summary.table.success).sum())
-    assert f"## Runs that failed: {failed}" in text
+    assert f"## Failed runs: {failed}" in text
     assert f"{failed - 25} more are in the page." in text
     assert "```antdrive run `odd` | x```" in text
     assert "76 more rows are in the page" in text
@@ -88,7 +88,7 @@ def test_what_is_not_known_is_said(tmp_path):
         assert len(write_campaign_report(alone, tmp_path, tmp_path / f"t.{kind}")) == 1
     few = summarise(made_up_runs({"a": Skill(), "b": Skill(seeded=False)}, worlds=3, seeds=3), title="t")
     assert any("3 worlds are too few" in note for note in few.notes)
-    assert any("Drives of b repeat with other seeds." in note for note in few.notes)
+    assert any("Drives of b do not depend on the seed." in note for note in few.notes)
 
 
 def table_of(planners, worlds, seeds=4):
@@ -105,7 +105,7 @@ def table_of(planners, worlds, seeds=4):
 def test_too_few_worlds_for_so_many_pairs_are_said(planners, too_few, need, pairs, seeds):
     few, enough = table_of(planners, too_few, seeds), table_of(planners, need, seeds)
     (note,) = few.notes
-    assert note.startswith(f"{too_few} worlds are too few to tell {pairs} of planners apart: ")
+    assert note.startswith(f"{too_few} worlds are too few to distinguish {pairs} of planners: ")
     assert f"It takes {need} worlds" in note
     assert ("--against" in note) == (len(planners) > 2)
     assert {row.better for row in few.comparisons["duration_s"]} == {""}
@@ -132,7 +132,7 @@ def test_outcomes_are_counted_by_planner(summary):
 def test_the_headline_favours_no_planner_with_fewer_or_with_more_counted_runs():
     columns = made_up_columns({"A": Skill(1.0), "B": Skill(1.0, seeded=False)}, worlds=10, seeds=2)
     tied = {words: value for value, words in headline(summarise(RunTable(columns), title="t", metrics=[]))}
-    assert tied["runs succeeded, of all planners"] == "40"
+    assert tied["runs succeeded, over all planners"] == "40"
     (best,) = (words for words in tied if words.startswith("succeeded with"))
     assert best == "succeeded with every planner (95 % over worlds: 72.2 to 100.0)"
     hard = [world >= "world-005" for world in columns["world"]]
@@ -142,7 +142,7 @@ def test_the_headline_favours_no_planner_with_fewer_or_with_more_counted_runs():
     some = summarise(RunTable({n: [v[k] for k in kept] for n, v in columns.items()}), title="t", metrics=[], size=40)
     assert [value for value, words in headline(some) if words.startswith("succeeded with every planner")] == ["100.0 %"]
     assert (
-        "Shares are over the 10 instances that every planner ran. Runs elsewhere, left out of them: A 10." in some.notes
+        "Shares are over the 10 instances that every planner ran. Omitted runs of other instances: A 10." in some.notes
     )
     assert success_cells(some).headings[-2:] == ("runs", "elsewhere")
     assert [row[-1] for row in success_cells(some).rows] == ["10", "0"]
@@ -172,8 +172,8 @@ def test_settings_that_are_mixed_are_named_and_those_of_worlds_are_not():
     columns["margin"] = [0.03 + 0.001 * seed for seed in columns["seed"]]
     columns["robot_hash"] = [str(seed) for seed in columns["seed"]]
     assert summarise(RunTable(columns), title="t", metrics=[]).notes == [
-        "Shares and medians are over several values of noise (0, 1); --where noise=0 takes one.",
-        "Shares and medians are over several values of margin_asked (auto, 0.03); --where margin_asked=auto takes one.",
+        "Shares and medians are over several values of noise (0, 1); --where noise=0 selects one.",
+        "Shares and medians are over several values of margin_asked (auto, 0.03); --where margin_asked=auto selects one.",
     ]
 
 

@@ -1,1 +1,1 @@
-"""Pages and tables of results: some runs, or a campaign's planners compared."""
+"""Reports of runs and campaigns as pages and tables."""

@@ -1,4 +1,4 @@
-"""Reports and comparisons of campaigns: a page that works offline, Markdown for pull requests, LaTeX for papers, CSV."""
+"""Campaign reports: an offline page, Markdown for pull requests, LaTeX for papers, and CSV."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from antdrive.views.pages.tables import (
     write_latex,
 )
 
-MARKDOWN_ROWS = 60  # of a table
-MARKDOWN_FAILURES = 25  # that are listed
-#: The columns that a campaign's page shows, if there; a task and settings stand between them where they differ.
+MARKDOWN_ROWS = 60  # per table
+MARKDOWN_FAILURES = 25  # listed failures
+#: Columns of a campaign's page, if present; differing tasks and settings come between them.
 SHOWN = ("world", "planner", "outcome", "seed")
 MEASURED = ("plan_length_m", "driven_length_m", "duration_s", "min_clearance_m", "plan_s")
 SENTENCES = {
@@ -51,18 +51,18 @@ def summarise_campaign(
     where: Mapping[str, str] = MappingProxyType({}),
     strict: bool = False,
 ) -> CampaignSummary:
-    """Success of each planner and paired comparisons, from the runs that are done so far.
+    """Summarise a campaign's completed runs: success of each planner and paired comparisons.
 
     Args:
-        folder: the campaign's folder, or several: a planner that two of them ran under the same conditions is told apart by
-            its folder, as in "astar @today"
-        title: of the report; the folders' names without
-        metrics: to compare besides success; driven length, duration and planning time without
-        against: label of the planner that each other one is compared with; every pair without
-        planners: labels of those to look at; all without
-        allow: by how much a planner may be worse than `against` and still count as not worse, such as {"success": 0.02}
-        where: take only runs with these values, by column, such as {"noise": "1"}; also "0,1" and, for numbers, "10..20"
-        strict: refuse where no two planners can be compared, instead of saying so in the report
+        folder: the campaign's folder, or several; the folder's name distinguishes equal configurations of several folders, as
+            in "astar @today"
+        title: of the report; default: the folders' names
+        metrics: to compare besides success; default: driven length, duration and planning time
+        against: label of the planner to compare with all others; default: every pair
+        planners: labels of the planners to include; default: all
+        allow: largest acceptable loss against `against` to count as not worse, such as {"success": 0.02}
+        where: values of the runs to include, by column, such as {"noise": "1"}, "0,1" or, for numbers, "10..20"
+        strict: raise if no two planners can be compared, instead of a note in the report
 
     Raises:
         InputError: the folder holds no campaign, no finished run, or no such planner or metric.
@@ -92,21 +92,21 @@ def report_campaign(
     allow: Mapping[str, float] = MappingProxyType({}),
     where: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Path]:
-    """Write a report about a campaign: a page, or its tables.
+    """Write a campaign's report: a page, or its tables.
 
     Args:
-        folder: the campaign's folder, or several: a planner that two of them ran under the same conditions is told apart by
-            its folder, as in "astar @today"
+        folder: the campaign's folder, or several; the folder's name distinguishes equal configurations of several folders, as
+            in "astar @today"
         out: the file to write: .html, .md, .tex or .csv
-        title: of the report; the folders' names without
-        metrics: to compare besides success; driven length, duration and planning time without
-        against: label of the planner that each other one is compared with; every pair without
-        planners: labels of those to report about; all without
-        allow: by how much a planner may be worse than `against` and still count as not worse, such as {"success": 0.02}
-        where: take only runs with these values, by column, such as {"noise": "1"}; also "0,1" and, for numbers, "10..20"
+        title: of the report; default: the folders' names
+        metrics: to compare besides success; default: driven length, duration and planning time
+        against: label of the planner to compare with all others; default: every pair
+        planners: labels of the planners to include; default: all
+        allow: largest acceptable loss against `against` to count as not worse, such as {"success": 0.02}
+        where: values of the runs to include, by column, such as {"noise": "1"}, "0,1" or, for numbers, "10..20"
 
     Returns:
-        The files written; for .csv the second holds the pairs.
+        The written files; for .csv the second holds the pairs.
 
     Raises:
         InputError: the folder holds no campaign, no finished run, or no such planner or metric; another suffix.
@@ -120,12 +120,12 @@ def report_campaign(
 
 
 def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
-    """Write a report about a campaign in the format of the file's suffix."""
+    """Write a campaign's report in the format of the file's suffix."""
     return WRITERS[check_suffix(out)](summary, folder, out)
 
 
 def check_suffix(out: Path) -> str:
-    """The suffix of a report, checked before any work."""
+    """Return the suffix of a report; raise `InputError` if it is unknown."""
     return known_suffix(out, WRITERS)
 
 
@@ -167,7 +167,7 @@ def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]
 
 
 def campaign_data(table: RunTable, planners: Sequence[str], base: str) -> str:
-    """Return a campaign's runs as JSON that may stand in a script element."""
+    """Return a campaign's runs as JSON for a script element."""
     columns = [json_column(name, table.columns[name]) for name in table.columns if name != "command"]
     kept = [column for column in (*columns, {"name": "command", **_commands(table)}) if column is not None]
     axes = [name for name in ("folder", "task", *table.settings) if name not in HASHES]
@@ -186,7 +186,7 @@ def campaign_data(table: RunTable, planners: Sequence[str], base: str) -> str:
 
 
 def _commands(table: RunTable) -> dict[str, Any]:
-    """Commands, without the seed at their end where all have it there, so that they repeat."""
+    """Return the commands; a common final seed is dropped, so that equal commands are stored once."""
     commands: list[str | None] = list(table.columns.get("command", [None] * len(table)))
     tails = [f" --seed {seed}" for seed in table.texts("seed")]
     if all(command is None or command.endswith(tail) for command, tail in zip(commands, tails, strict=True)):

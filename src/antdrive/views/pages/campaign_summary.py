@@ -1,4 +1,4 @@
-"""What is said about a campaign, computed once for pages, tables and the terminal."""
+"""Campaign summary for pages, tables and the terminal."""
 
 from __future__ import annotations
 
@@ -32,48 +32,48 @@ from antdrive.views.pages.rendering import percent, percents
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
 TITLES = {"plan_s": "planning time", "drive_wall_s": "wall time of the drive", "path_length_m": "planned length"}
-UNITS = ("_rad_per_m", "_m", "_s")  # that the names of metrics end with
+UNITS = ("_rad_per_m", "_m", "_s")  # suffixes of metric names
 
 
 @dataclass(frozen=True, eq=False)
 class CampaignSummary:
-    """A campaign's runs and its two tables."""
+    """Summary of a campaign: its runs, success and comparisons."""
 
     title: str  # of the page
-    paired: PairedRuns  # the runs, by instance and planner
-    size: int  # how many runs of these planners the campaign has; fewer may be done
-    success: Sequence[PlannerSuccess]  # a row for each planner
-    # by measure, "success" first, a row for each pair of planners; empty with one planner
+    paired: PairedRuns  # runs by instance and planner
+    size: int  # number of the campaign's runs of these planners, including missing ones
+    success: Sequence[PlannerSuccess]  # one per planner
+    # one per pair of planners, by measure, "success" first; empty with one planner
     comparisons: Mapping[str, Sequence[PairedComparison]]
     common: int  # number of instances in which every planner succeeded
-    # by metric, the median of each planner over those instances, with its interval
+    # each planner's median over those instances with its interval, by metric
     medians: Mapping[str, Sequence[tuple[float, Interval]]]
-    refusal: str = ""  # why planners are not compared; empty where they are
-    # whether planners are not worse than one of them by more than was allowed; empty where that is not asked
+    refusal: str = ""  # why planners are not compared; empty if they are
+    # non-inferiority tests against the reference planner; empty unless requested
     allowances: Sequence[NonInferiority] = ()
 
     @property
     def table(self) -> RunTable:
-        """The runs."""
+        """Table of the runs."""
         return self.paired.table
 
     @property
     def notes(self) -> list[str]:
-        """What a reader of the tables must know about this campaign, a sentence each."""
-        found: list[str] = []
+        """Caveats of the tables, a sentence each."""
+        notes: list[str] = []
         if len(self.table) < self.size:
-            found.append(f"{self.size - len(self.table)} of {self.size} runs are not done yet.")
-        found += [*_shares(self), *_mixed(self), *_repeated(self.success)]
+            notes.append(f"{self.size - len(self.table)} of {self.size} runs are not done yet.")
+        notes += [*_shares(self), *_mixed(self), *_repeated(self.success)]
         if len(self.paired.worlds) == 1:
-            found.append("There is one world: the intervals and tests say nothing about other worlds.")
+            notes.append("There is one world: the intervals and tests do not extend to other worlds.")
         else:
-            found += _too_few_worlds(self.comparisons)
+            notes += _too_few_worlds(self.comparisons)
         if self.refusal:
-            found.append(f"Planners are not compared: {self.refusal}.")
-        return found + [price.sentence for price in prices(self.table) if price.unpaired < price.drives]
+            notes.append(f"Planners are not compared: {self.refusal}.")
+        return notes + [price.sentence for price in prices(self.table) if price.unpaired < price.drives]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
+        """Return plain values for JSON."""
         return {
             "runs": len(self.table),
             "size": self.size,
@@ -103,7 +103,7 @@ def summarise(
     allow: Mapping[str, float] = MappingProxyType({}),
     strict: bool = False,
 ) -> CampaignSummary:
-    """Compute a campaign's tables."""
+    """Compute a campaign's summary."""
     paired = PairedRuns.of(table, planners)
     table = paired.table
     chosen = list(metrics) if metrics is not None else known_metrics(paired, DEFAULT_METRICS)
@@ -130,23 +130,23 @@ def summarise(
 
 def _allowances(paired: PairedRuns, against: str | None, allow: Mapping[str, float]) -> list[NonInferiority]:
     if allow and against is None:
-        raise FieldError("allow", "needs a planner to compare with (against)")
-    found = []
+        raise FieldError("allow", "needs a reference planner; set against")
+    tests = []
     for name, allowed in allow.items():
         if name != SUCCESS and name not in METRICS:
             raise FieldError("allow", f"unknown {name!r}; choose from {', '.join([SUCCESS, *METRICS])}")
         better = "higher" if name == SUCCESS else METRICS[name].better
-        found += not_worse(paired, against or "", name, allowed, better)
-    return found
+        tests += not_worse(paired, against or "", name, allowed, better)
+    return tests
 
 
 def known_metrics(paired: PairedRuns, names: Sequence[str]) -> list[str]:
-    """Those of the metrics that some successful run has."""
+    """Return the metrics that at least one successful run has."""
     return [name for name in names if np.isfinite(paired.values(name)).any()]
 
 
 def measure_title(name: str) -> str:
-    """What a measure is called in headings, with its unit."""
+    """Return a measure's heading with its unit."""
     if name not in METRICS:
         return name.replace("_", " ")
     unit = METRICS[name].unit
@@ -155,23 +155,23 @@ def measure_title(name: str) -> str:
     return plain if unit == "1" else f"{plain} [{unit}]"
 
 
-NAMED = 3  # planners that a card names
-VALUES = 5  # of a setting that a note names
+NAMED = 3  # planners named in a card
+VALUES = 5  # values of a setting named in a note
 
 
 def headline(summary: CampaignSummary) -> list[tuple[str, str]]:
-    """The headline numbers, each with its meaning."""
+    """Return the headline numbers, each with its meaning."""
     table, paired, rows = summary.table, summary.paired, summary.success
     runs, good = sum(row.runs for row in rows), int(paired.success.sum())
     done = ("run" if runs == 1 else "runs") if runs >= summary.size else f"of {summary.size:,} runs done"
     died = sum(row.outcomes.get("crashed", 0) + row.outcomes.get("planner_fault", 0) for row in rows)
     return [
         (f"{runs:,}", done),
-        (f"{good:,}", "runs succeeded, of all planners" if len(rows) > 1 else "runs succeeded"),
+        (f"{good:,}", "runs succeeded, over all planners" if len(rows) > 1 else "runs succeeded"),
         *(_counted(len(paired.planners), "planner"), _counted(len(paired.worlds), "world")),
         _counted(len(set(table.texts("seed"))), "seed"),
         *([_best(rows, paired)] if paired.shared.any() else []),
-        *([(str(died), "ended by a crash or a planner's error")] if died else []),
+        *([(str(died), "crashes and planner errors")] if died else []),
     ]
 
 
@@ -180,9 +180,9 @@ def _counted(count: int, what: str) -> tuple[str, str]:
 
 
 def _best(rows: Sequence[PlannerSuccess], paired: PairedRuns) -> tuple[str, str]:
-    """The highest share of successes, and all planners that have it."""
-    share = max(row.fraction for row in rows)
-    best = [row for row in rows if row.fraction == share]
+    """Return the highest success rate and its planners."""
+    rate = max(row.fraction for row in rows)
+    best = [row for row in rows if row.fraction == rate]
     if len(best) == len(rows) > 1:
         names = "every planner"
     else:
@@ -191,37 +191,39 @@ def _best(rows: Sequence[PlannerSuccess], paired: PairedRuns) -> tuple[str, str]
     intervals = [row.across_worlds for row in best]
     wide = Interval(min(one.low for one in intervals), max(one.high for one in intervals))
     over = "over worlds" if len(paired.worlds) > 1 else "in this world"
-    most = ", the highest share" if len(best) < len(rows) else ""
-    return f"{percent(share)} %", f"succeeded with {names}{most} (95 % {over}: {percents(wide)})"
+    most = ", the highest rate" if len(best) < len(rows) else ""
+    return f"{percent(rate)} %", f"succeeded with {names}{most} (95 % {over}: {percents(wide)})"
 
 
 def _shares(summary: CampaignSummary) -> list[str]:
-    """Over which instances shares are taken, where planners ran different ones."""
+    """Return a note on the instances of the success rates if planners ran different ones."""
     paired = summary.paired
     shared = int(paired.shared.sum())
     if shared == len(paired.row):
         return []
     if not shared:
         return [
-            "No instance was run by every planner: each share is over its planner's own, and shares are not comparable."
+            "No instance was run by every planner: each share is over its planner's own instances; shares are not comparable."
         ]
     more = ", ".join(f"{row.planner} {row.elsewhere}" for row in summary.success if row.elsewhere)
-    return [f"Shares are over the {shared} instances that every planner ran. Runs elsewhere, left out of them: {more}."]
+    return [f"Shares are over the {shared} instances that every planner ran. Omitted runs of other instances: {more}."]
 
 
 def _mixed(summary: CampaignSummary) -> list[str]:
-    """Settings over several values of which shares and medians are taken."""
-    table, found = summary.table, []
+    """Return a note for each setting with several values in the success rates and medians."""
+    table, notes = summary.table, []
     worlds = table.texts("world")
     for name in table.settings:
         texts = table.texts(name)
         if name in HASHES or len(set(zip(worlds, texts, strict=True))) == len(set(worlds)):
-            continue  # the same everywhere, or different from world to world only
+            continue  # constant, or varying with the world only
         values = [_plain(text) for text in dict.fromkeys(texts)]
         some = ", ".join(value or "none" for value in values[:VALUES]) + (", …" if len(values) > VALUES else "")
         one = next(value for value in values if value)
-        found.append(f"Shares and medians are over several values of {name} ({some}); --where {name}={one} takes one.")
-    return found
+        notes.append(
+            f"Shares and medians are over several values of {name} ({some}); --where {name}={one} selects one."
+        )
+    return notes
 
 
 def _plain(text: str) -> str:
@@ -236,35 +238,35 @@ def _repeated(rows: Sequence[PlannerSuccess]) -> list[str]:
     if not still:
         return []
     return [
-        f"Drives of {', '.join(still)} repeat with other seeds. Repetitions count once, except in pairs with a planner whose "
-        "drives the seed changes; planning times are medians over them."
+        f"Drives of {', '.join(still)} do not depend on the seed. Repetitions count once, except in pairs with a planner whose "
+        "drives do; planning times are medians over repetitions."
     ]
 
 
 def _too_few_worlds(comparisons: Mapping[str, Sequence[PairedComparison]]) -> list[str]:
-    """Where the worlds are too few for any pair of planners to be told apart, whatever the runs give."""
+    """Return a note for measures with too few worlds to distinguish any pair of planners, whatever the results."""
     least: dict[tuple[int, int], list[str]] = {}
     for measure, rows in comparisons.items():
         if any(row.pairs for row in rows) and not any(_decidable(row, rows) for row in rows):
             place = max(row.worlds for row in rows), sum(row.pairs > 0 for row in rows)
             least.setdefault(place, []).append(measure)
-    found = []
+    notes = []
     for (worlds, pairs), measures in least.items():
         of = "" if len(measures) == len(comparisons) else f" by {', '.join(measures)}"
-        told = "a pair" if pairs == 1 else f"{pairs} pairs"
+        compared = "a pair" if pairs == 1 else f"{pairs} pairs"
         corrected = "" if pairs == 1 else " after Holm's correction"
         need = math.floor(1 + math.log2(pairs / ALPHA)) + 1
         fewer = "" if pairs == 1 else ", or fewer pairs (--against, --planner)"
-        found.append(
-            f"{worlds} {'world is' if worlds == 1 else 'worlds are'} too few to tell {told} of planners apart{of}: no p-value "
-            f"over worlds can be below {ALPHA:g}{corrected}. "
+        notes.append(
+            f"{worlds} {'world is' if worlds == 1 else 'worlds are'} too few to distinguish {compared} of planners{of}: "
+            f"no p-value over worlds can be below {ALPHA:g}{corrected}. "
             f"It takes {need} worlds{fewer}."
         )
-    return found
+    return notes
 
 
 def _decidable(row: PairedComparison, rows: Sequence[PairedComparison]) -> bool:
-    """Whether a pair's p-values could be below 0.05 if all of its runs agreed, corrected for all pairs of its table."""
+    """Return whether a pair's corrected p-values could be below 0.05 if all of its runs agreed."""
 
     def reached(units: int, tests: int) -> bool:
         return bool(units) and tests * max(2.0 ** (1 - units), 1 / (FLIPS + 1)) < ALPHA

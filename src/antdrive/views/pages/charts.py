@@ -1,4 +1,4 @@
-"""The charts of a campaign's page, as SVG whose colours follow the page: profiles, distributions and boxes."""
+"""Charts of a campaign's page as SVG in the page's colours: profiles, distributions and box plots."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from antdrive.views.colours import INK, MUTED, LabelStyle, hexed
 from antdrive.views.figures.canvas import new_figure, styled
 from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics, measure_title
 
-WORST = 10_000.0  # times the best value: the right end of a profile
+WORST = 10_000.0  # right end of a profile, as a multiple of the best value
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
-FEWEST = 3  # values that a box is drawn for
-MOST_PANELS = 24  # planners that boxes are drawn for
-MOST_DOTS = 60  # beyond the whiskers of a box
+FEWEST = 3  # values per box
+MOST_PANELS = 24  # planners with box plots
+MOST_DOTS = 60  # outliers per box
 BINS = 4  # groups of world sizes
-CURVE_POINTS = 400  # of a curve, at most
+CURVE_POINTS = 400  # per curve, at most
 PROFILED = ("driven_length_m", "plan_s")
 DISTRIBUTED = ("duration_s", "plan_s")
 BOXED = ("plan_s", "gap_to_grid_optimum")
-AREA, OPTIMUM = "area_m2", "grid_optimum_m"  # columns that tell a world's size; the second where areas do not differ
-#: Colours of the canvas's style, and the page's own by which they are replaced.
+AREA, OPTIMUM = "area_m2", "grid_optimum_m"  # columns of a world's size; the second if all areas are equal
+#: CSS variables that replace the colours of the canvas's style.
 PAGE_COLOURS = {hexed(INK): "--ink", hexed(MUTED): "--muted", "#aab2bf": "--axis", "#e6e9ee": "--line"}
 
 
 class Chart(NamedTuple):
-    """A chart of the page."""
+    """Chart of the page."""
 
-    title: str  # its heading
-    note: str  # what it shows, in a sentence
-    svg: str  # the picture
+    title: str  # heading
+    note: str  # caption
+    svg: str  # picture
 
 
 def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> list[Chart]:
-    """Every chart that the campaign has data for."""
+    """Return all charts for which the campaign has data."""
     paired = summary.paired
     whole = paired.counted(*range(len(paired.planners)))
     charts = []
@@ -69,24 +69,24 @@ def _profile(name: str, curves: Sequence[StepCurve], count: int, styles: Sequenc
         largest = max((float(curve.x[-1]) for curve in curves if len(curve.x)), default=1.0)
         top = min(max(largest * 1.05, 1.1), WORST)
         _steps(axes, curves, styles, 1.0, top, log=top > 4)
-        axes.set(xlabel=f"{_plain(name)}: times the best planner's", ylabel="share of instances")
+        axes.set(xlabel=f"{_plain(name)}, relative to the best planner", ylabel="fraction of instances")
 
     note = (
-        f"The share of {count} instances (world, task, settings, seed; repetitions once) that a planner solves at no more "
-        "than x times the least value that any planner reached there. Failures stay below. Higher is better."
+        f"Fraction of {count} instances (world, task, settings, seed; repetitions once) that a planner solves within x times "
+        "the best planner's value. Failures count as unsolved. Higher is better."
     )
     return Chart(f"Performance profile: {_plain(name)}", note, _drawn(draw, styles))
 
 
 def _distribution(name: str, curves: Sequence[StepCurve], count: int, styles: Sequence[LabelStyle]) -> Chart:
     def draw(axes: Any) -> None:
-        found = np.concatenate([curve.x for curve in curves])
-        low, high = float(found.min()), float(found.max())
+        values = np.concatenate([curve.x for curve in curves])
+        low, high = float(values.min()), float(values.max())
         log = low > 0 and high > 20 * low
         _steps(axes, curves, styles, low / 1.1 if log else 0.0, high * 1.05, log=log)
-        axes.set(xlabel=measure_title(name), ylabel="share of instances")
+        axes.set(xlabel=measure_title(name), ylabel="fraction of instances")
 
-    note = f"The share of {count} instances that a planner solves with at most x. Failures are never solved."
+    note = f"Fraction of {count} instances that a planner solves with at most x. Failures count as unsolved."
     return Chart(f"Distribution: {_plain(name)}", note, _drawn(draw, styles))
 
 
@@ -107,7 +107,7 @@ def _steps(
 
 
 def _thinned(x: Floats, share: Floats, low: float, high: float, log: bool) -> tuple[Floats, Floats]:
-    """A curve with at most `CURVE_POINTS` steps: the last of those that would share a pixel."""
+    """Thin a curve to at most `CURVE_POINTS` steps, keeping the last step per pixel."""
     if len(x) <= CURVE_POINTS:
         return x, share
     place = (np.log(x / low) / np.log(high / low)) if log else (x - low) / (high - low)
@@ -117,7 +117,7 @@ def _thinned(x: Floats, share: Floats, low: float, high: float, log: bool) -> tu
 
 
 def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[LabelStyle]) -> list[Chart]:
-    """Boxes over groups of worlds of like size, a panel for each planner, on instances that all planners solved."""
+    """Return box plots by world size, a panel per planner, over instances that all planners solved."""
     for column in (AREA, OPTIMUM):
         known = np.nan_to_num(paired.table.numbers(column), nan=-np.inf)
         sizes = np.where(paired.row >= 0, known[paired.row], -np.inf).max(axis=1)
@@ -136,34 +136,34 @@ def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[L
     size = "area of the world [m²]" if column == AREA else "shortest path on the grid [m]"
     note = (
         f"{measure_title(name)} by {size}, on the {int(common.sum())} instances that every planner solved ({counts} "
-        "from left to right). Box: quartiles and median; whiskers: within 1.5 times the box; dots: beyond."
+        "from left to right). Box: quartiles and median; whiskers: within 1.5 times the box; dots: outliers."
     )
     svg = _panels(groups, labels, list(paired.planners), styles, name, size)
-    return [Chart(f"By size of the world: {_plain(name)}", note, svg)]
+    return [Chart(f"By world size: {_plain(name)}", note, svg)]
 
 
 def _edges(sizes: Floats) -> Floats:
-    """Edges of up to `BINS` groups of like number, the last beyond the largest size."""
+    """Return the edges of up to `BINS` groups of equal number, the last beyond the largest size."""
     distinct = np.unique(sizes)
     if len(distinct) < 2:
         return distinct
     if len(distinct) <= BINS:
-        return np.append(distinct, distinct[-1])  # a group for each size
+        return np.append(distinct, distinct[-1])  # one group per size
     inner = np.unique(np.quantile(sizes, np.linspace(0, 1, BINS + 1)))
     return np.asarray(inner)
 
 
 def _option_boxes(paired: PairedRuns, styles: Sequence[LabelStyle]) -> list[Chart]:
-    """Boxes over the values of each option that a planner has several of, on instances that all of them solved."""
+    """Return box plots over each option with several values, over instances solved with all of them."""
     table, charts = paired.table, []
-    first = paired.row.max(axis=0)  # some row of each planner
+    first = paired.row.max(axis=0)  # one row per planner
     names = np.array(table.texts("planner_name"), dtype=object)[first]
     for column in sorted(name for name in table.columns if name.startswith("option.")):
         texts = np.array(table.texts(column), dtype=object)[first]
         for planner in dict.fromkeys(names):
             mine = [k for k in range(len(names)) if names[k] == planner and texts[k]]
             others = {_other_options(table, int(first[k]), column) for k in mine}
-            if len({texts[k] for k in mine}) > 1 and len(others) == 1:  # it alone differs
+            if len({texts[k] for k in mine}) > 1 and len(others) == 1:  # no other option differs
                 mine.sort(key=lambda k: _natural(texts[k]))
                 charts += _boxes_of_option(paired, planner, column, mine, [texts[k] for k in mine], styles)
     return charts
@@ -176,15 +176,15 @@ def _boxes_of_option(
     common = paired.success[:, mine].all(axis=1) & paired.counted(*mine)
     charts = []
     for name in known_metrics(paired, BOXED):
-        found = [paired.values(name)[common, k] for k in mine]
+        boxes = [paired.values(name)[common, k] for k in mine]
         if common.sum() < FEWEST:
             continue
 
-        def draw(axes: Any, name: str = name, found: list[Floats] = found) -> None:
-            _draw_boxes(axes, found, [styles[k].light for k in mine])
+        def draw(axes: Any, name: str = name, boxes: list[Floats] = boxes) -> None:
+            _draw_boxes(axes, boxes, [styles[k].light for k in mine])
             axes.set(xlabel=option, ylabel=measure_title(name))
             axes.set_xticks(range(1, len(values) + 1), values)
-            _value_scale(axes, np.concatenate(found))
+            _value_scale(axes, np.concatenate(boxes))
 
         note = f"{measure_title(name)} of {planner} on the {int(common.sum())} instances solved with every {option}."
         charts.append(Chart(f"{planner} by {option}: {_plain(name)}", note, _drawn(draw, styles)))
@@ -204,7 +204,7 @@ def _panels(
     name: str,
     size: str,
 ) -> str:
-    """A small chart of boxes for each planner, all with the same axes."""
+    """Return a small box plot per planner, all with the same axes."""
     shown = min(len(planners), MOST_PANELS)
     columns = min(3, shown)
     rows = math.ceil(shown / columns)
@@ -219,8 +219,8 @@ def _panels(
                 continue
             _draw_boxes(axes, groups[k], [styles[k].light] * len(labels))
             axes.set_title(planners[k], fontsize=7.5, weight="normal", color=styles[k].light)
-        found = np.concatenate([np.concatenate(group) for group in groups[:shown]])
-        _value_scale(grid.flat[0], found, steps=(1, 3))
+        everything = np.concatenate([np.concatenate(group) for group in groups[:shown]])
+        _value_scale(grid.flat[0], everything, steps=(1, 3))
         for k, axes in enumerate(grid.flat[:shown]):
             axes.set_xticks(range(1, len(labels) + 1), labels)
             axes.tick_params(axis="x", labelsize=6, labelbottom=k + columns >= shown)
@@ -247,7 +247,7 @@ def _draw_boxes(axes: Any, groups: Sequence[Floats], colours: Sequence[str]) -> 
 
 
 def _value_scale(axes: Any, values: Floats, steps: tuple[float, ...] = ()) -> None:
-    """A logarithmic axis where the values span more than a factor of 20; `steps`: ticks of a decade."""
+    """Set a logarithmic axis if the values span more than a factor of 20; `steps`: ticks per decade."""
     low, high = float(values.min()), float(values.max())
     if low > 0 and high > 20 * low:
         axes.set_yscale("log")
@@ -255,7 +255,7 @@ def _value_scale(axes: Any, values: Floats, steps: tuple[float, ...] = ()) -> No
 
 
 def _plain_ticks(axis: Any, low: float, high: float, steps: tuple[float, ...] = ()) -> None:
-    """Ticks of a logarithmic axis as plain numbers."""
+    """Label the ticks of a logarithmic axis with plain numbers."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
     decades = math.log10(high / low)
@@ -279,7 +279,7 @@ def _drawn(draw: Any, styles: Sequence[LabelStyle]) -> str:
 
 
 def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:
-    """A figure as an SVG element without a size of its own; its colours are variables of the page."""
+    """Return a figure as an SVG element without a fixed size, in the page's colour variables."""
     content = io.StringIO()
     figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
     text = content.getvalue()
@@ -287,9 +287,9 @@ def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:
     text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r' id="planner-(\d+)"', r' class="planner-\1"', text)
-    text = re.sub(r' id="\w+_\d+"', "", text)  # would be there once for each chart
+    text = re.sub(r' id="\w+_\d+"', "", text)  # ids would repeat in every chart
     colours = {style.light: f"--planner-{k}" for k, style in enumerate(styles)} | PAGE_COLOURS
-    return re.sub("#[0-9a-f]{6}", lambda found: f"var({colours[found[0]]})" if found[0] in colours else found[0], text)
+    return re.sub("#[0-9a-f]{6}", lambda match: f"var({colours[match[0]]})" if match[0] in colours else match[0], text)
 
 
 def _plain(name: str) -> str:
@@ -301,7 +301,7 @@ def _round(value: float) -> str:
 
 
 def _natural(text: str) -> tuple[int, float, str]:
-    """A key that sorts numbers by value and before other texts."""
+    """Return a key that sorts numbers by value and before other texts."""
     try:
         return 0, float(text), text
     except ValueError:

@@ -1,4 +1,4 @@
-"""How pages are written: values as text, runs as JSON, and the templates of pages and of their Markdown."""
+"""Rendering of pages: values as text, runs as JSON, and templates."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from urllib.parse import quote
 from antdrive.runs.statistics.intervals import Interval
 
 NONE = "–"
-LONGEST = 200  # characters of a text
+LONGEST = 200  # characters per text
 
 
 class TextTable(NamedTuple):
-    """A table of text."""
+    """Table of text."""
 
-    title: str  # what it shows
-    headings: tuple[str, ...]  # of its columns
-    rows: list[tuple[str, ...]]  # its cells
+    title: str
+    headings: tuple[str, ...]  # of the columns
+    rows: list[tuple[str, ...]]  # cells
 
 
-def percent(share: float) -> str:
-    """A share in percent, with one digit; 100.0 and 0.0 only where they are exact."""
-    if math.isnan(share):
+def percent(fraction: float) -> str:
+    """Format a fraction in percent with one digit; 100.0 is exact."""
+    if math.isnan(fraction):
         return NONE
-    shown = f"{100 * share + 0.0:.1f}"
-    if shown == "100.0" and share < 1:
-        return f"{math.floor(10_000 * share) / 100:.2f}"
+    shown = f"{100 * fraction + 0.0:.1f}"
+    if shown == "100.0" and fraction < 1:
+        return f"{math.floor(10_000 * fraction) / 100:.2f}"
     return "0.0" if shown == "-0.0" else shown
 
 
 def percents(interval: Interval) -> str:
-    """An interval of shares in percent."""
+    """Format an interval of fractions in percent."""
     return NONE if math.isnan(interval.low) else f"{percent(interval.low)} to {percent(interval.high)}"
 
 
 def short(value: float) -> str:
-    """A number with three significant digits."""
+    """Format a number with three significant digits."""
     if not math.isfinite(value):
         return NONE if math.isnan(value) else "∞"
     if value == 0:
@@ -54,30 +54,30 @@ def short(value: float) -> str:
 
 
 def with_interval(value: float, interval: Interval) -> str:
-    """A number with its interval in brackets."""
+    """Format a number with its interval in brackets."""
     return f"{short(value)} ({short(interval.low)} to {short(interval.high)})"
 
 
 def probability(p: float) -> str:
-    """A p-value."""
+    """Format a p-value."""
     if math.isnan(p):
         return NONE
     return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
 def number(value: Any) -> float | None:
-    """Return a finite number; None for anything else."""
+    """Return a finite number as a float; None for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     try:
-        found = float(value)
+        converted = float(value)
     except OverflowError:
         return None
-    return found if math.isfinite(found) else None
+    return converted if math.isfinite(converted) else None
 
 
 def shown(value: Any, longest: int = LONGEST) -> str:
-    """A value as text on one line of printable characters, cut to a length."""
+    """Format a value as one line of printable characters, cut to a length."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None:
@@ -90,7 +90,7 @@ def shown(value: Any, longest: int = LONGEST) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
-SIGNIFICANT = 6  # digits of numbers in the page
+SIGNIFICANT = 6  # significant digits of numbers in a page
 
 
 def page_data(
@@ -101,7 +101,7 @@ def page_data(
     planners: Sequence[str],
     **more: Any,
 ) -> str:
-    """Return the runs of a page as JSON that may stand in a script element."""
+    """Return the runs of a page as JSON for a script element."""
     data = {
         "rows": len(good),
         "planners": list(planners),
@@ -116,7 +116,7 @@ def page_data(
 
 
 def json_column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
-    """Return a column by its kind: numbers, or texts; None if it is empty."""
+    """Return a column as numbers or texts; None if it is empty."""
     if all(value is None for value in values):
         return None
     if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
@@ -125,7 +125,7 @@ def json_column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
 
 
 def json_texts(values: Sequence[str | None]) -> dict[str, Any]:
-    """Return texts, or the different ones and the place of each row's text among them."""
+    """Return texts, or the distinct texts and each row's index among them."""
     different = {value: k for k, value in enumerate(dict.fromkeys(value for value in values if value is not None))}
     if len(different) == len(values):
         return {"texts": list(values)}
@@ -141,7 +141,7 @@ def _number(value: Any) -> float | int | None:
     return int(rounded) if rounded.is_integer() and abs(rounded) < 1e15 else rounded
 
 
-#: Parts of a page or of its Markdown that not every one has.
+#: Defaults of the optional parts of a page.
 NO_PARTS: Mapping[str, Any] = MappingProxyType(
     {
         **dict.fromkeys(("notes", "success", "pairs", "charts", "planners", "styles", "runs", "column_notes"), ()),
@@ -166,7 +166,7 @@ def rendered(template: str, **content: Any) -> str:
 
 
 def link_to(path: Path, base: Path) -> str:
-    """The path of a file relative to the page's folder, quoted for a URL."""
+    """Return a file's path relative to the page's folder, quoted for a URL."""
     return quote(Path(os.path.relpath(path.resolve(), base.resolve())).as_posix())
 
 

@@ -1,4 +1,4 @@
-"""The runs of a report, read from folders that `antdrive run --out` wrote, as text and numbers for the page."""
+"""Runs of a report, from Python or from folders, as text and numbers for the page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from antdrive.sim.verifying import false_claims, logged_settings, read_result
 from antdrive.views.pages.rendering import NONE, TextTable, number, shown
 
 LONGEST_COMMAND = 4000  # characters
-UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs that have no log
+UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs without a log
 CONTACT = (Outcome.COLLIDED.key, Outcome.INVALID_PLAN.key)  # outcomes with a red badge
 CLAIMED = (
     *("smoothing", "noise", "margin_m", "margin_auto", "cell_m", "physics_hz", "control_hz", "time_limit_s"),
@@ -29,7 +29,7 @@ CLAIMED = (
 )
 REQUIRED = ("world", "planner", "robot", "seed", "outcome")  # keys of result.json
 
-#: Measured columns: the heading, and the digits after the point.
+#: Measured columns: heading and decimal places.
 MEASURED: Mapping[str, tuple[str, int]] = MappingProxyType(
     {
         "path_length_m": ("path [m]", 2),
@@ -41,7 +41,7 @@ MEASURED: Mapping[str, tuple[str, int]] = MappingProxyType(
         "planning_ms": ("planning [ms]", 2),
     }
 )
-#: Headings of the settings that get a column where they differ between the runs, by their keys in result.json.
+#: Headings of settings that get a column if they differ between runs, by their keys in result.json.
 SETTINGS: Mapping[str, str] = MappingProxyType(
     {
         "options": "options",
@@ -56,84 +56,84 @@ SETTINGS: Mapping[str, str] = MappingProxyType(
         "explored_m2": "explored [m²]",
     }
 )
-WORDS = ("world", "planner", "outcome", "robot", "options", "route", "map", "pose by")  # headings of texts
+WORDS = ("world", "planner", "outcome", "robot", "options", "route", "map", "pose by")  # headings of text columns
 EXPLORED = "explored_m2"
-SENSED = {"map": "given", "localisation": "fixes"}  # unless the log says otherwise
-LISTED_SIGHTS = 40  # of the cylinders that a robot passed those that it came nearest to
+SENSED = {"map": "given", "localisation": "fixes"}  # defaults
+LISTED_SIGHTS = 40  # cylinders with the closest approaches
 
-#: What the less obvious columns mean.
+#: Meaning of the less obvious columns.
 COLUMN_NOTES = tuple(
     {
         "path": "length of the planned path, before smoothing",
-        "gap": "how much longer the smoothed route is than the shortest path among the inflated obstacles; only with the map",
+        "gap": "excess length of the smoothed route over the shortest path around the no-go area; only with a map",
         "min clearance": "smallest distance to an obstacle at any logged pose",
-        "planning": "wall time of the plan, with the kernels loaded",
-        "explored": "ground that the lidar of a robot without a map saw, near or far; on the robot's own map there is less",
-        "proved": "distance that the certificate guarantees between logged poses, too",
+        "planning": "wall time of planning, with loaded kernels",
+        "explored": "area scanned by a mapless robot's lidar at any range; its occupancy map covers less",
+        "proved": "clearance guaranteed by the certificate, including between logged poses",
     }.items()
 )
 
 
 @dataclass(frozen=True)
 class Attachment:
-    """A film, figure or file of a run."""
+    """Film, figure or file of a run."""
 
-    name: str  # the file's name
-    source: str  # a path relative to the page, or a data URI with the content
-    is_video: bool = False  # it needs a video element; other films are animated images
-    caption: str = ""  # what the figure shows
+    name: str  # file name
+    source: str  # path relative to the page, or data URI
+    is_video: bool = False  # whether it needs a video element; other films are animated images
+    caption: str = ""  # of a figure
     width: int = 0  # of an embedded figure [px]
     height: int = 0  # of an embedded figure [px]
 
 
 @dataclass(frozen=True)
 class LogFacts:
-    """What the log of a run says."""
+    """Facts of a run's log."""
 
     record: DriveRecord  # the log's record
-    certificate: Certificate  # the log's, computed for the report
-    metrics: Mapping[str, float]  # the log's metrics by name
-    sights: tuple[Sighting, ...]  # the cylinders and movers that a robot with a lidar passed
-    scans: int  # how many scans the log holds
+    certificate: Certificate  # computed for the report
+    metrics: Mapping[str, float]  # by name
+    sights: tuple[Sighting, ...]  # cylinders and movers passed by a robot with a lidar
+    scans: int  # number of scans
     digest: str  # of the log's content
-    settings: Mapping[str, Any]  # the log's settings by the keys of result.json
-    contradictions: tuple[str, ...]  # what result.json says otherwise, a sentence each
+    settings: Mapping[str, Any]  # by the keys of result.json
+    contradictions: tuple[str, ...]  # contradictions by result.json, a sentence each
 
 
 @dataclass
 class ReportedRun:
-    """A run as the report's templates show it: from its log alone, and as a claim of result.json where there is none."""
+    """Run in the report's templates: from its log alone, or as claims of result.json without a log."""
 
-    folder: Path | None  # where the run's files are; None for a run made in Python
-    result: Mapping[str, Any]  # the content of result.json
-    log: LogFacts | None  # what the log says; None if there is none
-    number: int  # its place among the runs of the report
+    folder: Path | None  # folder of the run's files; None for a run from Python
+    result: Mapping[str, Any]  # content of result.json
+    log: LogFacts | None  # facts of the log, if any
+    number: int  # index in the report
     figures: list[Attachment] = field(default_factory=list)  # embedded figures
     films: list[Attachment] = field(default_factory=list)  # films, embedded or linked
     links: list[Attachment] = field(default_factory=list)  # files beside the page
     pictures: list[Attachment] = field(default_factory=list)  # figures beside the page, for the Markdown report
-    # settings that differ between the runs, as shown, by the keys of `SETTINGS`
+    # text of the settings that differ between runs, by the keys of `SETTINGS`
     differing: dict[str, str] = field(default_factory=dict)
     world: str = field(init=False)  # the world's name
     planner: str = field(init=False)  # the planner's name
     robot: str = field(init=False)  # the robot's name
     seed: str = field(init=False)  # the random seed
-    reason: str = field(init=False)  # what the outcome leaves open
-    command: str = field(init=False)  # the command that repeats the run, as result.json claims it
+    reason: str = field(init=False)  # of the outcome
+    command: str = field(init=False)  # command that repeats the run, as claimed by result.json
 
     def __post_init__(self) -> None:
         names = {key: self.result.get(key) for key in ("world", "planner", "robot", "seed", "reason")}
         if self.log is not None:
             r = self.log.record
-            found = (r.task.world.name, r.planner.name, r.robot.name, r.seed, r.reason)
-            names = dict(zip(names, found, strict=True))
+            logged = (r.task.world.name, r.planner.name, r.robot.name, r.seed, r.reason)
+            names = dict(zip(names, logged, strict=True))
         self.world, self.planner, self.robot, self.seed = (shown(names[key]) for key in list(names)[:4])
         self.reason = shown(names["reason"] or "")
         self.command = shown(self.result.get("command") or "", LONGEST_COMMAND)
 
     @property
     def claimed(self) -> bool:
-        """Whether only result.json says that the robot drove."""
+        """Whether result.json claims a drive without a log."""
         return self.log is None and self.result["outcome"] not in UNDRIVEN
 
     @property
@@ -165,39 +165,39 @@ class ReportedRun:
 
     @property
     def problems(self) -> list[str]:
-        """Why the drive is not certified, and where result.json contradicts the log, a sentence each."""
+        """Problems of the certificate and contradictions by result.json, a sentence each."""
         return [*self.log.certificate.problems, *self.log.contradictions] if self.log else []
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """The log's settings by the keys of result.json, or those that result.json claims."""
+        """Settings of the log, or those claimed by result.json, by its keys."""
         return self.log.settings if self.log else self.result
 
     @property
     def faults(self) -> list[str]:
-        """Why the test failed that drove the run, as result.json claims it, a sentence each; empty where no test did."""
+        """Failures of the run's test, as claimed by result.json, a sentence each; empty without a test."""
         claimed = self.result.get("faults")
         return [shown(text, LONGEST_COMMAND) for text in claimed] if isinstance(claimed, list) else []
 
     @property
-    def verdict(self) -> str:
+    def certificate_sentence(self) -> str:
         """The certificate as a sentence."""
         if self.log is None:
-            return "Claimed by result.json: there is no log." if self.claimed else "The robot did not drive."
+            return "Claimed by result.json, without a log." if self.claimed else "The robot did not drive."
         certificate = self.log.certificate
         if not certificate.certified:
             return "Not certified collision-free."
-        verdict = certificate.statement[:1].upper() + certificate.statement[1:]
-        return f"{verdict}: at least {certificate.bound:.4f} m of clearance, between logged poses, too."
+        statement = certificate.statement[:1].upper() + certificate.statement[1:]
+        return f"{statement}: at least {certificate.bound:.4f} m of clearance, including between logged poses."
 
     @property
     def heading(self) -> dict[str, str]:
-        """What tells the run from the others, by the keys of `SETTINGS`: settings, not what came of them."""
+        """Settings that distinguish the run from others, by the keys of `SETTINGS`, without results."""
         return {key: value for key, value in self.differing.items() if value and key != EXPLORED}
 
     @property
     def metrics(self) -> Mapping[str, Any]:
-        """The log's metrics, or those that result.json claims."""
+        """Metrics of the log, or those claimed by result.json."""
         if self.log is not None:
             return self.log.metrics
         claimed = self.result.get("metrics")
@@ -205,13 +205,13 @@ class ReportedRun:
 
     @property
     def measured(self) -> dict[str, float | None]:
-        """The values of the columns `MEASURED`."""
-        found = {key: number(self.metrics.get(key)) for key in MEASURED}
+        """Values of the columns `MEASURED`."""
+        values = {key: number(self.metrics.get(key)) for key in MEASURED}
         gap, planning = number(self.metrics.get("gap_to_euclidean_optimum")), number(self.metrics.get("plan_s"))
-        found["gap_percent"] = None if gap is None else 100 * gap
-        found["proved_m"] = number(self.log.certificate.bound) if self.log else None
-        found["planning_ms"] = None if planning is None else 1000 * planning
-        return found
+        values["gap_percent"] = None if gap is None else 100 * gap
+        values["proved_m"] = number(self.log.certificate.bound) if self.log else None
+        values["planning_ms"] = None if planning is None else 1000 * planning
+        return values
 
     @property
     def details(self) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -232,7 +232,7 @@ class ReportedRun:
         certificate = {k: v for k, v in self.log.certificate.as_dict().items() if k != "problems"}
         return [
             ("Metrics", _pairs(self.metrics)),
-            ("First sight of what was passed", _sight_pairs(self.log.sights)),
+            ("First detections and closest approaches", _sight_pairs(self.log.sights)),
             ("Certificate", _pairs(certificate)),
             ("Planner", _pairs(record["planner"]["settings"])),
             ("Controller", _pairs(record["controller"]["settings"])),
@@ -242,7 +242,7 @@ class ReportedRun:
 
 
 def find_runs(folder: Path) -> Iterator[ReportedRun]:
-    """The runs in a folder and below, in the order of their paths."""
+    """Yield the runs below a folder, sorted by path."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     for place, path in enumerate(sorted(folder.rglob("result.json"))):
@@ -256,7 +256,7 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
 
 
 def log_facts(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts:
-    """What a log says, computed from the log alone, and what the result beside it says otherwise."""
+    """Compute the facts of a log, and the contradictions by the result beside it."""
     try:
         certificate, metrics, digest = certify(rollout), measure(rollout), rollout.digest
         sights = tuple(passed(rollout))
@@ -268,16 +268,13 @@ def log_facts(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFact
 
 
 def reported_run(run: Run) -> ReportedRun:
-    """A run made in Python, as reports show it. Its log is certified again."""
+    """Return a run from Python for a report; its log is certified again."""
     result, name = run.as_dict(), run.scenario.task.world.name
     return ReportedRun(None, result, None if run.rollout is None else log_facts(run.rollout, result, name), 0)
 
 
 def note_differences(runs: Sequence[ReportedRun]) -> None:
-    """Fill `differing` of every run.
-
-    Options are compared between the runs of one planner: those of different planners differ anyway.
-    """
+    """Fill `differing` of every run. Options are compared between runs of the same planner."""
     for key in SETTINGS:
         texts = _option_texts(runs) if key == "options" else [_setting_text(run, key) for run in runs]
         if len(set(texts)) > 1 or (key == EXPLORED and texts[0]):
@@ -287,7 +284,7 @@ def note_differences(runs: Sequence[ReportedRun]) -> None:
 
 def run_columns(runs: Sequence[ReportedRun]) -> dict[str, list[Any]]:
     """Return the values of the page's columns by name."""
-    found: dict[str, list[Any]] = {
+    columns: dict[str, list[Any]] = {
         "world": [run.world for run in runs],
         "planner": [run.planner for run in runs],
         "outcome": [run.ended for run in runs],
@@ -296,12 +293,12 @@ def run_columns(runs: Sequence[ReportedRun]) -> dict[str, list[Any]]:
         "seed": _numeric([run.seed for run in runs]),
         "reason": [run.reason or None for run in runs],
     }
-    found |= {key: _numeric([run.differing[key] for run in runs]) for key in runs[0].differing}
-    return found | {key: [run.measured[key] for run in runs] for key in MEASURED}
+    columns |= {key: _numeric([run.differing[key] for run in runs]) for key in runs[0].differing}
+    return columns | {key: [run.measured[key] for run in runs] for key in MEASURED}
 
 
 def _numeric(texts: list[str]) -> list[Any]:
-    """The texts as numbers, None for an empty one, if all of them are numbers; as they are otherwise."""
+    """Convert texts to numbers, empty ones to None, if all are numeric; else return them unchanged."""
     try:
         return [None if text == "" else float(text) for text in texts]
     except ValueError:
@@ -323,8 +320,8 @@ def run_table(runs: Sequence[ReportedRun]) -> TextTable:
 
 def _setting_text(run: ReportedRun, key: str) -> str:
     if key == EXPLORED:
-        found = number(run.metrics.get(key))
-        return "" if found is None else f"{found:.1f}"
+        area = number(run.metrics.get(key))
+        return "" if area is None else f"{area:.1f}"
     if key in SENSED:
         settings = run.result.get("settings")
         claimed = settings.get(key) if isinstance(settings, Mapping) else None
@@ -335,31 +332,33 @@ def _setting_text(run: ReportedRun, key: str) -> str:
 
 
 def _option_texts(runs: Sequence[ReportedRun]) -> list[str]:
-    """For each run its options that differ between the runs of its planner, such as "ants 50"."""
-    seen: dict[str, dict[str, set[str]]] = {}
-    found = []
+    """Return each run's options that differ between runs of its planner, such as "ants 50"."""
+    values: dict[str, dict[str, set[str]]] = {}
+    chosen = []
     for run in runs:
         claimed = run.settings.get("options")
         options = {shown(k, 40): shown(v, 40) for k, v in claimed.items()} if isinstance(claimed, Mapping) else {}
-        found.append(options)
+        chosen.append(options)
         for key, value in options.items():
-            seen.setdefault(run.planner, {}).setdefault(key, set()).add(value)
+            values.setdefault(run.planner, {}).setdefault(key, set()).add(value)
     return [
-        ", ".join(f"{key} {value}" for key, value in sorted(options.items()) if len(seen[run.planner][key]) > 1)
-        for run, options in zip(runs, found, strict=True)
+        ", ".join(f"{key} {value}" for key, value in sorted(options.items()) if len(values[run.planner][key]) > 1)
+        for run, options in zip(runs, chosen, strict=True)
     ]
 
 
 def _sight_pairs(sights: Sequence[Sighting]) -> list[tuple[str, str]]:
-    """When each cylinder was first seen and how near the robot came, those that it came nearest to, in the order of time."""
+    """Return first detection and closest approach of the nearest objects, sorted by time."""
     nearest = sorted(sights, key=lambda sight: (not sight.touched, sight.nearest))[:LISTED_SIGHTS]
-    found = []
+    pairs = []
     for sight in sorted(nearest, key=lambda sight: sight.nearest_at):
-        seen = f"seen {sight.seen_at:.2f} s, {sight.seen_from:.2f} m" if math.isfinite(sight.seen_at) else "never seen"
-        followed = f"followed {sight.tracked_at:.2f} s; " if math.isfinite(sight.tracked_at) else ""
-        came = f"{'touched' if sight.touched else 'nearest'} {sight.nearest_at:.2f} s, {sight.nearest:.2f} m"
-        found.append((sight.name, f"{seen}; {followed}{came}"))
-    return found
+        seen = (
+            f"detected {sight.seen_at:.2f} s, {sight.seen_from:.2f} m" if math.isfinite(sight.seen_at) else "undetected"
+        )
+        tracked = f"tracked {sight.tracked_at:.2f} s; " if math.isfinite(sight.tracked_at) else ""
+        came = f"{'contact' if sight.touched else 'closest'} {sight.nearest_at:.2f} s, {sight.nearest:.2f} m"
+        pairs.append((sight.name, f"{seen}; {tracked}{came}"))
+    return pairs
 
 
 def _pairs(values: Any) -> list[tuple[str, str]]:

@@ -1,7 +1,7 @@
-"""The page of runs: a table to sort and filter; for each run its film, figures, numbers and command.
+"""Report of runs: a sortable, filterable table, and each run's film, figures, numbers and command.
 
-The page works without a network. Figures are embedded up to a total size, the overview of every run first; the other
-figures and the films are linked. The text for pull requests has failures first and stays below 60 kB.
+The page works offline. Figures are embedded up to a total size, overviews first; other figures and films are linked. The
+Markdown for pull requests lists failures first and stays below 60 kB.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ from antdrive.views.pages.reported_runs import (
     run_table,
 )
 
-EMBEDDED_BYTES = 4_500_000  # of all embedded figures together, as base64
-MAX_PIXELS = 100_000_000  # of a figure
+EMBEDDED_BYTES = 4_500_000  # of all embedded figures, as base64
+MAX_PIXELS = 100_000_000  # per figure
 FIGURE_WIDTH = 1200  # of an embedded figure, at most [px]
 FILM_SIZE = (960, 540)  # of films of runs made in Python [px]
 MARKDOWN_BYTES = 60_000  # of a Markdown report; GitHub refuses comments of more than 65,536 characters
 MOST_ROWS, MOST_DETAILS, ENOUGH_DETAILS, MOST_OUTCOMES = 256, 64, 8, 12  # of a Markdown report
 FILM_TYPES = {".mp4": "video/mp4", ".gif": "image/gif", ".webp": "image/webp"}
 FIGURE_CAPTIONS: Mapping[str, str] = {
-    "then-and-now.png": "The baseline's drive and this one: where they part, their clearances, and the distance between them",
-    "overview.png": "Map with the driven path; clearance, speed, and the rule that limited the speed",
-    "certificate.png": "Driven path against route, and the certificate",
-    "sight.png": "What the robot knew: the ground on its map, hits, and its first sights of the obstacles it came near",
-    "plan.png": "Plan with the planner's field, and path lengths by iteration",
+    "then-and-now.png": "Baseline and this drive: divergence, clearances and distance",
+    "overview.png": "Map with driven path; clearance, speed and speed-limiting rule over time",
+    "certificate.png": "Driven path, route and certificate",
+    "sight.png": "Occupancy map, explored area and first detections of obstacles",
+    "plan.png": "Plan, planner's field and path length by iteration",
     "field-contours.png": "The planner's field as contours",
     "field-bars.png": "The planner's field as bars",
     "history.png": "Best path length by iteration",
@@ -64,23 +64,23 @@ def write_report(
     figures: bool = True,
     films: bool = False,
 ) -> int:
-    """Write a report about runs made in Python, and about every run in folders and below.
+    """Write a report of runs from Python and of all runs below folders.
 
     >>> write_report([run(scenario), "out/slalom"], "report.html")
 
     Args:
-        runs: one or more runs, and folders where `antdrive run --out` wrote runs
-        out: the file to write: a page (.html), or text for a pull request (.md)
-        title: of the report; by default the folder's name
-        embed_films: put films of folders into the page instead of linking them
-        figures: draw the overview of each run made in Python into the page, and embed those of folders
-        films: film each run made in Python, into the page
+        runs: one or more runs, or folders with runs of `antdrive run --out`
+        out: the file to write: a page (.html) or Markdown for a pull request (.md)
+        title: of the report; default: the folder's name
+        embed_films: embed films of folders instead of linking them
+        figures: embed each run's figures in the page
+        films: film each run from Python and embed the film
 
     Returns:
         The number of runs.
 
     Raises:
-        InputError: no runs there, a broken `result.json`, or an unknown suffix.
+        InputError: no runs, an invalid `result.json`, or an unknown suffix.
     """
     target = Path(out)
     page = known_suffix(target, (".html", ".md")) == ".html"
@@ -96,7 +96,7 @@ def write_report(
         else:
             found = list(find_runs(Path(source)))
             if not found:
-                raise InputError(f"{source}: no runs; `antdrive run --out` writes them, each with a result.json")
+                raise InputError(f"{source}: no runs (no result.json); write them with `antdrive run --out`")
             for run in found:
                 _attach_files(run, target.parent, embed_films and page)
             if page and figures:
@@ -106,7 +106,7 @@ def write_report(
     for place, run in enumerate(reported):
         run.number = place
     if not reported:
-        raise InputError(f"{target}: no runs to write about")
+        raise InputError(f"{target}: no runs to report")
     note_differences(reported)
     name = title or (Path(given[0]).resolve().name if len(given) == 1 and not isinstance(given[0], Run) else "runs")
     write_text(target, _page(reported, shown(name)) if page else _text(reported, shown(name)))
@@ -114,7 +114,7 @@ def write_report(
 
 
 def _page(runs: list[ReportedRun], title: str) -> str:
-    """The web page."""
+    """Render the page."""
     from antdrive.views.colours import label_styles
 
     planners = sorted({run.planner for run in runs})
@@ -144,7 +144,7 @@ def _title(name: str) -> str:
 
 
 def _text(runs: list[ReportedRun], title: str) -> str:
-    """The text for a pull request: failures first, and the others only counted where it would be too long."""
+    """Render the Markdown, failures first; runs beyond the size limit are only counted."""
     ordered = sorted(runs, key=lambda run: run.succeeded)
     rows, details = min(len(runs), MOST_ROWS), min(len(runs), MOST_DETAILS)
     while True:
@@ -167,7 +167,7 @@ def _text(runs: list[ReportedRun], title: str) -> str:
 
 
 def outcome_counts(runs: Sequence[ReportedRun]) -> str:
-    """How many runs ended in which way, such as "12 succeeded; 3 collided"; empty without runs."""
+    """Return the counts of outcomes, such as "12 succeeded; 3 collided"; empty without runs."""
     numbers = Counter(run.outcome for run in runs)
     most, rest = numbers.most_common(MOST_OUTCOMES), sum(numbers.values())
     rest -= sum(count for _, count in most)
@@ -175,7 +175,7 @@ def outcome_counts(runs: Sequence[ReportedRun]) -> str:
 
 
 def _drawn(run: Run) -> list[Attachment]:
-    """The overview of a run made in Python, or its plan where it did not drive."""
+    """Draw the overview of a run from Python, or its plan without a drive."""
     from antdrive.views.figures.run_figures import draw_run
 
     with tempfile.TemporaryDirectory() as folder:
@@ -185,7 +185,7 @@ def _drawn(run: Run) -> list[Attachment]:
 
 
 def _filmed(run: Run) -> list[Attachment]:
-    """A film of a run made in Python; none where it did not drive."""
+    """Film a run from Python; empty without a drive."""
     from antdrive.views.film.video import film
 
     if run.rollout is None:
@@ -196,10 +196,7 @@ def _filmed(run: Run) -> list[Attachment]:
 
 
 def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
-    """Attach the films and files of a run's folder. A film that is older than the log shows another drive.
-
-    Where there is no log, nothing shows that an older film is of this run either.
-    """
+    """Attach the films and files of a run's folder. Films older than the log, or than result.json, are only linked."""
     assert run.folder is not None
     log = run.folder / "rollout.npz"
     driven = (log if log.exists() else run.folder / "result.json").stat().st_mtime
@@ -213,8 +210,8 @@ def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
             continue
         source = _data_uri(kind, path.read_bytes()) if embed_films else link_to(path, base)
         run.films.append(Attachment(path.name, source, is_video=kind.startswith("video/")))
-    for names, found in ((("rollout.npz", "result.json"), run.links), (("overview.png", "plan.png"), run.pictures)):
-        found += [
+    for names, attached in ((("rollout.npz", "result.json"), run.links), (("overview.png", "plan.png"), run.pictures)):
+        attached += [
             Attachment(name, link_to(run.folder / name, base))
             for name in names
             if _lies_in(run.folder / name, run.folder)
@@ -222,12 +219,12 @@ def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
 
 
 def _lies_in(path: Path, folder: Path) -> bool:
-    """Whether a path is a regular file in a folder, also where links lead."""
+    """Return whether a path, with links resolved, is a regular file in a folder."""
     return path.is_file() and path.resolve().is_relative_to(folder.resolve())
 
 
 def _attach_figures(runs: list[ReportedRun], base: Path, used: int) -> None:
-    """Embed figures, one kind after the other, until `EMBEDDED_BYTES` are used up, `used` so far; link the others."""
+    """Embed figures, kind by kind, up to `EMBEDDED_BYTES` of which `used` are taken; link the others."""
     for name, caption in FIGURE_CAPTIONS.items():
         for run in runs:
             assert run.folder is not None
@@ -243,7 +240,7 @@ def _attach_figures(runs: list[ReportedRun], base: Path, used: int) -> None:
 
 
 def _embedded(path: Path, caption: str) -> Attachment:
-    """A figure as a data URI, at most `FIGURE_WIDTH` pixels wide."""
+    """Return a figure as a data URI, at most `FIGURE_WIDTH` pixels wide."""
     from PIL import Image
 
     try:
@@ -267,14 +264,14 @@ def _data_uri(kind: str, content: bytes) -> str:
 
 
 def _cards(runs: list[ReportedRun]) -> list[tuple[str, str]]:
-    """The report's headline numbers, each with its meaning."""
+    """Return the report's headline numbers, each with its meaning."""
     certified = sum(run.succeeded for run in runs)
     bounds = [run.log.certificate.bound for run in runs if run.log and run.succeeded]
     driven = sum(value for run in runs if run.log and (value := run.measured["driven_length_m"]))
     worlds, planners = len({run.world for run in runs}), len({run.planner for run in runs})
     return [
         (f"{certified} / {len(runs)}", "reached the goal, certified collision-free"),
-        (f"{min(bounds):.3f} m" if bounds else "–", "smallest clearance proved"),
+        (f"{min(bounds):.3f} m" if bounds else "–", "smallest certified clearance"),
         (f"{driven:.1f} m", "driven in total"),
         (str(worlds), "world" if worlds == 1 else "worlds"),
         (str(planners), "planner" if planners == 1 else "planners"),

@@ -1,4 +1,4 @@
-"""The tables of a campaign: as text for terminals and pages, as LaTeX and as CSV."""
+"""Tables of a campaign as text, LaTeX and CSV."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from antdrive.runs.statistics.success import PlannerSuccess
 from antdrive.views.pages.campaign_summary import CampaignSummary, measure_title
 from antdrive.views.pages.rendering import NONE, TextTable, percent, percents, probability, short, with_interval
 
-#: Headings of columns that hold words.
+#: Headings of text columns.
 WORDS = ("planner", "first", "second", "better", "lower", "against", "measure", "not worse")
-LATEX_PAGE = 40  # rows of a table that fit on a page
+LATEX_PAGE = 40  # table rows per page
 
 
 def success_cells(summary: CampaignSummary) -> TextTable:
-    """How often each planner succeeds, and its medians over the instances in which all do."""
+    """Return each planner's success rate and its medians over the instances solved by all planners."""
     names = list(summary.medians)
     elsewhere = any(row.elsewhere for row in summary.success)
     over = any(not math.isnan(row.over_worlds.low) for row in summary.success)
@@ -49,7 +49,7 @@ def success_cells(summary: CampaignSummary) -> TextTable:
 
 
 def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTable:
-    """The comparison of each pair of planners by one measure."""
+    """Return the comparison of each pair of planners by one measure."""
     over = any(not math.isnan(row.p_worlds) for row in comparisons)
     unpaired = any(row.unpaired for row in comparisons)
     success = measure == SUCCESS
@@ -86,7 +86,7 @@ def _pair_row(row: PairedComparison, success: bool, over: bool, unpaired: bool) 
 
 
 def outcome_cells(summary: CampaignSummary) -> TextTable:
-    """How the runs of each planner ended: the most frequent outcome first."""
+    """Return the outcomes of each planner's runs, the most frequent first."""
     total = Counter[str]()
     for row in summary.success:
         total.update(row.outcomes)
@@ -98,36 +98,36 @@ def outcome_cells(summary: CampaignSummary) -> TextTable:
 
 
 def all_cells(summary: CampaignSummary) -> list[TextTable]:
-    """Every table of a campaign."""
+    """Return all tables of a campaign."""
     pairs = (pair_cells(name, rows) for name, rows in summary.comparisons.items())
     allowed = [allowance_cells(summary)] if summary.allowances else []
     return [success_cells(summary), outcome_cells(summary), *pairs, *allowed]
 
 
 def allowance_cells(summary: CampaignSummary) -> TextTable:
-    """Which planners are not worse than another by more than was allowed."""
+    """Return the planners' non-inferiority tests."""
     headings = ("planner", "against", "measure", "not worse", "allowed", "advantage", "95 % of all", "worlds", "needed")
     rows: list[tuple[str, ...]] = []
     for row in summary.allowances:
         shown = percent if row.measure == SUCCESS else short
         title = "success [%]" if row.measure == SUCCESS else measure_title(row.measure)
-        verdict = "yes" if row.not_worse else NONE
+        passed = "yes" if row.not_worse else NONE
         ends = f"{shown(row.interval.low)} to {shown(row.interval.high)}"
         counts = (str(row.worlds), str(row.needed))
         rows.append(
-            (row.planner, row.reference, title, verdict, shown(row.allowed), shown(row.advantage), ends, *counts)
+            (row.planner, row.reference, title, passed, shown(row.allowed), shown(row.advantage), ends, *counts)
         )
     return TextTable("Not worse by more than allowed", headings, rows)
 
 
 def success_note(row: PlannerSuccess) -> str:
-    """The outcomes of a planner's runs, in words, the most frequent first."""
-    found = sorted(row.outcomes.items(), key=lambda item: (-item[1], item[0]))
-    return ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in found)
+    """Return the outcomes of a planner's runs in words, the most frequent first."""
+    outcomes = sorted(row.outcomes.items(), key=lambda item: (-item[1], item[0]))
+    return ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in outcomes)
 
 
 def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
-    """Plain numbers, for programs: shares between 0 and 1, an empty cell where there is none."""
+    """Write plain numbers as CSV: fractions from 0 to 1, empty cells for missing values."""
     names = list(summary.medians)
     medians = [f"{name}{end}" for name in names for end in ("_median", "_low", "_high")]
     outcomes = sorted({name for row in summary.success for name in row.outcomes})
@@ -135,10 +135,10 @@ def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
     shares = ["share", "low", "high", "worlds_low", "worlds_high"]
     lines: list[list[Any]] = [[*counts, *shares, *medians, *(f"outcome.{name}" for name in outcomes)]]
     for k, row in enumerate(summary.success):
-        found = [value for name in names for value in (summary.medians[name][k][0], *summary.medians[name][k][1])]
+        centres = [value for name in names for value in (summary.medians[name][k][0], *summary.medians[name][k][1])]
         counted = [row.planner, row.runs, row.elsewhere, row.counted, row.successes]
         ended = [row.outcomes.get(name, 0) for name in outcomes]
-        lines.append([*counted, row.fraction, *row.interval, *row.over_worlds, *found, *ended])
+        lines.append([*counted, row.fraction, *row.interval, *row.over_worlds, *centres, *ended])
     _write_lines(out, lines)
     pairs = [row for comparisons in summary.comparisons.values() for row in comparisons]
     if not pairs:
@@ -151,13 +151,13 @@ def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
 
 
 def _write_lines(path: Path, lines: Sequence[Sequence[Any]]) -> None:
-    """Write comma-separated values, an empty cell for what is not a number."""
+    """Write comma-separated values, with empty cells for NaN."""
     with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         csv.writer(stream).writerows(["" if value != value else value for value in line] for line in lines)
 
 
 def write_latex(summary: CampaignSummary, out: Path) -> list[Path]:
-    """Write the tables for a paper."""
+    """Write the tables as LaTeX."""
     lines = ["% antdrive report; needs \\usepackage{booktabs} and, for long tables, \\usepackage{longtable}"]
     for table in all_cells(summary):
         lines += ["", f"% {latex_text(table.title)}", *_latex_table(table)]
@@ -178,7 +178,7 @@ def _latex_table(table: TextTable) -> list[str]:
 
 
 def latex_text(text: str) -> str:
-    """A text as LaTeX shows it."""
+    """Escape a text for LaTeX."""
     special = {
         "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "–": "--", "<": r"$<$",
         ">": r"$>$", "²": r"\textsuperscript{2}", "∞": r"$\infty$", "·": r"$\cdot$",

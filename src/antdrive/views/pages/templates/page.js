@@ -3,7 +3,7 @@
   const make = (tag, text, name) => { const found = document.createElement(tag); if (text !== undefined) found.textContent = text; if (name) found.className = name; return found; };
   const collator = new Intl.Collator("en", { numeric: true }), columns = new Map();
 
-  // A column gives the text of a row and a number by which rows are sorted; texts are compared once each, not once a row.
+  // A column has the text and the sort key of each row; distinct texts are compared once.
   for (const raw of data.columns) {
     if (raw.numbers) {
       const keys = Float64Array.from(raw.numbers, (v) => (v === null ? NaN : v));
@@ -25,7 +25,7 @@
 
   const sectionOf = (row) => data.sections && $(`#run-${row}`);
 
-  // The runs: a sorted list of row numbers, of which only those in sight are in the document.
+  // The runs: a sorted list of row numbers; the document holds the visible ones only.
   const HEIGHT = 34, box = $("#runs"), body = $("tbody", box), heads = [];
   const shown = (name, row) => { const value = text(name, row); return columns.get(name).numeric && columns.get(name).digits === undefined && /[._]/.test(name) && value !== "–" ? String(Number(Number(value).toPrecision(4))) : value; };
   let sorted = Uint32Array.from({ length: data.rows }, (_, k) => k), visible = sorted, drawn = "";
@@ -93,7 +93,7 @@
   new ResizeObserver(redraw).observe(box);
   $("#filter").addEventListener("input", filter); $("#planner").addEventListener("change", filter); $("#outcome").addEventListener("change", filter);
 
-  // What is known about runs, in a dialog.
+  // Details of runs, in a dialog.
   const dialog = $("#details");
   const repeat = (row) => {
     const found = document.createDocumentFragment(), command = text("command", row), log = text("rollout", row);
@@ -110,7 +110,7 @@
   };
   body.addEventListener("click", (event) => { const line = event.target.closest("tr[data-row]"); if (!line) return; const row = Number(line.dataset.row), section = sectionOf(row); if (section) section.scrollIntoView(); else details(row); });
 
-  // World by planner: a deeper colour where more runs fail.
+  // World by planner: a deeper colour for more failures.
   const matrix = (grid) => {
     const worlds = columns.get("world"), labels = data.planners, cells = new Map();
     for (let row = 0; row < data.rows; row++) { const key = `${worlds.places[row]}\n${text("planner", row)}`; if (!cells.has(key)) cells.set(key, []); cells.get(key).push(row); }
@@ -118,7 +118,7 @@
       const bad = rows.filter((row) => !good(row)), parts = [make("h3", `${world} · ${label}: ${bad.length} of ${rows.length} runs failed`)];
       for (const row of bad.slice(0, 50)) { const part = make("section"), title = make("p", `Seed ${text("seed", row)}${columns.has("task") && text("task", row) !== "own" ? `, ${text("task", row)}` : ""}: `); title.append(badge(row)); part.append(title, make("p", sentence(row), "small"), repeat(row)); parts.push(part); }
       if (bad.length > 50) parts.push(make("p", `${bad.length - 50} more: filter the table below.`));
-      if (bad.length) parts.splice(1, 0, make("p", "Commands are meant for the campaign's folder.", "small"));
+      if (bad.length) parts.splice(1, 0, make("p", "Run commands in the campaign's folder.", "small"));
       open(...parts);
     };
     const head = make("tr"); head.append(make("th", "world"));
@@ -141,7 +141,7 @@
   };
   if ($("#matrix")) matrix($("#matrix"));
 
-  // The pairs of one measure, of one planner, or those that are decided.
+  // Pairs of one measure, of one planner, or with a better planner.
   const choosePairs = () => {
     const against = $("#against").value, decided = $("#decided").checked;
     for (const part of document.querySelectorAll(".pairs")) {
@@ -151,7 +151,7 @@
   };
   if ($("#measure")) for (const id of ["#measure", "#against", "#decided"]) $(id).addEventListener("change", choosePairs);
 
-  // Press a planner in the legend to see its curves alone.
+  // Pressing a planner in the legend highlights its curves.
   const pressed = new Set();
   for (const button of document.querySelectorAll(".legend button")) button.addEventListener("click", () => {
     const k = button.dataset.planner, on = !pressed.delete(k);
