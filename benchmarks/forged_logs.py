@@ -1,4 +1,4 @@
-"""Kinds of forged and broken logs, for `benchmarks.forgeries`: each changes a genuine log, and the digest with it."""
+"""Forged and broken logs for `benchmarks.forgeries`. Each changes a genuine log and updates its digest."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Log:
 
     @classmethod
     def of(cls, rollout: Rollout) -> Log:
-        """A copy of a log."""
+        """Copy a log."""
         return cls({name: getattr(rollout, name).copy() for name in ARRAYS}, copy.deepcopy(rollout.record.as_dict()))
 
     def __getitem__(self, name: str) -> Array:
@@ -73,11 +73,11 @@ class Log:
         return self
 
     def rollout(self) -> Rollout:
-        """The log as antdrive reads it."""
+        """Return the log as antdrive reads it."""
         return Rollout(**self.arrays, record=DriveRecord.from_json(json.dumps(self.record)))
 
     def consistent(self) -> Log:
-        """The log with movers and clearances that its own record and poses ask for."""
+        """Return the log with movers and clearances recomputed from its record and poses."""
         rollout = self.rollout()
         movers = rollout.trajectories().positions(rollout.t)
         rollout = dataclasses.replace(rollout, movers=movers)
@@ -98,7 +98,7 @@ class Log:
 
 
 def digest(arrays: Mapping[str, Array], text: str) -> str:
-    """The digest of a log, computed anew."""
+    """Recompute the digest of a log."""
     sha = hashlib.sha256()
     for name in ARRAYS:
         array = np.ascontiguousarray(arrays[name])
@@ -134,7 +134,7 @@ KINDS: dict[str, Kind] = {}
 
 
 def guarded(forge: Callable[[Log], Log | None], when: str) -> Forger:
-    """A forger for the drives to which all words of `when` apply; one that returns nothing has changed its log."""
+    """Register a forger for drives that match all words of `when`; a forger that returns None changed its log in place."""
 
     def forged(log: Log) -> Log | None:
         return (forge(log) or log) if all(WHEN[word](log) for word in when.split()) else None
@@ -498,7 +498,7 @@ def _(log: Log) -> Log:
 
 
 def _bent(log: Log, aside: float, *, follow: bool, seconds: float = 1.0, whole: bool = False) -> Log:
-    """The path bent to the side and back; `follow`: heading and measured speeds follow the bend."""
+    """Bend the path to the side and back; `follow`: heading and measured speeds follow the bend."""
     end = int(log["contacts"][0, 0]) - 2 if collided(log) else len(log["t"])
     length = end if whole else min(end - 2, round(2 * seconds * log.hz))
     first = 0 if whole else max(1, (end - length) // 3)
