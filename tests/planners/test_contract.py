@@ -1,4 +1,4 @@
-"""Properties of every planner in the registry. A planner added to `PLANNERS` is tested without further work."""
+"""Properties of every planner in the registry, including planners added to `PLANNERS`."""
 
 import dataclasses
 import math
@@ -18,7 +18,7 @@ INCOMPLETE = [name for name, planner in PLANNERS.items() if not capabilities_of(
 
 
 def solve(name, query, seed=0):
-    """A planner's answer, which `check_plan` accepts whatever it is."""
+    """Return a planner's answer after `check_plan` accepts it."""
     result = quick(name, ants=60, iterations=12).plan(query, np.random.default_rng(seed))
     assert check_plan(query, result) == ""
     return result
@@ -35,14 +35,14 @@ def assert_valid(result, query):
 
 
 def assert_drivable(result, query):
-    """If a planner draws a line of its own, the line keeps the clearance and joins the exact ends."""
+    """Assert that an any-angle planner's line keeps the clearance and joins the exact ends."""
     if result.waypoints is None:
         assert result.length is None
         return
     xy = query.grid.xy(result.line)
     np.testing.assert_allclose(xy[[0, -1]], [query.task.start[:2], query.task.goal], atol=1e-9)
     assert polyline_clearance(query.task.world, xy) >= query.grid.inflate - 1e-9
-    # The polyline passes arcs on their outside, so it is no shorter than the curve that it approximates.
+    # The polyline passes outside of arcs, so it is no shorter than the curve that it approximates.
     drawn = float(np.hypot(*np.diff(xy, axis=0).T).sum())
     assert drawn - 0.05 <= result.length <= drawn + 1e-9
 

@@ -1,4 +1,4 @@
-"""Kernels of planners against slow definitions, where plans alone do not show a small fault."""
+"""Planner kernels against slow definitions, for errors that plans alone do not reveal."""
 
 import itertools
 
@@ -115,7 +115,7 @@ def test_random_numbers_are_those_of_xorshift64():
 
 
 def test_the_goal_pulls_along_the_moves_that_lead_to_it():
-    """The cosine of the angle between a move and the way to the goal; 0 for moves away from it or not allowed."""
+    """The pull is the cosine between a move and the direction to the goal; 0 for moves away from it or not allowed."""
     grid = Grid.from_free(np.random.default_rng(6).random((6, 7)) >= 0.1)
     actual = np.full((42, 8), np.nan)
     goal_pull(grid.moves.ravel(), 7, 2, 4, actual)

@@ -1,4 +1,4 @@
-"""What is said of wrong options, names and queries of planners: all of it is in `messages.yml`."""
+"""Messages for invalid options, names and queries of planners, listed in `messages.yml`."""
 
 import math
 
@@ -26,7 +26,7 @@ from tests.messages import check_messages
 from tests.planners.graph.test_sipp import SPEED, Passing, corridor
 from tests.planners.worlds_to_solve import catalogue
 
-#: Values out of range, by class; `inf` and `nan` are those of floats.
+#: Values out of range by class; `inf` and `nan` are floats.
 OPTIONS = {
     AcoHan: (
         "ants 0", "iterations 0", "max_steps 0", "evaporation 1.5", "deposit 0.0", "attraction -1.0", "elitism -1", "form song",
@@ -47,7 +47,7 @@ OPTIONS = {
     Hybrid: ("colony aco-ham",),
     Tangent: ("bulge 0.0",),
 }  # fmt: skip
-#: What people write, for options of aco-han but for the last.
+#: Options as text: all of aco-han except the last.
 WRITTEN = (
     {"ants": "many"}, {"ants": 2.5}, {"ants": True}, {"ants": "0"}, {"ants": None}, {"antz": 5}, {"evaporation": "nan"},
     {"evaporation": "1.5"}, {"form": "song"}, {"time_budget": "-1"},
@@ -66,7 +66,7 @@ def value_of(text):
     return text
 
 
-def test_wrong_options_names_and_queries_are_refused_in_one_line(data_regression):
+def test_invalid_options_names_and_queries_are_refused_in_one_line(data_regression):
     def warm(**words):
         return WarmStartedColony(MergingAnts(), catalogue()["empty"], np.random.default_rng(0), **words)
 

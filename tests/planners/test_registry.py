@@ -1,4 +1,4 @@
-"""Planners by name: options, plugins, people's own files and modules, and what else has to know a planner."""
+"""Planners by name: options, plugins, user code, and the other places that list planners."""
 
 import hashlib
 import importlib
@@ -36,7 +36,7 @@ EXAMPLE = ROOT / "examples" / "plugin_planner"
 
 
 class Site:
-    """A directory of installed distributions, on the path while a test runs."""
+    """Put a directory of installed distributions on the path during a test."""
 
     def __init__(self, path):
         self.path = path
@@ -82,7 +82,7 @@ def test_the_example_plugin_joins_through_its_entry_point(site):
         load_planner("wavefront", strait="true")
 
 
-def test_a_broken_plugin_is_named_and_left_out(site):
+def test_a_broken_plugin_is_named_and_omitted(site):
     site.install(
         "antdrive-broken", {"broken_ants": "raise RuntimeError('no licence')"}, {"broken": "broken_ants:Planner"}
     )
@@ -99,7 +99,7 @@ def test_a_plugin_that_is_no_planner_is_refused(site):
         load_planner("odd")
 
 
-def test_a_plugin_cannot_take_a_name_of_ours(site):
+def test_a_plugin_cannot_take_a_built_in_name(site):
     site.install("antdrive-thief", {"thief": "raise AssertionError('must not load')"}, {"astar": "thief:AStar"})
     with pytest.warns(UserWarning, match="'astar' of antdrive-thief is omitted: antdrive already has that name"):
         assert list_planners()["astar"] is PLANNERS["astar"]
@@ -124,7 +124,7 @@ def test_options_are_read_by_their_type(options, field, value):
     assert type(read) is type(value)
 
 
-def test_every_planner_says_what_it_does_in_one_line():
+def test_every_planner_has_a_one_line_summary():
     for name, planner in PLANNERS.items():
         line = describe(planner)
         assert line.endswith("."), name
@@ -141,11 +141,11 @@ def test_naming_planners_does_not_load_the_compiler():
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
-# What else has to know a new planner
+# Other places that list planners
 
 
 def kernel_modules(planner):
-    """The kernel modules of a planner: those that the modules of its class and its bases import."""
+    """Return the kernel modules imported by the modules of a planner's class and its bases."""
     sources = (inspect.getsource(sys.modules[kind.__module__]) for kind in type(planner).__mro__[:-1])
     return {name for source in sources for name in re.findall(r"^ +from [\w.]+ import (_kernels_\w+)", source, re.M)}
 
@@ -153,7 +153,7 @@ def kernel_modules(planner):
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_planner_s_kernels_are_compiled_by_a_warm_up_group(name):
     groups = [names for names in TOGETHER if name in names]
-    # The drive in the warm-up plans with `astar` and `as`, whose kernels other planners use, too.
+    # The drive in the warm-up plans with `astar` and `as`, whose kernels other planners also use.
     known = {kernel for names in (*TOGETHER, ("astar", "as")) for n in names for kernel in kernel_modules(PLANNERS[n])}
     assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in cli/compiling.py"
 
@@ -165,7 +165,7 @@ def test_a_planner_has_a_line_style_of_its_own(name):
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_a_planner_s_class_is_offered_by_the_package(name):
+def test_a_planner_s_class_is_exported_by_the_package(name):
     assert type(PLANNERS[name]).__name__ in antdrive.planners.__all__, "add it to planners/__init__.pyi"
 
 

@@ -1,4 +1,4 @@
-"""Plans are checked: a right plan passes, and one that is wrong in any place is refused with that place."""
+"""Plan validation: a valid plan passes; an invalid one is rejected with the place of its error."""
 
 import dataclasses
 import math
@@ -52,11 +52,11 @@ def timed():
 
 
 def with_cells(cells):
-    """The right plan with other cells, priced right."""
+    """Return the valid plan with other cells and their cost."""
     return dataclasses.replace(RIGHT, cells=cells, cost=path_cost(cells, QUERY.grid.cell))
 
 
-def test_a_right_plan_is_left_as_it_is():
+def test_a_valid_plan_is_unchanged():
     assert checked(QUERY, RIGHT) is RIGHT
     assert checked(QUERY, LINE) is LINE
     assert check_plan(*timed()) == ""
@@ -70,7 +70,7 @@ def test_a_plan_that_was_changed_in_one_place_is_refused(data):
     mutant = RIGHT
     if kind == "drop":
         mutant = with_cells(np.delete(cells, k, axis=0))
-        # Beside a bend, the cell that is left out may have been no more than a detour.
+        # Beside a bend, the omitted cell may have been a mere detour.
         if np.abs(np.diff(mutant.cells, axis=0)).max() == 1:
             return
     elif kind == "jump":
@@ -95,7 +95,7 @@ def test_a_plan_that_was_changed_in_one_place_is_refused(data):
     assert not len(checked(QUERY, mutant).cells)
 
 
-def test_the_first_wrong_step_is_named():
+def test_the_first_invalid_step_is_named():
     cells = RIGHT.cells.copy()
     cells[3] += 5
     cells[7] += 5
@@ -150,7 +150,7 @@ def test_a_negative_cell_is_outside_and_not_the_last_one():
     ],
     ids=lambda value: str(value)[:24],
 )
-def test_a_field_of_the_wrong_kind_is_named(change, says):
+def test_a_field_of_an_invalid_type_is_named(change, says):
     assert check_plan(QUERY, dataclasses.replace(RIGHT, **change)).startswith(says)
 
 
@@ -166,7 +166,7 @@ def test_a_field_of_the_wrong_kind_is_named(change, says):
     ],
     ids=["no start", "no goal", "through the trap", "out of bounds", "nan", "shape"],
 )
-def test_a_wrong_line_is_refused(change, says):
+def test_an_invalid_line_is_refused(change, says):
     mutant = dataclasses.replace(LINE, waypoints=change(LINE.waypoints))
     assert re.match(f"waypoints: .*{says}", check_plan(QUERY, mutant))
 
@@ -207,7 +207,7 @@ def test_a_path_from_an_end_that_cannot_be_used_is_refused():
 
 
 class Broken:
-    """A planner that does something wrong."""
+    """A planner that raises an exception or returns an invalid answer."""
 
     def __init__(self, answer):
         self.answer = answer
@@ -244,19 +244,19 @@ def test_an_answer_that_is_no_plan_result_is_a_planner_error(answer):
         request_plan(Broken(answer), QUERY, RNG(0))
 
 
-def test_a_planner_that_exits_is_its_error_and_no_success():
+def test_a_planner_that_exits_is_a_planner_error():
     with pytest.raises(PlannerError, match=r"planner Broken raised SystemExit: 0 \(test_validation.py:"):
         request_plan(Broken(SystemExit(0)), QUERY, RNG(0))
 
 
-def test_a_planner_error_gets_to_another_process():
+def test_a_planner_error_can_be_pickled():
     with pytest.raises(PlannerError) as error:
         request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
     copy = pickle.loads(pickle.dumps(error.value))
     assert (str(copy), copy.planner, copy.problem) == (str(error.value), "mine", error.value.problem)
 
 
-def test_what_is_wrong_with_the_query_and_ctrl_c_pass():
+def test_input_errors_and_ctrl_c_pass_through():
     for error in (InputError("query: has no task"), KeyboardInterrupt(), Terminated(143)):
         with pytest.raises(type(error)):
             request_plan(Broken(error), QUERY, RNG(0))

@@ -1,4 +1,4 @@
-"""Planning time holds no loading of kernels. Nothing is timed: what is loaded within the clock is looked at instead."""
+"""Planning time excludes the loading of kernels. Instead of timing, the tests list the kernels loaded while timed."""
 
 import os
 import subprocess
@@ -11,7 +11,7 @@ import pytest
 from antdrive.planners import PLANNERS, GridPlanner, Query, load_planner, on_progress
 from antdrive.planners.warmup import kernels_loaded, tiny_query
 
-# Each planner gets a process of its own, in which no kernel is loaded yet. It prints what its first plan loads by itself.
+# Each planner gets its own process without loaded kernels and prints the kernels that its first plan loads.
 PLANS = """
 import gc, os, sys
 from dataclasses import replace
@@ -86,7 +86,7 @@ needs_kernels = pytest.mark.skipif(
 
 
 def printed(script, *words):
-    """What a script prints about each of its words."""
+    """Run a script and return its output for each of its words."""
     done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0, done.stderr
     lines = [line.split(" - ") for line in done.stdout.splitlines()]
@@ -113,7 +113,7 @@ def test_every_kernel_of_a_replan_is_loaded_before_the_clock_starts(words):
 
 
 class Counting(GridPlanner):
-    """Counts how often it is asked, and answers nothing."""
+    """A planner that counts its queries."""
 
     asked: list[Query] = []  # noqa: RUF012 - shared on purpose
 
@@ -144,9 +144,9 @@ def test_warming_up_reports_no_progress_and_draws_no_random_numbers(name):
     assert rng.bit_generator.state == other.bit_generator.state
 
 
-def test_a_planner_that_fails_is_heard_where_it_is_timed():
+def test_a_planner_that_fails_to_warm_up_fails_again_when_timed():
     class Failing(GridPlanner):
-        """Always fails."""
+        """A planner that always fails."""
 
         def _plan(self, query, rng):
             raise ArithmeticError(query.grid.shape)

@@ -1,4 +1,4 @@
-"""Grids and queries that the tests of planners share, and an oracle that shares no code with them."""
+"""Grids and queries for tests of planners, and an independent oracle."""
 
 import dataclasses
 import heapq
@@ -13,7 +13,7 @@ from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 
 
 def optimum(query):
-    """The length of the shortest path [m], inf if there is none: a plain Dijkstra."""
+    """Return the length of the shortest path [m], inf if there is none, by a plain Dijkstra."""
     moves = query.grid.moves
     best, queue = {query.start: 0.0}, [(0.0, query.start)]
     while queue:
@@ -33,7 +33,7 @@ def optimum(query):
 
 
 def optimum_by_scipy(query):
-    """The length of the shortest path by scipy, for grids that are too large for `optimum`."""
+    """Return the length of the shortest path by scipy, for grids too large for `optimum`."""
     rows, cols = query.grid.shape
     moves = query.grid.moves
     links = []
@@ -47,7 +47,7 @@ def optimum_by_scipy(query):
 
 
 def thinned(rng, side, cut):
-    """A grid with moves that neither cells nor discs explain: each two-way move is left out with probability `cut`."""
+    """Return a grid with arbitrary moves: each bidirectional move is removed with probability `cut`."""
     picture = Grid.from_free(rng.random((side, side)) >= 0.05)
     moves = picture.moves.copy()
     for k, (dr, dc) in enumerate(DIRECTIONS[:4]):
@@ -59,7 +59,7 @@ def thinned(rng, side, cut):
 
 
 def random_query(rng, largest=24):
-    """Randomly blocked cells and two random free ends; some queries have no path."""
+    """Draw a query with random blocked cells and two random free ends; some have no path."""
     shape = rng.integers(1, largest, size=2)
     free = rng.random(shape) >= rng.uniform(0.0, 0.5)
     free[tuple(shape // 2)] = True
@@ -68,7 +68,7 @@ def random_query(rng, largest=24):
 
 
 def random_discs(rng, count=14):
-    """Random discs, so that moves between free cells may be closed too."""
+    """Draw a query among random discs, which may also close moves between free cells."""
     discs = tuple(Disc(*rng.uniform(0, 10, 2), rng.uniform(0.05, 0.9)) for _ in range(count))
     grid = rasterise(World("random", (0, 0, 10, 10), discs), 0.5, rng.uniform(0, 0.4))
     free = np.argwhere(grid.free)
@@ -101,7 +101,7 @@ def _forest():
 
 
 def catalogue():
-    """Small worlds, each difficult in one way; all have a path."""
+    """Return small worlds, each with one difficulty; all have a path."""
     corner, far = (1.0, 1.0), (9.0, 9.0)
     slalom = _wall(2.5, 0, 2.5, 7) + _wall(5, 3, 5, 10) + _wall(7.5, 0, 7.5, 7)
     gate = _wall(5, 0, 5, 1) + _wall(5, 2.5, 5, 10)
@@ -116,13 +116,13 @@ def catalogue():
 
 
 def quick(name, **budget):
-    """A planner with a budget that is small enough for a test, as far as it has one."""
+    """Return the planner with a budget small enough for a test, if it has a budget."""
     known = {f.name for f in dataclasses.fields(PLANNERS[name])}
     return load_planner(name, **{key: value for key, value in budget.items() if key in known})
 
 
 def sealed():
-    """A goal behind a wall without a gap."""
+    """Return a query with the goal behind a closed wall."""
     free = np.ones((8, 8), dtype=np.bool_)
     free[:, 4] = False
     return Query(Grid.from_free(free), (1, 1), (6, 6))

@@ -1,4 +1,4 @@
-"""The genetic algorithm of Han's thesis (2007), section 4.1, alone and with ants for the corridor (after section 6.3)."""
+"""The genetic algorithm of Han's thesis (2007), section 4.1, alone and in the hybrid (after section 6.3)."""
 
 import dataclasses
 
@@ -10,12 +10,12 @@ from antdrive.planners import AcoHan, GaHan, Hybrid, PlanStatus, Query, Tangent,
 from antdrive.worlds import Disc, Grid, Task, World, load_task, polyline_clearance, rasterise
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
-THESIS = 33.1798  # the length that the thesis prints for 3 via points, the best of 1, 2 and 3
+THESIS = 33.1798  # length in the thesis for 3 via points, the best of 1, 2 and 3
 FLOOR = 30.0711
 
 
 def single():
-    """One obstacle of radius 5 at (10, 10) on the grid points (0, 0) to (20, 20), for a point robot."""
+    """Return a point robot's query: one obstacle of radius 5 at (10, 10) on the grid points (0, 0) to (20, 20)."""
     world = World("single", (-0.5, -0.5, 20.5, 20.5), (Disc(10, 10, 5),))
     task = Task(world, (0.0, 0.0, 0.0), (20.0, 20.0), cell=1.0)
     return Query.between(rasterise(world, 1.0), task)
@@ -145,7 +145,7 @@ def test_the_line_comes_within_two_percent_of_the_shortest():
 def test_the_line_keeps_the_clearance_and_is_near_the_shortest(name):
     query = of_catalogue(name)
     floor = Tangent().plan(query, np.random.default_rng(0)).length
-    # Where the grid has no free cells in the best corridor, ants cannot find it.
+    # Ants cannot find the best corridor if the grid has no free cells there.
     corridor = {"forest": 1.06, "han2007-aco": 1.10}.get(name, 1.03)
     for seed in range(3):
         result = hybrid(query, seed)

@@ -23,7 +23,7 @@ def is_a_path(query, cells):
 
 
 def picture(*rows):
-    """A bare grid drawn with '#' for blocked cells, its first row at the bottom."""
+    """Build a bare grid from a drawing: '#' is blocked, the first row is at the bottom."""
     free = np.array([[c != "#" for c in row] for row in rows])
     return Query(Grid.from_free(free), (0, 0), (len(rows) - 1, len(rows[0]) - 1))
 

@@ -1,4 +1,4 @@
-"""The exact shortest path among discs, compared with closed forms and with an oracle of polygons, and the widest passage."""
+"""The exact shortest path among discs against closed forms and a polygon oracle, and the widest passage."""
 
 import heapq
 import itertools
@@ -20,16 +20,16 @@ from antdrive.worlds import Disc, Task, World, forest, point_clearance, polyline
 from tests.planners.worlds_to_solve import catalogue
 
 Discs = Sequence[tuple[float, float, float]]
-RNG = np.random.default_rng(0)  # nothing is drawn from it
+RNG = np.random.default_rng(0)  # unused by the planner
 BOX = (-2.0, -2.0, 22.0, 22.0)
 WIDE = (-100.0, -100.0, 100.0, 100.0)
 
 
-# -- an oracle: shortest paths among polygons in place of discs
+# -- oracle: shortest paths among polygons instead of discs
 
 
 def polygon_bound(discs, box, ends, *, inside, sides=24):
-    """The shortest path among polygons: within the discs (a lower bound) or about them (an upper bound)."""
+    """Return the shortest path among polygons: inscribed (a lower bound) or circumscribed (an upper bound)."""
     angles = np.arange(sides) * math.tau / sides
     stretch = 1.0 if inside else 1.0 / math.cos(math.pi / sides)
     normals = np.stack((np.cos(angles + math.pi / sides), np.sin(angles + math.pi / sides)), axis=1)
@@ -81,7 +81,7 @@ def test_the_length_lies_between_those_among_inner_and_outer_polygons():
     assert sealed >= 2
 
 
-# -- worlds worked out by hand
+# -- hand calculations
 
 
 def test_the_path_around_one_disc_has_the_closed_form():
@@ -322,7 +322,7 @@ def test_in_a_forest_of_400_discs_a_tenth_of_all_tangents_is_checked():
 
 
 def test_a_lattice_of_discs_that_all_touch_is_solved():
-    """As in the worlds of the BARN set, three or four rims meet in one point."""
+    """Three or four rims meet in one point, as in BARN worlds."""
     rng = np.random.default_rng(5).random((30, 30)) < 0.25
     rng[:4, :4] = rng[-4:, -4:] = False
     discs = [(0.15 * c, 0.15 * r, 0.075) for r, c in np.argwhere(rng)]
@@ -339,12 +339,12 @@ def test_a_lattice_of_discs_that_all_touch_is_solved():
             assert polyline_clearance(world, path.polyline(1e-3, discs, box, inflate)) >= inflate - 1e-9
 
 
-# -- what makes it fast
+# -- shortcuts of the search
 
 
 @settings(max_examples=60)
 @given(some_discs, st.sampled_from([0.3, 0.999, 1.0, 1.05, 2.0]))
-def test_an_expected_length_right_or_wrong_changes_no_path(discs, fraction):
+def test_an_expected_length_changes_no_path(discs, fraction):
     path = shortest(discs, WALLS, 0.1, START, GOAL)
     expected = 1.0 if path is None else fraction * path.length + 1e-9
     again = shortest(discs, WALLS, 0.1, START, GOAL, expected=expected)
@@ -366,7 +366,7 @@ def test_among_many_discs_a_path_on_the_grid_bounds_the_search(monkeypatch):
 
 @settings(max_examples=100)
 @given(some_discs, st.floats(-12, 12), st.floats(-12, 12), st.floats(0, 1.7), st.sampled_from([-1, 1]), st.data())
-def test_no_tangent_to_a_free_arc_is_passed_over(discs, dx, dy, radius, turn, data):
+def test_every_tangent_to_a_free_arc_is_checked(discs, dx, dy, radius, turn, data):
     assume(discs)
     table = np.array(discs)
     rims = _kernels_tangent.free_arcs(table, np.array(WALLS))
@@ -390,7 +390,7 @@ STEP = 0.03  # of the field [m]
 
 
 def flooded(task):
-    """The widest disc that gets from the start to the goal over a field of points, by a flood from the roomiest on."""
+    """Return the widest disc from start to goal over a field of points, by a flood in the order of clearance."""
     xmin, ymin, xmax, ymax = task.world.bounds
     x, y = np.arange(xmin, xmax + STEP / 2, STEP), np.arange(ymin, ymax + STEP / 2, STEP)
     px, py = np.meshgrid(x, y)
@@ -436,7 +436,7 @@ def test_the_widest_disc_is_that_of_a_flood():
     assert through_gaps > 8
 
 
-def test_the_gap_is_named_and_its_middle_is_the_place():
+def test_the_bottleneck_is_the_middle_of_the_gap():
     wall = tuple(Disc(2.0, y, 0.25) for y in (0.25, 0.75, 1.25, 2.25, 2.75))  # a gap of 0.5 m around (2, 1.75)
     task = Task(World("gate", (0.0, 0.0, 4.0, 3.0), wall), (0.6, 0.6, 0.0), (3.4, 0.6))
     passage = widest_passage(task, 0.4)
@@ -445,7 +445,7 @@ def test_the_gap_is_named_and_its_middle_is_the_place():
     assert widest_passage(beside_a_wall, 0.9) == Passage(pytest.approx(0.35), pytest.approx((2.0, 2.65)), (0, 4))
 
 
-def test_what_has_no_narrowest_place():
+def test_worlds_without_a_bottleneck():
     room = World("room", (0.0, 0.0, 4.0, 3.0))
     assert widest_passage(Task(room, (0.5, 1.5, 0.0), (3.7, 1.5)), 0.4) == Passage(pytest.approx(0.3), (3.7, 1.5))
     closed = World("closed", (0.0, 0.0, 4.0, 3.0), tuple(Disc(2.0, y, 0.3) for y in np.arange(0.0, 3.1, 0.5)))

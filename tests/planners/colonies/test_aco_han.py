@@ -10,7 +10,7 @@ from tests.planners.worlds_to_solve import catalogue
 
 
 def state(graph, walked, best):
-    """The first iteration of a colony, with these walks."""
+    """Return the first iteration of a colony, with these walks."""
     tours = without_loops(walked, graph)
     return IterationState(0, graph, walked, tours, None, best, 0, np.random.default_rng(0))
 
@@ -100,7 +100,7 @@ def test_the_history_records_every_iteration():
 
 
 def test_elitism_concentrates_pheromone_on_the_best_path():
-    """As the thesis observes in its experiments 1 to 4: pheromone gathers in a narrow region."""
+    """Pheromone concentrates in a narrow region, as in experiments 1 to 4 of the thesis."""
     query = catalogue()["forest"]
 
     def share_on_path(elitism):
@@ -152,7 +152,7 @@ def test_a_time_budget_ends_the_plan_early_with_a_reason():
     assert "time budget of 0.05 s" in result.reason
 
 
-def test_a_watcher_is_called_after_every_iteration():
+def test_the_progress_callback_runs_after_every_iteration():
     seen = []
     planner = AcoHan(ants=20, iterations=4)
     with on_progress(seen.append):

@@ -1,4 +1,4 @@
-"""What the ant planners share (walking, cutting tours short, trails on arcs), and the rules of each of them."""
+"""Common parts of the ant planners (walking, shortcuts, trails on arcs), and the rules of each."""
 
 import itertools
 import math
@@ -42,7 +42,7 @@ BEND = [(0, 0), (0, 1), (1, 2), (1, 3), (2, 3)]
 
 
 def walks(*paths, graph=GRAPH):
-    """Walks whose lengths are summed in plain Python; an empty path is an ant that did not arrive."""
+    """Return walks with lengths summed in plain Python; an empty path is an ant that did not arrive."""
     cells = np.zeros((len(paths), max(map(len, paths))), dtype=np.int32)
     for a, path in enumerate(paths):
         cells[a, : len(path)] = [r * graph.shape[1] + c for r, c in path]
@@ -55,12 +55,12 @@ def state(tours, best=None, number=1, since=0):
 
 
 def arcs(path):
-    """The arcs of a path, as (cell, move)."""
+    """Return the arcs of a path as (cell, move)."""
     return [(r * 4 + c, DIRECTIONS.index((q - r, d - c))) for (r, c), (q, d) in itertools.pairwise(path)]
 
 
 def grid_query(size, blocked, seed):
-    """A query from corner to corner of a random grid that has a path."""
+    """Return a solvable query from corner to corner of a random grid."""
     rng = np.random.default_rng(seed)
     while True:
         free = rng.random((size, size)) >= blocked
@@ -119,7 +119,7 @@ def test_backtracking_ants_leave_a_trap_in_which_others_die(planner):
     free = np.ones((size, size), dtype=np.bool_)
     free[::2, 4:20] = False
     free[:, 20] = False
-    free[0, 20] = True  # one way out of a comb of dead ends
+    free[0, 20] = True  # one exit from a comb of dead ends
     free[0, 4:21] = True
     query = Query(Grid.from_free(free), (11, 5), (11, 23))
     lost = solve(replace(planner, ants=5, iterations=2), query)
@@ -194,7 +194,7 @@ def test_a_tour_cut_short_has_allowed_moves_and_is_never_longer(seed):
             assert there == max(p for p in range(here + 1, len(old)) if old[p] in reach)
 
 
-def test_a_walk_around_a_corner_is_cut_as_worked_out_by_hand():
+def test_a_walk_around_a_corner_is_cut_as_in_a_hand_calculation():
     detour = [(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (2, 1), (2, 2), (2, 3)]
     tours = cut_short(walks(detour), GRAPH)
     # The last cell of the walk beside (0, 0) is (1, 1); the last one beside (1, 1) is (2, 2).
@@ -280,7 +280,7 @@ def test_the_elite_of_an_iteration_deposits_more():
 # MAX-MIN ant system (Stützle & Hoos 2000)
 
 
-def test_the_bounds_are_those_worked_out_by_hand():
+def test_the_bounds_match_a_hand_calculation():
     best = walks(DIRECT)
     tau_min, tau_max = MaxMinAnts(evaporation=0.2, p_best=0.05).bounds(GRAPH, best)
     assert tau_max == pytest.approx(1 / (0.2 * (1 + 2 * math.sqrt(2))))
@@ -371,14 +371,14 @@ def test_merging_ants_stop_after_settled_iterations_without_a_better_tour():
 
 
 @pytest.mark.parametrize("world", ["slalom", "gate", "trap", "forest"])
-def test_merging_ants_find_the_shortest_way_through_the_catalogue(world):
+def test_merging_ants_find_the_shortest_paths_of_the_catalogue(world):
     query = catalogue()[world]
     assert solve(MergingAnts(), query).cost == pytest.approx(optimum(query))
 
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("size", [20, 50])
-def test_merging_ants_find_the_shortest_way_over_random_grids(size, seed):
+def test_merging_ants_find_the_shortest_paths_on_random_grids(size, seed):
     query = grid_query(size, 0.25, seed)
     assert solve(MergingAnts(), query, seed).cost == pytest.approx(optimum(query))
 

@@ -14,7 +14,7 @@ def solve(planner, query):
 
 
 def environment_5f():
-    """As hasan's: a horizontal wall, closed on the left and open on the right, between start and goal on the left."""
+    """Return a world like hasan's: start and goal on the left, separated by a horizontal wall that is open on the right."""
     free = np.random.default_rng(5).random((50, 50)) >= 0.06
     free[23:26] = True
     free[24, :47] = False
@@ -22,7 +22,7 @@ def environment_5f():
 
 
 def pheromone_by_heap(query):
-    """Cost of the path to the goal, at 1 or 1.4 per move, times 0.98."""
+    """Return the cost of the path to the goal, at 1 or 1.4 per move, times 0.98."""
     cost, queue = {query.goal: 0.0}, [(0.0, query.goal)]
     while queue:
         here, cell = heapq.heappop(queue)
@@ -35,7 +35,7 @@ def pheromone_by_heap(query):
     return {cell: 0.98 * value for cell, value in cost.items()}
 
 
-def test_pheromone_is_cost_times_the_share_retained():
+def test_pheromone_is_cost_times_the_fraction_retained():
     rng = np.random.default_rng(4)
     for _ in range(20):
         query = random_query(rng, largest=15)
@@ -53,7 +53,7 @@ def test_pheromone_is_cost_times_the_share_retained():
 
 
 @pytest.mark.parametrize("alpha_max", [26.0, 1.0])
-def test_circles_in_front_of_a_wall_are_noticed_and_left(alpha_max):
+def test_cycles_in_front_of_a_wall_are_detected_and_broken(alpha_max):
     query = environment_5f()
     result = solve(MaxMinDStar(alpha_max=alpha_max), query)
     assert result.solved
@@ -71,14 +71,14 @@ def test_on_an_empty_grid_the_exponents_stay_the_same():
     assert np.isfinite(result.field).all()
 
 
-def test_gate_cells_are_closed_unless_there_is_no_other_way():
+def test_gate_cells_are_closed_unless_there_is_no_other_path():
     free = np.fliplr(~np.eye(9, dtype=np.bool_))  # a wall from corner to corner
     free[4, 4] = True  # between two of its cells: a gate
     gate = Query(Grid.from_free(free), (1, 1), (7, 7))
     result = solve(MaxMinDStar(), gate)
     assert "reopened 1 gate cells" in result.reason
     assert result.cost == pytest.approx(optimum(gate))
-    free[6:9, :3] = True  # a wider way round
+    free[6:9, :3] = True  # a wider detour
     wide = Query(Grid.from_free(free), (1, 1), (7, 7))
     around = solve(MaxMinDStar(), wide)
     assert "gate" not in around.reason

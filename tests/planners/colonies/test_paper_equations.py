@@ -1,4 +1,4 @@
-"""Equations of papers that the tests of their planners leave out, against numbers worked out by hand on a few cells."""
+"""Further equations of papers against hand calculations on a few cells."""
 
 import math
 
@@ -25,7 +25,7 @@ SQUARE = graph(2, 2, (1, 1))
 
 
 def after(planner, over, walks, lengths, trail):
-    """The trail after an iteration of these walks, all arrived, the first the best."""
+    """Return the trail after an iteration of these walks; all arrived, the first is the best."""
     cells = np.zeros((len(walks), max(map(len, walks))), dtype=np.int32)
     for row, walk in enumerate(walks):
         cells[row, : len(walk)] = walk
@@ -36,7 +36,7 @@ def after(planner, over, walks, lengths, trail):
 
 def test_han2007_4_1_1_and_4_1_2():
     # The thesis' own example: (x - 12)^2 + (y - 12)^2 = 4 and the chromosome (0, 0), (10, 10), (20, 20). Its first line
-    # ends 2.83 from the centre and is clear, its second passes through. By way of (16, 6) both lines are clear: the
+    # ends 2.83 from the centre and is clear, its second passes through. Through (16, 6) both lines are clear: the
     # distances are 18 / sqrt(73) - 2 and 28 / sqrt(53) - 2.
     task = Task(World("thesis", (-0.5, -0.5, 20.5, 20.5), (Disc(12, 12, 2),)), (0.0, 0.0, 0.0), (20.0, 20.0), cell=1.0)
     land = terrain(Query.between(rasterise(task.world, 1.0), task))

@@ -18,7 +18,7 @@ def solve(planner, query, seed=0):
     return planner.plan(query, np.random.default_rng(seed))
 
 
-def test_the_potential_is_that_worked_out_by_hand():
+def test_the_potential_matches_a_hand_calculation():
     free = np.ones((4, 5))
     free[0, 4] = 0
     planner = PotentialFieldAnts(attraction=2.0, repulsion=8.0, influence=2.0)
@@ -48,7 +48,7 @@ def test_a_potential_measured_from_the_goal_is_highest_there():
         ("local", {"east": 5.0, "west": 1.0, "north": 3.0, "north east": 6.0, "north west": 2.0}),
     ],
 )
-def test_what_attracts_an_ant_is_that_worked_out_by_hand(form, expected):
+def test_attractions_match_a_hand_calculation(form, expected):
     query = Query(Grid.from_free(np.ones((2, 3))), (0, 0), (1, 2))
     planner = PotentialFieldAnts(attraction=2.0, repulsion=0.0, form=form)
     graph = ColonyGraph.of(query)
@@ -83,14 +83,14 @@ def test_without_a_memory_walks_return_to_cells_and_the_path_loses_its_loops():
     assert result.history.best[-1] == pytest.approx(result.cost)
 
 
-def test_loops_are_left_out_of_a_walk_without_a_memory():
+def test_loops_are_cut_out_of_a_walk_without_a_memory():
     walk, tour = np.array([0, 1, 2, 1, 4, 5, 4, 8], dtype=np.int32), np.zeros(8, dtype=np.int32)
     size = _kernels_pfaco.copy_without_loops(walk, 8, np.zeros(9, dtype=np.int64), tour)
     assert tour[:size].tolist() == [0, 1, 4, 8]
 
 
 def test_ants_cross_a_large_map_unless_they_follow_the_letter():
-    # The claim of lee2008 at a fifth of its ants: docs/papers/lee2008.md has the figures with all of them.
+    # The claim of lee2008 with a fifth of its ants; docs/papers/lee2008.md has the figures with all ants.
     query = blocks(100, 100, 25, 16, 300)
     gaps = {form: solve(PotentialFieldAnts(ants=100, iterations=60, form=form), query).cost for form in FORMS}
     assert optimum(query) <= min(gaps["local"], gaps["rise"])
@@ -157,7 +157,7 @@ def test_converged_pheromone_is_rebuilt_from_the_list():
 
 
 def test_pheromone_decays_every_tick_but_not_below_its_minimum():
-    # A start that cannot be left: walks end at once, so an iteration of four ants is one tick.
+    # A blocked-in start: walks end at once, so an iteration of four ants is one tick.
     free = np.ones((3, 3))
     free[0, 1] = free[1, 0] = free[1, 1] = 0
     query = Query(Grid.from_free(free), (0, 0), (2, 2))

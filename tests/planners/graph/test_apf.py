@@ -9,7 +9,7 @@ from antdrive.planners.graph.apf import obstacle_distance
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
-RNG = np.random.default_rng(0)  # the planner draws nothing from it
+RNG = np.random.default_rng(0)  # unused by the planner
 BARE = PotentialField(k_rep=0.0)
 
 

@@ -1,4 +1,4 @@
-"""D* and D* Lite: the costs that they keep, the queue, and what they repair."""
+"""D* and D* Lite: costs, queue and repairs."""
 
 import heapq
 import itertools
@@ -27,7 +27,7 @@ whole = st.integers(0, 10**8)
 
 @given(whole, whole, whole, whole)
 def test_integer_costs_compare_as_the_lengths_do(a, b, c, d):
-    """a + b sqrt(2) against c + d sqrt(2), decided exactly by squaring."""
+    """Compare a + b sqrt(2) with c + d sqrt(2) exactly, by squaring."""
     p, q = a - c, b - d  # the sign of p + q sqrt(2)
     sign = (p > 0) - (p < 0) if p * p > 2 * q * q else (q > 0) - (q < 0)
     cost = p * STRAIGHT + q * DIAGONAL
@@ -64,7 +64,7 @@ def test_it_expands_cells_towards_the_robot_only():
 
 
 def test_keys_stay_right_through_a_long_drive_with_changes_behind_and_ahead():
-    """Thousands of moves between few repairs, which is the case that k_m exists for."""
+    """Thousands of moves between few repairs: the case for k_m."""
     rng = np.random.default_rng(4)
     query = Query(Grid.from_free(rng.random((30, 30)) >= 0.15), (0, 0), (29, 29))
     replanner, world = DStarLite().replanner(query, np.random.default_rng(0)), World(query.grid)
@@ -80,7 +80,7 @@ def test_keys_stay_right_through_a_long_drive_with_changes_behind_and_ahead():
 
 
 def test_equally_long_paths_do_not_lead_in_circles():
-    """An empty grid has many shortest paths, and every repair leaves cells with outdated costs behind."""
+    """An empty grid has many shortest paths, and every repair leaves cells with outdated costs."""
     query = Query(Grid.from_free(np.ones((25, 25))), (12, 0), (12, 24))
     replanner, world = DStarLite().replanner(query, np.random.default_rng(0)), World(query.grid)
     for row, column in itertools.product((12, 11, 13, 10), (12, 8, 16)):
@@ -102,7 +102,7 @@ def test_the_cost_of_thousands_of_steps_is_exact():
 
 
 def corridor():
-    """Two ways to the goal: a short one along row 1, a long one along row 5."""
+    """Return a grid with two paths to the goal: a short one along row 1, a long one along row 5."""
     free = np.zeros((7, 12), dtype=np.bool_)
     free[1, 1:11] = free[5, 1:11] = True
     free[1:6, [1, 10]] = True
@@ -116,7 +116,7 @@ def test_a_blocked_corridor_raises_the_costs_of_paths_through_it():
     assert repair.result().cost == 4 + 9 + 4
     heights = repair._h.reshape(7, 12)
     assert heights[1, 1] == 17 * STRAIGHT
-    assert heights[1, 5] >= NEVER  # RAISE; what the robot does not need is not worked out
+    assert heights[1, 5] >= NEVER  # RAISE; costs that the robot does not need are not computed
     assert heights[1, 7] == 3 * STRAIGHT  # between the block and the goal nothing changed
     repair.move((1, 5))
     assert repair.result().cost == 17 + 4

@@ -13,7 +13,7 @@ from tests.planners.replanning.agreement import World, agree, change_at_random
 from tests.planners.worlds_to_solve import catalogue, random_discs, random_query, sealed
 
 BOTH = pytest.mark.parametrize("planner", [DStar(), DStarLite()], ids=lambda p: type(p).__name__)
-RNG = np.random.default_rng(0)  # searches draw nothing from it
+RNG = np.random.default_rng(0)  # unused by searches
 
 
 def open_ground(rows=12, cols=12):
@@ -44,7 +44,7 @@ def test_repairs_equal_the_oracle(planner):
         for _ in range(100)
         for make in (random_query, random_discs)
     )
-    assert solved > 600  # the test would say little if most were without a path
+    assert solved > 600  # most must have a path for the test to be meaningful
 
 
 @pytest.mark.slow
@@ -89,7 +89,7 @@ def test_repairs_equal_the_oracle_after_any_sequence_of_changes(planner, bits, e
 @BOTH
 @pytest.mark.parametrize("seed", range(3))
 def test_a_drive_through_an_unknown_map(planner, seed):
-    """The robot sees three cells far, takes all other cells for free, and replans at every step."""
+    """The robot detects cells within three cells, treats all others as free, and replans at every step."""
     rng = np.random.default_rng(seed)
     truth = rng.random((40, 40)) >= 0.25
     truth[1, 1] = truth[38, 38] = True

@@ -10,7 +10,7 @@ from antdrive.planners import PLANNERS, AStar, Dijkstra, Query, path_cost, reach
 from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.worlds_to_solve import catalogue, optimum, optimum_by_scipy, random_discs, random_query, thinned
 
-RNG = np.random.default_rng(0)  # searches draw nothing from it
+RNG = np.random.default_rng(0)  # unused by searches
 SEARCHES = [Dijkstra(), AStar()]
 
 
@@ -47,7 +47,7 @@ def test_costs_equal_the_oracle_on_thousands_of_grids():
 
 @pytest.mark.parametrize("side", [9, 40])
 def test_costs_equal_the_oracle_for_any_set_of_two_way_moves(side):
-    """The search may not rely on how the moves of neighbouring cells are related."""
+    """The search must not assume a relation between the moves of neighbouring cells."""
     rng = np.random.default_rng(4)
     for _ in range(200):
         query = thinned(rng, side, cut=0.3)
@@ -106,7 +106,7 @@ def test_the_ring_of_buckets_suffices_for_a_long_maze():
 
 
 def test_the_open_list_grows():
-    """From the middle of an empty grid, the open list needs more than the 1024 entries it begins with."""
+    """From the middle of an empty grid, the open list outgrows its initial 1024 entries."""
     query = Query(Grid.from_free(np.ones((701, 701))), (350, 350), (700, 699))
     result = Dijkstra().plan(query, RNG)
     assert result.cost == pytest.approx(1 + 349 * math.sqrt(2), abs=1e-9)

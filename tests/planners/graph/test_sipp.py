@@ -1,4 +1,4 @@
-"""Safe-interval planning against an oracle that cuts time into ticks and shares no code with it."""
+"""Safe-interval planning against an independent oracle in discrete time."""
 
 import dataclasses
 import itertools
@@ -19,7 +19,7 @@ SPEED, CELL, INFLATE = 0.5, 0.5, 0.2
 
 @dataclasses.dataclass(frozen=True)
 class Keyframed:
-    """A mover that goes straight between keyframes, back and forth, or jumps from the last to the first."""
+    """A mover that drives straight between keyframes, back and forth, or jumps from the last to the first."""
 
     radius: float
     frames: np.ndarray  # (K, 3) t, x, y
@@ -70,17 +70,17 @@ def some_mover(rng, side):
     return Keyframed(radius, np.column_stack([t, rng.uniform(0, side, (count, 2))]), bool(rng.random() < 0.8))
 
 
-# The oracle is a table of which cells can be reached at which tick.
+# The oracle tabulates the reachable cells at each tick.
 
 TICK = 0.05
 MOVES = [(dr, dc) for dr, dc in itertools.product((-1, 0, 1), repeat=2) if (dr, dc) != (0, 0)]
 
 
 def first_tick(query, movers, horizon, *, slack, hurry, stay=False):
-    """When the goal is reached at the earliest by a robot that acts on ticks only [s]; inf: not within the horizon.
+    """Return the earliest arrival of a robot that acts only on ticks [s]; inf: not within the horizon.
 
-    `slack` is added to the distance that must be kept. A diagonal move, which does not end on a tick, is rounded up,
-    and with `hurry` down as well.
+    `slack` is added to the clearance. The duration of a diagonal move is rounded up to ticks; with `hurry`, also
+    down.
     """
     free, (rows, cols), ticks = query.grid.free, query.grid.shape, round(horizon / TICK)
     fine = 2  # samples per tick
@@ -88,7 +88,7 @@ def first_tick(query, movers, horizon, *, slack, hurry, stay=False):
     where = [(m.at(t), m.radius + INFLATE + 2 * TOLERANCE + slack) for m in movers]
 
     def clear(path, n):
-        """For each tick, whether a robot that takes (S, 2) from there on, a sample at a time, keeps its distance."""
+        """Return for each tick whether a robot that follows (S, 2) from there, one row per sample, keeps the clearance."""
         samples = fine * np.arange(ticks - n + 1)[:, np.newaxis] + np.arange(len(path))
         gaps = [np.hypot(*np.moveaxis(xy[samples] - path, -1, 0)) - reach for xy, reach in where]
         return np.asarray((np.array(gaps) >= 0).all(axis=(0, 2)))
@@ -133,7 +133,7 @@ def small_world(seed):
 
 HORIZON = 12.0
 FEW, MANY = range(14), pytest.param(range(14, 120), marks=pytest.mark.slow)
-ABOVE, BELOW = 0.03, -2.0 * TICK  # m: what robot and mover move between two samples, and in a tick
+ABOVE, BELOW = 0.03, -2.0 * TICK  # m: motion of robot and mover between two samples, and per tick
 
 
 @pytest.fixture(scope="module")
@@ -148,15 +148,15 @@ def test_no_path_arrives_sooner_and_none_is_missed(seeds, stay):
     gaps, without = [], 0
     for query, movers in map(small_world, seeds):
         plan = plan_in_time(query, movers, speed=SPEED, horizon=HORIZON, stay=stay)
-        # A robot on ticks that keeps a little more distance can be followed by one that is bound to none ...
+        # A robot on ticks with more clearance bounds the free robot from above ...
         above = first_tick(query, movers, HORIZON, slack=ABOVE, hurry=False, stay=stay)
-        # ... which one on ticks can follow in turn, if it may keep less.
+        # ... and one with less clearance bounds it from below.
         below = first_tick(query, movers, HORIZON, slack=BELOW, hurry=True, stay=stay)
         assert below - TICK - 1e-9 <= plan.duration <= above + 1e-9
         without += math.isinf(below)
         if math.isfinite(above):
             gaps.append(above - below)
-    # The oracle says something: it mostly leaves no more room than its rounding takes, and some worlds have no path.
+    # The oracle is tight: bounds mostly differ by rounding only, and some worlds have no path.
     assert np.median(gaps) < 1.0
     assert len(gaps) > len(seeds) / 4
     assert without > 0
@@ -215,7 +215,7 @@ def corridor(length):
 
 
 def test_the_robot_waits_exactly_until_a_mover_has_crossed():
-    """A mover crosses the middle of a corridor; the robot gets there when its disc leaves the line."""
+    """A mover crosses the middle of a corridor; the robot arrives there when the mover's disc leaves the line."""
     query = corridor(3)  # x from 0 to 1 m
     mover = Passing(0.25, (0.5, -0.4), (0.0, 0.1))
     reach = 0.25 + INFLATE + 2 * TOLERANCE
@@ -247,7 +247,7 @@ def test_a_robot_backs_into_a_bay_to_let_a_mover_pass():
 
 
 def test_two_robots_do_not_change_places_through_each_other():
-    """In a corridor with an oncoming mover there is never room for both."""
+    """A corridor never has room for both the robot and an oncoming mover."""
     swap = Passing(0.05, (1.0, 0.0), (-0.5, 0.0))
     plan = plan_in_time(corridor(3), [swap], speed=SPEED, horizon=10)
     assert plan.status is PlanStatus.NO_PATH
@@ -293,7 +293,7 @@ def test_a_mover_on_the_start_is_named():
 
 
 def test_a_mover_that_jumps_blocks_nothing_in_between():
-    """A mover that starts again at the other end is never in between."""
+    """A mover that restarts at the other end is never in between."""
     loop = Keyframed(0.1, np.array([[0, 0.0, 0.0], [3.7, 0.0, 9.0]]), again=False)
     t, xy, jump = _samples(loop, 0.0, 10.0)
     assert jump.sum() == 2

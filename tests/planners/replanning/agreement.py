@@ -1,4 +1,4 @@
-"""An oracle for replanners that shares no code with them: scipy's Dijkstra on a graph built here."""
+"""Independent oracle for replanners: scipy's Dijkstra on a graph built here."""
 
 import math
 
@@ -9,11 +9,11 @@ from scipy.sparse.csgraph import dijkstra
 from antdrive.worlds import Grid
 
 Cell = tuple[int, int]
-HALF = {0: (0, 1), 1: (1, 1), 2: (1, 0), 3: (1, -1)}  # bit: (row, column); each two-way move once
+HALF = {0: (0, 1), 1: (1, 1), 2: (1, 0), 3: (1, -1)}  # bit: (row, column); each bidirectional move once
 
 
 def ends(shape, dr, dc):
-    """Where a move starts and where it ends, for all cells at once."""
+    """Return the start and end cells of a move, for all cells at once."""
     rows, cols = shape
     here = (slice(0, rows - dr), slice(max(0, -dc), cols - max(0, dc)))
     there = (slice(dr, rows), slice(max(0, dc), cols - max(0, -dc)))
@@ -21,7 +21,7 @@ def ends(shape, dr, dc):
 
 
 def pictured(free):
-    """The moves that free cells allow, by direction."""
+    """Return the moves between free cells, by direction."""
     able = {}
     for k, (dr, dc) in HALF.items():
         here, there = ends(free.shape, dr, dc)
@@ -30,7 +30,7 @@ def pictured(free):
 
 
 class World:
-    """Free cells and closed moves, kept by the test."""
+    """Free cells and closed moves, tracked by the test."""
 
     def __init__(self, grid):
         self.reset(grid)
@@ -77,7 +77,7 @@ def agree(replanner, world):
 
 
 def change_at_random(make, query, rng, turns):
-    """Report random changes to a replanner and compare it with the oracle after each; how often there was a path."""
+    """Report random changes to a replanner and compare it with the oracle after each; returns the number of paths."""
     world, replanner = World(query.grid), make(query)
     shape = query.grid.shape
     solved = 0
@@ -99,6 +99,6 @@ def change_at_random(make, query, rng, turns):
         path = replanner.result().cells if rng.random() < 0.5 else []
         if len(path) and rng.random() < 0.7:  # along the path
             replanner.move(tuple(map(int, path[min(len(path) - 1, int(rng.integers(0, 4)))])))
-        elif rng.random() < 0.3:  # carried off
+        elif rng.random() < 0.3:  # moved off the path
             replanner.move((int(rng.integers(0, shape[0])), int(rng.integers(0, shape[1]))))
     return solved

@@ -1,4 +1,4 @@
-"""Properties of every replanner, whichever planner it is made for, and agents that decide cell by cell among movers."""
+"""Properties of every planner's replanner, and agents that decide cell by cell among movers."""
 
 import math
 
@@ -126,8 +126,8 @@ def test_a_planner_s_own_replanner_is_used_if_it_has_one():
     assert isinstance(replanner_for(PLANNERS["mmas"], query, rng), ReplanFromScratch)
 
 
-def test_a_planner_that_declares_nothing_plans_anew_after_every_change():
-    """As other people's planners may: only `plan` is needed."""
+def test_a_planner_without_a_replanner_plans_from_scratch_after_every_change():
+    """A third-party planner with only the method `plan`."""
 
     class Bare:
         def plan(self, query, rng):
@@ -234,7 +234,7 @@ def test_pheromone_is_spread_once(case):
 
 
 def test_the_paper_s_exponents_alone_do_not_arrive_in_5f():
-    """The reason for the rule: at alpha 1 and beta 1 the ant walks in circles in front of the wall, as the author reports."""
+    """At alpha 1 and beta 1 the ant cycles in front of the wall, as the author reports."""
     query = CASES["5f"]
     robot = PheromoneAgent(MaxMinDStar(), query)
     robot._raise_alpha = lambda here: None
@@ -256,7 +256,7 @@ def test_the_note_reports_how_exponents_changed():
 
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar"])
 def test_total_cost_is_summed_as_the_paper_s_table_does(name):
-    """49 steps straight ahead: 49 + 48 + ... + 1, of the 1238.6 that its case 3c printed."""
+    """49 straight steps: 49 + 48 + ... + 1, of the 1238.6 printed in its case 3c."""
     free = np.ones((1, 50))
     robot = robot_by(name, Query(Grid.from_free(free), (0, 0), (0, 49)))
     assert alone(robot)
@@ -310,7 +310,7 @@ def test_an_agent_drives_around_a_lasting_block(name):
 
 
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar"])
-def test_an_enclosed_robot_waits_until_there_is_a_way_out(name):
+def test_an_enclosed_robot_waits_for_a_path(name):
     query = Query(Grid.from_free(np.ones((7, 7))), (3, 3), (6, 6))
     ring = [(3 + dr, 3 + dc) for dr, dc in DIRECTIONS]
     robot = robot_by(name, query)
@@ -319,7 +319,7 @@ def test_an_enclosed_robot_waits_until_there_is_a_way_out(name):
     assert robot.stats.waits == 3 * PATIENCE
     assert robot.cell == (3, 3)
     assert alone(robot, 20)
-    assert robot.step(NOBODY) is None  # at the goal there is nothing to do
+    assert robot.step(NOBODY) is None  # at the goal
     assert robot.stats.decisions == robot.stats.waits + robot.stats.steps
 
 

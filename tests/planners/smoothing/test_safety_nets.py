@@ -1,4 +1,4 @@
-"""The checks that a smoothed line has to pass, called directly: on real lines one may hide that another is missing."""
+"""The checks of smoothed lines, called directly: on real lines one may mask another."""
 
 import math
 
@@ -24,7 +24,7 @@ def length(xy):
 
 
 def over(top):
-    """A line straight over the disc at some height, with steep ends."""
+    """Return a line across the disc at some height, with steep ends."""
     return np.array([(1.0, 3.0), (1.5, top), (6.5, top), (7.0, 3.0)])
 
 
@@ -56,7 +56,7 @@ def test_a_string_that_comes_too_close_is_refused_though_its_drawing_does_not():
 
 
 def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners():
-    """The shortest line around the disc, whose corners stand off by less than those of the usual drawing."""
+    """The shortest line around the disc, with corners closer to the arc than usual."""
     radius = 0.7 + SHRINK
     side = math.acos(radius / 3.0)
     angles = np.linspace(math.pi - side, side, 32)

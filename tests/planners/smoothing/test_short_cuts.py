@@ -1,4 +1,4 @@
-"""What the kernels of smoothing leave out changes nothing: the oracles look at everything, with numpy."""
+"""The smoothing kernels' shortcuts change no result: the oracles check everything with numpy."""
 
 import math
 
@@ -12,7 +12,7 @@ seeds = st.integers(0, 10_000)
 
 
 def winding(loop, points):
-    """How often a closed polyline goes around points: the sum of the angles at which its sides are seen."""
+    """Return a closed polyline's winding numbers around points: the sum of the angles of its sides."""
     ends = loop[None] - points[:, None]
     angles = np.arctan2(ends[..., 1], ends[..., 0])
     turns = np.diff(np.column_stack((angles, angles[:, :1])), axis=1)
@@ -34,7 +34,7 @@ def test_a_loop_encloses_what_it_winds_around(seed, height):
 
 @settings(max_examples=25, deadline=None)
 @given(seeds, st.booleans())
-def test_discs_within_others_are_left_out(seed, tall):
+def test_discs_within_others_are_omitted(seed, tall):
     rng = np.random.default_rng(seed)
     discs = np.column_stack(
         (rng.uniform(0, 1, (40, 2)) * ((0.3, 2.0) if tall else (2.0, 0.3)), rng.uniform(0, 0.3, 40))
@@ -48,8 +48,8 @@ def test_discs_within_others_are_left_out(seed, tall):
 
 @settings(max_examples=25, deadline=None)
 @given(seeds)
-def test_a_gap_that_the_line_passes_is_shared(seed):
-    """Each disc may grow by its share of the narrowest gap that the line passes, whatever lies beside which."""
+def test_a_gap_that_the_line_passes_is_split_evenly(seed):
+    """Each disc may grow by half of the narrowest gap that the line passes."""
     rng = np.random.default_rng(seed)
     discs = np.column_stack((rng.uniform(-2, 2, 30), rng.uniform(-9, 9, 30), rng.uniform(0.2, 0.5, 30)))
     xy = np.column_stack((0.3 * np.sin(np.arange(20)), np.linspace(-9.5, 9.5, 20)))
@@ -69,7 +69,7 @@ def test_a_gap_that_the_line_passes_is_shared(seed):
 
 @settings(max_examples=100, deadline=None)
 @given(seeds, st.floats(0.0, 4.0), st.sampled_from([1.0, -1.0]))
-def test_no_direction_that_an_arc_sweeps_is_left_out(seed, sweep, turn):
+def test_every_direction_of_an_arc_is_covered(seed, sweep, turn):
     rng = np.random.default_rng(seed)
     begin, (x, y) = rng.uniform(0, 2 * np.pi), rng.uniform(-1, 1, 2).tolist()
     bx, by = 0.4 * math.cos(begin), 0.4 * math.sin(begin)

@@ -1,4 +1,4 @@
-"""Smoothed routes keep the exact clearance and the plan's corridor, are never longer, and are optimal in the best corridor."""
+"""Smoothed routes keep the clearance and the homotopy class, are never longer, and are optimal in the best corridor."""
 
 import dataclasses
 import itertools
@@ -32,7 +32,7 @@ from antdrive.worlds import (
 from tests.planners.worlds_to_solve import catalogue as small_worlds
 from tools.shared_data import BARN
 
-RNG = np.random.default_rng(0)  # nothing that counts is drawn from it
+RNG = np.random.default_rng(0)  # unused by these planners
 SMOOTHED = ("taut", "clearance")
 
 
@@ -40,7 +40,7 @@ SMOOTHED = ("taut", "clearance")
 
 
 def word(xy, centres):
-    """The homotopy class of a line among points, as the rays from the points that it crosses, in order and reduced."""
+    """Return the homotopy class of a line among points: the crossed rays from the points, in order and reduced."""
     angle = 0.7390851  # no ray may pass through another point
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     line, points = xy @ turn.T, np.unique(centres @ turn.T, axis=0)
@@ -69,7 +69,7 @@ def sampled(path, count=60):
 
 
 def wander(seed):
-    """A plan through random places of a random world of overlapping discs: loops, spirals, dead ends."""
+    """Draw a plan through a random world of overlapping discs: loops, spirals, dead ends."""
     rng = np.random.default_rng(seed)
     while True:
         largest = rng.choice([0.2, 0.6, 1.8])
@@ -108,7 +108,7 @@ def check(route, line, task, inflate, *, longest=math.inf):
 
 
 def one_disc(side):
-    """The radius-5 world of Han's thesis (2007), its disc passed on one side."""
+    """The radius-5 world of Han's thesis (2007), with its disc passed on one side."""
     task = Task(World("han", (-2, -2, 22, 22), (Disc(10, 10, 5),)), (0.0, 0.0, 0.0), (20.0, 20.0))
     grid = rasterise(task.world, 0.5)
     corner = (0.0, 20.0) if side > 0 else (20.0, 0.0)
@@ -293,7 +293,7 @@ def _barn():
 @pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")
 @pytest.mark.parametrize("cell", [0.15, 0.05])
 def test_barn_in_the_best_corridor_is_the_optimum(cell):
-    """With 0.363 m of clearance: Jackal's radius and 3 cm."""
+    """With 0.363 m of clearance: the Jackal's radius plus 3 cm."""
     gaps = []
     for task in barn():
         grid = rasterise(task.world, cell, 0.363)
@@ -314,7 +314,7 @@ def test_barn_in_the_best_corridor_is_the_optimum(cell):
     assert sum(same for _, same in gaps) >= 0.9 * len(gaps)
 
 
-# -- what cannot be smoothed, and misuse
+# -- lines that cannot be smoothed, and misuse
 
 
 def test_a_start_with_too_little_room_is_left_as_planned():
@@ -352,7 +352,7 @@ def test_a_plan_that_comes_too_close_is_kept_there_with_a_note():
 
 
 def test_spare_length_is_spent_only_once():
-    """Two parts of a line, between them one with too little room, and a centimetre to spare for all of them."""
+    """A line of two clear parts around one below the clearance, with 1 cm of spare length in total."""
     posts = ((5.0, -0.5, 0.5), (5.0, 2.6, 0.5), (10.0, 0.45, 0.3), (15.0, -0.5, 0.5), (15.0, 2.6, 0.5))
     task = Task(
         World("w", (0.0, -3.0, 20.0, 3.0), tuple(Disc(*post) for post in posts)), (1.0, 0.25, 0.0), (19.0, 0.25)
@@ -369,7 +369,7 @@ def test_spare_length_is_spent_only_once():
 
 
 def test_without_room_for_more_clearance_the_line_stays_taut():
-    """A plan whose own line is taut has no length to spare for more clearance."""
+    """A taut plan has no spare length for more clearance."""
     task, grid, plan = one_disc(1)
     taut = smooth(plan, grid, task)
     again = PlanResult(status=PlanStatus.SOLVED, waypoints=grid.fractional(taut.xy))

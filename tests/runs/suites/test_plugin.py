@@ -145,7 +145,7 @@ def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted):
     found.assert_outcomes(failed=1, deselected=1)
     found.stdout.fnmatch_lines([
         "duration_s: * s, in the baseline * s: * s longer, tolerance * s",
-        "the drives part at t = * s, at (*, 1.00) instead of (*, 1.00); *; at most * m apart",
+        "the drives diverge at t = * s, at (*, 1.00) instead of (*, 1.00); *; at most * m apart",
         "changed since the baseline: robot",
         "repeat: antdrive check 'a.drive.yaml::clear[[]0]'",
         "        antdrive run small.yaml --planner astar --robot slow.yaml --seed 0",

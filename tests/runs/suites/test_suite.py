@@ -232,8 +232,8 @@ def test_words_select_tests(tmp_path):
         ([f"{path}::d"], None, "no test 'd'; choose from"),
         ([str(path)], "x*", "no test of"),
         ([str(tmp_path / "none.drive.yaml")], None, "cannot be read (No such file"),
-        ([__file__], None, "is no suite; the name of a suite ends in .drive.yaml"),
-        ([str(Path(__file__).parent)], None, "holds no suites"),
+        ([__file__], None, "not a suite; its name must end in .drive.yaml"),
+        ([str(Path(__file__).parent)], None, "contains no suites"),
     ):
         with pytest.raises(InputError, match=re.escape(message)):
             select(words, pattern)

@@ -1,4 +1,4 @@
-"""Baselines: what an earlier drive did, in a small text file for version control."""
+"""Baselines: results of earlier drives, in small text files for version control."""
 
 from __future__ import annotations
 
@@ -40,25 +40,24 @@ def _to_outcome(value: Any) -> Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
-    """What an earlier drive did.
+    """The result of an earlier drive.
 
     Attributes:
-        schema: the version of the format, 1
-        case: the test that it belongs to, such as aisle[0]
-        outcome: how the run ended
+        schema: version of the format, 1
+        case: the test it belongs to, such as aisle[0]
+        outcome: outcome of the run
         reason: details of the outcome, in words; may be empty
         certified: whether the drive was certified collision-free
-        margin_m: the margin that was chosen for `margin: auto` [m]; None: it was given
-        bound_m: the clearance that the certificate proved [m]; None without one
-        metrics: every metric but wall-clock times; empty if the robot did not drive
-        nearest: what the robot came nearest to; None if it did not drive
+        margin_m: the margin chosen for `margin: auto` [m]; None: it was given
+        bound_m: the clearance proved by the certificate [m]; None without one
+        metrics: every metric except wall-clock times; empty if the robot did not drive
+        nearest: the closest approach; None if the robot did not drive
         hashes: of the world, the unseen obstacles, the robot and the settings; empty if the robot did not drive
         versions: of antdrive, Python and the packages that computed the drive
         drive_digest: `Rollout.drive_digest`; empty if the robot did not drive
         limiters: names of the rules that can limit the robot's speed
         line_hz: rate of the line [Hz]
-        line: x [m], y [m], yaw [rad] and the index of the rule that limited the speed, for each sample; the last one is
-            the drive's end
+        line: x [m], y [m], yaw [rad] and the index of the limiting rule, for each sample; the last is the drive's end
     """
 
     __pydantic_config__ = STRICT
@@ -89,11 +88,11 @@ class Baseline:
 
     @property
     def xy(self) -> Floats:
-        """The places of the line (N, 2) [m]."""
+        """The positions of the line (N, 2) [m]."""
         return np.array([sample[:2] for sample in self.line], dtype=np.float64).reshape(-1, 2)
 
     def metric(self, name: str) -> float:
-        """A metric of the earlier drive; NaN where there is none.
+        """Return a metric of the earlier drive; NaN if missing.
 
         Args:
             name: a name of `METRICS`
@@ -103,7 +102,7 @@ class Baseline:
 
     @classmethod
     def of(cls, run: Run, case: str) -> Baseline:
-        """The baseline that a run makes.
+        """Return the baseline of a run.
 
         Args:
             run: the run
@@ -132,7 +131,7 @@ class Baseline:
         return baseline
 
     def to_text(self) -> str:
-        """The baseline as JSON with one value, or one sample of the line, on each line."""
+        """Return the baseline as JSON, one value or one sample of the line per line."""
         values = _ADAPTER.dump_python(self, mode="python")
         if self.margin_m is None:
             del values["margin_m"]
@@ -144,7 +143,7 @@ class Baseline:
         return head.removesuffix("\n}") + f',\n "line": [\n{body}\n ]\n}}\n'.replace("[\n\n ]", "[]")
 
     def save(self, path: Path) -> None:
-        """Write the baseline, whole or not at all.
+        """Write the baseline atomically.
 
         Raises:
             InputError: the file cannot be written.
@@ -152,7 +151,7 @@ class Baseline:
         write_text(path, self.to_text())
 
     def renew(self, path: Path) -> str:
-        """Write the baseline unless the file holds the same drive already; what was done.
+        """Write the baseline unless the file holds the same drive; return "written", "renewed" or "unchanged".
 
         Raises:
             InputError: the file cannot be written.
@@ -165,22 +164,22 @@ class Baseline:
 
     @classmethod
     def load(cls, path: Path) -> Baseline | None:
-        """The baseline in a file; None if there is no such file.
+        """Load a baseline; None if the file is missing.
 
         Raises:
-            InputError: the file is no baseline.
+            InputError: the file is not a baseline.
         """
         if not path.exists():
             return None
         again = "accept the drive again with antdrive accept"
         try:
             text = read_bytes(path, 10 * MAX_BYTES, "a baseline").decode("utf-8")
-            found = json.loads(text)
+            data = json.loads(text)
         except (UnicodeDecodeError, ValueError, RecursionError) as error:
             if type(error).__name__ == "InputError":
                 raise
             raise input_error(str(path), f"not a baseline: not JSON; restore it, or {again}") from None
-        if not isinstance(found, dict) or found.get("schema") != SCHEMA:
+        if not isinstance(data, dict) or data.get("schema") != SCHEMA:
             raise input_error(str(path), f"schema: must be {SCHEMA}; {again}")
         try:
             baseline = _ADAPTER.validate_json(text)
@@ -195,23 +194,23 @@ class Baseline:
 
     @classmethod
     def own(cls, path: Path, case: str) -> Baseline | None:
-        """The baseline in a file, which must be that of the test; None if there is no such file.
+        """Load the baseline of a test; None if the file is missing.
 
         Args:
             path: the file
             case: the name of the test
 
         Raises:
-            InputError: the file is no baseline, or that of another test.
+            InputError: the file is not a baseline, or belongs to another test.
         """
         baseline = cls.load(path)
         if baseline is not None and baseline.case != case:
-            problem = f"belongs to {baseline.case}, not to {case}; remove the file, and accept {case} anew"
+            problem = f"belongs to {baseline.case}, not to {case}; delete the file and accept {case} again"
             raise input_error(shown_path(path), "case", problem)
         return baseline
 
     def gaps(self) -> Iterator[tuple[str, str]]:
-        """What is missing or too much, as key and problem: with less than this a comparison would say nothing."""
+        """Yield missing and surplus parts, as key and problem; a comparison needs complete ones."""
         parts = {name: getattr(self, name) for name in ("metrics", "nearest", "hashes", "drive_digest", "line")}
         if self.outcome in ENDED_BY.values() and not any(parts.values()):
             return
@@ -221,7 +220,7 @@ class Baseline:
             yield "metrics", f"{', '.join(missing[:3])}{' and others' if len(missing) > 3 else ''} missing"
         for name in self.metrics:
             if name not in known:
-                yield f"metrics.{name}", "no such metric"
+                yield f"metrics.{name}", "unknown metric"
         for name, part in parts.items():
             if not part:
                 yield name, "missing, though the robot drove"
@@ -235,9 +234,9 @@ _ADAPTER = TypeAdapter(Baseline)
 
 
 def configuration_hashes(run: Run) -> dict[str, str]:
-    """The hashes of all that a run depends on, by name: world, robot, settings, unseen obstacles; none without a rollout.
+    """Return the hashes of a run's configuration: world, robot, settings, unseen obstacles; empty without a rollout.
 
-    The record's time limit counts only where it was given: by default it follows from the robot and the route.
+    The time limit counts only if it was given: the default follows from the robot and the route.
     """
     if run.rollout is None:
         return {}
@@ -260,11 +259,11 @@ def _metrics(rollout: Rollout) -> dict[str, float | None]:
 
 
 def _line(rollout: Rollout, hz: float) -> tuple[tuple[float, float, float, int], ...]:
-    """The driven line at a rate, with the drive's end as its last sample."""
+    """Sample the driven line at a rate, with the drive's end as the last sample."""
     end = float(rollout.t[-1])
     moments = np.append(np.arange(0.0, max(end - 0.5 / hz, 0.0), 1 / hz), end) if end > 0 else np.zeros(1)
     rows = np.clip(np.round(moments * rollout.record.physics_hz).astype(int), 0, len(rollout.t) - 1)
-    # Between rows, because a rate of physics that the line's does not divide has no row at most of the moments.
+    # Interpolate, because the physics rate need not be a multiple of the line's.
     turned = np.column_stack([rollout.pose[:, :2], np.unwrap(rollout.pose[:, 2])])
     x, y, yaw = (np.interp(moments, rollout.t, turned[:, axis]) for axis in range(3))
     samples = np.column_stack([x, y, wrap_angle(yaw)]).tolist()

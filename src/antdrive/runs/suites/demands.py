@@ -1,4 +1,4 @@
-"""What a test demands of a drive: its outcome, bounds on metrics, and how much worse than the baseline it may be."""
+"""Demands of a test on a drive: its outcome, bounds on metrics, and tolerances relative to the baseline."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from antdrive.base.errors import FieldError
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK, Tolerance
 from antdrive.sim.log.outcome import Outcome
 
-#: The distance between the places where two drives end, which is judged like a metric [m].
+#: The distance between the ends of two drives, compared like a metric [m].
 END = "end_m"
 END_TOLERANCE = Tolerance(0.05)
 LEAST_TRAJECTORY = 0.002  # baselines hold positions in whole millimetres [m]
 
-#: The kinds of things that a robot can touch.
+#: Kinds of things that a robot can touch.
 CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"
 KINDS = (CYLINDER, UNSEEN, MOVER, WALL)
 
-#: The keys of `expect` that are no metrics.
+#: Keys of `expect` that are not metrics.
 NON_METRICS = ("outcome", "certified", "touched", "cause")
 
 _SIGNS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
@@ -50,23 +50,23 @@ class Bound:
     sign: str
     value: float
 
-    def holds(self, found: float) -> bool:
-        """Whether a value keeps the bound; no number never does.
+    def holds(self, measured: float) -> bool:
+        """Return whether a value keeps the bound; NaN never does.
 
         Args:
-            found: the metric of a drive
+            measured: the metric of a drive
         """
-        return not math.isnan(found) and _SIGNS[self.sign](found, self.value)
+        return not math.isnan(measured) and _SIGNS[self.sign](measured, self.value)
 
-    def broken(self, found: float) -> Bound | None:
-        """The bound that values keep which break this one as a value does; None where the value keeps it, or is no number.
+    def broken(self, measured: float) -> Bound | None:
+        """Return the bound of all values that break this one on the same side; None if the value keeps it or is NaN.
 
         Args:
-            found: the metric of a drive
+            measured: the metric of a drive
         """
-        if self.holds(found) or math.isnan(found):
+        if self.holds(measured) or math.isnan(measured):
             return None
-        signs = {">=": "<", "<=": ">", ">": "<=", "<": ">=", "==": ">" if found > self.value else "<"}
+        signs = {">=": "<", "<=": ">", ">": "<=", "<": ">=", "==": ">" if measured > self.value else "<"}
         return dataclasses.replace(self, sign=signs[self.sign])
 
     def __str__(self) -> str:
@@ -75,18 +75,17 @@ class Bound:
 
 @dataclass(frozen=True, kw_only=True)
 class Demands:
-    """What a test demands of a drive.
+    """The demands of a test on a drive.
 
     Attributes:
-        outcome: how the run must end
-        certified: whether the drive must be certified collision-free; None: it must be if it is to succeed
-        touched: what kind of thing must be touched first, one of `KINDS`; None: any, or none
-        cause: what must have taken most of the margin by then, one of `causes`; None: anything
+        outcome: required outcome of the run
+        certified: whether the drive must be certified collision-free; None: if it must succeed
+        touched: required kind of the first thing touched, one of `KINDS`; None: any, or none
+        cause: required largest cause of the lost margin, one of `causes`; None: any
         bounds: bounds on metrics
-        tolerances: how much worse than the baseline each metric may be, where it is not the metric's own tolerance; None:
-            the metric is not compared
-        trajectory: how far from the baseline's line the robot may be at any time [m]; "exact": the drive must be the
-            same, bit for bit; None: the line is not judged
+        tolerances: allowed losses against the baseline that replace the metrics' own; None: not compared
+        trajectory: largest distance from the baseline's line at any time [m]; "exact": bitwise the same drive; None: not
+            compared
     """
 
     outcome: Outcome = Outcome.SUCCEEDED
@@ -103,7 +102,7 @@ class Demands:
         return self.outcome is Outcome.SUCCEEDED if self.certified is None else self.certified
 
     def tolerance(self, name: str) -> Tolerance | None:
-        """How much worse than the baseline a metric may be; None where it is not compared.
+        """Return how much worse than the baseline a metric may be; None if it is not compared.
 
         Args:
             name: the name of a metric, or `END`
@@ -119,17 +118,17 @@ class Demands:
         tolerance: Mapping[str, Any] = MappingProxyType({}),
         trajectory: float | str | None = None,
     ) -> Demands:
-        """Demands as people write them.
+        """Parse demands as written in a suite.
 
         >>> Demands.of({"min_clearance_m": ">= 0.05"}, {"duration_s": "10 %", "jerk_rms": "any"}, 0.05)
 
         Args:
-            expect: outcome, certified, what is touched and why, and bounds on metrics such as ">= 5, <= 30"
-            tolerance: by metric, or `end_m`: a number in its unit, a share such as "10 %", or "any"
+            expect: outcome, certified, the thing touched and the cause, and bounds on metrics such as ">= 5, <= 30"
+            tolerance: by metric, or `end_m`: a number in its unit, a percentage such as "10 %", or "any"
             trajectory: a distance [m], or "exact"
 
         Raises:
-            FieldError: an unknown metric or outcome, or a value of another form.
+            FieldError: a metric or outcome is unknown, or a value invalid.
         """
         bounds: list[Bound] = []
         for key, value in expect.items():
@@ -162,7 +161,7 @@ def _certified(value: Any) -> bool | None:
 
 
 def causes() -> Sequence[str]:
-    """What can take the margin. Where they are listed loads the compiler, which collecting tests does not need."""
+    """Return the causes of lost margin. Importing them loads the compiler, which collecting tests does not need."""
     from antdrive.sim.log.margin import CAUSES
 
     return tuple(CAUSES)
@@ -171,7 +170,7 @@ def causes() -> Sequence[str]:
 def _of_a_contact(
     key: str, expect: Mapping[str, Any], choices: Callable[[], Sequence[str]], outcome: Outcome
 ) -> str | None:
-    """What is demanded of a contact, which must be what the test expects."""
+    """Parse a demand on a contact; the outcome must be one with contact."""
     value = expect.get(key)
     if value is None:
         return None
@@ -179,48 +178,48 @@ def _of_a_contact(
     if value not in known:
         raise FieldError(f"expect.{key}", f"unknown {show(value)}; choose from {', '.join(known)}")
     if not outcome.with_contact:
-        raise FieldError(f"expect.{key}", f"nothing is touched where the outcome is {outcome.key}; leave it out")
+        raise FieldError(f"expect.{key}", f"outcome {outcome.key} has no contact; omit it")
     return str(value)
 
 
 def _bounds(key: str, value: Any) -> list[Bound]:
     if key not in METRICS:
         known = [*NON_METRICS, *METRICS]
-        raise FieldError(f"expect.{key}", f"no such metric; {suggest(key, known)}")
+        raise FieldError(f"expect.{key}", f"unknown metric; {suggest(key, known)}")
     if key in WALL_CLOCK:
-        raise FieldError(f"expect.{key}", "depends on the machine and its load, so no test can bound it; leave it out")
+        raise FieldError(f"expect.{key}", "depends on the machine and its load; omit it")
     if isinstance(value, int | float) and not isinstance(value, bool):
         if METRICS[key].unit == "1" and float(value).is_integer():  # such as contacts_driving: 0
             return [Bound(key, "==", float(value))]
         sign = "<=" if METRICS[key].better == "lower" else ">="
-        raise FieldError(f"expect.{key}", f'no drive has exactly this; write a bound such as "{sign} {value:g}"')
-    found = []
+        raise FieldError(f"expect.{key}", f'no drive has exactly this value; write a bound such as "{sign} {value:g}"')
+    bounds = []
     for part in str(value).split(",") if isinstance(value, str) else [""]:
         match = _BOUND.fullmatch(part)
         if not match:
             raise FieldError(f"expect.{key}", f'must be a bound such as ">= 0.05" or ">= 5, <= 30", got {show(value)}')
-        found.append(Bound(key, match[1], float(match[2])))
-    return found
+        bounds.append(Bound(key, match[1], float(match[2])))
+    return bounds
 
 
 def _tolerance(key: str, value: Any) -> Tolerance | None:
     where = f"tolerance.{key}"
     if key not in METRICS and key != END:
-        raise FieldError(where, f"no such metric; {suggest(key, [*METRICS, END])}")
+        raise FieldError(where, f"unknown metric; {suggest(key, [*METRICS, END])}")
     if key != END and METRICS[key].better == "neither" and value != "any":
-        raise FieldError(where, "neither more nor less of it is better, so it is not compared; bound it in expect")
+        raise FieldError(where, "neither higher nor lower is better; bound it in expect instead")
     if value == "any":
         return None
     share = _SHARE.fullmatch(value) if isinstance(value, str) else None
     if share and key == END:
-        raise FieldError(where, f"must be a distance in metres, because there is no length to share, got {show(value)}")
+        raise FieldError(where, f"must be a distance in metres, not a percentage, got {show(value)}")
     if share and float(share[1]) >= 0:
         return Tolerance(relative=float(share[1]) / 100)
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < math.inf:
         return Tolerance(float(value))
     unit = "m" if key == END else METRICS[key].unit
     raise FieldError(
-        where, f'must be a number of at least 0 [{unit}], a share such as "10 %", or any, got {show(value)}'
+        where, f'must be a number of at least 0 [{unit}], a percentage such as "10 %", or any, got {show(value)}'
     )
 
 

@@ -1,8 +1,7 @@
-"""Judge a run by what its test demands, and against its baseline.
+"""Evaluate a run against its test's demands and its baseline.
 
-These always count: the outcome, whether the drive is certified, and the bounds of the suite. A metric that is worse
-than in the baseline by more than its tolerance is a fault, one that is better by more than that a gain. The driven line is
-judged only where the test demands it.
+Outcome, certificate and the suite's bounds always count. A metric worse than the baseline's by more than its tolerance is
+a fault; one better by more than that is a gain. The driven line counts only if the test demands it.
 """
 
 from __future__ import annotations
@@ -22,44 +21,46 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, versions
 
-#: Two drives diverge where they are farther apart than this at the same time [m].
+#: Distance at the same time beyond which two drives diverge [m].
 APART = 0.01
-SAME = "world, robot and settings are those of the baseline"
+SAME = "world, robot and settings are the baseline's"
 
 
 @dataclass(frozen=True)
 class Divergence:
-    """Where a drive leaves the line of its baseline."""
+    """The point where a drive leaves the line of its baseline."""
 
-    t: float  # the first sample of the baseline's line at which the two are more than `APART` apart [s]
-    now: Point  # where the robot is then [m]
-    then: Point  # where it was in the baseline [m]
-    limiter: str  # the rule that limits the robot's speed then
-    limiter_then: str  # the rule that limited it in the baseline
+    t: float  # first sample of the baseline's line more than `APART` away from the drive [s]
+    now: Point  # robot's position then [m]
+    then: Point  # its position in the baseline [m]
+    limiter: str  # rule that limits the robot's speed then
+    limiter_then: str  # rule that limited it in the baseline
 
     @property
     def sentence(self) -> str:
         """The divergence in words."""
         (x, y), (x0, y0) = self.now, self.then
-        rule = f"{_rule(self.limiter)} keeps the robot below its top speed then"
+        rule = f"{_rule(self.limiter)} limits the speed there"
         if self.limiter != self.limiter_then:
             rule += f", in the baseline {_rule(self.limiter_then)} did"
-        return f"the drives part at t = {self.t:.1f} s, at ({x:.2f}, {y:.2f}) instead of ({x0:.2f}, {y0:.2f}); {rule}"
+        return (
+            f"the drives diverge at t = {self.t:.1f} s, at ({x:.2f}, {y:.2f}) instead of ({x0:.2f}, {y0:.2f}); {rule}"
+        )
 
 
 def _rule(name: str) -> str:
-    """A rule's name as the subject of a sentence; at cruise there is none."""
+    """Return a rule's name as the subject of a sentence; at cruise there is none."""
     return "no rule" if name == "cruise" else f"the rule {name!r}"
 
 
 def distances(baseline: Baseline, rollout: Rollout) -> Floats:
-    """How far the two robots are apart at each sample of the baseline's line (N,) [m]; one that has arrived stays."""
+    """Return the distance between the robots at each sample of the baseline's line (N,) [m]; after arrival they stay."""
     places = np.column_stack([np.interp(baseline.times, rollout.t, rollout.pose[:, axis]) for axis in (0, 1)])
     return np.asarray(np.hypot(*(places - baseline.xy).T))
 
 
 def farthest(baseline: Baseline, rollout: Rollout) -> float:
-    """The largest distance between the two robots at the same time, up to the end of the later one [m]."""
+    """Return the largest distance between the robots at the same time, up to the end of the later drive [m]."""
     beyond = rollout.pose[rollout.t > baseline.times[-1], :2] if baseline.line else rollout.pose[:0, :2]
     after = np.hypot(*(beyond - baseline.xy[-1]).T) if len(beyond) else np.zeros(0)
     during = float(distances(baseline, rollout).max(initial=0.0))
@@ -67,14 +68,14 @@ def farthest(baseline: Baseline, rollout: Rollout) -> float:
 
 
 def end_distance(baseline: Baseline, rollout: Rollout) -> float:
-    """The distance between the places where the two drives end [m]; NaN if the baseline's robot did not drive."""
+    """Return the distance between the ends of the drives [m]; NaN if the baseline's robot did not drive."""
     if not baseline.line:
         return math.nan
     return float(np.hypot(*(rollout.pose[-1, :2] - baseline.xy[-1])))
 
 
 def divergence(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Divergence | None:
-    """Where a drive first is farther from its baseline than allowed; None if it nowhere is."""
+    """Return the first divergence of a drive from its baseline, or None."""
     far = distances(baseline, rollout) > apart
     if not far.any():
         return None
@@ -94,7 +95,7 @@ def divergence(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Di
 
 
 def explain(run: Run, baseline: Baseline | None) -> Iterator[str]:
-    """Yield what explains the faults of a test, a sentence each."""
+    """Yield explanations of a test's faults, a sentence each."""
     if run.rollout is not None:
         touched = first_contact(run.rollout)
         if touched is not None:
@@ -110,18 +111,18 @@ def explain(run: Run, baseline: Baseline | None) -> Iterator[str]:
 
 def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
     assert run.rollout is not None
-    found = divergence(baseline, run.rollout)
+    first = divergence(baseline, run.rollout)
     most = float(distances(baseline, run.rollout).max(initial=0.0))
-    if found is not None:
-        yield f"{found.sentence}; at most {most:.3g} m apart"
+    if first is not None:
+        yield f"{first.sentence}; at most {most:.3g} m apart"
     elif run.rollout.drive_digest == baseline.drive_digest:
-        yield "the drive is the baseline's, bit for bit"
+        yield "the drive equals the baseline's bit for bit"
     else:
         yield f"the drive follows the baseline's line within {max(most, 0.001):.3f} m"
 
 
 def changes(run: Run, baseline: Baseline) -> Iterator[str]:
-    """What differs between a run and its baseline, a line each."""
+    """Yield the differences in setup between a run and its baseline, a line each."""
     present: Mapping[str, str] = run.rollout.record.versions if run.rollout else versions()
     others = [
         f"{name} {baseline.versions.get(name, 'none')} -> {version}"
@@ -135,10 +136,8 @@ def changes(run: Run, baseline: Baseline) -> Iterator[str]:
             yield f"changed since the baseline: {', '.join(changed)}"
         elif others:
             yield SAME
-        elif (
-            run.rollout is None or run.rollout.drive_digest != baseline.drive_digest
-        ):  # else the demands are what changed
-            yield f"{SAME}; so the code is what changed"
+        elif run.rollout is None or run.rollout.drive_digest != baseline.drive_digest:  # else the demands changed
+            yield f"{SAME}; so the code has changed"
     chosen = run.scenario.chosen
     if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
         yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
@@ -146,7 +145,7 @@ def changes(run: Run, baseline: Baseline) -> Iterator[str]:
         yield f"versions since the baseline: {', '.join(others)}"
 
 
-#: In words, what is worse about a metric.
+#: Words for a worse metric.
 _WORSE = {"m": "longer", "s": "longer"}
 _WORDS = {
     "min_clearance_m": "nearer",
@@ -154,7 +153,7 @@ _WORDS = {
     "tracking_error_max_m": "farther off",
     "tracking_error_p95_m": "farther off",
 }
-#: The metrics that messages begin with.
+#: Metrics at the beginning of messages.
 FIRST = ("contacts_driving", "min_clearance_m", "duration_s", "driven_length_m")
 _PLACED = ("min_clearance_m",)
 #: The outcome of a test whose planner raised an error.
@@ -164,11 +163,11 @@ ROUNDED = 1e-6  # the last decimal of a baseline's metrics
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What is wrong with a run, and what is better than before.
+    """The faults and gains of a run.
 
     Attributes:
         faults: why the test fails, a sentence each
-        gains: what is better than in the baseline, a sentence each
+        gains: improvements over the baseline, a sentence each
     """
 
     faults: tuple[str, ...] = ()
@@ -181,11 +180,11 @@ class Evaluation:
 
 
 def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluation:
-    """Judge a run.
+    """Evaluate a run.
 
     Args:
         run: the run
-        demands: what its test demands
+        demands: its test's demands
         baseline: the earlier drive; None: only the demands count
     """
     faults = list(unmet_demands(run, demands))
@@ -211,7 +210,7 @@ def _certified(run: Run) -> bool:
 
 
 def unmet_demands(run: Run, demands: Demands) -> Iterator[str]:
-    """What a run does not fulfil, whatever the baseline, a sentence each."""
+    """Yield the demands that a run does not meet, whatever the baseline, a sentence each."""
     certified = _certified(run)
     if run.outcome is not demands.outcome:
         reason = f" ({run.reason})" if run.reason else ""
@@ -226,12 +225,12 @@ def unmet_demands(run: Run, demands: Demands) -> Iterator[str]:
     for bound in demands.bounds:
         if run.rollout is None:
             yield f"{bound.metric}: the robot did not drive, expected {bound.sign} {bound.value:g}"
-        elif not bound.holds(found := METRICS[bound.metric](run.rollout)):
-            yield f"{bound.metric}: {found:.6g}, expected {bound.sign} {bound.value:g}{_place(bound.metric, run.rollout)}"
+        elif not bound.holds(measured := METRICS[bound.metric](run.rollout)):
+            yield f"{bound.metric}: {measured:.6g}, expected {bound.sign} {bound.value:g}{_place(bound.metric, run.rollout)}"
 
 
 def _other_contact(rollout: Rollout, demands: Demands) -> Iterator[str]:
-    """How the first contact differs from the one that is demanded."""
+    """Yield the difference between the first contact and the demanded one."""
     if demands.touched is not None and (touched := first_contact_kind(rollout)) != demands.touched:
         yield f"touched: {touched}, expected {demands.touched}"
     elif demands.cause is not None and (cause := cause_of_contact(rollout)) != demands.cause:
@@ -239,7 +238,7 @@ def _other_contact(rollout: Rollout, demands: Demands) -> Iterator[str]:
 
 
 def _outcome_changes(run: Run, baseline: Baseline) -> list[str]:
-    """How outcome and certificate differ from the baseline's, a sentence each."""
+    """Return the differences of outcome and certificate from the baseline's, a sentence each."""
     if run.outcome is not baseline.outcome:
         return [f"outcome: {run.outcome.key}, in the baseline {baseline.outcome.key}"]
     certified = _certified(run)
@@ -254,7 +253,7 @@ def _outcome_changes(run: Run, baseline: Baseline) -> list[str]:
 
 
 def _demanded(outcome: Outcome, certified: bool, demands: Demands) -> bool:
-    """Whether an outcome and a certificate are those that the test demands."""
+    """Return whether an outcome and a certificate meet the demands."""
     wanted = True if demands.must_be_certified else demands.certified
     return outcome is demands.outcome and wanted in (None, certified)
 
@@ -269,7 +268,7 @@ def _compare(
     now, then = metric(rollout), baseline.metric(name)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
     if not math.isfinite(then) or (math.isnan(now) and rollout.record.exploring):
-        return  # earlier versions held the first plan of a robot without a map against the optimum
+        return  # earlier versions compared the first plan of a mapless robot with the optimum
     if not math.isfinite(now):
         faults.append(f"{name}: {now:g}, in the baseline {then:.6g}{unit}")
         return
@@ -286,7 +285,7 @@ def _compare(
 
 
 def limits(demands: Demands, baseline: Baseline) -> Iterator[Bound]:
-    """The bounds on metrics that a baseline sets: breaking one is worse than the baseline by more than its tolerance."""
+    """Yield the bounds set by a baseline: its metrics plus or minus their tolerances."""
     for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
         better, tolerance, then = METRICS[name].better, demands.tolerance(name), baseline.metric(name)
         if better == "neither" or tolerance is None or name in WALL_CLOCK or not math.isfinite(then):
@@ -296,15 +295,15 @@ def limits(demands: Demands, baseline: Baseline) -> Iterator[Bound]:
 
 
 def _place(name: str, rollout: Rollout) -> str:
-    """Where a metric is at its worst, for those that have a place."""
+    """Return where a metric is at its worst, for metrics with a place."""
     if name not in _PLACED:
         return ""
-    found = nearest_of(rollout)
-    return f"; nearest to {found.thing}, {found.place}"
+    nearest = nearest_of(rollout)
+    return f"; nearest to {nearest.thing}, {nearest.place}"
 
 
 def _line_faults(rollout: Rollout, baseline: Baseline, demands: Demands) -> Iterator[str]:
-    """What is wrong with where the robot ended and which line it drove."""
+    """Yield the faults of the drive's end and line."""
     ends, tolerance = end_distance(baseline, rollout), demands.tolerance(END)
     if tolerance is not None and ends > tolerance.allowed(0.0) + 1e-3:
         (x, y), (x0, y0) = rollout.pose[-1, :2].tolist(), baseline.xy[-1].tolist()
@@ -314,7 +313,7 @@ def _line_faults(rollout: Rollout, baseline: Baseline, demands: Demands) -> Iter
         )
     if demands.trajectory == "exact":
         if rollout.drive_digest != baseline.drive_digest:
-            yield "trajectory: not the baseline's, bit for bit"
+            yield "trajectory: differs from the baseline's"
     elif demands.trajectory is not None:
         most = farthest(baseline, rollout)
         if most > demands.trajectory + 1e-3:

@@ -1,4 +1,4 @@
-"""What people name: the tests of suites, and the worlds, robots and planners of tests. Loads no compiler."""
+"""Names in suites: tests, worlds, robots and planners. Loads no compiler."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from antdrive.robots.robot_file import list_robots
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
 from antdrive.worlds.files.world_file import list_worlds
 
-#: Where a planner comes from: a key of the mapping, beside its options.
+#: Keys that say where a planner comes from, beside its options.
 SOURCES = frozenset({"module", "file"})
 
 
 def check_names(case: SuiteCase) -> None:
-    """Check what can be checked of a test without reading worlds and robots: that all it names exists."""
+    """Check that everything a test names exists, without reading worlds and robots."""
     entry = case.entry
     if isinstance(entry.world, str):
         world_path(case, entry.world)
@@ -31,24 +31,24 @@ def check_names(case: SuiteCase) -> None:
 
 
 def world_path(case: SuiteCase, name: str) -> Path:
-    """The file of a world that a test names."""
+    """Return the file of a test's world."""
     return _path(case, "world", name, list_worlds())
 
 
 def robot_path(case: SuiteCase) -> Path:
-    """The file of a test's robot."""
+    """Return the file of a test's robot."""
     return _path(case, "robot", case.entry.robot, list_robots())
 
 
 def planner_of(case: SuiteCase) -> tuple[Planner, str]:
-    """The planner of a test, and its name in records."""
+    """Return the planner of a test, and its name in records."""
     given = case.entry.planner
     options = {"name": given} if isinstance(given, str) else dict(given)
     name, sources = options.pop("name", None), {key: options.pop(key) for key in SOURCES if key in options}
     if not isinstance(name, str):
         raise case.error("planner.name", "missing; write the planner's name, or that of its class in a module or file")
     if len(sources) > 1:
-        raise case.error("planner.file", "a planner comes from a module or from a file; keep one")
+        raise case.error("planner.file", "use either module or file")
     try:
         if not sources and not is_user_code(name):
             return load_planner(name, **options), name
@@ -65,14 +65,14 @@ def planner_of(case: SuiteCase) -> tuple[Planner, str]:
 
 
 def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
-    """Whether the words of a suite name a planner in a file or module."""
+    """Return whether a suite's entry names a planner in a file or module."""
     name = planner if isinstance(planner, str) else planner.get("name")
     sources = () if isinstance(planner, str) else (key for key in SOURCES if key in planner)
     return any(sources) or (isinstance(name, str) and is_user_code(name))
 
 
 def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:
-    """A file of the catalogue, or one relative to the suite; the catalogue's names come first."""
+    """Return a file of the catalogue, or one relative to the suite; the catalogue takes precedence."""
     try:
         return resolve(key, name, known, case.suite.parent)
     except FieldError as error:
@@ -80,7 +80,7 @@ def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Pa
 
 
 def _own(case: SuiteCase, name: str, sources: Mapping[str, Any]) -> Any:
-    """What a module or a file of people's own calls by a name, from FILE.py:NAME, MODULE:NAME or a key of `SOURCES`."""
+    """Import custom code by name, from FILE.py:NAME, MODULE:NAME or a key of `SOURCES`."""
     if not sources:
         key, (source, _, word) = "planner", name.rpartition(":")
         is_file, of_word = source.endswith(".py"), key
@@ -90,7 +90,7 @@ def _own(case: SuiteCase, name: str, sources: Mapping[str, Any]) -> Any:
         if not isinstance(source, str):
             raise case.error(key, f"must be text, got {show(source)}")
         if is_user_code(name):
-            raise case.error(of_word, f"must be the class alone, because {key} says where it is, got {show(name)}")
+            raise case.error(of_word, f"must be only the class, as {key} gives its place, got {show(name)}")
     if is_file and not (case.suite.parent / source).is_file():
         raise case.error(key, f"{source}: no such file beside the suite")
     try:
@@ -100,29 +100,29 @@ def _own(case: SuiteCase, name: str, sources: Mapping[str, Any]) -> Any:
 
 
 def select(words: Sequence[str], only: str | None = None) -> list[SuiteCase]:
-    """The tests that words name, each once, in their order.
+    """Return the selected tests, each once, in order.
 
     Args:
         words: suites, folders with suites, SUITE::scenario or SUITE::scenario[seed]
-        only: a pattern with * and ? that a scenario's name must match
+        only: a pattern with * and ? for the scenario's name
 
     Raises:
-        InputError: there is no such suite or test, or something in a suite is wrong.
+        InputError: a suite or test is missing or invalid.
     """
-    found: dict[tuple[Path, str], SuiteCase] = {}
+    selected: dict[tuple[Path, str], SuiteCase] = {}
     for word in words:
         for case in _named(word):
             if only is None or fnmatch.fnmatchcase(case.name, only) or case.id == only:
-                found.setdefault((case.suite, case.id), case)
-    for case in found.values():
+                selected.setdefault((case.suite, case.id), case)
+    for case in selected.values():
         check_names(case)
-    if not found:
+    if not selected:
         raise input_error("--only", f"no test of {' '.join(words)} matches {only!r}")
-    return list(found.values())
+    return list(selected.values())
 
 
 def _named(word: str) -> Iterator[SuiteCase]:
-    """The tests that one word names."""
+    """Yield the tests named by one word."""
     place, mark, wanted = word.partition("::")
     if mark and not wanted:
         raise input_error(word, f"names no test; write {place} for all, or {place}::SCENARIO")
@@ -130,12 +130,12 @@ def _named(word: str) -> Iterator[SuiteCase]:
     if path.is_dir() and not wanted:
         suites = sorted(path.rglob(f"*{SUFFIX}"))
         if not suites:
-            raise input_error(word, f"holds no suites; their names end in {SUFFIX}")
+            raise input_error(word, f"contains no suites; their names end in {SUFFIX}")
         for suite in suites:
             yield from load_suite(suite)
         return
     if path.is_file() and not path.name.endswith(SUFFIX):
-        raise input_error(word, f"is no suite; the name of a suite ends in {SUFFIX}")
+        raise input_error(word, f"not a suite; its name must end in {SUFFIX}")
     cases = load_suite(path)
     chosen = [case for case in cases if wanted in ("", case.name, case.id)]
     if not chosen:

@@ -1,4 +1,4 @@
-"""What a robot came nearest to or touched: which thing, where and when, and what took the margin until then."""
+"""Closest approach and first contact of a drive: the thing, the place, the time, and the cause of lost margin."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from antdrive.sim.log.margin import budget
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Disc
 
-# Columns of `footprint_distances` and indices in a log's contacts count the walls in different orders.
+# Columns of `footprint_distances` and indices in a log's contacts order the walls differently.
 _WALL_OF_CONTACT = (0, 2, 1, 3)  # left, right, lower, upper as columns after the obstacles
 
 
 @dataclass(frozen=True)
 class ClosestApproach:
-    """The robot beside a thing."""
+    """The robot's closest approach to a thing."""
 
     __pydantic_config__ = STRICT
 
-    thing: str  # an obstacle, a mover or a wall, as messages call it
-    t: float  # when [s]
-    x: float  # where the robot was [m]
-    y: float  # where the robot was [m]
+    thing: str  # an obstacle, a mover or a wall, as in messages
+    t: float  # time [s]
+    x: float  # robot's position [m]
+    y: float  # robot's position [m]
     clearance: float  # distance between the robot's surface and the thing's [m]
 
     @property
     def place(self) -> str:
-        """Where and when, in words."""
+        """Place and time, in words."""
         return f"the robot was at ({self.x:.2f}, {self.y:.2f}) at t = {self.t:.2f} s"
 
 
 def nearest_of(rollout: Rollout) -> ClosestApproach:
-    """What the robot came nearest to."""
+    """Return the closest approach of a drive."""
     row = int(rollout.clearance.argmin())
     world = dataclasses.replace(rollout.record.world, movers=())
     static = footprint_distances(world, rollout.record.robot, [rollout.pose[row]])[0]
@@ -51,7 +51,7 @@ def nearest_of(rollout: Rollout) -> ClosestApproach:
 
 
 def first_contact(rollout: Rollout) -> ClosestApproach | None:
-    """What the robot touched first; None if it touched nothing."""
+    """Return the first contact; None without one."""
     touches = touches_of(rollout)
     if not touches:
         return None
@@ -65,7 +65,7 @@ def first_contact(rollout: Rollout) -> ClosestApproach | None:
 
 
 def _mover_gaps(rollout: Rollout, row: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """The distance from the robot to each mover at a row (M,) [m]."""
+    """Return the distance from the robot to each mover at a row (M,) [m]."""
     record = rollout.record
     places = rollout.movers[row].tolist()
     discs = tuple(Disc(x, y, mover.radius) for (x, y), mover in zip(places, record.world.movers, strict=True))
@@ -84,15 +84,15 @@ def _encounter(rollout: Rollout, row: int, thing: str) -> ClosestApproach:
     return ClosestApproach(thing, round(float(rollout.t[row]), 3), x, y, clearance)
 
 
-NOTHING = "nothing"  # is what a drive without a contact touched
+NOTHING = "nothing"  # touched in a drive without contact
 
 
 def first_contact_kind(rollout: Rollout) -> str:
-    """The kind of thing that a drive touched first, or `NOTHING`."""
-    found = touches_of(rollout)
-    if not found:
+    """Return the kind of the first thing touched, or `NOTHING`."""
+    touches = touches_of(rollout)
+    if not touches:
         return NOTHING
-    index, record = found[0].obstacle, rollout.record
+    index, record = touches[0].obstacle, rollout.record
     known = len(record.task.world.obstacles)
     for kind, count in ((CYLINDER, known), (UNSEEN, len(record.unseen)), (MOVER, len(record.task.world.movers))):
         if index < count:
@@ -102,9 +102,9 @@ def first_contact_kind(rollout: Rollout) -> str:
 
 
 def cause_of_contact(rollout: Rollout) -> str:
-    """What took most of the margin at the tightest place up to the first contact, a key of `antdrive.sim.log.margin.CAUSES`.
+    """Return the largest cause of lost margin at the tightest place up to the first contact, a key of `CAUSES`.
 
-    It is empty for what no margin could prevent: contacts with movers, with cylinders that the planner did not know of, and none.
+    Empty for contacts that no margin could prevent, with movers or unseen cylinders, and without contact.
     """
     if first_contact_kind(rollout) not in (CYLINDER, WALL):
         return ""

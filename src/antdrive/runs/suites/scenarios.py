@@ -1,4 +1,4 @@
-"""From a suite's words to a scenario, and to the command that runs it alone."""
+"""Build a test's scenario, and the command that runs it alone."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from antdrive.worlds.generators.generate import generated
 
 
 def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = with_chosen_margin) -> Scenario:
-    """The scenario of a suite's test.
+    """Return the scenario of a suite's test.
 
-    Files of worlds and robots that were read last are kept, by their text.
+    Recently read files of worlds and robots are cached by their text.
 
     Args:
         case: the test
-        choose: chooses the margin where the suite says auto
+        choose: chooses the margin if the suite says auto
 
     Raises:
-        InputError: something that the suite names is missing or wrong; the message has the suite's file, line and key.
+        InputError: an item of the suite is missing or invalid; the message has the suite's file, line and key.
     """
     given = case.given
     auto = given.get("margin") == "auto"
@@ -45,7 +45,7 @@ def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = with_c
 
 
 def task_of(case: SuiteCase) -> Task:
-    """The world of a test, with the world's own start and goal."""
+    """Return the world of a test, with the world's own start and goal."""
     world = case.entry.world
     if isinstance(world, str):
         return load_task(world_path(case, world))
@@ -62,7 +62,7 @@ def task_of(case: SuiteCase) -> Task:
 
 
 def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
-    """The `antdrive run` command that drives a test's scenario alone; None where only `antdrive check` can."""
+    """Return the `antdrive run` command of a test's scenario; None if only `antdrive check` can run it."""
     entry = case.entry
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
     word, settings = _planner_word(case, planner, anywhere), setting_words(case.given)
@@ -76,7 +76,7 @@ def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
 
 
 def _planner_word(case: SuiteCase, planner: dict[str, Any], anywhere: bool) -> str | None:
-    """What a command calls a planner, whose name is taken out of its words; None where it is in a module beside the suite."""
+    """Pop a planner's name and return it as commands write it; None for a module beside the suite."""
     name = planner.pop("name")
     if not is_own_entry({"name": name, **planner}):
         return str(name)
@@ -87,7 +87,7 @@ def _planner_word(case: SuiteCase, planner: dict[str, Any], anywhere: bool) -> s
 
 
 def _world_words(case: SuiteCase, anywhere: bool) -> tuple[str, str]:
-    """What a command calls the world of a test, and the command that must write a random one before."""
+    """Return a world's name in commands, and the command that generates a random one first."""
     world = case.entry.world
     if isinstance(world, str):
         return _shown_name(case, world, list_worlds(), anywhere), ""
@@ -107,7 +107,7 @@ def _shown_name(case: SuiteCase, name: str, known: Mapping[str, Path], anywhere:
 
 
 def _with_ends(case: SuiteCase, task: Task) -> Task:
-    """The task with the test's own start and goal."""
+    """Return the task with the test's own start and goal."""
     start, goal = case.entry.start, case.entry.goal
     try:
         if start is not None:

@@ -1,4 +1,4 @@
-"""Hypothesis strategies for worlds and tasks. Hypothesis is imported when a strategy is made; `pip install hypothesis`."""
+"""Hypothesis strategies for worlds and tasks; they need `pip install hypothesis`."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from antdrive.worlds import Disc, Task, World, rasterise
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
 
-ROOM = 0.3  # between the walls and the robot at the start and at the goal [m]
+ROOM = 0.3  # between the walls and the robot at start and goal [m]
 
 
 def worlds(
     *, obstacles: int = 8, size: tuple[float, float] = (3.0, 8.0), radius: tuple[float, float] = (0.1, 0.8)
 ) -> SearchStrategy[World]:
-    """Worlds with cylinders that stand still, in whole centimetres; they shrink to few, small cylinders in a small world.
+    """Return a strategy for worlds of static cylinders, in whole centimetres; they shrink to few, small cylinders.
 
     Args:
-        obstacles: the most cylinders
+        obstacles: largest number of cylinders
         size: the least and the largest length of a side [m]
         radius: the least and the largest radius of a cylinder [m]
 
     Raises:
-        InputError: hypothesis is not installed, or no whole centimetre lies within a range.
+        InputError: hypothesis is not installed, or a range contains no whole centimetre.
     """
     st = _strategies()
     sides, radii = st.tuples(_metres(st, *size), _metres(st, *size)), _metres(st, *radius)
@@ -50,26 +50,26 @@ def tasks(
     radius: tuple[float, float] = (0.1, 0.8),
     solvable: bool = True,
 ) -> SearchStrategy[Task]:
-    """Tasks that a robot can begin and, unless told otherwise, that have a path, from one corner of a world to the other.
+    """Return a strategy for tasks from corner to corner that a robot can start and, by default, solve.
 
-    Cylinders that stand in the start or in the goal are left out, and from the last one on those that close every way.
+    Cylinders at the start or goal are omitted, then the last ones until a path is open.
 
     Args:
         robot: a robot, or its name or file
-        clearance: beyond the robot's radius: free at the start and the goal, and along the path [m]
+        clearance: free space beyond the robot's radius at start and goal and along the path [m]
         cell: grid resolution [m]
-        obstacles: the most cylinders
+        obstacles: largest number of cylinders
         size: the least and the largest length of a side [m]
         radius: the least and the largest radius of a cylinder [m]
         solvable: whether the grid must have a path
 
     Raises:
-        InputError: hypothesis is not installed, or there is no such robot.
+        InputError: hypothesis is not installed, or the robot is unknown.
     """
     st = _strategies()
     body = robot if isinstance(robot, RobotSpec) else load_robot(robot)
     reach = body.radius + clearance
-    keep = reach + cell  # the cells of the start and the goal are free, too
+    keep = reach + cell  # keeps the cells of start and goal free
     least = max(size[0], 4 * (reach + ROOM))
 
     def crossed(world: World, yaw: float) -> Task:
@@ -98,12 +98,10 @@ def _solved(task: Task, reach: float) -> bool:
 
 
 def _metres(st: Any, least: float, most: float) -> Any:
-    """Lengths in whole centimetres between two bounds [m]."""
+    """Return a strategy for lengths in whole centimetres between two bounds [m]."""
     first, last = math.ceil(100 * least - 1e-9), math.floor(100 * most + 1e-9)
     if first > last:
-        raise InputError(
-            f"antdrive.testing: no whole centimetre lies between {least:g} m and {most:g} m; widen the range"
-        )
+        raise InputError(f"antdrive.testing: no whole centimetre between {least:g} m and {most:g} m; widen the range")
     return st.integers(first, last).map(lambda centimetres: centimetres / 100)
 
 

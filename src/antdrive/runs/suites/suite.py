@@ -1,4 +1,4 @@
-"""Suites: files of scenarios, `*.drive.yaml`, each driven with one or several seeds and compared with its baseline."""
+"""Suites: `*.drive.yaml` files of scenarios, each driven with one or more seeds and compared with its baseline."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from antdrive.sim.settings import SETTINGS
 
 SUFFIX = ".drive.yaml"
 MAX_CASES = 100_000  # scenarios times seeds of one suite
-BASELINES = "baselines"  # the folder beside a suite
+BASELINES = "baselines"  # subfolder beside a suite
 
-#: What Python calls some keys, and what people may take for one.
+#: Python names and likely misnomers of some keys.
 _SYNONYMS = MappingProxyType(
     {"avoidance": "avoid", "replanning": "replan", "perception": "sees", "seed": "seeds", "options": "planner"}
 )
@@ -43,11 +43,11 @@ TrajectoryValue = Annotated[Any, PlainValidator(_anything), WithJsonSchema(_TRAJ
 
 
 class CaseEntry(BaseModel):
-    """A scenario of a suite beside its settings."""
+    """The keys of a scenario besides its settings."""
 
     model_config = STRICT
 
-    note: str | None = Field(None, description="what the scenario is for, free text")
+    note: str | None = Field(None, description="purpose of the scenario, free text")
     world: TextOrMapping = Field(
         None,
         description="a world file relative to the suite, a world of the catalogue, or {generate: forest, seed: 7} with the "
@@ -63,19 +63,19 @@ class CaseEntry(BaseModel):
     planner: TextOrMapping = Field(
         "ants",
         description="a planner's name; {name: aco-han, ants: 200} with options; planners.py:Mine, {file: planners.py, "
-        "name: Mine} or {module: my_package.planners, name: Mine} for a planner of your own",
+        "name: Mine} or {module: my_package.planners, name: Mine} for a custom planner",
     )
     seeds: SeedList = Field([0], description="one test for each: [0, 1, 2], or a range such as 0-9")
     expect: dict[str, Any] = Field(
         {}, description='demands: {outcome: succeeded, certified: true, min_clearance_m: ">= 0.05"}'
     )
     tolerance: dict[str, Any] = Field(
-        {}, description="by how much a metric may be worse than in the baseline: {duration_s: 0.5, jerk_rms: any}"
+        {}, description="how much worse than the baseline's a metric may be: {duration_s: 0.5, jerk_rms: any}"
     )
     trajectory: TrajectoryValue = Field(
-        None, description="how far from the baseline's line the robot may be at any time [m], or exact"
+        None, description="largest distance from the baseline's line at any time [m], or exact"
     )
-    baseline: bool = Field(True, description="whether there is a baseline to compare with; false: only expect counts")
+    baseline: bool = Field(True, description="whether to compare with a baseline; false: only expect counts")
 
 
 if TYPE_CHECKING:
@@ -84,20 +84,20 @@ else:
     ScenarioEntry = create_model(
         "ScenarioEntry",
         __base__=CaseEntry,
-        __doc__="A scenario of a suite, or the defaults of all of them.",
+        __doc__="A scenario of a suite, or the defaults of all scenarios.",
         **file_fields(one for one in SETTINGS.values() if one.name != "seed"),
     )
 
 
 class SuiteFile(BaseModel):
-    """A suite of scenarios, as written in a `*.drive.yaml` file."""
+    """A suite file, `*.drive.yaml`."""
 
     model_config = STRICT
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     defaults: ScenarioEntry = Field(
         default_factory=ScenarioEntry.model_construct,
-        description="keys that hold for all scenarios that do not set them",
+        description="default keys of all scenarios",
     )
     scenarios: dict[str, ScenarioEntry] = Field(
         description="the scenarios by name", json_schema_extra={"minProperties": 1}
@@ -113,9 +113,9 @@ class SuiteCase:
         name: the scenario's name
         seed: the seed of all random numbers
         entry: the scenario, with the suite's defaults
-        demands: what the drive must fulfil
+        demands: demands on the drive
         document: the suite as read, for errors
-        own: the keys that the scenario sets itself; the others come from the defaults
+        own: keys set by the scenario itself, not by the defaults
     """
 
     suite: Path
@@ -128,7 +128,7 @@ class SuiteCase:
 
     @property
     def given(self) -> dict[str, Any]:
-        """The settings that the scenario or the defaults give, by key."""
+        """The settings given by the scenario or the defaults, by key."""
         return given_settings(self.entry)
 
     @property
@@ -138,32 +138,32 @@ class SuiteCase:
 
     @property
     def address(self) -> str:
-        """The test as commands name it: SUITE::aisle[0], the suite relative to the working directory where it can be."""
+        """The test's name in commands, SUITE::aisle[0], with the suite relative to the working directory if possible."""
         return f"{shown_path(self.suite)}::{self.id}"
 
     @property
     def baseline_path(self) -> Path:
-        """Where the baseline is."""
+        """The path of the baseline."""
         return baseline_folder(self.suite) / f"{self.name}-{self.seed}.json"
 
     def error(self, key: str, problem: str) -> InputError:
-        """The error for a key of the scenario: file, line, key and problem.
+        """Return the error for a key of the scenario: file, line, key and problem.
 
         Args:
             key: the key, such as "planner.ants"; empty for the whole scenario
-            problem: what is wrong and what would be right
+            problem: what is invalid, and what is valid
         """
         location = _place(self.document, self.name, key, self.own)
         return self.document.error(location, problem)
 
 
 def baseline_folder(suite: Path) -> Path:
-    """The folder with the baselines of a suite, beside it."""
+    """Return the folder with the baselines of a suite, beside it."""
     return suite.parent / BASELINES / suite.name.removesuffix(SUFFIX)
 
 
 def shown_path(path: Path) -> str:
-    """A path as messages show it: relative to the working directory if it lies below."""
+    """Return a path as messages show it: relative to the working directory if it lies below."""
     try:
         return str(path.relative_to(Path.cwd()))
     except (ValueError, OSError):
@@ -171,10 +171,10 @@ def shown_path(path: Path) -> str:
 
 
 def load_suite(path: str | os.PathLike[str]) -> tuple[SuiteCase, ...]:
-    """The tests of a suite, in the order of the file. A suite is read once per process, and again when it changes.
+    """Load the tests of a suite, in the order of the file. A suite is cached until its file changes.
 
     Raises:
-        InputError: there is no such file, or something in it is wrong.
+        InputError: the file is missing or invalid.
     """
     target = Path(path)
     try:
@@ -190,7 +190,7 @@ def _load(path: Path, source: str, mtime: int, size: int) -> tuple[SuiteCase, ..
     _refuse_synonyms(document)
     suite = check(SuiteFile, document)
     if not suite.scenarios:
-        raise document.error(("scenarios",), "holds none; write at least one, such as one: {world: empty}")
+        raise document.error(("scenarios",), "must not be empty; write at least one, such as one: {world: empty}")
     cases: list[SuiteCase] = []
     for name, entry in suite.scenarios.items():
         if not _NAME.fullmatch(name):
@@ -204,7 +204,7 @@ def _load(path: Path, source: str, mtime: int, size: int) -> tuple[SuiteCase, ..
 
 
 def _refuse_synonyms(document: Document) -> None:
-    """Refuse keys that are called otherwise in a suite, where the likeness of the words would not tell which is meant."""
+    """Reject names that keys have elsewhere; spelling alone would not suggest the right key."""
     for location in document.lines:
         scenario = location[:1] == ("defaults",) and len(location) == 2
         if (scenario or (location[:1] == ("scenarios",) and len(location) == 3)) and location[-1] in _SYNONYMS:
@@ -214,7 +214,7 @@ def _refuse_synonyms(document: Document) -> None:
 
 
 def _cases(path: Path, document: Document, name: str, defaults: ScenarioEntry, entry: ScenarioEntry) -> list[SuiteCase]:
-    """The tests of one scenario, one for each seed."""
+    """Return the tests of one scenario, one for each seed."""
     own = frozenset(entry.model_fields_set)
     values = {key: getattr(defaults, key) for key in defaults.model_fields_set}
     values |= {key: getattr(entry, key) for key in own}
@@ -230,13 +230,13 @@ def _cases(path: Path, document: Document, name: str, defaults: ScenarioEntry, e
         raise document.error(_place(document, name, error.key, own), error.problem) from None
     for key in ("tolerance", "trajectory"):
         if not merged.baseline and key in own and getattr(entry, key):
-            problem = "there is no baseline to compare with; leave it out, or baseline: false"
+            problem = "needs a baseline; omit it, or baseline: false"
             raise document.error(_place(document, name, key, own), problem)
     return [SuiteCase(path, name, seed, merged, demands, document, own) for seed in merged.seeds]
 
 
 def _place(document: Document, name: str, key: str, own: frozenset[str]) -> Location:
-    """Where a key of a scenario stands: in the scenario, or in the defaults."""
+    """Return the location of a scenario's key: in the scenario, or in the defaults."""
     parts = tuple(key.split(".")) if key else ()
     here: Location = ("scenarios", name, *parts)
     there: Location = ("defaults", *parts)
@@ -248,7 +248,7 @@ def _place(document: Document, name: str, key: str, own: frozenset[str]) -> Loca
 
 
 def suite_schema() -> dict[str, Any]:
-    """The JSON Schema of suites, for editors."""
+    """Return the JSON Schema of suites, for editors."""
     schema = SuiteFile.model_json_schema(by_alias=True)
     entry = schema["$defs"]["ScenarioEntry"]["properties"]
     bound = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^\\s*(>=|<=|>|<|==)"}]}
@@ -257,17 +257,17 @@ def suite_schema() -> dict[str, Any]:
         "properties": {
             "outcome": {"enum": [outcome.key for outcome in Outcome]},
             "certified": {"type": "boolean"},
-            "touched": {"enum": list(KINDS), "description": "what kind of thing must be touched first"},
+            "touched": {"enum": list(KINDS), "description": "required kind of the first thing touched"},
             "cause": {
                 "enum": list(causes()),
-                "description": "what must have taken most of the margin until the contact",
+                "description": "required largest cause of the lost margin until the contact",
             },
             **{name: {**bound, "description": metric.definition} for name, metric in METRICS.items()},
         },
         "additionalProperties": False,
     }
     compared = {name: metric.definition for name, metric in METRICS.items() if metric.better != "neither"}
-    compared[END] = "Distance between the places where the two drives end."
+    compared[END] = "Distance between the ends of the two drives."
     entry["tolerance"] |= {
         "properties": {name: {**allowed, "description": text} for name, text in compared.items()},
         "additionalProperties": False,

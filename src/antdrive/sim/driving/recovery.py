@@ -36,7 +36,7 @@ class ScanTurn:
     """Scan turn: a turn on the spot, first one way, then the other if the first is not free all round.
 
     Attributes:
-        done: whether it is over
+        done: whether the scan turn is over
     """
 
     def __init__(self, turns: list[float], yaw: float, rate: float, robot: RobotSpec, hz: int) -> None:

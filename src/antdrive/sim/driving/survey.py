@@ -88,7 +88,7 @@ class MoverTracking:
         self._log: list[tuple[int, TrackedMovers]] = []
 
     def read(self, ground: Ground, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
-        """Read a scan; which beams met movers that are followed (beams,)."""
+        """Update the tracks with a scan; return which beams hit tracked movers (beams,)."""
         theirs = self.tracker.update(ground, pose, ranges, tick / self._hz)
         self.tick = tick
         crossed = np.clip(ranges, 0.0, self.reach)

@@ -115,7 +115,7 @@ def spl(rollout: Rollout) -> float:
 
 
 def barn(rollout: Rollout) -> float:
-    """The BARN challenge's score: OT / clip(arrival, 2 OT, 8 OT), where OT = optimum / 2 m/s; at most 0.5.
+    """BARN challenge score: OT / clip(arrival, 2 OT, 8 OT), where OT = optimum / 2 m/s; at most 0.5.
 
     A drive without success scores 0.
     """
@@ -147,12 +147,12 @@ def tracking_error_p95_m(rollout: Rollout) -> float:
 
 
 def duration_s(rollout: Rollout) -> float:
-    """Simulated time of the drive."""
+    """Duration of the drive in simulated time."""
     return float(rollout.t[-1])
 
 
 def arrival_s(rollout: Rollout) -> float:
-    """Simulated time from 0.1 m off the start until first within the goal's tolerance, as the BARN challenge counts it.
+    """Arrival by the BARN challenge's clock: simulated time from 0.1 m off the start until first within the goal's tolerance.
 
     Infinite if the robot never gets there.
     """
@@ -196,27 +196,28 @@ def jerk_rms(rollout: Rollout) -> float:
 
 
 def contacts_driving(rollout: Rollout) -> float:
-    """Number of touches caused by the driving robot."""
+    """Count of touches caused by the driving robot."""
     return _touches(rollout, Outcome.COLLIDED)
 
 
 def contacts_standing(rollout: Rollout) -> float:
-    """Number of hits by a mover while the robot stood still."""
+    """Count of hits by a mover while the robot stood still."""
     return _touches(rollout, Outcome.HIT_WHILE_STANDING)
 
 
 def contacts_teleported(rollout: Rollout) -> float:
-    """Number of teleports of a mover onto the robot, or within its braking distance."""
+    """Count of teleports of a mover onto the robot, or within its braking distance."""
     return _touches(rollout, Outcome.HIT_BY_TELEPORT)
 
 
 def replans(rollout: Rollout) -> float:
-    """Number of searches for a new route while driving."""
+    """Count of searches for a new route during the drive."""
     return float(len(rollout.record.replans))
 
 
 def avoiding_s(rollout: Rollout) -> float:
-    """Simulated time during which the robot avoided movers."""
+    """Time during which the robot avoided movers, simulated."""
+
     limiters = rollout.record.limiters
     if AVOIDING not in limiters:
         return 0.0

@@ -1,1 +1,1 @@
-"""Physics: PyBullet behind an engine that speaks in poses, twists and contacts."""
+"""PyBullet behind an engine interface of poses, twists and contacts."""

@@ -1,4 +1,4 @@
-"""The PyBullet module and its clients. No other module imports PyBullet."""
+"""PyBullet module and clients. No other module imports PyBullet."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-# Collision groups. The chassis meets obstacles and walls only, so its contact list is exactly the list of
-# collisions.
+# Collision groups. The chassis collides with obstacles and walls only, so its contacts are exactly the collisions.
 GROUND, WHEELS, CHASSIS, OBSTACLE = 1, 2, 4, 8
 
 
 @functools.cache
 def bullet() -> Any:
-    """The PyBullet module, imported without its banner on stderr."""
+    """Return the PyBullet module, imported without its banner on stderr."""
     stderr, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)
     try:
@@ -29,10 +28,10 @@ def bullet() -> Any:
 
 
 class _CStdout:
-    """C's `stdout`, which leads nowhere while a client is open: Bullet prints its warnings there.
+    """C's `stdout`, silenced while a client is open: Bullet prints its warnings there.
 
-    Python writes to file descriptor 1 by itself and is not affected. To redirect the descriptor instead would cost each
-    step a flush of C's buffer, and would swallow what Python prints.
+    Python writes to file descriptor 1 itself and is not affected. Redirecting the descriptor would flush C's buffer at
+    every step, and swallow Python's output.
     """
 
     def __init__(self) -> None:
@@ -48,13 +47,13 @@ class _CStdout:
                 break
 
     def shut(self) -> None:
-        """One more client is open."""
+        """Count an opened client."""
         self._clients += 1
         if self._clients == 1 and self._stream is not None and self._nowhere:
             self._real, self._stream.value = self._stream.value, self._nowhere
 
     def release(self) -> None:
-        """One client less is open."""
+        """Count a closed client."""
         self._clients -= 1
         if self._clients == 0 and self._real is not None and self._stream is not None:
             self._stream.value, self._real = self._real, None
@@ -65,15 +64,15 @@ def _c_stdout() -> _CStdout:
     return _CStdout()
 
 
-_idle: list[int] = []  # a client that a world has left, for the next one: opening one takes 16 ms
+_idle: list[int] = []  # an idle client for the next world: opening one takes 16 ms
 
 
 @contextlib.contextmanager
 def client() -> Iterator[int]:
-    """The number of a headless PyBullet client without bodies, for the length of the `with` block.
+    """Provide a headless PyBullet client without bodies, by its number.
 
-    Within the block Bullet prints nothing on stdout, which may be JSON. Parameters of the engine may be left over from
-    another world: set all of them.
+    Within the block Bullet prints nothing on stdout, which may be JSON. The engine's parameters may be those of another
+    world: set all of them.
     """
     p, stdout = bullet(), _c_stdout()
     stdout.shut()
@@ -95,7 +94,7 @@ def client() -> Iterator[int]:
 
 
 def _connected() -> int:
-    """An idle client, or a new one; not number 0, which is what a user's own calls of PyBullet mean by default."""
+    """Return an idle or new client other than 0, the default of a user's own PyBullet calls."""
     p = bullet()
     while _idle:
         number = _idle.pop()
@@ -111,10 +110,10 @@ def _connected() -> int:
 
 
 def drawn_as(number: int) -> int:
-    """A visual shape of one triangle in client `number`, for bodies that are never drawn.
+    """Create a visual shape of one triangle in client `number`, for bodies that are never drawn.
 
-    For a body without a visual shape Bullet makes one from the collision shape. For a cylinder, a sphere or a plane that
-    takes longer than all the rest of the body: 0.2 ms, 0.2 ms and 2 ms.
+    Without one, Bullet derives it from the collision shape, which takes longer than the rest of the body: 0.2 ms for a
+    cylinder or sphere, 2 ms for a plane.
     """
     p = bullet()
     shape: int = p.createVisualShape(

@@ -1,8 +1,8 @@
-"""A world and a robot in physics: place, command, step, state, contacts.
+"""Physics engine of a world and a robot: place, command, step, state, contacts.
 
-Obstacles are sleeping maximal-coordinate bodies, so 400 of them were measured to cost hardly more than ten. In worlds of
-thousands, only those around the robot have bodies.
-Collision groups let the chassis meet obstacles, movers and walls only; the wheels meet only the floor.
+Obstacles are sleeping maximal-coordinate bodies: 400 of them were measured to cost hardly more than ten. In worlds of
+thousands, only those near the robot have bodies. Collision groups let the chassis collide with obstacles, movers and
+walls only, and the wheels with the floor only.
 """
 
 from __future__ import annotations
@@ -31,34 +31,33 @@ from antdrive.worlds.world import Disc, World
 
 Point3: TypeAlias = tuple[float, float, float]  # [m]
 
-MIN_HEIGHT = 0.05  # of obstacles: the chassis hangs 5 mm above the floor and must not pass over anything [m]
-SETTLING_TIME = 0.1  # in which a placed robot sinks onto its wheels [s]
+MIN_HEIGHT = 0.05  # least height of obstacles: the chassis hangs 5 mm above the floor and must not pass over them [m]
+SETTLING_TIME = 0.1  # time in which a placed robot settles on its wheels [s]
 TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
-MAX_JOINT_VELOCITY = 1e6  # of wheels; Bullet's default of 100 would slow down small wheels [rad/s]
-RESIDUAL = 5e-7  # where the solver stops for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
-USUAL_RESIDUAL = 1e-7  # the same of all other wheels, which is Bullet's default [(rad/s)^2]
-OVERSPEED = 1.5  # no robot drives faster by itself than its highest speed times this
+MAX_JOINT_VELOCITY = 1e6  # speed limit of wheels; Bullet's default of 100 would slow small ones [rad/s]
+RESIDUAL = 5e-7  # solver residual for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
+USUAL_RESIDUAL = 1e-7  # solver residual for other wheels, Bullet's default [(rad/s)^2]
+OVERSPEED = 1.5  # bound of a robot's own speed, as a multiple of its top speed
 # Any other body, the robot's link -1, any link of the other: naming these costs 0.4 us a step.
 CHASSIS_AND_ANY = (-1, -1, -2)
-BATCH = 5000  # bodies that are built in one call at most
-MANY_BODIES = 1000  # in worlds of more cylinders only those near the robot have bodies
-CHECK_EVERY = 8  # physics steps after which bodies are looked for again
-NEAR_MARGIN = 0.2  # how much farther than the robot can get in that time bodies are made [m]
-WALL_THICKNESS = 0.1  # half of it [m]
+BATCH = 5000  # most bodies built in one call
+MANY_BODIES = 1000  # in worlds with more cylinders, only those near the robot have bodies
+CHECK_EVERY = 8  # physics steps between updates of these bodies
+NEAR_MARGIN = 0.2  # reserve beyond the robot's reach within that time [m]
+WALL_THICKNESS = 0.1  # half the thickness [m]
 
 
 class Contact(NamedTuple):
-    """The robot's chassis touching something at one physics step."""
+    """Contact of the robot's chassis in one physics step."""
 
-    # what is touched; indices count the world's obstacles, then its movers, then the walls in the order left,
-    # right, bottom, top
+    # index of the obstacle: the world's obstacles, then its movers, then the walls left, right, bottom, top
     obstacle: int
     distance: float  # distance of the surfaces [m]; negative where they overlap
     force: float  # normal force [N]
 
 
 class State(NamedTuple):
-    """Pose and velocity of the robot, measured at the axle's centre."""
+    """Pose and velocity of the robot at the axle's centre."""
 
     x: float  # position [m]
     y: float  # position [m]
@@ -73,7 +72,7 @@ class State(NamedTuple):
 
 
 class Engine:
-    """A world and a robot in physics. Use it in a `with` block.
+    """Physics engine of a world and a robot, for use in a `with` block.
 
     >>> with Engine(world, robot) as engine:
     ...     engine.place(task.start)
@@ -82,10 +81,10 @@ class Engine:
 
     Args:
         physics_hz: physics steps per simulated second
-        trajectories: the motions of the world's movers; needed where the world has movers
+        trajectories: the motions of the world's movers; required where it has movers
 
     Raises:
-        ValueError: `trajectories` are not those of the world's movers.
+        ValueError: `trajectories` do not match the world's movers.
     """
 
     def __init__(
@@ -97,7 +96,7 @@ class Engine:
         self.robot = robot
         self.physics_hz = physics_hz
         self.trajectories = trajectories
-        self._steps = 0  # since the robot was placed
+        self._steps = 0  # since placement
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Engine:
@@ -117,7 +116,7 @@ class Engine:
         self._build_ground()
         self._build_robot()
         self._obstacles: dict[int, int] = {}  # contact index by body number, without movers
-        # Bullet's search tree, and with it the order of contacts, follows the order in which bodies are made.
+        # Bullet's search tree, and with it the order of contacts, follows the order of creation.
         self._shapes: dict[tuple[float, float], int] = {}
         self._near = self._near_bodies() if len(self.world.obstacles) > MANY_BODIES else None
         if self._near is None:
@@ -137,10 +136,9 @@ class Engine:
         self._open.__exit__(kind, error, traceback)
 
     def place(self, pose: Pose) -> None:
-        """Put the robot at a pose, at rest on its wheels, and restart the movers at time 0.
+        """Place the robot at a pose, at rest on its wheels, and restart the movers at time 0.
 
-        If the robot overlaps an obstacle, settling is skipped: the solver would push it out before contacts
-        are checked.
+        A robot that overlaps an obstacle does not settle: the solver would push it out before the first contact check.
         """
         p, x, y, yaw = self._p, *pose
         height = self.robot.wheel_radius + CASTER_GAP - self._com_drop
@@ -160,7 +158,7 @@ class Engine:
             self._movers.restart()
 
     def command(self, speed: float, yaw_rate: float) -> None:
-        """Set the wheel motors' target to a twist; the motors reach it as far as their torque allows.
+        """Set the wheel motors' targets to a twist, which they reach as far as their torque allows.
 
         Args:
             speed: forward [m/s]
@@ -177,7 +175,7 @@ class Engine:
         )
 
     def step(self) -> list[Contact]:
-        """Advance one physics step and return the chassis's contacts after it."""
+        """Advance one physics step, and return the chassis's contacts after it."""
         if self._movers is not None:
             self._movers.steer(self._steps)
         if self._near is not None and self._steps % CHECK_EVERY == 0:
@@ -189,17 +187,16 @@ class Engine:
         return self._touching(points) if points else []
 
     def contacts(self) -> list[Contact]:
-        """The chassis's contacts now, without advancing time."""
+        """Return the chassis's current contacts, without advancing time."""
         self._p.performCollisionDetection(physicsClientId=self._client)
         return self._touching(self._p.getContactPoints(bodyA=self._robot, linkIndexA=-1, physicsClientId=self._client))
 
     def state(self) -> State:
-        """The pose and velocity of the axle's centre."""
+        """Return the pose and velocity of the axle's centre."""
         p = self._p
         (x, y, _), (qx, qy, qz, qw) = p.getBasePositionAndOrientation(self._robot, self._client)
         (vx, vy, _), (_, _, yaw_rate) = p.getBaseVelocity(self._robot, self._client)
-        # PyBullet reports the centre of mass, which hangs below the axle: subtract the offset along the
-        # tilted z axis.
+        # PyBullet reports the centre of mass below the axle: subtract the offset along the tilted z axis.
         x += 2.0 * (qx * qz + qw * qy) * self._com_drop
         y += 2.0 * (qy * qz - qw * qx) * self._com_drop
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
@@ -207,20 +204,19 @@ class Engine:
 
     @property
     def time(self) -> float:
-        """Simulated time since the robot was placed [s]."""
+        """Simulated time since placement [s]."""
         return self._steps / self.physics_hz
 
     def mover_positions(self) -> Floats:
-        """Positions of the movers (M, 2) [m]: the trajectories at `time`, apart from rounding; of bodies, where there are."""
+        """Return the positions of the movers (M, 2) [m]: those of their bodies where they exist, else of the trajectories."""
         return self._movers.positions(self._steps) if self._movers else np.empty((0, 2))
 
     def mover_track(self, steps: int) -> Floats:
-        """Where the trajectories lead the movers (steps, M, 2) [m]: before each of the first steps since placing."""
+        """Return the positions of the trajectories (steps, M, 2) [m] before each of the first steps since placement."""
         return self._movers.track(steps) if self._movers else np.empty((steps, 0, 2))
 
     def _touching(self, points: Sequence[Any]) -> list[Contact]:
-        # Bullet also lists points some millimetres apart. A pressing contact may read 0.05 mm apart, but
-        # has a force.
+        # Bullet also lists points some millimetres apart. A pressing contact may be listed 0.05 mm apart, but has a force.
         return [
             Contact(self._index(point[2]), point[8], point[9])
             for point in points
@@ -228,7 +224,7 @@ class Engine:
         ]
 
     def _index(self, body: int) -> int:
-        """The contact index of a body."""
+        """Return the contact index of a body."""
         if body in self._obstacles:
             return self._obstacles[body]
         assert self._movers is not None
@@ -250,7 +246,7 @@ class Engine:
         torque = self.robot.wheel_torque * (self._rolling / self.robot.wheel_radius)
         self._torques = torque, torque
         gear = self.robot.wheel_radius / self._rolling
-        # The solver measures in rad/s, and smaller spheres turn faster. The client may have simulated another robot before.
+        # The solver measures in rad/s, and smaller spheres turn faster. The client may hold the value of another robot.
         residual = RESIDUAL * gear**2 if gear > 1 else USUAL_RESIDUAL
         p.setPhysicsEngineParameter(solverResidualThreshold=residual, physicsClientId=self._client)
         text = robot_urdf(self.robot, self._com_drop)
@@ -286,13 +282,13 @@ class Engine:
         return MoverBodies(trajectories, self.robot.radius, fast, where, self.physics_hz, self._client)
 
     def _near_bodies(self) -> NearBodies:
-        """The bodies around the robot; it cannot pass beyond them before it is looked at again."""
+        """Create the bodies near the robot, which covers less than their range between two updates."""
         way = OVERSPEED * self.robot.max_speed * CHECK_EVERY / self.physics_hz
         reach = self.robot.radius + way + NEAR_MARGIN
         return NearBodies(self.world.obstacles, reach, _size, self._build_cylinders, self._obstacles, self._client)
 
     def _build_cylinders(self, alike: Disc, indices: list[int]) -> list[int]:
-        """Build the bodies of obstacles of one size, the first of them given; the bodies' numbers."""
+        """Build the bodies of obstacles of one size, given one of them; return the bodies' numbers."""
         radius, height = size = _size(alike)
         if size not in self._shapes:
             self._shapes[size] = self._p.createCollisionShape(
@@ -302,9 +298,9 @@ class Engine:
         return self._build_obstacles(indices, self._shapes[size], places)
 
     def _build_obstacles(self, indices: list[int], shape: int, centres: list[Point3]) -> list[int]:
-        """Build bodies of one shape with these contact indices; their numbers.
+        """Build bodies of one shape with these contact indices; return their numbers.
 
-        Many in one call take a tenth of the time of as many calls.
+        One call for many takes a tenth of the time of one call each.
         """
         p = self._p
         bodies = [
@@ -327,12 +323,12 @@ class Engine:
 
 
 def _size(disc: Disc) -> tuple[float, float]:
-    """Radius and height of a cylinder as it is built [m]."""
+    """Return the built radius and height of a cylinder [m]."""
     return disc.radius, max(disc.height, MIN_HEIGHT)
 
 
 def _walls(world: World, height: float) -> Iterator[tuple[Point3, Point3]]:
-    """Half extents and centres of the walls [m]: left, right, bottom, top."""
+    """Yield half extents and centres of the walls [m]: left, right, bottom, top."""
     xmin, ymin, xmax, ymax = world.bounds
     width, depth = world.size
     thick = WALL_THICKNESS

@@ -1,9 +1,8 @@
-"""Bodies of moving obstacles in physics.
+"""Physics bodies of movers.
 
-Movers are massless multibodies with a velocity: PyBullet integrates the velocity exactly, nothing slows
-them down, and the solver pushes the robot away from them instead of letting it sink in.
-
-Each such body costs every physics step, however far away it is, so only movers that the robot could soon meet have one.
+Movers are massless multibodies with a velocity. PyBullet integrates the velocity exactly, nothing slows them down, and the
+solver pushes the robot out of them. Each body costs time at every physics step, however distant, so only movers that the
+robot could soon meet have one.
 """
 
 from __future__ import annotations
@@ -18,22 +17,22 @@ from antdrive.base.types import Floats
 from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE, bullet, drawn_as
 from antdrive.worlds.trajectories import Trajectories
 
-SAME_VELOCITY = 1e-10  # velocities closer than this differ by rounding only [m/s]
-CHUNK = 480  # physics steps whose velocities are computed at once
-WINDOW = 60  # physics steps for which it is decided at once which movers have bodies; divides CHUNK
+SAME_VELOCITY = 1e-10  # velocities within this differ by rounding only [m/s]
+CHUNK = 480  # physics steps whose velocities are computed together
+WINDOW = 60  # physics steps between updates of the bodies; divides CHUNK
 MARGIN = 0.2  # a mover that could come this close to the robot's circumscribed circle has a body [m]
-HOLD = 0.3  # a body stays until its mover is this much farther away than that [m]
+HOLD = 0.3  # additional distance at which a body is removed [m]
 
 #: A mover's index, its velocity x and y [m/s], and a position to set first [m]
 Change: TypeAlias = tuple[int, float, float, tuple[float, float] | None]
 
 
 class MoverBodies:
-    """One body per mover near the robot. Its velocity takes it exactly from its position at one step to that at the next.
+    """Bodies of the movers near the robot. Velocities take them exactly from one step's position to the next.
 
     Attributes:
-        bodies: PyBullet's body numbers by the index of the mover, for the movers that have a body now
-        indices: the mover's index by PyBullet's body number, for every body that there ever was
+        bodies: PyBullet's body numbers by mover index, for the movers with a body
+        indices: mover indices by PyBullet's body number, for all bodies ever created
     """
 
     def __init__(
@@ -60,19 +59,19 @@ class MoverBodies:
         self.indices: dict[int, int] = {}
 
     def park(self) -> None:
-        """Take all movers out of the world."""
+        """Remove all bodies."""
         for m in list(self.bodies):
             self._remove(m)
 
     def restart(self) -> None:
-        """Put the movers where they are at time 0."""
+        """Place the movers at their positions at time 0."""
         self._chunk = _Chunk.of(self._trajectories, self._hz, 0)
         self._past = [self._chunk.positions]
         self.park()
         self._choose(0)
 
     def steer(self, step: int) -> None:
-        """Set the velocities that change with physics step number `step`, and carry out jumps."""
+        """Set the velocities that change at a physics step, and carry out jumps."""
         if step % WINDOW == 0:
             if step >= self._chunk.end:
                 self._chunk = _Chunk.of(self._trajectories, self._hz, step)
@@ -85,25 +84,25 @@ class MoverBodies:
                 self._set_velocity(m, vx, vy)
 
     def positions(self, step: int) -> Floats:
-        """Where all movers are before physics step number `step` (M, 2) [m]: the places of bodies, where there are any."""
+        """Return the positions of all movers before a physics step (M, 2) [m]: those of bodies where they exist."""
         places: Floats = self._trajectories.positions(step / self._hz)[0]
         for m, body in self.bodies.items():
             places[m] = self._p.getBasePositionAndOrientation(body, self._client)[0][:2]
         return places
 
     def track(self, steps: int) -> Floats:
-        """Where all movers were before each of the first steps since the restart (steps, M, 2) [m]."""
+        """Return the positions of all movers before each of the first steps since the restart (steps, M, 2) [m]."""
         while sum(map(len, self._past)) < steps:
             chunk = _Chunk.of(self._trajectories, self._hz, CHUNK * len(self._past))
             self._past.append(chunk.positions)
         return np.concatenate(self._past)[:steps]
 
     def _choose(self, step: int) -> None:
-        """Add and remove bodies, so that those exist that the robot can meet in the window that begins with `step`."""
+        """Keep bodies for the movers that the robot can meet in the window beginning at `step`."""
         chunk, w = self._chunk, (step - self._chunk.first) // WINDOW
         robot = np.array(self._where())
-        # Until there is a contact the robot drives by itself; after that, a mover may push it at its own speed.
-        # A jump's step begins off the trajectory, by as much as the mover moves in it.
+        # Before a contact the robot drives at its own speed; after one, a mover may push it at the mover's speed. In the step of
+        # a jump the body begins off the trajectory, by the mover's travel in that step.
         travel = (self._speed * WINDOW + chunk.fastest[w] * (WINDOW + 1)) / self._hz
         off = np.maximum(np.maximum(chunk.low[w] - robot, robot - chunk.high[w]), 0.0)
         away = np.hypot(off[:, 0], off[:, 1]) - self._trajectories.radii - self._radius - travel
@@ -116,7 +115,7 @@ class MoverBodies:
     def _add(self, m: int, step: int) -> None:
         p, (position, velocity) = self._p, self._chunk.state(m, step)
         place = (*position, self._half_heights[m])
-        # Unlike an obstacle, a mover must be awake, and it would not move with maximal coordinates.
+        # Unlike an obstacle, a mover must be awake; with maximal coordinates it would not move.
         body = p.createMultiBody(0, self._shapes[m], self._drawn, basePosition=place, physicsClientId=self._client)
         p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
         self.bodies[m], self.indices[body] = body, m
@@ -134,24 +133,24 @@ class MoverBodies:
 
 
 class _Chunk(NamedTuple):
-    """The movers in a number of steps, computed at once."""
+    """Motions of the movers over a number of steps."""
 
     first: int  # the first step
     end: int  # the first step after the chunk
     hz: int  # physics steps per simulated second
-    positions: Floats  # where each mover is before each step (K, M, 2) [m]
-    changes: dict[int, list[Change]]  # by physics step
+    positions: Floats  # positions before each step (K, M, 2) [m]
+    changes: dict[int, list[Change]]  # velocity changes by physics step
     changed: npt.NDArray[np.bool_]  # whether a mover's velocity is set in a step (K, M)
-    set_anew: npt.NDArray[np.bool_]  # whether its position is set as well (K, M)
-    velocity: Floats  # the velocity that takes it to its next position (K, M, 2) [m/s]
-    came_from: Floats  # where that velocity starts from (K, M, 2) [m]
-    low: Floats  # the least x and y of each mover in each window (W, M, 2) [m]
-    high: Floats  # the greatest [m]
-    fastest: list[float]  # the highest speed of any mover in each window [m/s]
+    repositioned: npt.NDArray[np.bool_]  # whether its position is set as well (K, M)
+    velocity: Floats  # velocity to the next position (K, M, 2) [m/s]
+    came_from: Floats  # starting position of that velocity (K, M, 2) [m]
+    low: Floats  # least x and y of each mover in each window (W, M, 2) [m]
+    high: Floats  # greatest x and y [m]
+    fastest: list[float]  # highest speed of any mover in each window [m/s]
 
     @classmethod
     def of(cls, trajectories: Trajectories, hz: int, first: int) -> _Chunk:
-        """The steps from `first` on. The first step sets all velocities, later steps those that change."""
+        """Compute the steps from `first` on. The first step sets all velocities, later steps those that change."""
         t = np.arange(first, first + CHUNK + 2) / hz
         positions = trajectories.positions(t)
         velocity = np.diff(positions, axis=0) * hz
@@ -162,12 +161,12 @@ class _Chunk(NamedTuple):
         changed = np.ones(jumps[:-1].shape, dtype=np.bool_)
         differs = np.abs(velocity[1:-1] - velocity[:-2]) > SAME_VELOCITY
         changed[1:] = differs[..., 0] | differs[..., 1] | jumps[:-2] | jumps[1:-1]
-        # The first step of a chunk also sets positions, so that rounding errors do not add up.
-        set_anew = jumps[:-1].copy()
-        set_anew[0] = True
+        # The first step of a chunk also sets positions, so that rounding does not accumulate.
+        repositioned = jumps[:-1].copy()
+        repositioned[0] = True
         changes: dict[int, list[Change]] = {}
         for k, m in np.argwhere(changed).tolist():
-            jump = tuple(came_from[k, m].tolist()) if set_anew[k, m] else None
+            jump = tuple(came_from[k, m].tolist()) if repositioned[k, m] else None
             changes.setdefault(first + k, []).append((m, *velocity[k, m].tolist(), jump))
         windows = (CHUNK // WINDOW, WINDOW, len(trajectories), 2)
         begin, end = positions[:-2].reshape(windows), positions[WINDOW:-1:WINDOW]  # a window's last step ends there
@@ -175,14 +174,14 @@ class _Chunk(NamedTuple):
         squares = velocity[:-1].reshape(windows) ** 2
         fastest = np.sqrt((squares[..., 0] + squares[..., 1]).max(axis=(1, 2), initial=0.0)).tolist()
         return cls(
-            first, first + CHUNK, hz, positions[:-2], changes, changed, set_anew, velocity[:-1], came_from[:-1],
+            first, first + CHUNK, hz, positions[:-2], changes, changed, repositioned, velocity[:-1], came_from[:-1],
             low, high, fastest,
         )  # fmt: skip
 
     def state(self, m: int, step: int) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Position [m] and velocity [m/s] of a mover's body before a step, to the last bit as if it had always been there."""
+        """Return position [m] and velocity [m/s] of a mover's body before a step, bit for bit as if it had always existed."""
         k = step - self.first
-        begin = int(np.flatnonzero(self.set_anew[: k + 1, m])[-1])
+        begin = int(np.flatnonzero(self.repositioned[: k + 1, m])[-1])
         latest = np.maximum.accumulate(np.where(self.changed[: k + 1, m], np.arange(k + 1), 0))
         velocity = self.velocity[latest, m]
         moves = np.vstack([self.came_from[begin, m], velocity[begin:k] * (1.0 / self.hz)])

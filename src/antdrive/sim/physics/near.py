@@ -1,7 +1,7 @@
-"""Bodies of the cylinders around the robot alone, for worlds of thousands of cylinders.
+"""Physics bodies of the cylinders near the robot, for worlds of thousands.
 
-In every step Bullet looks at every body, at some 50 ns each, though the robot can touch only those next to it. Where a world
-has many cylinders, only those have bodies that the robot can reach before it is looked at again. Bodies come and go as it drives.
+Bullet visits every body at every step, at about 50 ns each, though the robot can touch only the nearest. In large worlds,
+only cylinders within reach before the next update have bodies.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from antdrive.base.types import Floats
 from antdrive.sim.physics.bullet import bullet
 from antdrive.worlds.world import Disc
 
-HOLD = 2.0  # the robot goes this far before other cylinders get bodies [m]
-BELOW = -1000.0  # where bodies wait that no cylinder needs [m]
+HOLD = 2.0  # travel of the robot between two updates [m]
+BELOW = -1000.0  # height of unused bodies [m]
 
 
 class NearBodies:
-    """The bodies around the robot."""
+    """Bodies of the cylinders near the robot."""
 
     def __init__(
         self,
@@ -37,17 +37,17 @@ class NearBodies:
         self._discs: Floats = np.array([(disc.x, disc.y, disc.radius) for disc in obstacles])
         self._reach = HOLD + reach
         self._made: dict[int, int] = {}  # body number by cylinder
-        self._spare: dict[tuple[float, float], list[int]] = {}  # bodies that stand for no cylinder, by size
+        self._spare: dict[tuple[float, float], list[int]] = {}  # unused bodies, by size
         self._centre = (math.inf, math.inf)
 
     def start(self, x: float, y: float) -> None:
-        """Make the bodies around a place, and no others, whatever was there before."""
+        """Restart with the bodies around a position."""
         self._release(list(self._made))
         self._centre = (math.inf, math.inf)
         self.follow(x, y)
 
     def follow(self, x: float, y: float) -> None:
-        """See to it that all cylinders in reach have bodies."""
+        """Give bodies to all cylinders in reach of a position."""
         if math.hypot(x - self._centre[0], y - self._centre[1]) <= HOLD:
             return
         self._centre = (x, y)
@@ -58,7 +58,7 @@ class NearBodies:
             self._furnish(size, list(alike))
 
     def _furnish(self, size: tuple[float, float], indices: list[int]) -> None:
-        """Give bodies to cylinders of one size: spare ones while there are any, then new ones."""
+        """Give bodies to cylinders of one size: unused ones first, then new ones."""
         spare = self._spare.get(size, [])
         reused, built = indices[: len(spare)], indices[len(spare) :]
         for index in reused:
@@ -69,7 +69,7 @@ class NearBodies:
             self._made |= dict(zip(built, self._build(self._obstacles[built[0]], built), strict=True))
 
     def _release(self, indices: list[int]) -> None:
-        """Take the bodies away from cylinders. They wait far below the floor: PyBullet's removal confuses body numbers."""
+        """Move the bodies of cylinders far below the floor; PyBullet's removal would confuse body numbers."""
         for index in indices:
             body = self._made.pop(index)
             del self._bodies[body]

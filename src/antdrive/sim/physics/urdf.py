@@ -1,10 +1,10 @@
-"""The robot's URDF description for the physics engine.
+"""URDF description of a robot for the physics engine.
 
 The robot rolls on spheres, within 0.1 % of the commanded twist at 240 Hz (`python -m benchmarks.physics`); URDF cylinders
-were measured to be off by 5 %. The casters hang 0.5 mm above the floor, because coplanar casters would carry most of the
-weight. No sphere reaches beyond the footprint: where a wheel is thinner than a sphere of its radius, a smaller sphere stands
-under the wheel's middle and is geared so that speed and force on the floor are the wheel's. The mass is centred on the axle
-wherever the footprint is.
+were measured to be 5 % off. The casters hang 0.5 mm above the floor, because coplanar casters would carry most of the
+weight. No sphere protrudes from the footprint: where a wheel is thinner than a sphere of its radius, a smaller sphere stands
+under the wheel's middle, geared to the wheel's speed and force on the floor. The mass is centred on the axle wherever the
+footprint is.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from antdrive.base.types import Point
 from antdrive.robots.spec import RobotSpec, yaw_inertia
 
 GROUND_CLEARANCE = 0.005  # height of the chassis above the floor [m]
-CASTER_GAP = 5e-4  # height of wheels and casters above the floor when the robot is placed [m]
-# For a link that is not to be drawn Bullet makes a visual shape from the collision shape, which takes 0.2 ms for a sphere.
+CASTER_GAP = 5e-4  # height of wheels and casters above the floor at placement [m]
+# Without it, Bullet derives a visual shape from the collision shape, which takes 0.2 ms for a sphere.
 DRAWN = '<visual><geometry><box size="0.01 0.01 0.01"/></geometry></visual>'
 CHASSIS_FILE = "chassis.obj"
-MESH_MARGIN = 0.001  # of Bullet's meshes in URDF files [m]
-INSIDE = 0.99  # the share of the room up to the footprint's edge that wheels and casters fill at most
+MESH_MARGIN = 0.001  # collision margin of Bullet's meshes in URDF files [m]
+INSIDE = 0.99  # largest fraction of the room up to the footprint's edge that wheels and casters fill
 
 
 class _Ball(NamedTuple):
-    """A sphere under the chassis: a driven wheel or a fixed, frictionless caster."""
+    """Sphere under the chassis: a driven wheel or a fixed, frictionless caster."""
 
     name: str
     radius: float  # [m]
@@ -39,14 +39,14 @@ class _Ball(NamedTuple):
 
 
 def rolling_radius(robot: RobotSpec) -> float:
-    """Radius of the spheres that stand for the driven wheels: the wheels' own where the footprint has room for it [m]."""
+    """Return the radius of the spheres that represent the driven wheels: the wheels' own where the footprint permits [m]."""
     return min(robot.wheel_radius, INSIDE * robot.wheel_room)
 
 
 def robot_urdf(robot: RobotSpec, com_drop: float) -> str:
-    """The robot as URDF text. The base frame is the axle's centre.
+    """Return the robot as URDF text. The base frame is the axle's centre.
 
-    A chassis that is neither a disc nor a rectangle is the mesh `CHASSIS_FILE`, which `chassis_mesh` gives.
+    A chassis that is neither a disc nor a rectangle is the mesh `CHASSIS_FILE`, which `chassis_mesh` returns.
     """
     foot = robot.footprint
     if foot.rounding and not foot.is_disc and len(foot.corners) != 1:
@@ -66,9 +66,9 @@ def robot_urdf(robot: RobotSpec, com_drop: float) -> str:
 
 
 def chassis_mesh(robot: RobotSpec) -> str | None:
-    """The chassis as Wavefront OBJ in the base frame; None for discs and rectangles, which are simpler shapes.
+    """Return the chassis as Wavefront OBJ in the base frame; None for discs and rectangles, which are simpler shapes.
 
-    Bullet moves the surface of a mesh outwards by its collision margin, so the mesh is smaller by that.
+    Bullet moves a mesh's surface outwards by its collision margin, so the mesh is smaller by that.
     """
     foot = robot.footprint
     if len(foot.corners) < 3 or foot.box is not None:
@@ -89,7 +89,7 @@ def chassis_mesh(robot: RobotSpec) -> str | None:
 
 
 def _moved_inwards(corners: tuple[Point, ...], by: float) -> list[Point]:
-    """The corners of a convex, counter-clockwise polygon whose edges are moved inwards [m]."""
+    """Return the corners of a convex, counter-clockwise polygon with its edges moved inwards [m]."""
     moved = []
     for (ax, ay), (bx, by_), (cx, cy) in zip(
         (corners[-1], *corners[:-1]), corners, (*corners[1:], corners[0]), strict=True
@@ -103,7 +103,7 @@ def _moved_inwards(corners: tuple[Point, ...], by: float) -> list[Point]:
 
 
 def _caster(robot: RobotSpec, way: int) -> tuple[float, float]:
-    """Where the front (1) or the rear (-1) caster is on the x axis, and its radius [m]."""
+    """Return the x position of the front (1) or rear (-1) caster, and its radius [m]."""
     foot, most = robot.footprint, 0.8 * robot.wheel_radius
     if not foot.corners:
         half_length, half_width = foot.half_length + foot.rounding, foot.half_width + foot.rounding
@@ -114,7 +114,7 @@ def _caster(robot: RobotSpec, way: int) -> tuple[float, float]:
 
 
 def _chassis(robot: RobotSpec, com_drop: float) -> list[str]:
-    """The chassis: a cylinder, a box or a mesh of the footprint's size, with 92 % of the mass."""
+    """Return the chassis: a cylinder, a box or a mesh of the footprint's size, with 92 % of the mass."""
     foot, bottom = robot.footprint, GROUND_CLEARANCE - robot.wheel_radius
     inertia_z = yaw_inertia(robot)
     xmin, ymin, xmax, ymax = foot.bounds
@@ -142,7 +142,8 @@ def _chassis(robot: RobotSpec, com_drop: float) -> list[str]:
 
 
 def _link(ball: _Ball, mass: float) -> list[str]:
-    """A wheel or caster of a mass [kg] and the joint that holds it."""
+    """Return a wheel or caster of a mass [kg] with its joint."""
+
     inertia = 0.4 * mass * ball.radius**2
     return [
         f'<link name="{ball.name}">',

@@ -1,8 +1,8 @@
-"""The map that a robot makes of its scans: where ground was seen free, and what was hit, as discs.
+"""Occupancy map of a robot's scans: observed free ground, and hits as discs.
 
 H. Moravec, A. Elfes, *High resolution maps from wide angle sonar*, 1985; S. Thrun, W. Burgard, D. Fox, *Probabilistic
-Robotics*, 2005, chapter 9; log-odds with limits after A. Hornung et al., *OctoMap*, 2013. Only cells on the beams of a scan
-are touched, so a scan costs the same however large the map is.
+Robotics*, 2005, chapter 9; log-odds with limits after A. Hornung et al., *OctoMap*, 2013. A scan touches only cells on its
+beams, so its cost is independent of the map's size.
 """
 
 from __future__ import annotations
@@ -29,42 +29,41 @@ _NONE = np.empty((0, 3))
 Cells = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
 
-BLOCK = 64  # a map grows by multiples of so many cells
-OFTEN = 12.5  # how often a scan is entered as a whole, where the lidar's rate allows [Hz]
-EACH_WAY = 6.25  # how often the free way of each beam is entered, where it allows that [Hz]
-LISTED = 2048  # occupied cells that a map has room for at first
-ROOM = 4.0  # how far beyond its horizon a map that grows is laid out at first [m]
+BLOCK = 64  # growth increment of the map [cells]
+OFTEN = 12.5  # rate of whole scans, if the lidar's rate allows [Hz]
+EACH_WAY = 6.25  # rate at which the free path of each beam is entered, if possible [Hz]
+LISTED = 2048  # initial capacity for occupied cells
+ROOM = 4.0  # initial extent of a growing map beyond its horizon [m]
 
 
 class OccupancyMap:
-    """What a robot has seen so far, in the frame of its odometry.
+    """Occupancy map in the frame of the robot's odometry.
 
-    A cell is unknown, seen free, or occupied. It is seen free once a beam has passed it, as far as beams lie no farther apart
-    than a cell is wide; a thing thinner than that may stand between two of them. A single hit makes a cell occupied, and it
-    is free again when the beams on both sides of its hits have ended beyond them: at the ninth time, for what was hit often.
+    A cell is unknown, free or occupied. It is free once a beam has passed it, as far as beams lie no farther apart than a
+    cell; a thinner object may stand between two of them. One hit makes a cell occupied. It is free again once the beams on both
+    sides of its hits have ended beyond them: at the ninth time, for cells with many hits.
 
-    Every `share`-th scan is entered as a whole. Of the others only the places of the hits are entered: where something stands
-    is on the map at once; that ground is free, or free again, with the next whole scan.
-    The free ways are those of every `turns`-th beam, in turn, and of all beams of the first scan.
-
+    Every `share`-th scan is entered as a whole. The others contribute their hits only: obstacles appear at once, and free
+    ground with the next whole scan. Free paths are those of every `turns`-th beam, in turn, and of all beams of the first
+    scan.
     Attributes:
         cell: side of a cell [m]
-        horizon: hits farther than this are not entered [m]
-        trust: ground is seen free up to this distance [m]
+        horizon: hits farther than this are omitted [m]
+        trust: ground is observed as free up to this distance [m]
         scans: number of scans entered
-        share: every `share`-th scan is entered as a whole, the first one, too
-        turns: of these scans the free ways of every `turns`-th beam are entered
-        beams: directions of the lidar's beams, seen from the lidar (beams, 2)
-        layouts: how often the map was laid out; cells have other numbers after it has grown
+        share: every `share`-th scan is entered as a whole, beginning with the first
+        turns: whole scans enter the free paths of every `turns`-th beam
+        beams: directions of the lidar's beams in its frame (beams, 2)
+        layouts: number of layouts; cell indices change when the map grows
 
     Args:
-        lidar: the lidar whose scans are entered
+        lidar: the scanning lidar
         cell: side of a cell [m]
-        centre: where the robot starts, in the frame of the map [m]
-        horizon: hits farther than this are not entered [m]
-        bounds: the ground that the map covers, for good; None: it grows as needed [m]
-        goal: where the robot is to go [m]; a map that grows is laid out for the way there. None: for no way
-        share: every `share`-th scan is entered as a whole; None: about 12 in a second
+        centre: the robot's start, in the frame of the map [m]
+        horizon: hits farther than this are omitted [m]
+        bounds: the fixed bounds of the map [m]; None: it grows as needed
+        goal: the robot's goal [m], included in the layout of a growing map; None: no goal
+        share: every `share`-th scan is entered as a whole; None: about 12 per second
     """
 
     def __init__(
@@ -84,7 +83,7 @@ class OccupancyMap:
         self.cell, self.horizon = cell, min(horizon, lidar.max_range)
         self.trust = min(self.horizon, cell / lidar.spacing)
         self.scans = self.layouts = 0
-        self._spare = 0  # so many more occupied cells the lists surely have room for
+        self._spare = 0  # free capacity of the lists of occupied cells
         self._lidar, self._grows, self._closed = lidar, bounds is None, lidar.full_circle
         angles = lidar.angles - lidar.yaw
         self.beams = np.column_stack((np.cos(angles), np.sin(angles)))
@@ -102,17 +101,17 @@ class OccupancyMap:
 
     @property
     def origin(self) -> Point:
-        """The lower left corner of cell (0, 0) [m]."""
+        """Lower left corner of cell (0, 0) [m]."""
         return float(self._arrays.frame[0]), float(self._arrays.frame[1])
 
     @property
     def occupied(self) -> Mask:
-        """Which cells hold hits (rows, cols); rows along +y. A live view, to be read only."""
+        """Cells with hits (rows, cols); rows along +y. A read-only live view."""
         return _read_only(self._arrays.occupied)
 
     @property
     def seen_free(self) -> Mask:
-        """Which cells were seen free and are not occupied (rows, cols). A live view, to be read only."""
+        """Cells that were observed as free and are not occupied (rows, cols). A read-only live view."""
         return _read_only(self._arrays.free)
 
     @property
@@ -122,21 +121,21 @@ class OccupancyMap:
 
     @property
     def arrays(self) -> kernels.MapArrays:
-        """The arrays of the map by their names."""
+        """Arrays of the map by name."""
         return self._arrays
 
     @property
     def plain(self) -> tuple[Any, ...]:
-        """The same arrays, for kernels."""
+        """Arrays of the map, for kernels."""
         return self._plain
 
     def insert(self, pose: Pose, ranges: Floats, omitted: Mask | None = None) -> Cells:
-        """Enter a scan, and return the cells that became free, occupied, or free again (K, 2): row, col.
+        """Enter a scan, and return the cells that became free or occupied (K, 2): row, col.
 
         Args:
             pose: the estimated pose of the robot, not of its lidar
             ranges: the scan (beams,) [m]
-            omitted: beams whose hits are not entered, such as those of movers (beams,)
+            omitted: beams whose hits are omitted, such as those of movers (beams,)
         """
         x, y, yaw = self._lidar.pose_on(pose)
         if self._grows:
@@ -156,7 +155,7 @@ class OccupancyMap:
         return self._changed[:count].copy()
 
     def endpoints(self, pose: Pose, ranges: Floats) -> Floats:
-        """Where the beams end (beams, 2) [m]; not a number where they hit nothing that can be measured.
+        """Return the ends of the beams (beams, 2) [m]; nan without a measurable hit.
 
         Args:
             pose: the estimated pose of the robot
@@ -169,46 +168,46 @@ class OccupancyMap:
         return np.asarray(measured * turned + (x, y), dtype=np.float64)
 
     def explained(self, points: Floats, settle: int) -> Mask:
-        """Whether points belong to what stands still (N,): they lie in or beside cells that have long been occupied.
+        """Return whether points belong to standing obstacles (N,): they lie in or beside cells that have long been occupied.
 
-        Points on ground that had been seen free until less than `settle` scans ago do not, whether or not their scan has been
+        Points on ground that was observed as free less than `settle` scans ago do not, whether or not their scan has been
         entered.
 
         Args:
-            points: places (N, 2) [m]
-            settle: after how many scans what has come counts as standing
+            points: positions (N, 2) [m]
+            settle: scans after which a new object counts as standing
         """
         out = np.empty(len(points), dtype=np.bool_)
         kernels.explained(np.ascontiguousarray(points), self.scans, settle, self._plain, out)
         return out
 
     def discs(self, within: Bounds | None = None) -> Floats:
-        """Discs around all hits (D, 3): x, y, radius [m]. Every point that was entered and not seen through lies in one.
+        """Return discs around all hits (D, 3): x, y, radius [m]. They contain every entered hit that no beam has cleared.
 
         Args:
-            within: only those of cells that meet this rectangle [m]; None: all
+            within: omit cells outside this rectangle [m]; None: all
         """
-        found: Floats = kernels.discs_within(*(within or EVERYWHERE), self._plain)
-        return found
+        discs: Floats = kernels.discs_within(*(within or EVERYWHERE), self._plain)
+        return discs
 
     def clear_hits(self, place: Point, radius: float) -> Cells:
-        """Take what was hit around a place for free ground, and return the cells (K, 2): a mover has gone on.
+        """Mark hits around a position as free ground after a mover has left, and return the cells (K, 2).
 
         Args:
             place: x, y [m]
-            radius: how far around it [m]
+            radius: distance around it [m]
         """
         count = kernels.forget(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
     def mark_free(self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None) -> Cells:
-        """Take unknown ground for free, such as that under the robot, and return the cells (K, 2).
+        """Mark unknown ground as free, such as that under the robot, and return the cells (K, 2).
 
         Args:
             place: x, y [m]
-            radius: how far around it [m]
-            world: cells that meet one of its cylinders or walls stay unknown; None: none do
-            movers: discs of what moves there now (N, 3) [m]; cells that they meet stay unknown, too. None: there are none
+            radius: distance around it [m]
+            world: cells that meet its cylinders or walls stay unknown; None: no world
+            movers: discs of movers (N, 3) [m], whose cells stay unknown as well; None: no movers
         """
         discs, walls = (_NONE, EVERYWHERE) if world is None else (world.discs, world.bounds)
         if movers is not None:
@@ -217,12 +216,12 @@ class OccupancyMap:
         return self._changed[:count].copy()
 
     def reset_around(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:
-        """An empty map with the same cells, but for what this one has seen free around a place; hits there are unknown ground.
+        """Return a map without hits and with only the free ground around a position; hits there become unknown ground.
 
         Args:
-            place: around which the map is laid out, x, y [m]
-            radius: how far around it free ground stays free [m]
-            goal: where the robot is to go [m]; None: for no way
+            place: centre of the new layout, x, y [m]
+            radius: free ground within this distance stays free [m]
+            goal: the robot's goal [m]; None: no goal
         """
         cell, half = self.cell, self.horizon + ROOM
         x, y = (
@@ -252,7 +251,7 @@ class OccupancyMap:
         kernels.count_unseen(self._arrays.free, self._arrays.unseen)
 
     def _make_room(self, x: float, y: float) -> None:
-        """Grow where the horizon around the lidar would leave the map."""
+        """Grow the map if the lidar's horizon would leave it."""
         x_low, x_high, y_low, y_high = self._room
         if x_low <= x <= x_high and y_low <= y <= y_high:
             return
@@ -269,7 +268,7 @@ class OccupancyMap:
         new.occupied[listed], new.slot[listed] = True, np.arange(count)
 
     def _blocks(self, west: float, south: float, east: float, north: float) -> tuple[int, int, int, int]:
-        """How many cells are to be added on each side for so many metres: whole blocks, none for less than 0."""
+        """Return the cells to add on each side for so many metres: whole blocks, none below 0."""
         w, s, e, n = (max(0, math.ceil(side / self.cell / BLOCK)) * BLOCK for side in (west, south, east, north))
         return w, s, e, n
 
@@ -282,7 +281,7 @@ class OccupancyMap:
         more: tuple[int, int, int, int],
         old: kernels.MapArrays | None = None,
     ) -> None:
-        """New arrays for so many cells from a corner on and `more` in the west, south, east and north; lists as in `old`."""
+        """Allocate arrays for cells from a corner, and `more` cells in the west, south, east and north; lists as in `old`."""
         west, south, east, north = more
         shape = (rows + south + north, cols + west + east)
         frame = np.array([x0 - west * self.cell, y0 - south * self.cell, self.cell])
@@ -313,7 +312,7 @@ class OccupancyMap:
         self.layouts += 1
 
     def _lengthen_lists(self) -> None:
-        """Make the lists of occupied cells longer where a scan could fill them."""
+        """Extend the lists of occupied cells if a scan could fill them."""
         held, room = int(self._arrays.count[0]), len(self._arrays.cells)
         missing = held + self._lidar.beams - room
         if missing > 0:
@@ -328,9 +327,9 @@ class OccupancyMap:
 
 
 def _zeros(shape: tuple[int, ...], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
-    """An array of zeros whose pages the system provides when they are first written to: most of a map stays empty.
+    """Return an array of zeros whose pages are allocated on the first write, since most of a map stays empty.
 
-    `np.zeros` writes all of them, wherever the allocator has used the memory before.
+    `np.zeros` writes all pages where the allocator reuses memory.
     """
     kind = np.dtype(dtype)
     return np.frombuffer(mmap.mmap(-1, math.prod(shape) * kind.itemsize), kind).reshape(shape)
@@ -352,10 +351,10 @@ def clear_distance(
     *,
     freespace: bool = False,
 ) -> float:
-    """How far the footprint, swept along the arc of a twist, stays on ground that was seen free, at most `limit` [m].
+    """Return how far the footprint, swept along a twist's arc, stays on observed free ground, at most `limit` [m].
 
-    Ground counts as not seen by whole cells, and what was hit by its discs. It is a lower bound, to 1 mm. What the
-    footprint overlaps already does not stop a robot that leaves it or drives along it, only one that would come nearer.
+    Unknown ground counts by whole cells, hits by their discs. The result is a lower bound, to 1 mm. Overlaps at the
+    start stop only motion that comes nearer.
 
     Args:
         seen: the map
@@ -363,8 +362,8 @@ def clear_distance(
         speed: forward speed [m/s], not 0; negative: backwards
         yaw_rate: counter-clockwise [rad/s]
         footprint: the robot's footprint
-        limit: how far is far enough [m]
-        freespace: whether ground that was not seen counts as free, so that only hits end the way
+        limit: the largest distance of interest [m]
+        freespace: whether unknown ground counts as free, so that only hits limit the path
     """
     if speed == 0.0:
         return 0.0 if yaw_rate else limit
@@ -374,15 +373,15 @@ def clear_distance(
 def clear_turn(
     seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float, *, freespace: bool = False
 ) -> float:
-    """How far the robot can turn on the spot over ground that was seen free, at most `limit` [rad]; as `clear_distance`.
+    """Return how far the robot can turn on the spot over observed free ground, at most `limit` [rad], as `clear_distance`.
 
     Args:
         seen: the map
         pose: the robot's estimated pose
         yaw_rate: counter-clockwise [rad/s]; only its sign counts
         footprint: the robot's footprint
-        limit: how far is far enough [rad]
-        freespace: whether ground that was not seen counts as free
+        limit: the largest angle of interest [rad]
+        freespace: whether unknown ground counts as free
     """
     return _clear(seen, pose, 0.0, yaw_rate, footprint, limit, freespace)
 

@@ -1,9 +1,9 @@
-"""Movers found in scans: points that what stands still does not explain, clustered, fitted with circles, followed over time.
+"""Mover tracking: cluster unexplained scan points, fit circles, and track them over time.
 
 Each track is a Kalman filter with constant velocity (Y. Bar-Shalom, X. Li, T. Kirubarajan, *Estimation with Applications to
-Tracking and Navigation*, 2001, chapter 6). A cluster in which several tracks expect points is shared out among them, so that
-movers which pass each other keep their tracks; other clusters and tracks are matched nearest first. A given map, or the
-robot's own, says what stands still.
+Tracking and Navigation*, 2001, chapter 6). Tracks that expect points in one cluster share it, so that passing movers keep
+their tracks; other clusters and tracks are matched nearest first. A given map, or the robot's own, explains standing
+obstacles.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from antdrive.sim.sensing import _kernels_tracking as kernels
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.worlds import World, point_clearance
 
-SLACK = 0.02  # points so near to a known surface lie on it, without any error [m]
-SIGMAS = 3.0  # errors up to so many standard deviations are allowed for
+SLACK = 0.02  # points this near to a known surface lie on it [m]
+SIGMAS = 3.0  # tolerance of errors in standard deviations
 
 
 class Hits(NamedTuple):
-    """Where the beams of a scan ended."""
+    """Ends of the beams of a scan."""
 
-    beams: npt.NDArray[np.intp]  # the numbers of the beams that met something near enough (N,)
-    points: Floats  # where they ended, in the frame of the estimated pose (N, 2) [m]
-    explained: npt.NDArray[np.bool_]  # whether what stands still explains them (N,)
+    beams: npt.NDArray[np.intp]  # numbers of the beams with a hit in range (N,)
+    points: Floats  # their ends, in the frame of the estimate (N, 2) [m]
+    explained: npt.NDArray[np.bool_]  # whether standing obstacles explain them (N,)
 
 
 class Ground(Protocol):
-    """Tells which hits of a scan are no news."""
+    """Map that explains hits by standing obstacles."""
 
     @property
     def complete(self) -> bool:
-        """Whether all that is known to stand still is on it from the beginning."""
+        """Whether the map is complete from the beginning."""
 
     def hits(self, pose: Pose, ranges: Floats) -> Hits:
-        """The hits of a scan."""
+        """Return the hits of a scan."""
 
 
 class KnownGround:
-    """The cylinders and walls of a given map. Whatever they do not explain is a mover or an unknown obstacle.
+    """Cylinders and walls of a given map. Unexplained hits belong to movers or unknown obstacles.
 
     Attributes:
         complete: true
@@ -55,7 +55,7 @@ class KnownGround:
     Args:
         lidar: the robot's lidar; cylinders below its beams do not count
         world: the map; its movers do not count
-        reach: hits farther than this from the lidar are left out [m]
+        reach: hits farther than this from the lidar are omitted [m]
         pose_xy: standard deviation of the estimated position [m]
         pose_yaw: and of the heading [rad]
     """
@@ -71,7 +71,7 @@ class KnownGround:
         self._pose_xy, self._pose_yaw = pose_xy, pose_yaw
 
     def hits(self, pose: Pose, ranges: Floats) -> Hits:
-        """The hits of a scan.
+        """Return the hits of a scan.
 
         Args:
             pose: the robot's estimated pose
@@ -85,14 +85,14 @@ class KnownGround:
 
 
 class MappedGround:
-    """The map that a robot makes of its scans. It explains what has long been there, and what lies on ground not yet seen.
+    """The robot's own map. It explains lasting hits, and hits on unknown ground.
 
     Attributes:
         complete: false
 
     Args:
         seen: the map of the earlier scans
-        settle: after how many scans what has come counts as standing
+        settle: scans after which a new object counts as standing
     """
 
     complete = False
@@ -101,7 +101,7 @@ class MappedGround:
         self._seen, self._settle = seen, settle
 
     def hits(self, pose: Pose, ranges: Floats) -> Hits:
-        """The hits of a scan.
+        """Return the hits of a scan.
 
         Args:
             pose: the robot's estimated pose
@@ -113,26 +113,26 @@ class MappedGround:
 
 
 def ends(lidar: Lidar, pose: Pose, ranges: Floats, beams: npt.NDArray[np.intp]) -> Floats:
-    """Where some beams of a scan end (N, 2) [m]."""
+    """Return the ends of some beams of a scan (N, 2) [m]."""
     x, y, yaw = lidar.pose_on(pose)
     angles = lidar.angles[beams] - lidar.yaw + yaw
     return np.column_stack((x + ranges[beams] * np.cos(angles), y + ranges[beams] * np.sin(angles)))
 
 
 SKIN = kernels.SKIN
-ROOM = 64  # tracks that there is room for at first
-PARTIAL = 3.0  # the centre of a mover that is partly hidden has so many times the error
+ROOM = 64  # initial capacity for tracks
+PARTIAL = 3.0  # factor on the error of a partly hidden mover's centre
 
 
 class TrackedMovers(NamedTuple):
-    """The movers that are followed now.
+    """Tracked movers.
 
     Attributes:
         positions: their centres (T, 2) [m]
         velocities: their velocities (T, 2) [m/s]
         radii: their radii (T,) [m]
-        numbers: their numbers (T,), in the order in which they were found; a number is never used again
-        met: whether the last scan met them (T,), or they are expected where they are hidden
+        numbers: their unique numbers (T,), in the order of detection
+        met: whether the last scan hit them (T,); else they are hidden and predicted
     """
 
     positions: Floats
@@ -144,25 +144,25 @@ class TrackedMovers(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingPolicy:
-    """How movers are found and followed.
+    """Tracking policy.
 
     Attributes:
-        gap: neighbouring points farther apart belong to different things [m]
-        least: points that a cluster needs to begin a track
-        settle: what has stood on once free ground for so long is part of a map of the robot's own [s]
-        smallest: the least radius that is estimated [m]
-        largest: the largest one [m]
-        gate: a cluster farther from where a track is expected is not its own [m]
-        speed: the highest speed that a mover is looked for with [m/s]; it widens the gate of a new track
+        gap: neighbouring points farther apart belong to different objects [m]
+        least: points that start a track
+        settle: time after which an object on once free ground belongs to the robot's own map [s]
+        smallest: least estimated radius [m]
+        largest: largest estimated radius [m]
+        gate: largest distance between a cluster and a track's prediction [m]
+        speed: highest speed of a mover, which widens the gate of a new track [m/s]
         acceleration: standard deviation of the movers' acceleration [m/s^2]
         error: standard deviation of a measured centre [m]
-        confirmed: in how many scans a mover has to be seen before it counts
-        way: how far a mover has to have come before it counts [m]; on a given map it need not have moved
-        patience: for how long a track goes on while it is hidden [s]
-        doubt: the same for one that does not count yet [s]
+        confirmed: scans that must hit a mover before it counts
+        way: distance that a mover must cover before it counts [m]; 0 on a given map
+        patience: time for which a hidden track is kept [s]
+        doubt: the same for an unconfirmed track [s]
 
     Raises:
-        FieldError: a value that is not positive.
+        FieldError: a value is not positive.
     """
 
     gap: float = 0.2
@@ -187,15 +187,15 @@ class TrackingPolicy:
 
 
 class MoverTracker:
-    """Finds movers in the scans of one drive, and follows them.
+    """Mover tracker over the scans of one drive.
 
     Attributes:
-        policy: how movers are found and followed
+        policy: the tracking policy
 
     Args:
-        lidar: the lidar whose scans are read
-        policy: how movers are found and followed; None: as by default
-        pose_xy: standard deviation of the estimated positions at which scans are taken [m]
+        lidar: the scanning lidar
+        policy: the tracking policy; None: the default
+        pose_xy: standard deviation of the estimated positions [m]
         pose_yaw: and of the headings [rad]
     """
 
@@ -240,23 +240,23 @@ class MoverTracker:
 
     @property
     def tracks_begun(self) -> int:
-        """How many tracks were begun so far."""
+        """Number of tracks begun so far."""
         return self._found
 
     def movers(self) -> TrackedMovers:
-        """The movers that count, at the time of the last scan."""
+        """Return the confirmed movers at the time of the last scan."""
         return self._now
 
     def update(self, ground: Ground, pose: Pose, ranges: Floats, time: float) -> npt.NDArray[np.bool_]:
-        """Read a scan; which beams met movers that are followed (beams,).
+        """Update the tracks with a scan; return which beams hit tracked movers (beams,).
 
-        Those beams can be left out of a map (`OccupancyMap.insert`, `omitted`).
+        A map can omit those beams (`OccupancyMap.insert`, `omitted`).
 
         Args:
-            ground: what stands still, as known before this scan
+            ground: the map before this scan
             pose: the robot's estimated pose
             ranges: the scan (beams,) [m]
-            time: when it was taken [s]; later than the scan before
+            time: time of the scan [s]; later than the scan before
         """
         dt = time - self._time if math.isfinite(self._time) else 0.0
         self._time = time
@@ -280,13 +280,13 @@ class MoverTracker:
         return out
 
     def suspected(self, ground: Ground, pose: Pose, ranges: Floats, time: float) -> npt.NDArray[np.bool_]:
-        """Which beams of a scan that was not read yet may have met something that moves (beams,): no marks to steer by.
+        """Return which beams of an unprocessed scan may have hit a mover (beams,), so that scan matching omits them.
 
         Args:
-            ground: what stands still, as known before this scan; what it explains moves only if it was seen to move
+            ground: the map before this scan; objects that it explains count only if seen to move
             pose: the robot's estimated pose
             ranges: the scan (beams,) [m]
-            time: when it was taken [s]
+            time: time of the scan [s]
         """
         hits = ground.hits(pose, ranges)
         points, explained = np.ascontiguousarray(hits.points), np.ascontiguousarray(hits.explained)
@@ -298,7 +298,7 @@ class MoverTracker:
         return out
 
     def _make_room(self, points: int) -> None:
-        """Room for the tracks that a scan may begin: each needs some points."""
+        """Extend the tracks by those that a scan may begin."""
         needed = self._count + points // self.policy.least + 1
         if needed > len(self._tracks):
             longer = np.zeros(2 * needed, dtype=kernels.TRACK)
