@@ -1,8 +1,8 @@
-"""A building of 40 x 30 m as a map of 0.05 m a pixel: what each stage of its use costs, and the loop among 10,000 cylinders.
+"""Cost of importing, planning and driving in a building of 40 x 30 m (0.05 m per pixel), and of 10,000 cylinders.
 
 python -m benchmarks.building               # tables for docs/notebook/building.md
 python -m benchmarks.building tasks         # 30 random tasks in it, with the campaign's statistics
-python -m benchmarks.building --map DIR     # only write the map, to look at it
+python -m benchmarks.building --map DIR     # only write the map
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ T = TypeVar("T")
 
 
 def building(seed: int = 0) -> np.ndarray:
-    """The free pixels: rooms on both sides of three corridors, each with a door and furniture."""
+    """Return the free pixels: rooms with doors and furniture along three corridors."""
     rng = np.random.default_rng(seed)
     width, height = (round(side / RESOLUTION) for side in SIZE)
     free = np.ones((height, width), dtype=bool)
@@ -69,7 +69,7 @@ def building(seed: int = 0) -> np.ndarray:
                 fill(x - WALL / 2, low, x + WALL / 2, high)
             for a, b in itertools.pairwise(edges):
                 _furnish(rng, fill, float(a), low, float(b), high)
-    for y in corridors:  # doors of both sides, at last
+    for y in corridors:  # doors on both sides
         for left, right in ((WALL, 19.0 - WALL), (21.0 + WALL, 40 - WALL)):
             for middle in np.linspace(left, right, 11)[1::2]:
                 for side in (-1, 1):
@@ -79,7 +79,7 @@ def building(seed: int = 0) -> np.ndarray:
 
 
 def _furnish(rng: np.random.Generator, fill: Callable[..., None], x0: float, y0: float, x1: float, y1: float) -> None:
-    """Desks and chairs, with a free aisle before the doors."""
+    """Place desks and chairs, with a free aisle before the doors."""
     for _ in range(5):
         wide, deep = rng.uniform(0.4, 1.4), rng.uniform(0.4, 0.8)
         x = rng.uniform(x0 + 0.2, max(x0 + 0.21, x1 - wide - 0.2))
@@ -91,7 +91,7 @@ def _furnish(rng: np.random.Generator, fill: Callable[..., None], x0: float, y0:
 
 
 def write_map(folder: Path) -> Path:
-    """The building as map_server has it."""
+    """Write the building as a map_server map."""
     picture = np.where(building()[::-1], 254, 0).astype(np.uint8)
     Image.fromarray(picture).save(folder / "building.png")
     path = folder / "building.yaml"
@@ -103,7 +103,7 @@ def write_map(folder: Path) -> Path:
 
 
 def stage(name: str, work: Callable[[], T]) -> T:
-    """Do some work and print its time, its processor time, and the most memory that the process has held so far."""
+    """Run `work` and print its time, its processor time and the peak memory of the process so far."""
     started, used = time.perf_counter(), processor_time()
     result = work()
     seconds, used = time.perf_counter() - started, processor_time() - used
@@ -113,7 +113,7 @@ def stage(name: str, work: Callable[[], T]) -> T:
 
 
 def processor_time() -> float:
-    """Of this process and of the children that have ended [s]."""
+    """Return the processor time of this process and its finished children [s]."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 
@@ -160,7 +160,7 @@ def stages(folder: Path) -> None:
 
 
 def tasks(folder: Path, number: int, apart: float, jobs: int) -> None:
-    """Drive random tasks in the building with one command, and print what its report says."""
+    """Drive random tasks in the building with one command and print its report."""
     world = folder / "building.world.yaml"
     save_task(import_map_server(write_map(folder), start=START, goal=GOAL), world)
     command = [
@@ -173,7 +173,7 @@ def tasks(folder: Path, number: int, apart: float, jobs: int) -> None:
 
 
 def loop(rounds: int, counts: tuple[int, ...] = (400, 10_000)) -> None:
-    """Print what a step of the drive loop costs among many cylinders, in processor time."""
+    """Print the processor time of a drive-loop step among many cylinders."""
     robot, controller = load_robot("turtlebot"), PurePursuit()
     costs: dict[int, list[float]] = {count: [] for count in counts}
     with contextlib.ExitStack() as stack:

@@ -1,16 +1,16 @@
-"""What campaigns survive and cost: `python -m benchmarks.campaigns [PART ...] [--share S] [--drive]`, by default all parts.
+"""Robustness and cost of campaigns: `python -m benchmarks.campaigns [PART ...] [--share S] [--drive]`, by default all parts.
 
 - kill: 2,000 short runs with 20 `kill -9` at random moments: of workers, of the parent, of dask's workers and of its
-  scheduler, five each. After resuming, the canonical table must be that of an undisturbed campaign, byte for byte.
-  kill-worker, kill-parent, kill-dask-worker and kill-dask-scheduler are parts of their own.
-- equality: 160 drives of two planners in four worlds, with and without noise: one table, byte for byte, from this process, from
-  1, 2 and 4 processes, from dask, and in other orders.
-- efficiency: runs that compute for 0.2 s on one and on two processes, local and dask: T1 / (2 T2), without the start; the same
-  of plain processes, which is what the machine gives.
-- overhead: 100,000 runs that do nothing: what the engines, the folder and the expansion cost for each.
+  scheduler, five each. After resuming, the canonical table must equal that of an undisturbed campaign, byte for byte.
+  kill-worker, kill-parent, kill-dask-worker and kill-dask-scheduler are separate parts.
+- equality: 160 drives of two planners in four worlds, with and without noise. The table must be the same, byte for byte, from
+  this process, from 1, 2 and 4 processes, from Dask, and in other orders.
+- efficiency: T1 / (2 T2), without start-up, of runs that compute for 0.2 s on one and two processes, local and Dask; plain
+  processes show the machine's limit.
+- overhead: cost per run of engines, folder and expansion, with 100,000 empty runs.
 
-`--share 0.05` takes a twentieth of the runs. `--drive` kills campaigns of real drives instead of runs that sleep. Each result (of
-`kill`: of each victim) is kept in out/campaigns and not measured again.
+`--share 0.05` takes a twentieth of the runs. `--drive` kills campaigns of real drives instead of sleeping runs. Results (of
+`kill`: per victim) are cached in out/campaigns.
 """
 
 from __future__ import annotations
@@ -43,28 +43,28 @@ from benchmarks.markdown import chosen, command_line, table
 
 SMALLEST = ("overhead --share 0.005",)
 OUT = Path("out/campaigns").resolve()
-SHORT = 0.02  # how long a run sleeps in a campaign that is killed [s]
-LONG = 0.2  # how long a run computes where efficiency is measured [s]
-ROUNDS = 3  # how often each engine has its turn there
+SHORT = 0.02  # sleep of a run in a killed campaign [s]
+LONG = 0.2  # computing time of a run in the efficiency part [s]
+ROUNDS = 3  # rounds of each engine in the efficiency part
 VICTIMS = ("worker", "parent", "dask worker", "dask scheduler")
 PARTS = ("kill", *(f"kill-{v.replace(' ', '-')}" for v in VICTIMS), "equality", "efficiency", "overhead")
 
 
 @dataclass(frozen=True)
 class Sleeping:
-    """A run that sleeps; its result follows from its key."""
+    """A sleeping run; its result follows from its key."""
 
     seconds: float = 0.0
 
     def __call__(self, job: Job) -> Finished:
-        if self.seconds:  # even no sleep at all gives the processor away
+        if self.seconds:  # sleep(0) would yield the processor
             time.sleep(self.seconds)
         return Finished(fault_row(job.key, "succeeded", hashlib.sha256(job.key.encode()).hexdigest()))
 
 
 @dataclass(frozen=True)
 class Computing:
-    """A run that computes: so many rounds of a hash."""
+    """A computing run: a number of hash rounds."""
 
     rounds: int
 
@@ -76,12 +76,12 @@ class Computing:
 
 
 def campaign(runs: int) -> dict[str, Any]:
-    """A campaign of so many runs in four worlds."""
+    """Return a campaign with a number of runs in four worlds."""
     return {"worlds": ["empty", "gate", "slalom", "u-trap"], "planners": ["astar"], "seeds": max(1, runs // 4)}
 
 
 def go(folder: Path, runs: int, work: Any, **options: Any) -> float:
-    """Run a campaign, or what is left of it; the time from its first result to its last [s]."""
+    """Run a campaign, or resume it. Return the time from its first result to its last [s]."""
     asked, times = make_campaign(campaign(runs)), list[float]()
 
     def note(done: int, size: int) -> None:
@@ -92,7 +92,7 @@ def go(folder: Path, runs: int, work: Any, **options: Any) -> float:
 
 
 def kept(name: str, measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """A result from out/campaigns, or measured now and kept there."""
+    """Return a result cached in out/campaigns, or measure and cache it."""
     path = OUT / f"{name}.json"
     if not path.exists():
         found = measure()
@@ -106,7 +106,7 @@ def started(*words: str) -> subprocess.Popen[bytes]:
 
 
 class Cluster:
-    """A scheduler and two workers in processes of their own, which are killed and replaced."""
+    """A scheduler and two workers in separate processes, which are killed and replaced."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.number = folder, 0
@@ -144,9 +144,9 @@ class Cluster:
 
 
 def children(process: int, word: str) -> list[int]:
-    """The children of a process whose command line holds a word."""
+    """Return the children of a process whose command line contains a word."""
     with contextlib.suppress(OSError):
-        threads = Path(f"/proc/{process}/task").glob("*/children")  # each thread has children of its own
+        threads = Path(f"/proc/{process}/task").glob("*/children")  # children are listed per thread
         found = " ".join(path.read_text() for path in threads).split()
         return [int(pid) for pid in found if word in Path(f"/proc/{pid}/cmdline").read_text()]
     return []
@@ -162,7 +162,7 @@ def kill_one(processes: list[int], rng: random.Random) -> bool:
 
 
 def kill(victim: str, kills: int, runs: int, drive: bool) -> dict[str, Any]:
-    """Kill one kind of process so many times in a campaign, which is resumed until it is complete."""
+    """Kill one kind of process repeatedly in a campaign, and resume the campaign until it is complete."""
     rng, folder = random.Random(VICTIMS.index(victim)), OUT / "folders" / f"{victim.replace(' ', '-')}-{runs}-{drive}"
     calm = OUT / "folders" / f"calm-{runs}-{drive}"
     shutil.rmtree(folder, ignore_errors=True)
@@ -176,7 +176,7 @@ def kill(victim: str, kills: int, runs: int, drive: bool) -> dict[str, Any]:
             resumed += 1
             before = len(parts_in(folder)) if folder.exists() else 0
             while parent.poll() is None:
-                # Kills are spread over the campaign, and come when something new has been written since the last one.
+                # Kills are spread over the campaign; each waits for results written after the last one.
                 time.sleep(rng.uniform(0.2, 0.8) * runs * SHORT / 2 / (kills + 2))
                 if not left or not folder.exists() or len(parts_in(folder)) <= before:
                     continue
@@ -207,7 +207,7 @@ def kill(victim: str, kills: int, runs: int, drive: bool) -> dict[str, Any]:
 
 
 def efficiency(runs: int) -> dict[str, Any]:
-    """T1 / (2 T2) of runs that compute for 0.2 s: medians of rounds, in each of which every engine has its turn.
+    """Measure T1 / (2 T2) of runs that compute for 0.2 s: medians over rounds with all engines.
 
     *bare* is the same work in plain processes that share nothing: what the machine itself gives to two processes.
     """
@@ -236,14 +236,14 @@ def efficiency(runs: int) -> dict[str, Any]:
 
 
 def bare(processes: int, runs: int, rounds: int) -> float:
-    """The time that plain processes take for runs that they share out evenly, without their start [s]."""
+    """Measure plain processes that share the runs evenly, without start-up [s]."""
     command = [sys.executable, "-m", "benchmarks.campaigns", "_compute", str(runs // processes), str(rounds)]
     started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(processes)]
     return max(float(one.communicate()[0]) for one in started)
 
 
 def compute(runs: int, rounds: int) -> float:
-    """The time that runs which compute take in this process [s]."""
+    """Measure computing runs in this process [s]."""
     (job,) = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"]})).jobs
     work, begun = Computing(rounds), time.perf_counter()
     for _ in range(runs):
@@ -252,7 +252,7 @@ def compute(runs: int, rounds: int) -> float:
 
 
 def equality(runs: int) -> dict[str, Any]:
-    """Which ways to make a campaign give the table of this process, byte for byte."""
+    """List the engines whose table equals that of this process, byte for byte."""
     asked = make_campaign(
         {
             "worlds": ["empty", "gate", "slalom", "u-trap"], "planners": ["astar", {"name": "aco-han", "ants": 10}],
@@ -281,7 +281,7 @@ def equality(runs: int) -> dict[str, Any]:
 
 
 def overhead(runs: int) -> dict[str, Any]:
-    """What a run costs that does nothing [ms]."""
+    """Measure the cost of an empty run [ms]."""
     begun = time.perf_counter()
     expand(make_campaign(campaign(runs)))
     found: dict[str, Any] = {"runs": runs, "expand_ms": (time.perf_counter() - begun) / runs * 1e3}
@@ -299,7 +299,7 @@ def overhead(runs: int) -> dict[str, Any]:
 
 
 def print_parts(parts: list[str], share: float, drive: bool) -> Iterator[str]:
-    """The tables of the wanted parts."""
+    """Yield the tables of the selected parts."""
     victims = [v for v in VICTIMS if "kill" in parts or f"kill-{v.replace(' ', '-')}" in parts]
     if victims:
         runs, kills = int(2000 * share), max(1, int(5 * share**0.5))

@@ -1,11 +1,10 @@
-"""Measure what a certified drive and a frame of a film cost, here and in another checkout: `python -m benchmarks.cost`.
+"""Cost of a certified drive and of a film frame, in this and another checkout: `python -m benchmarks.cost`.
 
-With `--against PATH` the same drives are run by the antdrive of another checkout, in a process of its own, world by world in
-turn with those of this one; the table shows the medians and the median ratio within a pair, and every pair of drives must agree
-bit for bit. Drives are timed in processor time of the process, films on the clock and in processor time without the encoder's;
-ratios are those of processor times.
+`--against PATH` runs the same drives in another checkout, in a separate process, alternating world by world. The table shows
+medians and the median ratio within a pair; every pair of drives must agree bit for bit. Drives are timed in processor time,
+films in wall-clock time and in processor time without the encoder. Ratios compare processor times.
 
-- first: a world that the process meets for the first time, read from its YAML file
+- first: a world that is new to the process, read from its YAML file
 - again: the same file with the next seed, in the same process
 - film: ten seconds among movers, from a fixed camera, rendered and encoded
 
@@ -45,7 +44,7 @@ def write_barn(source: Path, folder: Path) -> None:
 
 
 def drive(path: str, seed: int) -> dict[str, Any]:
-    """Drive a world file; what it cost [s], and the digest of the drive."""
+    """Drive a world file. Return the costs [s] and the digest of the drive."""
     from antdrive.sim import Scenario, run
 
     started = time.process_time()
@@ -56,7 +55,7 @@ def drive(path: str, seed: int) -> dict[str, Any]:
 
 
 def film_rate(movers: int, size: tuple[int, int], seconds: float) -> dict[str, Any]:
-    """Film a drive through a hall with movers; frames per second."""
+    """Film a drive through a hall with movers. Return the frames per second."""
     import numpy as np
 
     from antdrive.sim import Scenario, run
@@ -87,7 +86,7 @@ def film_rate(movers: int, size: tuple[int, int], seconds: float) -> dict[str, A
 
 
 def serve() -> None:
-    """Answer requests, a line of JSON each, until the input ends."""
+    """Answer requests, one line of JSON each, until the input ends."""
     for line in sys.stdin:
         kind, *rest = json.loads(line)
         answer = drive(*rest) if kind == "drive" else film_rate(rest[0], tuple(rest[1]), rest[2])
@@ -110,7 +109,7 @@ class Checkout:
         print(json.dumps(request), file=self._process.stdin, flush=True)
         line = self._process.stdout.readline()
         if not line:
-            raise SystemExit(f"the process of a checkout ended with {self._process.wait()}")
+            raise SystemExit(f"process of a checkout exited with code {self._process.wait()}")
         answer: dict[str, Any] = json.loads(line)
         return answer
 
@@ -121,14 +120,14 @@ class Checkout:
 
 
 def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator[str]:
-    """The costs of first and further drives, world by world in turn."""
-    for checkout in checkouts.values():  # loads kernels, and meets no world of the table
+    """Yield the costs of first and further drives, alternating checkouts world by world."""
+    for checkout in checkouts.values():  # loads kernels, with a world outside the table
         checkout.ask("drive", "slalom", 0)
     costs: dict[tuple[str, str], list[float]] = {}
     certified = 0
     for k, world in enumerate(worlds):
         for kind, seed in (("first", 0), ("again", 1)):
-            # Who goes first changes with each world, so that a slow moment of the machine hits both alike.
+            # The order alternates, so that load from other programs affects both alike.
             order = list(checkouts) if k % 2 else list(checkouts)[::-1]
             found = {name: checkouts[name].ask("drive", str(world), seed) for name in order}
             assert len({answer["digest"] for answer in found.values()}) == 1, f"{world}: the drives differ"
@@ -149,7 +148,7 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
 
 
 def films_table(checkouts: dict[str, Checkout], seconds: float, rounds: int) -> Iterator[str]:
-    """Frames per second among movers, in turn, and the processor time of a frame without its encoding."""
+    """Yield frames per second among movers, and the processor time of a frame without encoding."""
     yield f"\n{seconds:g} s of film, camera oblique, rendered and encoded; median of {rounds}"
     yield "| movers | size | " + " | ".join(f"{name} [frames/s] | {name} [ms]" for name in checkouts) + " | ratio |"
     yield "|---|---|" + "---|" * (2 * len(checkouts) + 1)
@@ -176,16 +175,16 @@ def main() -> None:
     parser.add_argument("--against", type=Path, help="root of another checkout of antdrive")
     parser.add_argument("--worlds", type=Path, help="folder of world files; default: BARN's worlds")
     parser.add_argument("--barn", type=Path, help="folder or archive of BARN's world_*.world files")
-    parser.add_argument("--count", type=int, default=50, help="how many of the worlds; 0: no drives")
+    parser.add_argument("--count", type=int, default=50, help="number of worlds; 0: no drives")
     parser.add_argument("--seconds", type=float, default=10.0, help="length of each film; 0: no films [s]")
     parser.add_argument("--rounds", type=int, default=3, help="films of each kind")
-    parser.add_argument("--python", default=sys.executable, help="the interpreter that runs both checkouts")
+    parser.add_argument("--python", default=sys.executable, help="interpreter of both checkouts")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.serve:
         serve()
         return
-    from tools.shared_data import BARN  # the process of an older checkout, which serves, may not have it
+    from tools.shared_data import BARN  # missing in older checkouts, which only serve
 
     barn = options.barn or BARN
     with contextlib.ExitStack() as stack:

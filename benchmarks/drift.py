@@ -1,8 +1,8 @@
-"""How far the same drives drift with other compilers' targets and versions: `python -m benchmarks.drift`.
+"""Drift of drives between compiler targets and versions: `python -m benchmarks.drift`.
 
-The same scenarios are driven again by other processes: with machine code for a generic CPU (`NUMBA_CPU_NAME=generic`), without
-compilation (`NUMBA_DISABLE_JIT=1`, some scenarios only), and by the interpreters that are named, NAME=PATH, which may have other
-versions of Python and numpy. The default tolerances of `antdrive.sim.log.metrics` come from the table that is printed.
+Other processes drive the same scenarios: with machine code for a generic CPU (`NUMBA_CPU_NAME=generic`), without compilation
+(`NUMBA_DISABLE_JIT=1`, some scenarios only), and with given interpreters NAME=PATH, which may have other versions of Python
+and numpy. The printed table is the source of the default tolerances in `antdrive.sim.log.metrics`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ WALL_CLOCK = ("plan_s", "drive_wall_s")
 
 
 def scenarios(size: str) -> Iterator[tuple[str, str, Any]]:
-    """Kind, name and scenario of each drive; a smaller size has the first of each kind, `tiny` two in one forest."""
+    """Yield kind, name and scenario of each drive; smaller sizes have the first of each kind, `tiny` two in one forest."""
     from antdrive.sim import Scenario
     from antdrive.worlds import generate
 
@@ -54,7 +54,7 @@ def scenarios(size: str) -> Iterator[tuple[str, str, Any]]:
 
 
 def drive_all(size: str) -> dict[str, Any]:
-    """What each drive did, by name, as plain values."""
+    """Return each drive's results by name, as plain values."""
     from antdrive.sim import measure, run
 
     found = {}
@@ -78,7 +78,7 @@ def drive_all(size: str) -> dict[str, Any]:
 
 
 def other(python: str, size: str, extra: Mapping[str, str]) -> dict[str, Any]:
-    """The drives of another process."""
+    """Return the drives of another process."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "drives.json"
         words = [python, "-m", "benchmarks.drift", "--write", str(path), "--size", size]
@@ -89,7 +89,7 @@ def other(python: str, size: str, extra: Mapping[str, str]) -> dict[str, Any]:
 
 
 def rows(name: str, ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator[list[str]]:
-    """A row for each kind of drive."""
+    """Return one row per kind of drive."""
     kinds = dict.fromkeys(drive["kind"] for drive in theirs.values())
     for kind in kinds:
         pairs = [(ours[key], drive) for key, drive in theirs.items() if drive["kind"] == kind]
@@ -105,13 +105,13 @@ def rows(name: str, ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> Itera
 
 
 def change(key: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> float:
-    """How far a metric differs; 0 where both have no number."""
+    """Return the difference of a metric; 0 if both are NaN."""
     difference = abs(a["metrics"][key] - b["metrics"][key])
     return 0.0 if np.isnan(difference) else float(difference)
 
 
 def apart(a: Mapping[str, Any], b: Mapping[str, Any]) -> float:
-    """The largest distance between two drives at the same time [m]; a robot that has arrived stays."""
+    """Return the largest distance between two drives at equal times [m]; a robot stays at its end."""
     first, second = (np.array(drive["line"]) for drive in (a, b))
     most = max(first.shape[1], second.shape[1])
     first, second = (np.pad(line, ((0, 0), (0, most - line.shape[1])), mode="edge") for line in (first, second))

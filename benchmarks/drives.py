@@ -2,9 +2,9 @@
 
 Tables:
 
-- barn: the BARN challenge's worlds, by planner, smoothing and noise; needs their folder or archive (`--barn`)
+- barn: the BARN Challenge worlds, by planner, smoothing and noise; needs their folder or archive (`--barn`)
 - forests: random worlds; every failure is listed with its seed
-- smooth: how much longer taut routes are than the exact optimum
+- smooth: excess length of taut routes over the exact optimum
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Result(NamedTuple):
 
 
 def drive(name: str, task: Any, planner: str, robot: str, **settings: Any) -> Result:
-    """Drive once; the rollout stays in this process."""
+    """Drive once, discarding the rollout."""
     done = run(Scenario.of(task, planner, robot, **settings))
     log = done.rollout
     if log is None:
@@ -79,7 +79,7 @@ def failures(results: Sequence[Result]) -> str:
 
 
 def barn_tasks(source: Path) -> dict[str, Task]:
-    """BARN's worlds by name, in the order of their numbers."""
+    """Load BARN's worlds by name, in the order of their numbers."""
     if not source.exists():
         missing(f"no worlds at {source}; docs/how-to/data.md says where BARN's are")
     with tempfile.TemporaryDirectory() as folder:
@@ -92,7 +92,7 @@ def barn_tasks(source: Path) -> dict[str, Task]:
 
 
 def barn(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
-    """BARN's worlds, driven by the jackal."""
+    """Drive BARN's worlds with the jackal."""
     tasks, rows = dict(list(barn_tasks(source).items())[:worlds]), []
     for planner, smoothing, noise in (
         ("astar", "clearance", 0.0), ("astar", "taut", 0.0), ("astar", "none", 0.0), ("ants", "clearance", 0.0),
@@ -126,7 +126,7 @@ def barn(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
 
 
 def forests(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
-    """Random worlds, half of them from each generator."""
+    """Drive random worlds, half from each generator."""
     rows, wrong = [], []
     kinds = {
         kind: [generate(kind, np.random.default_rng(n), {}, name=f"{kind} {n}", note="") for n in range(worlds // 2)]
@@ -158,7 +158,7 @@ def forests(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
 
 
 def smooth(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
-    """Taut routes compared with the exact shortest paths between the same ends."""
+    """Compare taut routes with the exact shortest paths between the same ends."""
     gaps: dict[str, list[float]] = {"as by the optimum": [], "on other sides": []}
     for kind, n in itertools.product(("forest", "barn"), range(worlds // 2)):
         task = generate(kind, np.random.default_rng(n), {}, name="", note="")

@@ -2,9 +2,9 @@
 
 Tables:
 
-- dynabarn: ten DynaBARN worlds, each started at ten moments, by what the robot may do
+- dynabarn: ten DynaBARN worlds, each started at ten times, by policy
 - random: worlds with 1 to 10 movers as fast as the robot; every failure is listed with its seed
-- hasan: the cases of hasan's paper, driven
+- hasan: drives of the cases in hasan's paper
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ from tools.shared_data import DYNABARN
 
 SMALLEST = ("--most 1 --jobs 1",)
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
-LATELY = 1.0  # what a mover did in this time before a contact is said [s]
-JUMP, TURN = 0.3, 0.7  # a mover that gets so far between two rows of a log has jumped [m]; a turn that is said [rad]
-START_INTERVAL = 7.3  # between the moments at which drives in one world start [s]
+LATELY = 1.0  # time before a contact in which the mover's motion is reported [s]
+JUMP, TURN = 0.3, 0.7  # mover displacement between two rows that counts as a jump [m]; smallest reported turn [rad]
+START_INTERVAL = 7.3  # between start times of drives in one world [s]
 KNOWN, BY_LIDAR = Perception(kind="motions"), Perception(kind="lidar")
 POLICIES: dict[str, dict[str, Any]] = {
     "neither": {"avoidance": None, "replanning": None},
@@ -84,7 +84,7 @@ class Result(NamedTuple):
 
 
 def drive(name: str, task: Task, planner: str, robot: str, **settings: Any) -> Result:
-    """Drive once; the rollout stays in this process."""
+    """Drive once, discarding the rollout."""
     done = run(Scenario.of(task, planner, robot, **settings))
     log = done.rollout
     if log is None:
@@ -94,7 +94,7 @@ def drive(name: str, task: Task, planner: str, robot: str, **settings: Any) -> R
 
 
 def warning(log: Rollout) -> str:
-    """Of a drive without a map that ended in a contact with a mover: for how long the robot had followed it, and what it did."""
+    """Describe a contact of a mapless drive with a mover: how long it was tracked, and its motion."""
     if not len(log.contacts) or not len(log.scans):
         return ""
     row, mover = int(log.contacts[0, 0]), int(log.contacts[0, 1]) - len(log.record.world.obstacles)
@@ -114,7 +114,7 @@ def warning(log: Rollout) -> str:
 
 
 def columns(results: Sequence[Result]) -> list[str]:
-    """The columns that every table has, see `HEADS`."""
+    """Return the columns common to all tables, see `HEADS`."""
     ends = collections.Counter(r.outcome for r in results)
     touches = [
         str(ends.pop(kind, 0)) for kind in (Outcome.COLLIDED, Outcome.HIT_WHILE_STANDING, Outcome.HIT_BY_TELEPORT)
@@ -132,7 +132,7 @@ HEADS = "certified successes | collided | hit while standing | hit by a teleport
 
 
 def dynabarn(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
-    """DynaBARN's worlds, driven by the jackal."""
+    """Drive DynaBARN's worlds with the jackal."""
     if not source.exists():
         missing(f"no worlds at {source}; docs/how-to/data.md says where DynaBARN's are")
     tasks = import_dynabarn(source)[: most or None]
@@ -161,7 +161,7 @@ def dynabarn(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
 
 
 def random_task(seed: int) -> tuple[Task, int]:
-    """A hall of 10 m with 8 columns and 1 to 10 movers, at most as fast as the turtlebot; the number of movers."""
+    """Generate a hall of 10 m with 8 columns and 1 to 10 movers up to the turtlebot's speed. Return it with their number."""
     rng = np.random.default_rng([seed, 77])
     start, goal = (1.0, 1.0, 0.785), (9.0, 9.0)
     count, fastest = int(rng.integers(1, 11)), load_robot("turtlebot").max_speed
@@ -192,7 +192,7 @@ def random_task(seed: int) -> tuple[Task, int]:
 
 
 def random_drive(seed: int, settings: dict[str, Any]) -> Result:
-    """Drive through a random hall; whether a path exists is proved at the robot's top speed."""
+    """Drive through a random hall, and prove whether a path exists at the robot's top speed."""
     task, _ = random_task(seed)
     robot = load_robot("turtlebot")
     grid = rasterise(task.world, task.cell, robot.radius + 0.03)
@@ -204,7 +204,7 @@ def random_drive(seed: int, settings: dict[str, Any]) -> Result:
 
 
 def random(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
-    """Random worlds, driven by the turtlebot."""
+    """Drive random worlds with the turtlebot."""
     seeds, rows, wrong = range(most or 500), [], []
     for policy in ("neither", "avoid and replan"):
         got = call_all((partial(random_drive, seed, POLICIES[policy]) for seed in seeds), jobs)
@@ -222,7 +222,7 @@ def random(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
 
 
 def hasan(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
-    """hasan's cases, driven by the turtlebot."""
+    """Drive hasan's cases with the turtlebot."""
     names = [name for name in list_worlds() if name.startswith("hasan") and load_task(name).world.movers]
     names, rows = names[: most or None], []
     for planner in ("mmas-dstar", "dstar"):

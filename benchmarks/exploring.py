@@ -1,19 +1,18 @@
-"""Measure what driving without a map adds to the drive loop: `python -m benchmarks.exploring`, part of `make bench`.
+"""Overhead of mapless driving in the drive loop: `python -m benchmarks.exploring`, part of `make bench`.
 
 Prints Markdown.
 Six of BARN's worlds, `jackal`, `--map none`, and the same drives with the map: with exact sensors, then with `--noise 1` and
-odometry, alone and with matching. All times are milliseconds for each simulated second. *Loop* is the control periods of the
-drive loop without what follows in the row. *To know* is what scans, matching, the map, its watch and replans take, over the rest
-of the loop; *all* counts the rule of sight, too, which limits the speed as the controller's other rules do. Drives with one seed
-are alike, so each call does the same work in all of them: the least time that it took in several drives counts (of replans the
-processor's time), and other work on the machine disturbs the figures little.
+odometry, alone and with matching. All times are milliseconds per simulated second. *Loop* is the control periods of the
+drive loop without the following columns. *To know* is the ratio of scans, matching, map, route check and replans to the rest
+of the loop; *all* includes the stopping constraint. Drives with one seed are identical, so the minimum over several drives
+counts for each call (processor time for replans), and load from other programs has little effect.
 
-- scan: the exact rays, their noise
-- match: the estimated pose corrected by the scan
-- map: the scan entered
-- watch: whether the route ahead is still clear, and the discs for the controller
-- sight: how far the robot may go on ground that it has seen
-- replans: plans, their smoothing, their preparation for the controller
+- scan: exact rays and their noise
+- match: correction of the estimated pose
+- map: insertion of the scan
+- watch: route check, and discs for the controller
+- sight: stopping constraint
+- replans: plans, smoothing, preparation for the controller
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ SMALLEST = ("--drives 1 --worlds 1",)
 WORLDS = ("world_0", "world_138", "world_186", "world_24", "world_288", "world_66")
 PERIOD = "loop"
 PARTS = ("scan", "match", "map", "watch", "sight", "replans")
-SENSORS: tuple[tuple[str, dict[str, Any]], ...] = (  # how the robot without a map senses
+SENSORS: tuple[tuple[str, dict[str, Any]], ...] = (  # sensors of the mapless robot
     ("exact", {}),
     ("noise 1, odometry", {"noise": 1.0, "localisation": "odometry"}),
     ("noise 1, matching", {"noise": 1.0, "localisation": "matching"}),
@@ -49,7 +48,7 @@ SENSORS: tuple[tuple[str, dict[str, Any]], ...] = (  # how the robot without a m
 
 
 class Meter:
-    """Measures the calls of functions by name; of calls within calls only the outermost counts, and periods count without it.
+    """Profiler of functions by name; counts only outermost calls, and excludes them from control periods.
 
     Attributes:
         calls: what each call took, by name [s]
@@ -60,7 +59,7 @@ class Meter:
         self._within, self._inside = "", 0.0
 
     def watch(self, owner: Any, method: str, name: str) -> None:
-        """Measure a function of a module or a class from now on."""
+        """Start to measure a function of a module or class."""
         inner: Callable[..., Any] = getattr(owner, method)
 
         def measured(*args: Any, **options: Any) -> Any:
@@ -69,7 +68,7 @@ class Meter:
             outside, self._within = self._within, name
             if name == PERIOD:
                 self._inside = 0.0
-            # Reading the processor's time takes longer than short calls do, which seldom are interrupted.
+            # Reading the processor time takes longer than short calls, which are seldom interrupted.
             clock = time.process_time if name == "replans" else time.perf_counter
             began, started = time.perf_counter(), clock()
             try:
@@ -84,7 +83,7 @@ class Meter:
 
 
 def costs(meter: Meter, scenario: Scenario, drives: int) -> tuple[dict[str, float], bool]:
-    """What the parts of a drive's loop cost for each simulated second [ms/s], and whether the drive was certified."""
+    """Return the cost of each part of the drive loop [ms per simulated second], and whether the drive was certified."""
     done = run(scenario)  # reads files and loads kernels
     assert done.rollout is not None
     found: dict[str, list[list[float]]] = {}

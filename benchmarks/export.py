@@ -1,9 +1,9 @@
-"""How long exports take: of drives of a jackal, whose lidar has 720 beams 50 times a second, with a map and without one.
+"""Time of exports of jackal drives (720 beams at 50 Hz), with and without a map.
 
 python -m benchmarks.export
 
-Times are processor time, of the function and of the whole command; where a drive did not use its lidar, `--scans` takes the
-scans at export. In a process that has exported before, packages and compiled code are loaded.
+Times are processor times of the function and of the whole command. `--scans` simulates the scans of drives without lidar at
+export. Later exports of a process find packages and compiled code loaded.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from benchmarks.markdown import command_line, print_table
 
 SMALLEST = ("--rounds 1 --drives 1",)
 KINDS = ("mcap", "rosbag2", "csv")
-#: The scenarios' settings by what a row of the table is called.
+#: Scenario settings by row of the table.
 DRIVES = {
     "with a map, movers by lidar": ("plaza-moving", "dstar-lite", {"perception": Perception(kind="lidar")}),
     "with a map, movers told": ("plaza-moving", "dstar-lite", {}),
@@ -41,14 +41,14 @@ for turn in range(int(times)):
 
 
 def in_one_process(log: Path, kind: str, folder: Path, times: int) -> list[float]:
-    """The processor time of each of several exports in a fresh process [s]."""
+    """Return the processor time of each of several exports in a fresh process [s]."""
     suffix = ".mcap" if kind == "mcap" else ""
     words = [sys.executable, "-c", TIMED, str(log), kind, str(folder), str(times), suffix]
     return [float(line) for line in subprocess.run(words, check=True, capture_output=True, text=True).stdout.split()]
 
 
 def by_command(log: Path, kind: str, target: Path) -> float:
-    """The processor time of a call of the command, start of the interpreter and imports included [s]."""
+    """Return the processor time of the command, including interpreter start and imports [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     words = [sys.executable, "-m", "antdrive", "export", str(log), "--to", kind, "-o", str(target)]
     subprocess.run(words, check=True, capture_output=True)
@@ -57,7 +57,7 @@ def by_command(log: Path, kind: str, target: Path) -> float:
 
 
 def messages(log: Path) -> tuple[int, int]:
-    """How many messages and scans the bag of a log has."""
+    """Count the messages and scans in the bag of a log."""
     from antdrive.views.export.exporting import topics_of
     from antdrive.views.export.samples import DriveScans
 
@@ -67,7 +67,7 @@ def messages(log: Path) -> tuple[int, int]:
 
 
 def rows(folder: Path, rounds: int, drives: int) -> Iterator[list[str]]:
-    """The rows of the table."""
+    """Yield the rows of the table."""
     for name, (world, planner, settings) in list(DRIVES.items())[-drives:]:
         log = run(Scenario.of(world, planner, "jackal", **settings)).rollout
         assert log is not None

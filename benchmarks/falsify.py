@@ -1,13 +1,13 @@
-"""Failures found by search: `python -m benchmarks.falsify [--seeds N] [--budget N] [--worlds N] [--setups NAME ...] [--jobs N]
-[--results FILE.jsonl] [TABLE ...]`.
+"""Falsification of configurations: `python -m benchmarks.falsify [--seeds N] [--budget N] [--worlds N] [--setups NAME ...]
+[--jobs N] [--results FILE.jsonl] [TABLE ...]`.
 
-With a file of results each search is a line as soon as it is over, and a later call makes those that are missing; so a table can
-be measured in pieces, and made larger later. Every failure is run again in another process than the one that found it.
+With a results file, each finished search is one line, and a later call runs the missing searches, so a table can be measured
+in pieces and extended. Every failure is repeated in another process.
 
 Tables:
 
-- methods: careless set-ups (A*, no smoothing, no margin, the robot's noise), guided search against random worlds
-- default: random worlds against the set-up that `antdrive run` has without options
+- methods: careless configurations (A*, no smoothing, no margin, the robot's noise), guided search against random worlds
+- default: random worlds against the default configuration of `antdrive run`
 - noise: the same with the robot's noise
 """
 
@@ -38,12 +38,12 @@ SETUPS = {
     "default": Scenario.of("empty"),
     "noise 1": Scenario.of("empty", noise=1.0),
 }
-PIECE = 100  # worlds of a search with the default set-up; some ten seconds
+PIECE = 100  # worlds per search with the default configuration; about ten seconds
 
 
 @dataclasses.dataclass(frozen=True)
 class Search:
-    """What a search found, as a line of the file of results.
+    """Result of a search, as a line of the results file.
 
     Attributes:
         setup: the name of the set-up
@@ -80,14 +80,14 @@ class Search:
 
 
 def search(key: tuple[Any, ...]) -> tuple[tuple[Any, ...], Hunt]:
-    """The search of a key of `Search`, with the key."""
+    """Run the search of a key. Return the key and the result."""
     setup, method, seed, budget, obstacles = key
     hunt = find_failures(SETUPS[setup], budget=budget, seed=seed, method=method, obstacles=obstacles)
     return key, hunt
 
 
 def as_line(asked: tuple[Any, ...], hunt: Hunt) -> Search:
-    """What a search of another process found, and whether it repeats in this one."""
+    """Return a search result of another process, with whether its failures repeat in this one."""
     found = [finding.failure.sentence for finding in hunt.findings]
     worlds = [finding.scenario.task.world.name for finding in hunt.findings]
     again = sum(map(repeats, hunt.findings))
@@ -95,7 +95,7 @@ def as_line(asked: tuple[Any, ...], hunt: Hunt) -> Search:
 
 
 def repeats(finding: Finding) -> bool:
-    """Whether a failure gives the same bits again, fails in the same way, and has a path."""
+    """Return whether a failure repeats bit for bit, fails in the same way, and has a path."""
     done = run(finding.scenario)
     room = feasible(finding.scenario.task, finding.scenario.inflate)
     return (
@@ -104,7 +104,7 @@ def repeats(finding: Finding) -> bool:
 
 
 def searched(arguments: argparse.Namespace, asked: Sequence[tuple[Any, ...]]) -> list[Search]:
-    """The searches that are asked for: those of the file of results, and all others now, each a line as soon as it is over."""
+    """Return the requested searches: those in the results file, and the others after running them."""
     known = {one.key: one for one in (Search(**line) for line in read_lines(arguments.results))}
     missing = [key for key in asked if key not in known]
     with Pool(arguments.jobs) as pool:
@@ -117,12 +117,12 @@ def searched(arguments: argparse.Namespace, asked: Sequence[tuple[Any, ...]]) ->
 
 
 def methods(arguments: argparse.Namespace) -> Iterator[str]:
-    """Guided search against random worlds, careless set-ups."""
+    """Compare guided search with random worlds on careless configurations."""
     budget, obstacles = arguments.budget, arguments.obstacles
     names = chosen(
         arguments.setups.split(",") if arguments.setups else [name for name in SETUPS if "careless" in name], SETUPS
     )
-    # Seed by seed, so that an unfinished file has as many of each set-up and method.
+    # Seed by seed, so that an unfinished file is balanced over configurations and methods.
     asked = [
         (name, method, seed, budget, obstacles)
         for seed in range(arguments.seeds)
@@ -148,17 +148,17 @@ def methods(arguments: argparse.Namespace) -> Iterator[str]:
 
 
 def default(arguments: argparse.Namespace) -> Iterator[str]:
-    """Random worlds against the default set-up."""
+    """Test the default configuration in random worlds."""
     yield from _worlds(arguments, "default")
 
 
 def noise(arguments: argparse.Namespace) -> Iterator[str]:
-    """Random worlds against the default set-up with noise 1."""
+    """Test the default configuration with noise 1 in random worlds."""
     yield from _worlds(arguments, "noise 1")
 
 
 def _worlds(arguments: argparse.Namespace, name: str) -> Iterator[str]:
-    """What random worlds do to a set-up."""
+    """Test a configuration in random worlds."""
     pieces = range(-(-arguments.worlds // PIECE))
     budgets = [min(PIECE, arguments.worlds - PIECE * seed) for seed in pieces]
     asked = [(name, "random", seed, budgets[seed], arguments.obstacles) for seed in pieces]

@@ -1,7 +1,7 @@
-"""Measure how many frames per second a film is rendered and encoded with: `python -m benchmarks.film`.
+"""Frame rate of rendering and encoding films: `python -m benchmarks.film`.
 
-With `--memory`, measure the peak memory of films of ten seconds and of five minutes instead, each in its own process;
-with `--sight`, what it costs to show what a robot without a map has seen.
+`--memory` measures the peak memory of films of ten seconds and of five minutes, each in its own process;
+`--sight` measures the cost of showing the occupancy map of a mapless robot.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SIZES = ((640, 480), (1280, 720))
 
 
 def cut(rollout: Rollout, seconds: float) -> Rollout:
-    """The first `seconds` of a run; a run that is too short is repeated."""
+    """Return the first `seconds` of a run, repeating a shorter run."""
     import dataclasses
 
     step = float(rollout.t[1] - rollout.t[0])
@@ -71,7 +71,7 @@ def memory(path: Path, seconds: float) -> None:
 
 def peak(path: str, camera: str, seconds: float) -> None:
     log = cut(Rollout.load(path), seconds)
-    fps = 30 if camera == "oblique" else 2  # a moving camera holds the same number of frames at any rate
+    fps = 30 if camera == "oblique" else 2  # a moving camera buffers the same number of frames at any rate
     with tempfile.TemporaryDirectory() as folder:
         film(log, Path(folder) / "a.mp4", camera=camera, size=(640, 480), fps=fps, jobs=1)
     own, child = (resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -79,7 +79,7 @@ def peak(path: str, camera: str, seconds: float) -> None:
 
 
 def sight(rounds: int, frames: int) -> None:
-    """Print the processor time of a frame of a drive without a map, with what the robot has seen and without."""
+    """Print the processor time per frame of a mapless drive, with and without its occupancy map."""
     import dataclasses
 
     log = run(Scenario.of("forest", "astar", "jackal", map="none", localisation="matching", noise=1.0, seed=1)).rollout

@@ -1,14 +1,14 @@
-"""Forged and broken logs, and which check finds each: `python -m benchmarks.forgeries [WORD ...]`. Prints Markdown.
+"""Detection of forged and broken logs by check: `python -m benchmarks.forgeries [WORD ...]`. Prints Markdown.
 
-A forger has a genuine log, changes it, and computes a new digest, so that the digest never finds anything here.
-`benchmarks.forged_logs` holds the forgeries by name; each is applied to every genuine drive of `genuine_drives` that it
-makes sense for. The checks are those of `antdrive verify`, from the cheapest on:
+A forger changes a genuine log and updates its digest, so the digest detects nothing here. `benchmarks.forged_logs` holds the
+forgeries by name; each is applied to all applicable drives of `genuine_drives`. The checks are those of `antdrive verify`,
+cheapest first:
 
-- load: the file is no log, or its arrays and record are of no drive
+- load: the file is not a log, or its arrays and record are invalid
 - verify: the log contradicts itself (certificate and consistency)
-- files: the log is about another world or robot than the trusted files (`--world`, `--robot`)
-- replay: physics, given the logged commands, leads elsewhere (`--replay`)
-- none: nothing finds it; docs/explanation/certificate.md says so
+- files: world or robot differ from the trusted files (`--world`, `--robot`)
+- replay: re-execution of the logged commands diverges (`--replay`)
+- none: undetected, as documented in docs/explanation/certificate.md
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Finding:
 
 
 def found(path: Path, genuine: Rollout) -> tuple[str, str]:
-    """The first level that finds something wrong with a log, and what it says."""
+    """Return the first check that detects a forged log, and its message."""
     try:
         log = Rollout.load(path)
     except InputError as error:

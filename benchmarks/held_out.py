@@ -1,12 +1,12 @@
-"""Drives in worlds that no test knows: `python -m benchmarks.held_out [--drives 10000] [--jobs 2] [--seed S]`.
+"""Drives in held-out worlds: `python -m benchmarks.held_out [--drives 10000] [--jobs 2] [--seed S]`.
 
-Drive n of a seed is always the same: its world, planner, robot, noise and smoothing follow from n and the seed. Planners
-take turns, so that each gets its share of every kind of world. Each drive is certified, and a second audit
-(`benchmarks.second_audit`) that shares no code with the certificate looks for the least clearance again.
+World, planner, robot, noise and smoothing of drive n follow from n and the seed. Planners alternate over every kind of
+world. Each drive is certified, and a second audit (`benchmarks.second_audit`), which shares no code with the certificate,
+recomputes the least clearance.
 
 Worlds: forests by han2007's rule; thickets of 20 to 60 thinner cylinders; fields by BARN's cellular automaton; halls with
-columns and 1 to 10 movers. Results are kept line by line in a JSONL file, where an interrupted run goes on. `--only N`
-drives one of them again and prints all about it.
+columns and 1 to 10 movers. Results are lines of a JSONL file, from which an interrupted run resumes. `--only N` repeats one
+drive and prints its details.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ MARGINS = {"fixed": {0.0: 0.03, 1.0: 0.06}, "auto": {0.0: "auto", 1.0: "auto"}} 
 
 
 def world_of(kind: str, rng: np.random.Generator) -> Task:
-    """A random world of a kind."""
+    """Generate a random world of a kind."""
     if kind == "hall":
         return random_task(int(rng.integers(1_000_000, 2**31)))[0]
     options = {
@@ -60,7 +60,7 @@ def world_of(kind: str, rng: np.random.Generator) -> Task:
 
 
 def case(n: int) -> dict[str, Any]:
-    """What drive n is: the kind of world, robot, noise, smoothing and planner."""
+    """Return kind of world, robot, noise, smoothing and planner of drive n."""
     lap, place = divmod(n, len(KINDS))
     robot, noise, smoothing = SETTINGS[lap % len(SETTINGS)]
     names = tuple(PLANNERS)
@@ -80,7 +80,7 @@ def drive(n: int, seed: int, margins: str) -> dict[str, Any]:
 
 
 def scenario(n: int, seed: int, margins: str) -> Scenario:
-    """The scenario of drive n."""
+    """Return the scenario of drive n."""
     what = case(n)
     task = world_of(what["kind"], np.random.default_rng([STREAM, seed, n]))
     return Scenario.of(
@@ -95,7 +95,7 @@ def scenario(n: int, seed: int, margins: str) -> Scenario:
 
 
 def audited(s: Scenario) -> dict[str, Any]:
-    """The outcome of a scenario, its certificate, and the second audit's findings."""
+    """Drive a scenario. Return its outcome, certificate and the second audit's findings."""
     done = run(s)
     found: dict[str, Any] = {"outcome": done.outcome.key, "reason": done.reason}
     log, certificate = done.rollout, done.certificate
@@ -121,7 +121,7 @@ def audited(s: Scenario) -> dict[str, Any]:
 
 
 def files_of(s: Scenario) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The world's file and the robot's file, as plain YAML."""
+    """Return world file and robot file as plain YAML."""
     folder = RESULTS / "worlds"
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{s.task.world.name}-{s.seed}.yaml"
@@ -132,7 +132,7 @@ def files_of(s: Scenario) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def contradictions(log: Rollout, world: dict[str, Any], certificate: Certificate, least: Least) -> Iterator[str]:
-    """What the second audit has against a certificate, a sentence each."""
+    """Return the second audit's objections to a certificate, one sentence each."""
     if abs(least.rows - certificate.min_clearance) > SAME:
         yield (
             f"the least clearance at the rows is {certificate.min_clearance:.5f} m in the certificate, "
@@ -181,7 +181,7 @@ COUNTS: dict[str, Callable[[dict[str, Any]], bool]] = {
 
 
 def counted(keys: Sequence[str], results: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """A table with a row for each combination of some keys of the results, and one for all."""
+    """Return a table with one row per combination of some keys of the results, and one for all."""
     groups: dict[tuple[str, ...], list[dict[str, Any]]] = collections.defaultdict(list)
     for r in results:
         groups[tuple(f"{r[key]:g}" if isinstance(r[key], float) else str(r[key]) for key in keys)].append(r)
@@ -212,7 +212,7 @@ def failures(results: Sequence[dict[str, Any]]) -> Iterator[str]:
 
 
 def results_of(path: Path) -> list[dict[str, Any]]:
-    """What a file of results holds; a last line that was cut off does not count."""
+    """Read a results file, ignoring a truncated last line."""
     lines = path.read_text().splitlines(keepends=True) if path.exists() else []
     return [json.loads(line) for line in lines if line.endswith("}\n")]
 

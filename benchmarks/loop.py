@@ -1,4 +1,4 @@
-"""The cost of the drive loop compared with bare physics: `make bench`.
+"""Cost of the drive loop relative to bare physics: `make bench`.
 
 The same world, robot and commands are stepped twice in turn: by the whole loop (control, contacts,
 clearance, log) and by `stepSimulation` alone. The table shows the median over all rounds of the ratio
@@ -30,7 +30,7 @@ MOVERS = 24
 
 
 def task_among(count: int, size: tuple[float, float] = (20.0, 20.0), radius: float = 0.1) -> Task:
-    """An 18 m drive through the middle of a hall among `count` thin cylinders."""
+    """Return a task of 18 m through the middle of a hall among `count` thin cylinders."""
     rng, middle = np.random.default_rng(0), size[1] / 2
     discs: list[Disc] = []
     while len(discs) < count:
@@ -41,13 +41,13 @@ def task_among(count: int, size: tuple[float, float] = (20.0, 20.0), radius: flo
 
 
 def winding(task: Task) -> Route:
-    """The route of the drive, which winds about the middle of the hall."""
+    """Return the route, which winds about the middle of the hall."""
     x = np.linspace(1, 19, 73)
     return Route(np.stack([x, task.start[1] + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
 
 
 def with_movers(task: Task) -> Task:
-    """The task with movers at 0.2 to 0.7 m/s, none of them within 2 m of the start."""
+    """Add movers at 0.2 to 0.7 m/s, at least 2 m from the start."""
     rng, movers = np.random.default_rng(1), list[Cruising]()
     while len(movers) < MOVERS:
         x, y = rng.uniform(0.5, 19.5, 2).tolist()

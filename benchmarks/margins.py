@@ -1,7 +1,7 @@
-"""Predicted and measured losses of margin: `python -m benchmarks.margins [--worlds N] [--jobs N]`.
+"""Predicted and measured margin losses: `python -m benchmarks.margins [--worlds N] [--jobs N]`.
 
 Every combination of robot, noise and smoothing drives random worlds, half of them forests and half of them like BARN's, with
-`--margin auto`. The worlds' seeds are none of the calibration's.
+`--margin auto`. The worlds' seeds differ from the calibration's.
 """
 
 from __future__ import annotations

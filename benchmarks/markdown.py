@@ -1,6 +1,6 @@
-"""What benchmarks share: the options of their command lines and the tables that they print.
+"""Command-line options and Markdown tables shared by benchmarks.
 
-Each benchmark names in `SMALLEST` the words of its smallest call, one string for each call. `tests/benchmarks` makes these calls.
+Each benchmark lists the arguments of its smallest calls in `SMALLEST`. `tests/benchmarks` makes these calls.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ MISSING = 77  # the exit code where data or packages are missing; test drivers t
 
 
 def command_line(doc: str | None, **settings: tuple[Any, str]) -> argparse.Namespace:
-    """The options of the command line.
+    """Parse the command line.
 
     Args:
         doc: what the benchmark does
@@ -40,10 +40,10 @@ def missing(what: str) -> NoReturn:
 
 
 def table(heads: str | Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Markdown, a line at a time.
+    """Yield a Markdown table line by line.
 
     Args:
-        heads: of the columns; in a string " | " stands between them
+        heads: column headings, or one string with " | " between them
         rows: the cells
     """
     heads = heads.split(" | ") if isinstance(heads, str) else heads
@@ -55,13 +55,13 @@ def table(heads: str | Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator
 
 
 def print_table(heads: str | Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table as its rows come."""
+    """Print a table row by row."""
     for line in table(heads, rows):
         print(line, flush=True)
 
 
 def chosen(names: Sequence[str], known: Iterable[str]) -> list[str]:
-    """The names, or all that are known; ends at one that is not known."""
+    """Return the names, or all known ones; exit on an unknown name."""
     known = list(known)
     for name in names:
         if name not in known:
@@ -70,7 +70,7 @@ def chosen(names: Sequence[str], known: Iterable[str]) -> list[str]:
 
 
 def print_tables(names: Sequence[str], makers: Mapping[str, Callable[..., Iterable[str]]], *given: Any) -> None:
-    """Print the tables of these names, or all, each under its name."""
+    """Print the named tables, or all, each under its name."""
     for name in chosen(names, makers):
         print(f"## {name}\n")
         for line in makers[name](*given):
@@ -78,10 +78,10 @@ def print_tables(names: Sequence[str], makers: Mapping[str, Callable[..., Iterab
 
 
 def seconds(value: float) -> str:
-    """A time with two digits or more."""
+    """Format a time with at least two digits."""
     return f"{1e3 * value:.2g} ms" if value < 0.0995 else f"{1e3 * value:.0f} ms" if value < 1 else f"{value:.2f} s"
 
 
-def percent(share: float) -> str:
-    """A share that is not below 0."""
-    return f"{100 * max(share, 0.0):.1f} %"
+def percent(fraction: float) -> str:
+    """Format a fraction, at least 0, as percent."""
+    return f"{100 * max(fraction, 0.0):.1f} %"

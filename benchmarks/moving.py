@@ -1,11 +1,10 @@
 """hasan's six cases with movers, cell by cell: `python -m benchmarks.moving [--seeds N]`. Prints Markdown.
 
-The environments are recreated (`antdrive.runs.papers.maps`) with the paper's start and goal. The paper has
-one mover; here 1 and 10 start on random free cells. In every step each mover goes to a random free
-neighbouring cell other than the robot's, then the robot decides. With the same seed, movers go the same way
-for every planner until they meet the robot. `mmas-dstar` uses one rule for its exponents in all cases; the
-table shows the exponents that the paper chose for each case. The total cost is defined as in the paper: the
-cost-to-go in cells, summed over all cells visited.
+The environments are recreated (`antdrive.runs.papers.maps`) with the paper's start and goal. The paper has one mover; here
+1 and 10 start on random free cells. In every step each mover goes to a random free neighbouring cell other than the
+robot's, then the robot decides. With one seed, movers take the same paths for every planner until they meet the robot.
+`mmas-dstar` uses one rule for its exponents in all cases; the table shows the exponents that the paper chose per case. The
+total cost is the paper's: the cost-to-go in cells, summed over all visited cells.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""How fast `astar` is beside other libraries' A*: `python -m benchmarks.peers [--archive FILE]`.
+"""Speed of `astar` relative to other libraries' A*: `python -m benchmarks.peers [--archive FILE]`.
 
-Needs the extra `peers`, best in an environment of its own. FILE is a .tar.xz with the MovingAI maps named in `MOVINGAI` and
-their problems. Every solver gets the same grids and queries in turns within one run, so the ratios mean something where times do
-not. Each path is checked against the solver's own corner rule and against the optimum under it, by scipy. A ratio above 1 says
-how many times longer the peer took than `astar`. Prints Markdown.
+Needs the extra `peers`, best in a separate environment. FILE is a .tar.xz with the MovingAI maps in `MOVINGAI` and their
+problems. Solvers alternate on the same grids and queries within one run, so ratios are comparable where times are not. Each
+path is checked against the solver's own corner rule and the optimum under it, by scipy. Ratios are peer time over `astar`
+time. Prints Markdown.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ SOLVERS = (
 
 
 def optimum(free: Any, solver: Solver) -> Callable[[Cell, Cell], float]:
-    """The least cost under a solver's own rule and prices, by scipy's Dijkstra."""
+    """Return the optimal cost under a solver's own rule and prices, by scipy's Dijkstra."""
     rows, cols = free.shape
     index = np.arange(rows * cols).reshape(rows, cols)
     parts = []
@@ -154,7 +154,7 @@ def optimum(free: Any, solver: Solver) -> Callable[[Cell, Cell], float]:
 
 
 def judge(free: Any, solver: Solver, path: Any, start: Cell, goal: Cell) -> tuple[float, bool]:
-    """The path's cost by the solver's own prices, and whether it cuts a corner; fails if it is no path at all."""
+    """Return a path's cost by the solver's own prices, and whether it cuts a corner. Fail if it is not a path."""
     cells = np.asarray(path, dtype=np.int64).reshape(-1, 2)
     if tuple(cells[0]) != start:
         cells = cells[::-1]
@@ -187,7 +187,7 @@ def far_queries(free: Any, count: int, rng: np.random.Generator) -> list[tuple[C
 
 
 def problems(folder: Path, name: str, count: int, rng: np.random.Generator) -> tuple[Any, list[tuple[Cell, Cell]]]:
-    """A MovingAI map and some of the longer half of its problems."""
+    """Load a MovingAI map and some of the longer half of its problems."""
     free = import_movingai_map(folder / f"{name}.map").free.copy()
     listed = sorted(import_movingai_problems(folder / f"{name}.map.scen"), key=lambda p: p.optimal)
     picked = rng.choice(len(listed) // 2, size=count, replace=False) + len(listed) // 2

@@ -1,7 +1,7 @@
-"""What physics makes of commands and of contacts: `python -m benchmarks.physics`.
+"""Accuracy of commands and contacts in physics: `python -m benchmarks.physics`.
 
-Steady turns, straight stops and passes beside a cylinder, at several rates and with both robots of the README. The
-poses of the same drive without the cylinder tell, in the closed form, whether the robot should touch it, and by how much.
+Steady turns, straight stops and passes beside a cylinder, at several rates and with both robots of the README. The same
+drive without the cylinder gives, in closed form, whether the robot should touch it, and by how much.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def speed_up(engine: Engine, robot: RobotSpec, speed: float, yaw_rate: float) ->
 
 
 def worst_turn(robot: RobotSpec, hz: int) -> Turn:
-    """The worst of nine turns within the robot's limits, each held for two seconds; means over the second one."""
+    """Return the worst of nine turns within the robot's limits, each held for two seconds; means over the second one."""
     worst = Turn(0, 0, 0, 0, 0)
     for forward, share in itertools.product((0.25, 0.5, 1.0), (0.0, 0.5, 1.0)):
         speed = forward * robot.max_speed
@@ -70,7 +70,7 @@ def worst_turn(robot: RobotSpec, hz: int) -> Turn:
 
 
 def stop(robot: RobotSpec, hz: int, *, at_once: bool) -> tuple[float, float]:
-    """The way that a robot takes to stop from its top speed, and the way of its file's deceleration [m].
+    """Return the stopping distance from top speed, and that of the deceleration in the robot's file [m].
 
     Args:
         robot: the robot
@@ -90,7 +90,7 @@ def stop(robot: RobotSpec, hz: int, *, at_once: bool) -> tuple[float, float]:
 
 
 def drive_on(robot: RobotSpec, hz: int, speed: float) -> list[Pose]:
-    """The poses of a straight drive with nothing in its way."""
+    """Return the poses of a straight, free drive."""
     poses = []
     with Engine(OPEN, robot, physics_hz=hz) as engine:
         engine.place((0.0, 0.0, 0.0))

@@ -1,13 +1,13 @@
-"""How good and how fast the planners are: `python -m benchmarks.planners [--quick] [--peer PYTHON] [TABLE ...]`.
+"""Path quality and speed of the planners: `python -m benchmarks.planners [--quick] [--peer PYTHON] [TABLE ...]`.
 
-Tables: quality, hard, papers, hasan, han2007, speed, peer; all but the last by default. Everything runs in one go on one
-core, on the same grids; figures are medians over seeds, times those of the processor. A gap is how much longer a path
-is than the shortest over the same moves.
+Tables: quality, hard, papers, hasan, han2007, speed, peer; all but the last by default. One run on one core uses the same
+grids; figures are medians over seeds, times are processor times. A gap is the excess length over the shortest path with the
+same moves.
 
-The papers' own maps are known as pictures only. Maps here that stand for them are called recreated: random ones of the same size
-and kind, judged by their own optimum. The papers' figures stand beside them, and are not of the same map.
+The papers' maps exist as pictures only. Recreated maps are random ones of the same size and kind, with their own optimum;
+the papers' figures, shown beside them, belong to other maps.
 
-The peer is python_motion_planning 1.1.1 (GPL, hence never imported here): PYTHON is an interpreter that has it.
+The peer is python_motion_planning 1.1.1 (GPL, hence never imported here); PYTHON is an interpreter with it.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def random_grid(size: int, seed: int, blocked: float = 0.25) -> Query:
 
 
 def cylinder_grid(size: int, seed: int) -> Query:
-    """A forest of cylinders, cut into cells of 0.25 m for a robot of radius 0.2 m."""
+    """Return a grid of a forest of cylinders, with cells of 0.25 m, for a robot of radius 0.2 m."""
     side = 0.25 * size
     count = max(3, round(0.12 * side**2))
     rng = np.random.default_rng(seed)
@@ -53,7 +53,7 @@ def cylinder_grid(size: int, seed: int) -> Query:
 
 
 def maze(size: int, seed: int, opened: float = 0.0) -> Query:
-    """A maze of size × size cells (odd) with one way only, but that a share of its walls is then opened."""
+    """Generate a perfect maze of size × size cells (odd), then open a fraction of its walls."""
     rng, n = np.random.default_rng(seed), size // 2
     free = np.zeros((size, size), dtype=np.bool_)
     free[1, 1] = True
@@ -73,7 +73,7 @@ def maze(size: int, seed: int, opened: float = 0.0) -> Query:
 
 
 def cup(size: int) -> Query:
-    """The start deep in a cup that is closed towards the goal."""
+    """Return a query whose start lies deep in a cup closed towards the goal."""
     free = np.ones((size, size), dtype=np.bool_)
     low, high = size // 6, 5 * size // 6
     free[low : high + 1, high] = free[low, low:high] = free[high, low:high] = False
@@ -81,7 +81,7 @@ def cup(size: int) -> Query:
 
 
 def solve(planner: Planner, query: Query, seed: int) -> PlanResult:
-    """The plan, its time that of the processor: nothing here runs on a second core, and others may be at work."""
+    """Plan with processor time as the plan's time, which is robust to load from other programs."""
     started = time.process_time()
     result = planner.plan(query, np.random.default_rng(seed))
     return dataclasses.replace(result, wall_s=time.process_time() - started)
@@ -231,7 +231,7 @@ def han_disc() -> Query:
 
 
 def han2007(quick: bool) -> Iterator[str]:
-    """The thesis' genetic algorithm on one disc, and its experiment 6 with ants: the mean of ten trials."""
+    """Run the thesis' genetic algorithm on one disc, and its experiment 6 with ants: means of ten trials."""
     query = han_disc()
     floor = solve(load_planner("tangent"), query, 0).line_length
     rows = [["han2007, printed, 3 via points", "33.1798", "", "", "", ""]]
@@ -354,7 +354,7 @@ print(json.dumps(answers))
 
 
 def path_length(cells: Sequence[Sequence[int]], query: Query) -> float:
-    """The length of a peer's path in either direction, inf if it is none."""
+    """Return the length of a peer's path in either direction; inf without a path."""
     cells = [tuple(cell) for cell in cells]
     if cells and cells[0] != query.start:
         cells = cells[::-1]

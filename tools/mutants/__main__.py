@@ -87,7 +87,7 @@ def chosen(only: list[str] | None, per_file: int | None, seed: int) -> dict[str,
 
 
 def judged(mutants: dict[str, list[Mutant]], jobs: int, results: Path | None) -> Fates:
-    """The fate of every mutant; those that `results` holds are taken as they are, and new ones are added to it."""
+    """Return the fate of every mutant: from `results`, or determined and appended to it."""
     processes, equivalent, known = Processes(), equivalents(), kept(results)
     waiting: dict[str, list[Mutant]] = {}
     fates: Fates = {}
@@ -133,20 +133,20 @@ def judged(mutants: dict[str, list[Mutant]], jobs: int, results: Path | None) ->
 
 
 def kept(results: Path | None) -> dict[tuple[str, ...], str]:
-    """What a file of results says of each mutant with its stamp."""
+    """Read the fate of each mutant with its stamp from a results file."""
     lines = results.read_text().splitlines() if results and results.exists() else []
     return {tuple(entry[:-1]): entry[-1] for entry in map(json.loads, lines)}
 
 
 @functools.cache
 def stamp(file: str) -> str:
-    """A hash of a file and its tests: what became of its mutants holds as long as these are the same."""
+    """Return a hash of a file and its tests; fates are valid while it is unchanged."""
     texts = [(ROOT / name).read_bytes() for name in (f"{SOURCE}/{file}", *PLANS[file].files)]
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 
 
 def line_of(mutant: Mutant) -> str:
-    """A mutant as one line: where it is, what was there and what is."""
+    """Describe a mutant in one line: place, original and mutated code."""
     return f"{mutant.file}:{mutant.line} [{mutant.operator}] {mutant.was}  ->  {mutant.now}"
 
 
@@ -159,7 +159,7 @@ def counts(group: list[tuple[Mutant, str]]) -> dict[str, Any]:
 
 
 def as_data(fates: Fates) -> dict[str, Any]:
-    """The result as plain values, for JSON."""
+    """Return the result as plain values for JSON."""
     everything = [entry for group in fates.values() for entry in group]
     names = ("file", "line", "function", "operator", "was", "now")
     return {
@@ -170,7 +170,7 @@ def as_data(fates: Fates) -> dict[str, Any]:
 
 
 def as_text(fates: Fates) -> str:
-    """The result as a table in Markdown and the list of survivors."""
+    """Return the result as a Markdown table and the list of survivors."""
     everything = [entry for group in fates.values() for entry in group]
     heads = ("file", "mutants", "killed", "of these by timeout", "equivalent", "alive", "not judged", "score")
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]

@@ -105,7 +105,7 @@ def mutants_of(file: str, source: str) -> list[Mutant]:
 
 
 def described(file: str, operator: str, function: str, source: str, text: str) -> Mutant:
-    """The mutant that turns `source` into `text`, with the lines that differ."""
+    """Return the mutant that turns `source` into `text`, with the differing lines."""
     before, after = source.splitlines(), text.splitlines()
     shorter = min(len(before), len(after))
     first = next((i for i in range(shorter) if before[i] != after[i]), shorter)
@@ -127,7 +127,7 @@ class _Finder(ast.NodeVisitor):
         self._scope: list[str] = []
 
     def end(self, statement: ast.stmt) -> int:
-        """The byte after a statement."""
+        """Return the offset of the byte after a statement."""
         return self._place(statement)[1]
 
     def visit(self, node: ast.AST) -> None:

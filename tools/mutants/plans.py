@@ -94,13 +94,13 @@ def named_mutants(root: Path = ROOT) -> list[Mutant]:
 
 
 def equivalents() -> set[tuple[str, str, str, str]]:
-    """The keys of the mutants in `equivalent.yaml`, which no test can notice, because the program does the same."""
+    """Load the keys of equivalent mutants in `equivalent.yaml`, which change no result."""
     table = yaml.safe_load((HERE / "equivalent.yaml").read_text())
     return {(entry["file"], entry["function"], entry["was"], entry["now"]) for entry in table}
 
 
 def drawn(file: str, count: int, seed: int = SEED, root: Path = ROOT) -> list[Mutant]:
-    """A sample of the mutants of a file: one of each function in turn, so that every function has its share."""
+    """Sample the mutants of a file, cycling through its functions."""
     rng = random.Random(f"{seed} {file}")  # noqa: S311 - nothing is kept secret
     by_function: dict[str, list[Mutant]] = {}
     for mutant in mutants_of(file, (root / SOURCE / file).read_text()):

@@ -227,7 +227,7 @@ class Server:
 
 
 def stamp_of(root: Path) -> str:
-    """The stamp that the cache of machine code has in a project."""
+    """Return the stamp of a project's cache of machine code."""
     code = "from antdrive.base.kernel_cache import sources_stamp; print(sources_stamp())"
     environment = {**os.environ, "PYTHONPATH": str(root / "src")}
     command = [sys.executable, "-c", code]
@@ -236,7 +236,7 @@ def stamp_of(root: Path) -> str:
 
 
 def dependents(root: Path, file: str) -> set[str]:
-    """A file and all files of the rooms that import it, directly or through others, relative to `SOURCE`."""
+    """Return a file and all files that import it, directly or indirectly, relative to `SOURCE`."""
     source = root / SOURCE
     lazy = _lazy_names(source)
     imported: dict[str, set[str]] = {}
@@ -257,7 +257,7 @@ def _module(file: str) -> str:
 
 
 def _imports(path: Path) -> set[str]:
-    """What a file imports, without the leading package name: modules, and names in them."""
+    """Return the modules that a file imports, and names in them, without the leading package name."""
     names: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.module:
@@ -268,7 +268,7 @@ def _imports(path: Path) -> set[str]:
 
 
 def _lazy_names(source: Path) -> dict[str, str]:
-    """The module that holds each name that a package offers: "worlds.Disc" is in "worlds.world"."""
+    """Return the module of each name that a package exports: "worlds.Disc" is in "worlds.world"."""
     found = {}
     for stub in source.rglob("__init__.pyi"):
         package = "".join(f"{part}." for part in stub.parent.relative_to(source).parts)

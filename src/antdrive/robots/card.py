@@ -1,4 +1,4 @@
-"""How notebooks show a robot: an SVG drawing to scale and its main values, made without heavy imports."""
+"""Robot cards for notebooks: an SVG drawing to scale and the main values, without imports of plotting libraries."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 
 from antdrive.worlds.svg import card
 
-if TYPE_CHECKING:  # a robot draws itself with this module
+if TYPE_CHECKING:  # `RobotSpec` imports this module to draw itself
     from antdrive.robots.lidar import Lidar
     from antdrive.robots.spec import RobotSpec
 
 WIDTH = 240  # of a drawing [px]
 BODY, BODY_EDGE, WHEEL, HEADING, RULER = "#e8ecf6", "#345cbe", "#39424f", "#ff7a0e", "#5b6576"
-WHEEL_ASPECT = 0.4  # a wheel's drawn thickness as a fraction of its diameter: robot files do not give it
+WHEEL_ASPECT = 0.4  # drawn thickness of a wheel as a fraction of its diameter; robot files do not give it
 MM = 1000.0  # the drawing's unit, because browsers render text in units of a metre badly
 
 
 def robot_svg(spec: RobotSpec) -> str:
-    """A robot from above as SVG, heading right, to scale: footprint, wheels, heading and a ruler.
+    """Draw a robot from above as SVG, to scale, heading right: footprint, wheels, heading and a ruler.
 
-    Its coordinates are millimetres from the axle's centre, y upwards.
+    Coordinates are millimetres from the axle's centre, y upwards.
     """
     foot = spec.footprint
     xmin, ymin, xmax, ymax = (MM * value for value in foot.bounds)
@@ -66,12 +66,12 @@ def robot_svg(spec: RobotSpec) -> str:
 
 
 def robot_card(spec: RobotSpec) -> str:
-    """A robot as HTML: its drawing, then its main values."""
+    """Return a robot's drawing and main values as HTML."""
     return card(robot_svg(spec), spec.name, facts_of(spec))
 
 
 def facts_of(spec: RobotSpec) -> dict[str, str]:
-    """A robot's main values in words."""
+    """Return a robot's main values as text."""
     noise = spec.noise
     noisy = (
         f"pose ±{noise.pose_xy:g} m, ±{noise.pose_yaw:g} rad; encoders ±{100 * noise.encoder:g} %; "
@@ -90,7 +90,7 @@ def facts_of(spec: RobotSpec) -> dict[str, str]:
 
 
 def lidar_text(lidar: Lidar) -> str:
-    """A lidar in words: beams, view, rate, and where it is."""
+    """Describe a lidar: beams, field of view, rate, ranges and position."""
     view = "all around" if lidar.full_circle else f"{math.degrees(lidar.field_of_view):.4g}°"
     where = f"{abs(lidar.x):.3g} m {'ahead of' if lidar.x >= 0 else 'behind'} the axle" if lidar.x else "over the axle"
     return (
@@ -100,7 +100,7 @@ def lidar_text(lidar: Lidar) -> str:
 
 
 def footprint_text(spec: RobotSpec) -> str:
-    """A robot's footprint in words: kind, size, and where it is on the axle."""
+    """Describe a robot's footprint: kind, size and offset from the axle."""
     foot = spec.footprint
     xmin, ymin, xmax, ymax = foot.bounds
     size = f"{xmax - xmin:g} × {ymax - ymin:g} m"
@@ -117,7 +117,7 @@ def footprint_text(spec: RobotSpec) -> str:
 
 
 def wheel_thickness(spec: RobotSpec) -> float:
-    """How thick the wheels are drawn, so that they stay within the footprint [m]."""
+    """Return the drawn thickness of the wheels, limited to the footprint [m]."""
     foot = spec.footprint
     if foot.corners:
         return max(min(2 * spec.wheel_radius * WHEEL_ASPECT, 2 * spec.wheel_room), 0.02 * spec.track)
@@ -128,6 +128,6 @@ def wheel_thickness(spec: RobotSpec) -> float:
 
 
 def _ruler_length(most: float) -> float:
-    """The longest round length (1, 2 or 5 times a power of ten) up to `most` [m]."""
+    """Return the longest round length (1, 2 or 5 times a power of ten) up to `most` [m]."""
     lengths = (digit * 10.0**power for power in range(-6, 7) for digit in (1, 2, 5))
     return max((length for length in lengths if length <= most), default=most)

@@ -1,4 +1,4 @@
-"""Whether a robot fits where it stands, and what is in its way. Needs numpy alone, but for one kernel."""
+"""Distances between a robot's footprint and the obstacles and walls, in numpy except for one kernel."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
 
 
 def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike) -> Floats:
-    """Distance from the footprint at each pose to the nearest disc surface or wall, shape (N,) [m].
+    """Return the distance from the footprint at each pose to the nearest disc or wall, shape (N,) [m].
 
-    It is negative where the footprint overlaps a disc or a wall. Its size is then a bound on the depth of the
-    overlap, not the exact depth.
+    Negative for overlaps; the magnitude is then a bound on the depth, not the exact depth.
 
     Args:
         world: the discs and walls
@@ -33,13 +32,13 @@ def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike
 
 
 def kernel_shape(footprint: Footprint) -> tuple[Floats, Floats]:
-    """A footprint as kernels take it: half length, half width and rounding (3,), and a polygon's corners (K, 2) [m]."""
+    """Return a footprint for kernels: half length, half width and rounding (3,), and corners (K, 2) [m]."""
     shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
     return shape, np.array(footprint.corners, dtype=np.float64).reshape(-1, 2)
 
 
 def footprint_distances(world: World, spec: RobotSpec, poses: npt.ArrayLike) -> Floats:
-    """The distance from the robot's footprint to each obstacle and then each of `WALLS`, negative in it, (P, N + 4) [m]."""
+    """Return the signed distance from the footprint to each obstacle, then to each of `WALLS`, (P, N + 4) [m]."""
     x, y, yaw = np.asarray(poses, dtype=np.float64).reshape(-1, 3, 1).swapaxes(0, 1)
     foot, discs = spec.footprint, world.discs
     cos, sin = np.cos(yaw), np.sin(yaw)
@@ -61,7 +60,7 @@ def footprint_distances(world: World, spec: RobotSpec, poses: npt.ArrayLike) -> 
 
 
 def _beyond_polygon(footprint: Footprint, x: Floats, y: Floats) -> Floats:
-    """The distance from a footprint's polygon to points in its frame, negative within it [m]."""
+    """Return the signed distance from a footprint's polygon to points in its frame, negative inside [m]."""
     corners = np.array(footprint.corners)
     over, apart = np.full(x.shape, -np.inf), np.full(x.shape, np.inf)
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
@@ -74,7 +73,7 @@ def _beyond_polygon(footprint: Footprint, x: Floats, y: Floats) -> Floats:
 
 
 def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
-    """What messages call an obstacle or a wall."""
+    """Return the name of an obstacle or a wall for messages."""
     count = len(world.obstacles)
     if index >= count:
         return WALLS[index - count]
@@ -84,7 +83,7 @@ def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
 
 
 def overlap_at(world: World, spec: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
-    """What the robot's footprint overlaps or touches most at a pose, and by how much; empty where it fits.
+    """Describe the footprint's deepest overlap at a pose; empty if there is none.
 
     Args:
         world: the obstacles and walls; movers do not count

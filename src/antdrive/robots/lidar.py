@@ -1,4 +1,4 @@
-"""The lidar of a robot: a fan of beams in one horizontal plane."""
+"""Planar lidar of a robot."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from antdrive.base.errors import FieldError
 from antdrive.base.records import require_ranges
 from antdrive.base.types import Floats, Pose
 
-FULL_CIRCLE = 2 * math.pi - 1e-4  # a field of view from here on has no first and last beam [rad]
+FULL_CIRCLE = 2 * math.pi - 1e-4  # least field of view that counts as a full circle [rad]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lidar:
     """A planar lidar.
 
-    The beams are evenly spaced. The first and the last lie on the edges of the field of view, unless it is a full circle:
-    then the first points backwards and all are one spacing apart.
+    The beams are evenly spaced. The first and the last lie on the edges of the field of view. In a full circle the first
+    beam points backwards.
 
     Attributes:
         beams: number of beams in a scan
-        field_of_view: angle between the first and the last beam, symmetric about the lidar's heading [rad]; 6.2832: all
-            around
-        min_range: what is nearer is noticed, but not measured [m]
-        max_range: what is farther is not noticed [m]
-        rate: scans in a second [Hz]
-        resolution: measured ranges are multiples of it [m]; 0: they are exact
+        field_of_view: angle between the first and the last beam, symmetric about the lidar's heading [rad]; 6.2832:
+            full circle
+        min_range: nearer surfaces are detected, but not measured [m]
+        max_range: farther surfaces are not detected [m]
+        rate: scan rate [Hz]
+        resolution: measured ranges are multiples of it [m]; 0: exact
         sigma: standard deviation of a measured range [m]
-        x: where the lidar is, ahead of the axle's centre [m]
-        y: to the left of it [m]
+        x: position ahead of the axle's centre [m]
+        y: position to the left of the axle's centre [m]
         yaw: the lidar's heading, counter-clockwise from the robot's [rad]
-        height: of the beams above the floor [m]; cylinders that are lower are not seen
+        height: of the beams above the floor [m]; lower cylinders are not detected
 
     Raises:
-        FieldError: a value outside its range, or ranges that enclose nothing.
+        FieldError: a value is outside its range, or min_range is not below max_range.
     """
 
     beams: Annotated[int, Interval(ge=3, le=10_000)]
-    field_of_view: Annotated[float, Interval(ge=0.01, le=2 * math.pi + 1e-6)]  # files that round 2 pi up mean it
+    field_of_view: Annotated[float, Interval(ge=0.01, le=2 * math.pi + 1e-6)]  # 2 pi, rounded up in some files
     min_range: Annotated[float, Interval(ge=0.0, le=10.0)]
     max_range: Annotated[float, Interval(ge=0.1, le=300.0)]
     rate: Annotated[float, Interval(ge=1.0, le=1000.0)]
@@ -61,22 +61,22 @@ class Lidar:
 
     @property
     def spacing(self) -> float:
-        """Angle between two neighbouring beams [rad]."""
+        """Angle between neighbouring beams [rad]."""
         return 2 * math.pi / self.beams if self.full_circle else self.field_of_view / (self.beams - 1)
 
     @property
     def full_circle(self) -> bool:
-        """Whether the lidar sees all around."""
+        """Whether the field of view is a full circle."""
         return self.field_of_view >= FULL_CIRCLE
 
     @property
     def angles(self) -> Floats:
-        """The direction of each beam, counter-clockwise from the robot's heading (beams,) [rad]."""
+        """Direction of each beam, counter-clockwise from the robot's heading (beams,) [rad]."""
         first = -math.pi if self.full_circle else -self.field_of_view / 2
         return np.asarray(self.yaw + first + self.spacing * np.arange(self.beams), dtype=np.float64)
 
     def at(self, hz: int) -> Lidar:
-        """The lidar on a robot of so many control periods a second, which takes one scan in each of them at most.
+        """Return the lidar with at most one scan per control period.
 
         Args:
             hz: control periods per second
@@ -84,7 +84,7 @@ class Lidar:
         return self if self.rate <= hz else dataclasses.replace(self, rate=float(hz))
 
     def pose_on(self, pose: Pose) -> Pose:
-        """The lidar's own pose on a robot: x, y [m] and yaw [rad].
+        """Return the lidar's pose in the world: x, y [m] and yaw [rad].
 
         Args:
             pose: the robot's pose
@@ -94,10 +94,10 @@ class Lidar:
         return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, yaw + self.yaw
 
     def due(self, tick: int, hz: int) -> bool:
-        """Whether a scan is due in a control period.
+        """Return whether a scan is due in a control period.
 
         Args:
-            tick: the number of the control period
+            tick: index of the control period
             hz: control periods per second
         """
         per_tick = self.rate / hz

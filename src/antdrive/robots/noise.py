@@ -1,7 +1,7 @@
-"""The noise of a real robot: wheels that slip, inexact encoders, delayed commands and an estimated pose.
+"""Noise of a drive: wheel slip, encoder errors, delayed commands and pose estimation.
 
-A robot's file holds the levels (`Noise`). A drive scales them; at 0 the robot is perfect. All random numbers
-come from the generator that the caller passes.
+A robot's file has the levels (`Noise`). A drive scales them; 0 means a perfect robot. All random numbers come from the
+caller's generator.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from antdrive.robots.control.pursuit import Twist
 from antdrive.robots.spec import Noise
 
 SLIP_TIME = 0.5  # correlation time of slip [s]
-MIN_GAIN = 0.05  # of the filter, so that fixes always correct the estimate somewhat
+MIN_GAIN = 0.05  # of the filter, so that fixes always correct the estimate
 
 
 class NoiseModel:
-    """The noise of one drive: what the wheels make of commands, and what the robot estimates its pose to be.
+    """Actuation and pose-estimation noise of one drive.
 
-    Between two pose fixes the robot uses odometry. A fix corrects the estimate with the gain of a
-    steady-state Kalman filter. Slip is a first-order Gauss-Markov process, a factor on each wheel's speed.
-    Encoders count turns of the wheels, so they do not measure it.
+    Between pose fixes the robot uses odometry. A fix corrects the estimate with the gain of a steady-state Kalman
+    filter. Slip is a first-order Gauss-Markov process, a factor on each wheel's speed. Encoders count turns of the
+    wheels and do not measure slip.
 
     Attributes:
         estimate: the estimated pose at the last control period: x, y [m] and yaw [rad]
@@ -33,8 +33,8 @@ class NoiseModel:
         noise: the levels
         track: distance between the wheels [m]
         period: control period [s]
-        start: the pose at the start, which the robot knows
-        rng: where all random numbers come from
+        start: the start pose, known exactly
+        rng: the random generator
     """
 
     def __init__(self, noise: Noise, track: float, period: float, start: Pose, rng: np.random.Generator) -> None:
@@ -44,16 +44,15 @@ class NoiseModel:
         self._ticks_per_fix = max(1, round(1 / (noise.pose_rate * period)))
         self._tick = 0
         self.estimate = start
-        # The variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over
-        # several.
+        # Variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors accumulate over several.
         correlated = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
         drift = (noise.encoder**2 + correlated * noise.slip**2) / noise.pose_rate**2
         self._gain = _steady_gain(drift / 2, noise.pose_xy**2), _steady_gain(2 * drift / track**2, noise.pose_yaw**2)
 
     def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
-        """The estimated pose of a robot whose true pose is `pose` and whose true velocity is `twist`.
+        """Return the estimated pose for a true `pose` and a true velocity `twist`.
 
-        To be called once in every control period, before `actuate`.
+        Call once in every control period, before `actuate`.
         """
         noise, rng = self._noise, self._rng
         rolled = self._wheels(twist) / (1 + self._slip) * (1 + noise.encoder * rng.standard_normal(2))
@@ -69,17 +68,17 @@ class NoiseModel:
         return self.estimate
 
     def pose_after_delay(self) -> Pose:
-        """The pose expected when the next command takes effect: the estimate moved by pending commands."""
+        """Return the pose expected when the next command takes effect: the estimate moved by pending commands."""
         pose = self.estimate
         for twist in self._pending:
             pose = _moved(pose, twist, self._period)
         return pose
 
     def actuate(self, command: Twist) -> Twist:
-        """The velocity that the wheels produce now, from a delayed command and with slip.
+        """Return the velocity of the wheels: the delayed command with slip.
 
         Args:
-            command: the new command, which takes effect after the delay
+            command: the new command; it takes effect after the delay
         """
         self._pending.append(command)
         delayed = self._pending.popleft()
@@ -97,7 +96,7 @@ class NoiseModel:
 
 
 def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
-    """A pose after driving with a twist for a time."""
+    """Return a pose after driving with a twist for a time."""
     x, y, yaw = pose
     middle = yaw + twist.yaw_rate * time / 2
     return (
@@ -108,7 +107,7 @@ def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
 
 
 def _steady_gain(drift: float, error: float) -> float:
-    """The steady-state gain of a scalar Kalman filter, from the variances of drift and of a fix."""
+    """Return the steady-state gain of a scalar Kalman filter from the variances of drift and fix."""
     if error == 0:
         return 1.0
     ratio = drift / error

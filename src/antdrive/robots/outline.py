@@ -1,4 +1,4 @@
-"""A robot's footprint: its outline from above, and what follows from it."""
+"""Robot footprints: outlines from above and their geometry."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from antdrive.base.errors import FieldError
 from antdrive.base.types import Bounds, Point
 
 MAX_CORNERS = 32  # of a polygon
-STRAIGHT = 1e-9  # a corner no farther from the line between its neighbours adds nothing [m]
+STRAIGHT = 1e-9  # corners closer to the line between their neighbours are redundant [m]
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """The robot's outline from above, in the robot's frame: x ahead, y to the left, origin at the axle's centre.
+    """A robot's outline from above, in the robot's frame: x ahead, y to the left, origin at the axle's centre.
 
-    It is a rectangle centred on the axle, or the convex polygon of `corners`, moved outwards by `rounding`. A disc is a
-    rectangle of size zero with a rounding, and a disc off the axle is a single corner with a rounding.
+    A rectangle centred on the axle, or the convex polygon of `corners`, offset outwards by `rounding`. A disc is a
+    rectangle of size zero with a rounding; a disc off the axle is a single corner with a rounding.
 
     Attributes:
         half_length: half the rectangle's length, along the robot's heading [m]; 0 for a polygon
         half_width: half its width [m]; 0 for a polygon
-        rounding: how far the outline is moved outwards [m]
-        corners: the polygon's corners, counter-clockwise [m]; none for what is centred on the axle
+        rounding: outward offset of the outline [m]
+        corners: the polygon's corners, counter-clockwise [m]; none for shapes centred on the axle
     """
 
     half_length: float = 0.0
     half_width: float = 0.0
     rounding: float = 0.0
-    # Records leave it out where there are none, so that the logs of centred robots are as they were.
+    # Omitted from records if empty, so that logs of centred robots keep their hashes.
     corners: tuple[Point, ...] = field(default=(), metadata={"omit_if_default": True})
 
     @classmethod
     def disc(cls, radius: float, centre: Point = (0.0, 0.0)) -> Footprint:
-        """A disc.
+        """Return a disc.
 
         Args:
             radius: its radius [m]
@@ -45,7 +45,7 @@ class Footprint:
 
     @classmethod
     def rectangle(cls, length: float, width: float, centre: Point = (0.0, 0.0)) -> Footprint:
-        """A rectangle.
+        """Return a rectangle.
 
         Args:
             length: along the robot's heading [m]
@@ -60,25 +60,25 @@ class Footprint:
 
     @classmethod
     def polygon(cls, points: Sequence[Sequence[float]]) -> Footprint:
-        """A convex polygon.
+        """Return a convex polygon.
 
         Args:
-            points: its corners in order, either way round (K, 2) [m]
+            points: its corners in order, clockwise or counter-clockwise (K, 2) [m]
 
         Raises:
-            FieldError: they are no convex polygon, or too many.
+            FieldError: the points are not a convex polygon, or too many.
         """
         corners = [(float(x), float(y)) for x, y in points]
         if sum(_cross((0.0, 0.0), a, b) for a, b in _around(corners)) < 0:
             corners.reverse()
         corners = [
-            b for k, b in enumerate(corners) if not _on_the_way(corners[k - 1], b, corners[k + 1 - len(corners)])
+            b for k, b in enumerate(corners) if not _is_between(corners[k - 1], b, corners[k + 1 - len(corners)])
         ]
-        found = cls(corners=tuple(corners))
+        footprint = cls(corners=tuple(corners))
         if len(corners) < 3:
-            raise FieldError("corners", "must be three points or more that are not on one line")
-        found.require_convex()
-        return found
+            raise FieldError("corners", "must be at least three points that are not on one line")
+        footprint.require_convex()
+        return footprint
 
     @property
     def is_disc(self) -> bool:
@@ -101,7 +101,7 @@ class Footprint:
 
     @property
     def bounds(self) -> Bounds:
-        """The rectangle around it along the robot's axes: xmin, ymin, xmax, ymax [m]."""
+        """Bounding box along the robot's axes: xmin, ymin, xmax, ymax [m]."""
         a, b = self.half_length + self.rounding, self.half_width + self.rounding
         if not self.corners:
             return -a, -b, a, b
@@ -112,7 +112,7 @@ class Footprint:
     def box(self) -> tuple[float, float, Point] | None:
         """Length, width and centre [m] of a rectangle along the robot's axes; None for any other shape."""
         xmin, ymin, xmax, ymax = self.bounds
-        # Where a rectangle's corners were computed from its middle, they lie on its sides but for rounding.
+        # Tolerance for corners that were computed from the rectangle's centre.
         sides = (xmin, xmax), (ymin, ymax)
         aligned = all(
             min(abs(v - s) for s in side) < 1e-12 for p in self.corners for v, side in zip(p, sides, strict=True)
@@ -122,7 +122,7 @@ class Footprint:
         return xmax - xmin, ymax - ymin, ((xmin + xmax) / 2, (ymin + ymax) / 2)
 
     def depth(self, x: float, y: float) -> float:
-        """How deep within the footprint a point lies: its distance from the edge, negative outside [m].
+        """Return a point's depth in the footprint: its distance from the edge, negative outside [m].
 
         Args:
             x: ahead of the axle [m]
@@ -136,7 +136,7 @@ class Footprint:
         return self.rounding - math.hypot(min(ahead, 0.0), min(aside, 0.0))
 
     def nearest(self, x: float, y: float) -> Point:
-        """The point of the footprint without its rounding that is nearest to a point [m].
+        """Return the nearest point of the footprint without its rounding [m].
 
         Args:
             x: ahead of the axle [m]
@@ -150,23 +150,23 @@ class Footprint:
         return min((_on_edge(a, b, (x, y)) for a, b in _around(self.corners)), key=lambda at: math.dist(at, (x, y)))
 
     def reach(self, direction: float) -> float:
-        """How far the footprint reaches from the axle's centre in a direction [m].
+        """Return the distance from the axle's centre to the edge in a direction [m].
 
         Args:
             direction: counter-clockwise from straight ahead [rad]
         """
         low, high = 0.0, self.radius
-        for _ in range(60):  # convex and around the axle's centre, so halving finds the edge
+        for _ in range(60):  # bisection: the footprint is convex and contains the axle's centre
             middle = (low + high) / 2
             inside = self.depth(middle * math.cos(direction), middle * math.sin(direction)) >= 0
             low, high = (middle, high) if inside else (low, middle)
         return low
 
     def outline(self, steps: int = 16) -> list[Point]:
-        """Points on the outline, counter-clockwise [m].
+        """Return points on the outline, counter-clockwise [m].
 
         Args:
-            steps: how many each quarter turn of a round corner gets
+            steps: points for each quarter turn of a round corner
         """
         a, b, r = self.half_length, self.half_width, self.rounding
         corners = self.corners or ((a, b), (-a, b), (-a, -b), (a, -b))
@@ -187,10 +187,10 @@ class Footprint:
         return points
 
     def require_convex(self) -> None:
-        """Refuse corners that are no convex polygon in the right order.
+        """Raise FieldError unless the corners are a counter-clockwise convex polygon.
 
         Raises:
-            FieldError: what is wrong with the corners.
+            FieldError: the corners are invalid.
         """
         corners = self.corners
         if len(corners) == 2 or len(corners) > MAX_CORNERS:
@@ -210,31 +210,31 @@ class Footprint:
 
 
 def _around(corners: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
-    """Each corner and the next one."""
+    """Return pairs of each corner and the next one."""
     return zip(corners, (*corners[1:], *corners[:1]), strict=True)
 
 
 def _cross(a: Point, b: Point, c: Point) -> float:
-    """Twice the area of a triangle, positive where c is to the left of the way from a to b [m^2]."""
+    """Return twice the signed area of a triangle, positive if c is left of the line from a to b [m^2]."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _beyond(corners: Sequence[Point], point: Point) -> float:
-    """The distance from a polygon to a point; negative within it, that to the nearest edge [m]."""
+    """Return the signed distance from a polygon to a point, negative inside [m]."""
     over = max(-_cross(a, b, point) / math.dist(a, b) if a != b else math.inf for a, b in _around(corners))
     return over if over <= 0 else min(math.dist(_on_edge(a, b, point), point) for a, b in _around(corners))
 
 
 def _on_edge(a: Point, b: Point, c: Point) -> Point:
-    """The point between a and b that is nearest to c."""
+    """Return the point of the segment a-b nearest to c."""
     ex, ey = b[0] - a[0], b[1] - a[1]
     length2 = ex * ex + ey * ey
-    share = min(max(((c[0] - a[0]) * ex + (c[1] - a[1]) * ey) / length2, 0.0), 1.0) if length2 else 0.0
-    return a[0] + share * ex, a[1] + share * ey
+    fraction = min(max(((c[0] - a[0]) * ex + (c[1] - a[1]) * ey) / length2, 0.0), 1.0) if length2 else 0.0
+    return a[0] + fraction * ex, a[1] + fraction * ey
 
 
-def _on_the_way(a: Point, b: Point, c: Point) -> bool:
-    """Whether b lies on the straight way from a to c."""
+def _is_between(a: Point, b: Point, c: Point) -> bool:
+    """Return whether b lies on the segment from a to c."""
     away = math.dist(a, c)
     if math.dist(a, b) <= STRAIGHT:
         return True
@@ -243,5 +243,5 @@ def _on_the_way(a: Point, b: Point, c: Point) -> bool:
 
 
 def _outwards(a: Point, b: Point) -> float:
-    """The direction away from the polygon on its edge from a to b [rad]."""
+    """Return the direction of the outward normal of the edge from a to b [rad]."""
     return math.atan2(a[0] - b[0], b[1] - a[1])

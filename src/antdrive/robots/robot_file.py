@@ -1,4 +1,4 @@
-"""Robot files: specifications read from YAML, and the catalogue of robots that the package contains."""
+"""Robot files (specifications in YAML) and the package's catalogue of robots."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _Place: TypeAlias = tuple[float, float]
 
 
 _FORMS = (
-    "write {radius: 0.18} for a disc, {length: 0.5, width: 0.4} for a rectangle, either with centre: [0.1, 0] if its middle "
-    "is not the axle's, or {polygon: [[0.3, -0.2], [0.3, 0.2], [-0.2, 0.2], [-0.2, -0.2]]}"
+    "write {radius: 0.18} for a disc, {length: 0.5, width: 0.4} for a rectangle, both with centre: [0.1, 0] if offset "
+    "from the axle, or {polygon: [[0.3, -0.2], [0.3, 0.2], [-0.2, 0.2], [-0.2, -0.2]]}"
 )
 
 
 class FootprintEntry(BaseModel):
-    """A disc, given by its radius, a rectangle, given by its length (along the heading) and width, or a convex polygon.
+    """A footprint in a robot file: a disc by radius, a rectangle by length and width, or a convex polygon.
 
     Positions are in the robot's frame: x ahead and y to the left of the axle's centre.
     """
@@ -58,7 +58,7 @@ class FootprintEntry(BaseModel):
         return self
 
     def footprint(self) -> Footprint:
-        """The footprint that this entry describes."""
+        """Return the footprint of this entry."""
         centre = self.centre or (0.0, 0.0)
         if self.polygon is not None:
             try:
@@ -80,48 +80,48 @@ def _robot_file() -> Any:
         "schema_": (SchemaVersion, Field(alias="schema", description="write schema: 1")),
         "name": (
             OneLine,
-            Field(min_length=1, max_length=200, description="name of the robot, by default that of the file"),
+            Field(min_length=1, max_length=200, description="the robot's name; by default the file's name"),
         ),
         "footprint": (FootprintEntry, Field(description=f"{_FORMS} [m]")),
     }
     return create_model("RobotFile", __config__=STRICT, __doc__=RobotSpec.__doc__, **values)
 
 
-#: A robot as written in a file: a specification, but for its footprint and for a name that the file may leave out.
+#: A robot file: a specification with its own form of the footprint and an optional name.
 RobotFile = _robot_file()
 
 
 def list_robots() -> Mapping[str, Path]:
-    """The files of the robots in the package's catalogue, by name."""
+    """Return the files of the package's robots by name."""
     return {path.stem: path for path in sorted(_CATALOG.glob("*.yaml"))}
 
 
 def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
-    """The robot that a file describes.
+    """Load a robot's specification.
 
     Args:
-        robot: the file's path, or a name from `list_robots`
+        robot: a file's path, or a name from `list_robots`
 
     Raises:
-        InputError: the file does not exist, or something in it is wrong.
+        InputError: the file does not exist or is invalid.
     """
     try:
         path = resolve("robot", robot, list_robots())
     except FieldError as error:
         raise input_error(error.problem) from None
     if path.suffix.lower() in (".urdf", ".xacro"):
-        raise input_error(str(path), f"is no robot file; make one of it with antdrive robots import {path}")
+        raise input_error(str(path), f"not a robot file; convert it with: antdrive robots import {path}")
     return _robot_in(read_yaml(path), os.fspath(path), path.stem)
 
 
 def robot_from_text(text: str, source: str, stem: str) -> RobotSpec:
-    """The robot in the text of a robot file."""
+    """Parse the text of a robot file."""
     return _robot_in(text, source, stem)
 
 
 @cached(16)
 def _robot_in(text: str, source: str, stem: str) -> RobotSpec:
-    """The robot in the text of a robot file."""
+    """Parse the text of a robot file."""
     document = parse_document(text, source)
     if isinstance(document.data, dict):
         document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "robot")
@@ -130,7 +130,7 @@ def _robot_in(text: str, source: str, stem: str) -> RobotSpec:
 
 
 def robot_schema() -> dict[str, Any]:
-    """The JSON Schema of robot files, for editors."""
+    """Return the JSON Schema of robot files, for editors."""
     schema = schema_of(RobotFile)
     required = [key for key in schema["required"] if key != "name"]
     draft = "https://json-schema.org/draft/2020-12/schema"
@@ -148,20 +148,20 @@ def _to_spec(entry: Any, document: Document) -> RobotSpec:
 
 
 def robot_to_dict(spec: RobotSpec) -> dict[str, Any]:
-    """A robot as plain data, as it stands in a rollout's record."""
-    left_out = {
+    """Return a robot as plain data, as in a rollout's record."""
+    omitted = {
         field.name
         for field in dataclasses.fields(spec)
         if field.metadata.get("omit_if_default") and getattr(spec, field.name) == field.default
     }
-    data = {key: value for key, value in dataclasses.asdict(spec).items() if key not in left_out}
+    data = {key: value for key, value in dataclasses.asdict(spec).items() if key not in omitted}
     if not spec.footprint.corners:
         del data["footprint"]["corners"]
     return data
 
 
 def footprint_to_dict(footprint: Footprint) -> dict[str, Any]:
-    """A footprint as it stands in a robot's file."""
+    """Return a footprint as plain data, as in a robot file."""
     corners = footprint.corners
     if footprint.is_disc or len(corners) == 1:
         return {"radius": footprint.rounding, **({"centre": list(corners[0])} if corners else {})}

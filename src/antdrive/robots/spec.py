@@ -1,4 +1,4 @@
-"""What a robot is: its footprint, its drive, its limits and how noisy it is; and whether it can do what its file promises."""
+"""Robot specifications: footprint, drive, limits and noise, and their feasibility."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from antdrive.base.records import require_ranges
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint as Footprint
 
-#: The rate at which the noise of a sample is given [Hz].
+#: The sampling rate for which `Odometry` gives noise per sample [Hz].
 SAMPLE_RATE = 50.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Odometry:
-    """How wrong odometry is. Levels are standard deviations.
+    """Errors of odometry. Levels are standard deviations.
 
-    Scales and bias are drawn once for a drive and stay; noise is drawn anew for each sample. What is estimated does not
-    depend on the rate of sampling but for the draws: at another rate than 50 Hz, noise is scaled so that poses drift as far.
+    Scales and bias are drawn once for each drive, noise for each sample. At rates other than 50 Hz noise is scaled to
+    give the same drift of the pose.
 
     Attributes:
-        speed_scale: constant error of the speed, as a fraction of it: wheels that are larger than thought, or slip
+        speed_scale: constant error of the speed, as a fraction of it, from wheel size or slip
         yaw_scale: constant error of the yaw rate, as a fraction of it
         gyro_bias: constant error of the yaw rate [rad/s]
         speed_noise: noise of the speed in a sample at 50 Hz, as a fraction of the speed
@@ -46,24 +46,24 @@ class Odometry:
         require_ranges(self)
 
     def scaled(self, factor: float) -> Odometry:
-        """The errors multiplied by a factor; 0 is perfect odometry.
+        """Return the errors multiplied by a factor; 0 is perfect odometry.
 
         Args:
-            factor: what every level is multiplied by
+            factor: the multiplier
         """
         return Odometry(**{field.name: getattr(self, field.name) * factor for field in dataclasses.fields(self)})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """How a real robot differs from a perfect one. Levels are standard deviations.
+    """Noise levels of a robot. Levels are standard deviations.
 
     Attributes:
         pose_xy: error of a pose fix in x and in y [m]
         pose_yaw: error of a pose fix in heading [rad]
         pose_rate: rate of pose fixes; between two fixes the robot uses odometry [Hz]
         encoder: error of each wheel's measured speed, as a fraction of the speed
-        slip: slip of each wheel, as a fraction of its speed; it changes over about half a second
+        slip: slip of each wheel, as a fraction of its speed; its correlation time is 0.5 s
         delay: time from a command to the motors [s]
 
     Raises:
@@ -81,7 +81,7 @@ class Noise:
         require_ranges(self)
 
     def scaled(self, factor: float) -> Noise:
-        """The noise with all errors and the delay multiplied by `factor`."""
+        """Return the noise with all errors and the delay multiplied by `factor`."""
         levels = {f.name: getattr(self, f.name) * factor for f in dataclasses.fields(self) if f.name != "pose_rate"}
         return dataclasses.replace(self, **levels)
 
@@ -92,17 +92,17 @@ class Noise:
 
 
 FOOTPRINT_RANGE = (0.02, 20.0)  # of the diameter, or of length and width [m]
-WHEEL_ROOM = 0.05  # the least distance from a wheel's middle to the footprint's edge, in wheel radii
+WHEEL_ROOM = 0.05  # least distance from a wheel's centre to the footprint's edge [wheel radii]
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotSpec:
-    """A differential-drive robot: two driven wheels on one axle, whose centre is the robot's origin, and two casters.
+    """A differential-drive robot: two driven wheels on one axle, whose centre is the origin, and two casters.
 
-    The footprint may reach farther ahead than behind; the mass counts as centred on the axle.
+    The footprint need not be centred on the axle; the mass is modelled as centred on it.
 
     Attributes:
-        name: what the robot is called
+        name: the robot's name
         footprint: its outline from above
         height: height of its body [m]
         mass: mass of the whole robot [kg]
@@ -116,13 +116,12 @@ class RobotSpec:
         max_wheel_speed: limit of each wheel's speed [rad/s]
         wheel_torque: highest torque of each wheel's motor [N m]
         wheel_friction: Coulomb friction coefficient of the wheels on the floor
-        noise: the robot's noise at a scenario's noise level of 1
-        source: where these values come from
-        lidar: what the robot sees with; None: it has no lidar
+        noise: the robot's noise at noise level 1
+        source: origin of these values
+        lidar: the robot's lidar; None: no lidar
 
     Raises:
-        FieldError: a value is not positive or outside its range, or the wheels stand
-            outside the footprint.
+        FieldError: a value is not positive or outside its range, or the wheels protrude from the footprint.
     """
 
     name: str
@@ -131,7 +130,7 @@ class RobotSpec:
     mass: Annotated[float, Interval(ge=0.01, le=1e5)]
     wheel_radius: Annotated[float, Interval(ge=0.005, le=5.0)]
     track: Annotated[float, Interval(ge=0.01, le=20.0)]
-    max_speed: Annotated[float, Interval(ge=0.05, le=10.0)]  # slower ones would count as standing; faster ones wobble
+    max_speed: Annotated[float, Interval(ge=0.05, le=10.0)]  # slower robots count as standing; faster ones oscillate
     max_yaw_rate: Annotated[float, Interval(ge=0.05, le=50.0)]
     max_acceleration: Annotated[float, Interval(ge=0.01, le=100.0)]
     max_yaw_acceleration: Annotated[float, Interval(ge=0.01, le=1000.0)]
@@ -165,23 +164,23 @@ class RobotSpec:
         self._require_wheels_inside()
 
     def _require_wheels_inside(self) -> None:
-        # Only the chassis detects contacts, so no part of a wheel may stand outside it.
+        # Only the chassis detects contacts, so wheels must not protrude.
         foot, half_track = self.footprint, self.track / 2
         if foot.corners:
             self._require_wheels_in_polygon()
         elif foot.is_disc and math.hypot(half_track, self.wheel_radius) > foot.rounding:
             raise FieldError(
-                "track", f"wheels of {self.wheel_radius:g} m, {self.track:g} m apart, stand outside the footprint"
+                "track", f"wheels of {self.wheel_radius:g} m, {self.track:g} m apart, protrude from the footprint"
             )
         elif not foot.is_disc and half_track > foot.half_width + foot.rounding:
-            raise FieldError("track", f"wheels {self.track:g} m apart stand outside the footprint")
+            raise FieldError("track", f"wheels {self.track:g} m apart protrude from the footprint")
         elif not foot.is_disc and self.wheel_radius > foot.half_length + foot.rounding:
-            raise FieldError("wheel_radius", f"wheels of {self.wheel_radius:g} m stand outside the footprint")
+            raise FieldError("wheel_radius", f"wheels of {self.wheel_radius:g} m protrude from the footprint")
         if self.wheel_room < WHEEL_ROOM * self.wheel_radius:
             raise FieldError(
                 "track",
-                f"wheels {self.track:g} m apart have their middles {self.wheel_room:g} m from the footprint's edge; "
-                f"their own width needs {WHEEL_ROOM * self.wheel_radius:g} m",
+                f"wheels {self.track:g} m apart are {self.wheel_room:g} m from the footprint's edge; "
+                f"their width needs {WHEEL_ROOM * self.wheel_radius:g} m",
             )
 
     def _require_wheels_in_polygon(self) -> None:
@@ -191,8 +190,8 @@ class RobotSpec:
         if self.footprint.depth(x, y) < 0:
             raise FieldError(
                 "footprint",
-                f"wheels of {r:g} m, {self.track:g} m apart, stand outside it at ({x:g}, {y:g}); the origin of the footprint "
-                "is the axle's centre",
+                f"wheels of {r:g} m, {self.track:g} m apart, protrude from it at ({x:g}, {y:g}); its origin is the axle's "
+                "centre",
             )
 
     @property
@@ -202,27 +201,27 @@ class RobotSpec:
 
     @property
     def wheel_room(self) -> float:
-        """Distance from the middle of a wheel to the footprint's edge, seen from above [m]."""
+        """Least horizontal distance from a wheel's centre to the footprint's edge [m]."""
         return min(self.footprint.depth(0.0, side * self.track / 2) for side in (1, -1))
 
     def _repr_html_(self) -> str:
-        """The robot as notebooks show it."""
+        """Return the robot's card for notebooks."""
         from antdrive.robots.card import robot_card
 
         return robot_card(self)
 
 
 GRAVITY = 9.81  # [m/s^2]
-ROUNDED = 1e-3  # a lidar on the footprint's edge may be this far outside: files round places [m]
+ROUNDED = 1e-3  # tolerance for a lidar on the footprint's edge: files round positions [m]
 
 
 def require_feasible(spec: RobotSpec) -> None:
-    """Refuse a robot whose wheels and motors cannot reach its own limits."""
+    """Raise FieldError if wheels and motors cannot reach the robot's own limits."""
     if 2 * spec.wheel_radius > spec.height:
         raise FieldError(
             "wheel_radius",
             f"wheels of {spec.wheel_radius:g} m are higher than the body of {spec.height:g} m; "
-            f"at most {spec.height / 2:.3g} m fits",
+            f"the largest radius is {spec.height / 2:.3g} m",
         )
     if spec.lidar is not None:
         require_on_robot(spec.lidar, spec.footprint)
@@ -244,7 +243,7 @@ def require_feasible(spec: RobotSpec) -> None:
 
 
 def require_on_robot(lidar: Lidar, foot: Footprint) -> None:
-    """Refuse a lidar beside the robot: nothing would notice what it strikes, and it would look through what it stands in."""
+    """Raise FieldError for a lidar outside the footprint, where contacts are not detected."""
     outside = -foot.depth(lidar.x, lidar.y)
     if outside > ROUNDED:
         key = "x" if abs(lidar.x) >= abs(lidar.y) else "y"
@@ -255,12 +254,12 @@ def require_on_robot(lidar: Lidar, foot: Footprint) -> None:
 
 
 def yaw_inertia(spec: RobotSpec) -> float:
-    """Moment of inertia of a robot's body about the vertical axis through its axle's centre, mass spread evenly [kg m^2]."""
+    """Return the moment of inertia of a uniform body about the vertical axis through the axle's centre [kg m^2]."""
     return yaw_inertia_of(spec.mass, spec.footprint)
 
 
 def yaw_inertia_of(mass: float, foot: Footprint) -> float:
-    """The same of a mass [kg] that is spread evenly over a footprint."""
+    """Return the moment of inertia of a mass [kg] spread evenly over a footprint [kg m^2]."""
     if len(foot.corners) == 1:
         (x, y), r = foot.corners[0], foot.rounding
         return mass * (r**2 / 2 + x**2 + y**2)
@@ -283,5 +282,5 @@ def _require_reached(key: str, what: str, spec: RobotSpec, limit: str, reached: 
         raise FieldError(
             key,
             f"{what} on a robot of {spec.mass:g} kg with wheels of {spec.wheel_radius:g} m, {spec.track:g} m apart, "
-            f"reach {reached:.3g} {unit} at most, but {limit} is {promised:g}; raise {key} or lower {limit}",
+            f"reach at most {reached:.3g} {unit}, but {limit} is {promised:g}; raise {key} or lower {limit}",
         )

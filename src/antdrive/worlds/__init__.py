@@ -1,6 +1,6 @@
-"""Where the robot drives: worlds and tasks, movers, exact geometry, grids, files, other formats, and a catalogue."""
+"""Worlds, tasks, movers, exact geometry, grids, files, imports and exports, and the catalogue of worlds."""
 
 import lazy_loader
 
-# What this package offers is listed, with its types, in __init__.pyi; each name is imported when first used.
+# __init__.pyi lists the public names and their types. Each name is imported when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,7 +1,7 @@
 """Exact distances to discs and walls.
 
 Clearance is the distance to the nearest disc surface or wall, in metres, negative inside a disc or beyond a wall.
-A robot of radius R that moves along a segment touches something when the segment's clearance is at most R.
+A robot of radius R moving along a segment has contact if the segment's clearance is at most R.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from antdrive.worlds.world import World
 
 
 def point_clearance(world: World, points: npt.ArrayLike) -> Floats:
-    """The clearance of each point, shape (N,) [m].
+    """Return the clearance of each point, shape (N,) [m].
 
     Args:
         world: the obstacles and walls; movers do not count
@@ -28,12 +28,12 @@ def point_clearance(world: World, points: npt.ArrayLike) -> Floats:
 
 
 def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) -> Floats:
-    """The clearance of each straight segment, shape (N,) [m].
+    """Return the clearance of each straight segment, shape (N,) [m].
 
     Args:
         world: the obstacles and walls; movers do not count
-        starts: the segments' first points (N, 2) [m]
-        ends: the segments' last points (N, 2) [m]
+        starts: the segments' start points (N, 2) [m]
+        ends: the segments' end points (N, 2) [m]
     """
     a = np.ascontiguousarray(starts, dtype=np.float64).reshape(-1, 2)
     b = np.ascontiguousarray(ends, dtype=np.float64).reshape(-1, 2)
@@ -43,7 +43,7 @@ def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) 
 
 
 def polyline_clearance(world: World, xy: npt.ArrayLike) -> float:
-    """The clearance of a whole polyline [m].
+    """Return the clearance of a polyline [m].
 
     Args:
         world: the obstacles and walls; movers do not count

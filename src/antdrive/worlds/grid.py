@@ -1,6 +1,6 @@
-"""A world cut into square cells: which are free, and which moves between them are free of collisions.
+"""Planning grids: free square cells and collision-free moves between them.
 
-Cells are (row, col) with the row along +y; cell (0, 0) holds the world's lower-left corner.
+Cells are (row, col), rows along +y; cell (0, 0) is at the world's lower-left corner.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Grid:
     """Free cells and allowed moves, for a robot of radius `inflate`.
 
     Attributes:
-        free: which cells are free (R, C): those at whose centre the robot touches nothing; read-only
+        free: cells at whose centre the robot has no contact (R, C), read-only
         moves: bit k is set where the move `DIRECTIONS[k]` is allowed (R, C), read-only
         cell: side of a cell [m]
         origin: centre of cell (0, 0), x and y [m]
@@ -46,9 +46,9 @@ class Grid:
         return rows, cols
 
     def xy(self, cells: npt.ArrayLike) -> Floats:
-        """The centres of cells in world coordinates, shape (N, 2) [m].
+        """Return the centres of cells in world coordinates, shape (N, 2) [m].
 
-        This is the one place where (row, col) becomes (x, y).
+        Only this method converts (row, col) to (x, y).
 
         Args:
             cells: (row, col) of each cell (N, 2); fractional cells are allowed
@@ -57,7 +57,7 @@ class Grid:
         return np.asarray(rc[:, ::-1] * self.cell + np.asarray(self.origin))
 
     def fractional(self, xy: npt.ArrayLike) -> Floats:
-        """The fractional cells (N, 2) of points: the inverse of `Grid.xy`.
+        """Return the fractional cells (N, 2) of points: the inverse of `Grid.xy`.
 
         Args:
             xy: world coordinates (N, 2) [m]
@@ -66,7 +66,7 @@ class Grid:
         return np.asarray((points - np.asarray(self.origin)) / self.cell)[:, ::-1]
 
     def cell_at(self, x: float, y: float) -> tuple[int, int]:
-        """The (row, col) of the cell that holds a point; points outside the grid get the nearest cell.
+        """Return the (row, col) of the cell that contains a point; of the nearest cell for points outside the grid.
 
         Args:
             x: world coordinate [m]
@@ -91,7 +91,7 @@ class Grid:
 
     @classmethod
     def from_free(cls, free: npt.ArrayLike, cell: float = 1.0, origin: Point = (0.0, 0.0)) -> Grid:
-        """A grid from its free cells alone; a diagonal move needs both orthogonal neighbours free.
+        """Return a grid of given free cells; a diagonal move requires both orthogonal neighbours free.
 
         Args:
             free: which cells are free (R, C)
@@ -113,11 +113,11 @@ class Grid:
 
 
 def rasterise(world: World, cell: float, inflate: float = 0.0) -> Grid:
-    """The grid of a world, for a robot of a given size.
+    """Rasterise a world for a robot of a given size.
 
-    A cell is free when a disc of radius `inflate` at its centre touches nothing. A move is allowed when both cells are
-    free, the disc swept along the move touches nothing (exact segment-disc distance), and, for a diagonal, both
-    orthogonal neighbours are free.
+    A cell is free if a disc of radius `inflate` at its centre has no contact. A move is allowed if both cells are
+    free, the disc swept along it has no contact (exact segment-disc distance), and, for a diagonal, both orthogonal
+    neighbours are free.
 
     Args:
         world: the obstacles and walls; movers do not count

@@ -1,7 +1,7 @@
-"""One mover as a function of time.
+"""Motions of movers as functions of time.
 
-Random steps are drawn once, from a run's seed. Everything else is a function of time that gives the same bits for the
-same time, whichever other times are asked for.
+Random steps are drawn once, from the run's seed. The result for a time is bit-identical, whatever other times are
+requested.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from antdrive.base.types import Bounds, Floats, Point
 from antdrive.worlds.limits import MAX_DRAWS
 from antdrive.worlds.movers import Cruising, Keyframed, Mover, Wandering
 
-CLEAR_OF_ROBOT = 1.0  # a wanderer's random first cell is at least this far from the robot's start, surface to point [m]
-TRIES = 10_000
-PATH_POINTS = 120  # of a line that is drawn
+CLEAR_OF_ROBOT = 1.0  # least distance from a wanderer's surface in its random first cell to the robot's start [m]
+TRIES = 10_000  # draws of a wanderer's first cell
+PATH_POINTS = 120  # points of a drawn path
 _NEIGHBOURS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.float64)  # x, y
 
 
 @runtime_checkable
 class MoverMotion(Protocol):
-    """A disc whose motion is known: what a planner in space and time needs of a mover."""
+    """A disc with known motion, as space-time planners use it."""
 
     @property
     def radius(self) -> float:
@@ -36,10 +36,10 @@ class MoverMotion(Protocol):
         ...
 
     def at(self, t: Floats) -> Floats:
-        """The disc's centres.
+        """Return the disc's centres.
 
         Args:
-            t: times (T,), not before a run's start and increasing [s]
+            t: times (T,) from a run's start on, increasing [s]
 
         Returns:
             Centres (T, 2) [m].
@@ -48,45 +48,43 @@ class MoverMotion(Protocol):
 
 
 class Motion(ABC):
-    """The motion of a world's mover: a `MoverMotion` that also says how fast it moves and when it jumps.
+    """The motion of a world's mover: a `MoverMotion` with velocities and jumps.
 
     All times (T,) are seconds since a run's start, >= 0 and increasing.
     """
 
     radius: float  # the mover's radius [m]
-    draws: int = 0  # how many random places were tried before a wanderer had its first cell
+    draws: int = 0  # random draws of a wanderer's first cell
 
     @abstractmethod
     def at(self, t: Floats) -> Floats:
-        """The mover's centres, (T, 2) [m]."""
+        """Return the mover's centres, (T, 2) [m]."""
 
     @abstractmethod
     def velocities(self, t: Floats) -> Floats:
-        """Velocities from each time on, (T, 2) [m/s]."""
+        """Return velocities, right-continuous in time, (T, 2) [m/s]."""
 
     @abstractmethod
     def travelled(self, t: Floats) -> Floats:
-        """A distance (T,) that grows at least as fast as the mover moves; jumps do not count [m]."""
+        """Return an upper bound of the distance travelled at each time, without jumps, (T,) [m]."""
 
     def jumped(self, t: Floats) -> npt.NDArray[np.int64]:
-        """The number of jumps up to each time, (T,)."""
+        """Return the number of jumps up to each time, (T,)."""
         return np.zeros(len(t), dtype=np.int64)
 
     def jump_times(self, until: float) -> Floats:
-        """The times of the jumps up to `until`, (J,) [s]."""
+        """Return the times of the jumps up to `until`, (J,) [s]."""
         return np.empty(0)
 
 
 def require_few_draws(motions: Iterable[Motion]) -> None:
-    """Refuse wanderers that took too many draws together to find free first cells."""
+    """Raise FieldError if the wanderers needed too many draws for their first cells."""
     if sum(motion.draws for motion in motions) > MAX_DRAWS:
-        raise FieldError(
-            "walk.start", f"missing; finding free first cells takes more than {MAX_DRAWS} draws in this world"
-        )
+        raise FieldError("walk.start", f"missing; random first cells need more than {MAX_DRAWS} draws in this world")
 
 
 def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, start: Point, seed: int) -> Motion:
-    """The motion of one mover of a world."""
+    """Return the motion of a world's mover."""
     if isinstance(mover, Keyframed):
         return _KeyframedMotion(mover)
     if isinstance(mover, Cruising):
@@ -96,20 +94,20 @@ def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, start: Po
 
 
 def path_ahead(motion: Motion, seconds: float) -> Floats:
-    """Where a mover goes from a run's start on, up to its first jump (N, 2) [m]: a line to draw."""
+    """Return a mover's path from the run's start to its first jump, to draw (N, 2) [m]."""
     end = float(min(motion.jump_times(seconds), default=seconds))
     times = np.linspace(0.0, end, PATH_POINTS)
     return motion.at(times[:-1] if end < seconds else times)
 
 
 class _KeyframedMotion(Motion):
-    """Along keyframes: each segment is a cubic in the share of its time that has passed."""
+    """Motion along keyframes; each segment is a cubic in its elapsed fraction of time."""
 
     def __init__(self, mover: Keyframed) -> None:
         frames = np.array(mover.keyframes, dtype=np.float64)
         self.radius = mover.radius
         self._loop = mover.loop
-        self._late = mover.phase - frames[0, 0]  # keyframe time 0 is this long before the run's start
+        self._late = mover.phase - frames[0, 0]  # time from keyframe time 0 to the run's start
         self._knots = frames[:, 0] - frames[0, 0]
         self._span = float(self._knots[-1])
         self._durations = np.diff(self._knots)
@@ -159,7 +157,7 @@ class _KeyframedMotion(Motion):
         return np.asarray(np.arange(first, last + 1) * self._span - self._late)
 
     def _lap(self, t: Floats) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
-        """The time along the keyframes, its direction (-1, 0 or 1), and the number of laps completed; each (T,)."""
+        """Return the time along the keyframes, its direction (-1, 0 or 1) and the laps completed, each (T,)."""
         local = t + self._late
         started = local >= 0
         local = np.maximum(local, 0.0)
@@ -172,28 +170,28 @@ class _KeyframedMotion(Motion):
         return along, np.where(started, np.where(back, -1.0, 1.0), 0.0), lap.astype(np.int64)
 
     def _segment(self, along: Floats, side: str) -> tuple[npt.NDArray[np.int64], Floats]:
-        """The segment (T,) of each time along the keyframes, and the share of it that has passed (T, 1)."""
-        found = np.searchsorted(self._knots, along, side="right" if side == "right" else "left") - 1
-        k = np.clip(found, 0, len(self._durations) - 1)
+        """Return the segment (T,) of each time along the keyframes, and its elapsed fraction (T, 1)."""
+        segment = np.searchsorted(self._knots, along, side="right" if side == "right" else "left") - 1
+        k = np.clip(segment, 0, len(self._durations) - 1)
         return k, ((along - self._knots[k]) / self._durations[k])[:, None]
 
 
 def _longest(terms: Floats) -> Floats:
-    """An upper bound (K,) of each cubic segment's length: its duration times the highest speed in it [m]."""
+    """Return an upper bound of each cubic segment's length: duration times highest speed, (K,) [m]."""
     _, a, b, c = terms
     ends = [np.abs(a), np.abs(a + 2 * b + 3 * c)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        turn = np.clip(np.nan_to_num(-b / (3 * c), nan=0.0), 0.0, 1.0)  # where a component's speed is extreme
+        turn = np.clip(np.nan_to_num(-b / (3 * c), nan=0.0), 0.0, 1.0)  # extremum of a component's speed
     most = np.maximum.reduce([*ends, np.abs(a + turn * (2 * b + turn * 3 * c))])
     return np.asarray(np.hypot(most[:, 0], most[:, 1]))
 
 
 class _CruisingMotion(Motion):
-    """Straight on, reflected at the walls: each coordinate is a line folded into the room between the walls."""
+    """Straight motion reflected at the walls: each coordinate is a line folded into the free interval."""
 
     def __init__(self, mover: Cruising, bounds: Bounds) -> None:
         self.radius = mover.radius
-        # Columns (2, 1): numpy is several times faster along rows of T than along T rows of two.
+        # Columns (2, 1): numpy is several times faster on two rows of T than on T rows of two.
         low, high = np.array(bounds[:2])[:, None], np.array(bounds[2:])[:, None]
         self._low = low + mover.radius
         self._room = high - mover.radius - self._low
@@ -206,7 +204,7 @@ class _CruisingMotion(Motion):
 
     def velocities(self, t: Floats) -> Floats:
         unfolded = self._unfolded(t)
-        # At the wall itself the mover already moves away from it.
+        # At the wall the velocity already points away from it.
         back = np.where(self._velocity < 0, (unfolded > self._room) | (unfolded == 0), unfolded >= self._room)
         return np.asarray(np.where(back, -self._velocity, self._velocity)).T
 
@@ -214,12 +212,12 @@ class _CruisingMotion(Motion):
         return np.asarray(t * math.hypot(*self._velocity[:, 0]))
 
     def _unfolded(self, t: Floats) -> Floats:
-        """The place (2, T) in a room twice as wide: the true one and its mirror image behind the wall."""
+        """Return the position (2, T) in the interval doubled by its mirror image."""
         return np.asarray(np.mod(self._first + t * self._velocity, 2 * self._room))
 
 
 class _WanderingMotion(Motion):
-    """From cell to cell. Steps are drawn when they are first asked for, in order, so that later calls change nothing."""
+    """Random walk between cells. Steps are drawn on first use, in order, and kept."""
 
     def __init__(self, mover: Wandering, bounds: Bounds, discs: Floats, start: Point, rng: np.random.Generator) -> None:
         self.radius = mover.radius
@@ -227,8 +225,8 @@ class _WanderingMotion(Motion):
         self._stops = [self._first_stop(start)]
 
     def at(self, t: Floats) -> Floats:
-        here, there, share = self._steps(t)
-        return np.asarray(here + share[:, None] * (there - here))
+        here, there, fraction = self._steps(t)
+        return np.asarray(here + fraction[:, None] * (there - here))
 
     def velocities(self, t: Floats) -> Floats:
         here, there, _ = self._steps(t)
@@ -238,7 +236,7 @@ class _WanderingMotion(Motion):
         return np.asarray(t * (math.sqrt(2) * self._mover.cell / self._mover.period))
 
     def _steps(self, t: Floats) -> tuple[Floats, Floats, Floats]:
-        """The step under way at each time: its beginning (T, 2), its end (T, 2) and the share of it done (T,)."""
+        """Return the current step at each time: start (T, 2), end (T, 2) and completed fraction (T,)."""
         periods = (t + self._mover.phase) / self._mover.period
         step = np.floor(periods).astype(np.int64)
         while len(self._stops) < (step.max(initial=0) + 2):
@@ -249,7 +247,7 @@ class _WanderingMotion(Motion):
     def _next_stop(self, here: Point) -> Point:
         cell = self._mover.cell
         x0, y0 = self._bounds[0] + cell / 2, self._bounds[1] + cell / 2
-        # Counted in cells, so that rounding errors do not add up from step to step.
+        # Counted in cells, so that rounding errors do not accumulate.
         col, row = round((here[0] - x0) / cell), round((here[1] - y0) / cell)
         ends = np.array([x0, y0]) + (_NEIGHBOURS + (col, row)) * cell
         free = np.flatnonzero(_free_steps(self._discs, self._bounds, here, ends, self._mover.radius))
@@ -273,13 +271,12 @@ class _WanderingMotion(Motion):
                 return x, y
         raise FieldError(
             "walk",
-            f"found no free cell of {mover.cell:g} m to begin in, {CLEAR_OF_ROBOT:g} m from the robot's start; "
-            "give walk.start",
+            f"no free first cell of {mover.cell:g} m at least {CLEAR_OF_ROBOT:g} m from the robot's start; give walk.start",
         )
 
 
 def first_cell(mover: Wandering, bounds: Bounds, discs: Floats) -> Point:
-    """The centre of the cell that holds the start of a wanderer that has one."""
+    """Return the centre of the cell that contains a wanderer's given start."""
     assert mover.start is not None
     (x, y), (xmin, ymin, xmax, ymax), cell = mover.start, bounds, mover.cell
     if not (xmin <= x <= xmax and ymin <= y <= ymax):
@@ -295,19 +292,19 @@ def first_cell(mover: Wandering, bounds: Bounds, discs: Floats) -> Point:
 
 
 def _cells_across(bounds: Bounds, cell: float) -> tuple[int, int]:
-    """How many columns and rows of cells the bounds hold."""
+    """Return the number of columns and rows of cells within the bounds."""
     width, height = bounds[2] - bounds[0], bounds[3] - bounds[1]
     return max(1, math.ceil(width / cell - 1e-9)), max(1, math.ceil(height / cell - 1e-9))
 
 
 def _free_steps(discs: Floats, bounds: Bounds, here: Point, ends: Floats, radius: float) -> npt.NDArray[np.bool_]:
-    """Whether a disc that is moved straight from a point to each of the ends (N, 2) touches no obstacle and no wall."""
+    """Return whether a disc moves straight from a point to each end (N, 2) without contact, (N,)."""
     walls = np.minimum(ends - np.array(bounds[:2]), np.array(bounds[2:]) - ends).min(axis=1)
     if not len(discs):
         return np.asarray(walls > radius)
     step = ends - np.array(here)
     length2 = np.maximum((step**2).sum(axis=1), 1e-300)
     to = discs[:, :2] - np.array(here)
-    share = np.clip(step @ to.T / length2[:, None], 0.0, 1.0)  # of the step, where a disc is nearest
-    gap = np.hypot(*np.moveaxis(to[None] - share[..., None] * step[:, None], -1, 0)) - discs[:, 2]
+    nearest = np.clip(step @ to.T / length2[:, None], 0.0, 1.0)  # fraction of the step where a disc is nearest
+    gap = np.hypot(*np.moveaxis(to[None] - nearest[..., None] * step[:, None], -1, 0)) - discs[:, 2]
     return np.asarray((walls > radius) & (gap > radius).all(axis=1))

@@ -1,8 +1,7 @@
-"""Moving cylinders as a world declares them: along keyframes, bouncing between the walls, or wandering from cell to cell.
+"""Mover declarations: cylinders that follow keyframes, bounce between the walls or walk at random.
 
-Nothing stops a mover or turns it aside: movers pass through each other, and a robot does not push them. Keyframed and
-cruising movers also pass through obstacles; wanderers choose steps that avoid them. `antdrive.worlds.trajectories`
-computes where movers are at any time.
+Movers are kinematic: they pass through each other, and robots do not push them. Keyframed and cruising movers also pass
+through obstacles; wanderers avoid them. `antdrive.worlds.trajectories` computes positions over time.
 """
 
 from __future__ import annotations
@@ -22,12 +21,12 @@ Interpolation = Literal["linear", "catmull-rom"]
 
 @dataclass(frozen=True, kw_only=True)
 class _Body:
-    """An upright cylinder that moves.
+    """A moving upright cylinder.
 
     Attributes:
         radius: as built, never inflated [m], > 0
         height: [m], > 0
-        phase: how much of the motion has already passed when a run starts [s], >= 0
+        phase: time into the motion at a run's start [s], >= 0
     """
 
     radius: float
@@ -43,19 +42,19 @@ class _Body:
 
 @dataclass(frozen=True, kw_only=True)
 class Keyframed(_Body):
-    """A mover that is at given places at given times. Before the first keyframe it stands at the first place.
+    """A mover with given positions at given times. It stands at the first position until the first keyframe.
 
     Attributes:
         radius: as built, never inflated [m], > 0
         height: [m], > 0
-        phase: how much of the motion has already passed when a run starts [s], >= 0
-        keyframes: time [s], x [m] and y [m] of each place, at least two, in the order of time; a mover whose
-            keyframes are all at one place stands still
-        loop: after the last keyframe the mover goes back the way it came, and forth again ("pingpong"), appears at
-            the first place again ("teleport"), or stays where it is ("once")
-        interpolation: between keyframes the mover goes straight at constant speed ("linear"), or along a cubic through
-            all places ("catmull-rom"). The cubic is uniform in each segment's share of time, as in Gazebo's
-            animations, and much faster than linear where a short segment follows a long one.
+        phase: time into the motion at a run's start [s], >= 0
+        keyframes: time [s], x [m] and y [m] of each, at least two, in order of time; with equal positions the mover
+            stands still
+        loop: after the last keyframe the mover goes back and forth ("pingpong"), jumps to the first position
+            ("teleport"), or stops ("once")
+        interpolation: straight at constant speed ("linear"), or along a cubic through all positions ("catmull-rom").
+            The cubic is uniform in each segment's fraction of time, as in Gazebo's animations, and much faster than
+            linear where a short segment follows a long one.
 
     Raises:
         FieldError: fewer than two keyframes, times that do not increase, or more than 20 m/s between keyframes.
@@ -76,24 +75,22 @@ class Keyframed(_Body):
                 raise FieldError(f"keyframes[{i}]", f"must be finite numbers, got {list(frame)}")
         for i, ((t0, *here), (t1, *there)) in enumerate(zip(self.keyframes, self.keyframes[1:], strict=False), 1):
             if not t1 > t0:
-                raise FieldError(f"keyframes[{i}]", f"its time must be later than the {t0:g} s before it, got {t1:g}")
+                raise FieldError(f"keyframes[{i}]", f"time must be greater than the previous {t0:g} s, got {t1:g}")
             if math.dist(here, there) > MAX_SPEED * (t1 - t0):
                 speed = math.dist(here, there) / (t1 - t0)
-                raise FieldError(
-                    f"keyframes[{i}]", f"is reached at {speed:.4g} m/s; at most {MAX_SPEED:g} m/s are allowed"
-                )
+                raise FieldError(f"keyframes[{i}]", f"needs {speed:.4g} m/s; the limit is {MAX_SPEED:g} m/s")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cruising(_Body):
-    """A mover that goes straight on at constant speed; its surface bounces off the walls like a ball off a cushion.
+    """A mover at constant speed whose surface bounces off the walls.
 
     Attributes:
         radius: as built, never inflated [m], > 0
         height: [m], > 0
-        phase: how much of the motion has already passed when a run starts [s], >= 0
-        position: the centre at first, x and y [m]
-        velocity: the velocity at first, x and y [m/s]
+        phase: time into the motion at a run's start [s], >= 0
+        position: initial centre, x and y [m]
+        velocity: initial velocity, x and y [m/s]
 
     Raises:
         FieldError: a velocity of 0 or of more than 20 m/s.
@@ -114,19 +111,19 @@ class Cruising(_Body):
 
 @dataclass(frozen=True, kw_only=True)
 class Wandering(_Body):
-    """A mover that walks at random: in every period from a cell's centre to a neighbour's (hasan's dynamic obstacle).
+    """A random walker: one step each period, from a cell's centre to a neighbour's (hasan's dynamic obstacle).
 
-    All of the eight neighbours that this radius can be moved to without touching an obstacle or a wall are equally
-    likely. Where there is none, the mover waits for a period.
+    All of the eight neighbours reachable without contact are equally likely. If there is none, the mover waits for a
+    period.
 
     Attributes:
         radius: as built, never inflated [m], > 0
         height: [m], > 0
-        phase: how much of the motion has already passed when a run starts [s], >= 0
-        cell: side of the cells, which are those of a grid over the world [m]
+        phase: time into the motion at a run's start [s], >= 0
+        cell: side of the cells of a grid over the world [m]
         period: time for one step, straight or diagonal [s]
         start: a point in the first cell, x and y [m]; None: a random free cell at least 1 m from the robot's start
-        seed: random seed of this mover; None: drawn from the run's seed and the mover's place in the list
+        seed: random seed of this mover; None: derived from the run's seed and the mover's index
 
     Raises:
         FieldError: a period below 0.05 s, or steps faster than 20 m/s.
@@ -150,10 +147,10 @@ class Wandering(_Body):
             raise FieldError("walk.seed", f"must be a whole number of at least 0, got {self.seed}")
 
 
-#: A cylinder that moves, in one of three ways.
+#: A moving cylinder of one of three kinds.
 Mover: TypeAlias = Keyframed | Cruising | Wandering
 
-#: The keys of each kind of mover in a file; the first of them says which kind it is.
+#: The keys of each kind of mover in a file; the first one determines the kind.
 _KEYS_BY_KIND = {
     "keyframes": ("keyframes", "loop", "interpolation"),
     "velocity": ("velocity", "position"),
@@ -162,13 +159,13 @@ _KEYS_BY_KIND = {
 
 
 def mover_from_dict(entry: Mapping[str, Any]) -> Mover:
-    """The mover in plain data, as in a world file."""
+    """Return the mover in plain data, as in a world file."""
     given = {key: value for key, value in entry.items() if value is not None}
     kinds = [kind for kind in _KEYS_BY_KIND if kind in given]
     if not kinds:
-        raise FieldError("", f"must have one of the keys {', '.join(_KEYS_BY_KIND)}, which says how it moves")
+        raise FieldError("", f"must have one of the keys {', '.join(_KEYS_BY_KIND)}")
     if len(kinds) > 1:
-        raise FieldError(kinds[1], f"cannot be given together with {kinds[0]}; a mover moves in one way, keep one")
+        raise FieldError(kinds[1], f"excludes {kinds[0]}; keep one of them")
     kind = kinds[0]
     body = {key: given[key] for key in ("radius", "height", "phase") if key in given}
     for key in given:
@@ -181,7 +178,7 @@ def mover_from_dict(entry: Mapping[str, Any]) -> Mover:
         return Keyframed(**body, keyframes=frames, **rest)
     if kind == "velocity":
         if "position" not in given:
-            raise FieldError("position", "missing; write [x, y], the centre at first")
+            raise FieldError("position", "missing; write [x, y], the centre at the start")
         return Cruising(**body, position=tuple(given["position"]), velocity=tuple(given["velocity"]))
     walk = {key: value for key, value in given["walk"].items() if value is not None}
     start = tuple(walk.pop("start")) if "start" in walk else None
@@ -189,7 +186,7 @@ def mover_from_dict(entry: Mapping[str, Any]) -> Mover:
 
 
 def mover_to_dict(mover: Mover) -> dict[str, Any]:
-    """A mover as plain data with the keys of a world file, ready for JSON."""
+    """Return a mover as JSON-ready data with the keys of a world file."""
     body: dict[str, Any] = {"radius": float(mover.radius), "height": float(mover.height)}
     if mover.phase:
         body["phase"] = float(mover.phase)
@@ -207,7 +204,7 @@ def mover_to_dict(mover: Mover) -> dict[str, Any]:
 
 
 def later(mover: Mover, seconds: float) -> Mover:
-    """The same mover, further into its motion when a run starts."""
+    """Return the mover with its phase advanced."""
     return dataclasses.replace(mover, phase=mover.phase + seconds)
 
 

@@ -1,10 +1,9 @@
-"""The polyline that a robot is asked to follow, and how far the ends of a path on a grid may lie from a task's.
+"""Routes, and the rule that joins a task's start and goal to the grid.
 
-The rule for ends is one for planning and for every check. A start or a goal need not lie at the centre of a free cell. The
-robot gets to a free cell near it on a straight line, no longer than `end_reach`. Where the start has less room than paths
-keep, that line, and nothing else of the path, may come as close to an obstacle as the start itself. Where the goal has less
-room, the path ends within the goal's tolerance of it. The line of a planner that is not bound to the grid has a path of cells
-beside it, which is as long but for `DETOUR`.
+Planning and all checks share the rule. A start or a goal need not lie at the centre of a free cell. A straight lead, at
+most `end_reach` long, joins it to a free cell nearby. If the start has less clearance than paths keep, its lead, and
+nothing else of the path, may be as close to obstacles as the start. If the goal has less clearance, the path ends within
+the goal tolerance. The line of an any-angle planner is at most `DETOUR` longer than its path of cells.
 """
 
 from __future__ import annotations
@@ -19,39 +18,39 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.base.types import Floats
 
-DETOUR = 3.0  # cells by which the line of a planner that is not bound to the grid may be longer than its cells
+DETOUR = 3.0  # largest excess of an any-angle planner's line over its path of cells [cells]
 
 
 def cells_beside(inflate: float, cell: float) -> int:
-    """How many rows and columns away from its own cell an end may be joined to the grid.
+    """Return how many rows and columns away an end may be joined to the grid.
 
-    Getting to farther cells would take a plan of its own.
+    Reaching farther cells would need a plan of its own.
     """
     return max(3, math.ceil(inflate / cell) + 1)
 
 
 def end_reach(inflate: float, cell: float) -> float:
-    """The farthest that the centre of such a cell can be from the end [m]."""
+    """Return the largest distance from an end to the centre of its grid cell [m]."""
     return math.sqrt(2.0) * (cells_beside(inflate, cell) + 0.5) * cell
 
 
 def longest_line(cost: float, leads: float, cell: float) -> float:
-    """The greatest length of a line beside a path of cells [m]."""
+    """Return the largest length of an any-angle line for a path of cells [m]."""
     return cost + leads + DETOUR * cell
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """The polyline, in world coordinates, that a robot is asked to follow.
+    """A polyline in world coordinates for the robot to follow.
 
     Attributes:
-        xy: the points (N, 2), N >= 2, read-only [m]; of equal neighbours only one is kept
-        curvature: of the exact curve from each point to the next (N,) [1/m]; None: not known
+        xy: the points (N, 2), N >= 2, read-only [m]; consecutive duplicates are removed
+        curvature: of the exact curve from each point to the next (N,) [1/m]; None: unknown
         kind: how the plan was smoothed
-        note: why the plan was not smoothed as asked; empty where it was
+        note: why the requested smoothing was not applied; empty if it was
 
     Raises:
-        FieldError: points that are not finite, not of shape (N, 2) or all equal, or a curvature of another length.
+        FieldError: points are not finite, not of shape (N, 2) or all equal, or the curvature's length differs.
     """
 
     xy: Floats
@@ -68,21 +67,21 @@ class Route:
             curvature = np.array(self.curvature, dtype=np.float64)
             if curvature.shape != xy.shape[:1] or not np.isfinite(curvature).all():
                 raise FieldError("curvature", f"must be {len(xy)} finite numbers, got shape {curvature.shape}")
-            curvature = curvature[np.append(moves_on, True)]  # the last of equal points holds the next segment's
+            curvature = curvature[np.append(moves_on, True)]  # the last of equal points has the next segment's
             curvature.setflags(write=False)
             object.__setattr__(self, "curvature", curvature)
         xy = np.ascontiguousarray(xy[np.insert(moves_on, 0, True)])
         if len(xy) < 2:
-            raise FieldError("xy", "a route needs at least two different points")
+            raise FieldError("xy", "must have at least two different points")
         xy.setflags(write=False)
         object.__setattr__(self, "xy", xy)
 
     @functools.cached_property
     def arc(self) -> Floats:
-        """The length along the route at each point, shape (N,) [m], from 0."""
+        """Arc length at each point, shape (N,) [m], from 0."""
         return arc_lengths(self.xy)
 
     @property
     def length(self) -> float:
-        """The whole length [m]."""
+        """Length [m]."""
         return float(self.arc[-1])

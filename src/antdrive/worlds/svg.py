@@ -1,6 +1,6 @@
-"""Drawings for notebooks: small SVG written by hand, so that nothing heavy is imported to look at a world.
+"""SVG drawings for notebooks, without imports of plotting libraries.
 
-Drawings take plain numbers: records import this module to draw themselves, not the other way round.
+The functions take plain numbers: records import this module to draw themselves.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from antdrive.base.types import Bounds, Floats, Pose
 
 LONGER_SIDE = 420  # of a world's drawing [px]
-MAX_DRAWN = 200  # cells along the longer side of a drawn grid; more would make notebooks slow
+MAX_DRAWN = 200  # cells along the longer side of a drawn grid; more slow notebooks down
 OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#ff7a0e"
 MOVER = "#a8329e"
 
@@ -29,16 +29,16 @@ def world_svg(
     lines: Iterable[tuple[Floats, str, bool]] = (),
     movers: Iterable[tuple[Floats, float]] = (),
 ) -> str:
-    """A world from above, as SVG."""
+    """Draw a world from above as SVG."""
     x0, y0, x1, y1 = bounds
     scale = LONGER_SIDE / max(x1 - x0, y1 - y0)
     pen = 1.6 / scale
     parts = [_rectangle(bounds, 'fill="#f3f5f8"')]
     parts += [f'<circle cx="{x:.4g}" cy="{y:.4g}" r="{radius:.4g}" fill="{OBSTACLE}"/>' for x, y, radius in discs]
-    for way, radius in movers:
+    for path, radius in movers:
         style = f'stroke="{MOVER}" stroke-width="{pen:.3g}"'
-        x, y = way[0]
-        parts.append(_polyline(way, f'{style} stroke-dasharray="{pen:.3g} {2 * pen:.3g}"'))
+        x, y = path[0]
+        parts.append(_polyline(path, f'{style} stroke-dasharray="{pen:.3g} {2 * pen:.3g}"'))
         parts.append(f'<circle class="mover" cx="{x:.4g}" cy="{y:.4g}" r="{radius:.4g}" fill="{MOVER}55" {style}/>')
     for points, colour, dashed in lines:
         dash = f' stroke-dasharray="{5 * pen:.3g} {3 * pen:.3g}"' if dashed else ""
@@ -58,7 +58,7 @@ def world_svg(
 
 
 def path_svg(points: Floats, longer_side: int = 240) -> str:
-    """A polyline alone, x right and y up, as SVG."""
+    """Draw a polyline, x right and y up, as SVG."""
     (x0, y0), (x1, y1) = points.min(axis=0) - 1, points.max(axis=0) + 1
     pen = 2.0 * max(x1 - x0, y1 - y0) / longer_side
     line = _polyline(points, f'stroke="{LINE}" stroke-width="{pen:.3g}"')
@@ -70,7 +70,7 @@ def path_svg(points: Floats, longer_side: int = 240) -> str:
 
 
 def cells_svg(free: npt.NDArray[np.bool_]) -> str:
-    """The blocked cells of a grid (R, C) as SVG, rows upwards. Large grids are drawn coarser."""
+    """Draw the blocked cells of a grid (R, C) as SVG, rows upwards. Large grids are drawn more coarsely."""
     coarse = -(-max(free.shape) // MAX_DRAWN)
     blocked = np.pad(~free, [(0, -side % coarse) for side in free.shape], constant_values=False)
     rows, cols = blocked.shape[0] // coarse, blocked.shape[1] // coarse
@@ -87,7 +87,7 @@ def cells_svg(free: npt.NDArray[np.bool_]) -> str:
 
 
 def curve_svg(values: Floats, width: int = 240, height: int = 90) -> str:
-    """Values by iteration, as SVG; empty where fewer than two are finite."""
+    """Draw values by iteration as SVG; empty if fewer than two are finite."""
     known = [(k, float(value)) for k, value in enumerate(values) if math.isfinite(value)]
     if len(known) < 2:
         return ""
@@ -104,7 +104,7 @@ def curve_svg(values: Floats, width: int = 240, height: int = 90) -> str:
 
 
 def card(picture: str, title: str, facts: Mapping[str, object]) -> str:
-    """A picture with a title and a table of facts below, as HTML."""
+    """Return a picture with a title and a table of facts as HTML."""
     rows = "".join(
         f'<tr><td style="color:#5b6576;text-align:left">{escape(str(key))}</td>'
         f'<td style="text-align:left">{escape(str(value))}</td></tr>'
@@ -124,7 +124,7 @@ def _polyline(points: Floats, style: str) -> str:
 
 
 def _svg(bounds: Bounds, parts: list[str], longer_side: int) -> str:
-    """Parts in metres, y up, in a picture whose longer side has so many pixels."""
+    """Return an SVG of parts in metres, y up; `longer_side` is in pixels."""
     x0, y0, x1, y1 = bounds
     pad = 0.02 * max(x1 - x0, y1 - y0)
     width, height = x1 - x0 + 2 * pad, y1 - y0 + 2 * pad

@@ -1,4 +1,4 @@
-"""Where all movers of a run are at any time. Needs numpy alone, so that a log is checked without compiler or physics."""
+"""Trajectories of a run's movers, in numpy only, so that logs are checked without compiler or physics."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from antdrive.worlds.world import World
 class Trajectories:
     """All movers of a run as functions of time.
 
-    The same time gives the same bits, whichever other times are asked for.
+    The result for a time is bit-identical, whatever other times are requested.
 
     Attributes:
         radii: each mover's radius (M,) [m]
@@ -31,15 +31,15 @@ class Trajectories:
 
     @classmethod
     def of(cls, world: World, start: Point, seed: int = 0) -> Trajectories:
-        """The trajectories of a world's movers.
+        """Return the trajectories of a world's movers.
 
         Args:
             world: the world
-            start: the robot's start, which a wanderer's random first cell keeps off [m]
-            seed: the run's random seed, for wanderers without a seed of their own
+            start: the robot's start, avoided by wanderers' random first cells [m]
+            seed: the run's random seed, for wanderers without their own
 
         Raises:
-            InputError: there is no free cell in which a wanderer could begin.
+            InputError: a wanderer has no free first cell.
         """
         discs, motions = world.discs, []
         for i, mover in enumerate(world.movers):
@@ -55,7 +55,7 @@ class Trajectories:
         return len(self.motions)
 
     def positions(self, t: npt.ArrayLike) -> Floats:
-        """The movers' centres, shape (T, M, 2) [m].
+        """Return the movers' centres, shape (T, M, 2) [m].
 
         Args:
             t: times (T,), or one time [s]
@@ -64,7 +64,7 @@ class Trajectories:
         return _stacked([motion.at(times) for motion in self.motions], (len(times), 0, 2))
 
     def velocities(self, t: npt.ArrayLike) -> Floats:
-        """The movers' velocities from each time on, shape (T, M, 2) [m/s].
+        """Return the movers' velocities, right-continuous in time, shape (T, M, 2) [m/s].
 
         Args:
             t: times (T,), or one time [s]
@@ -73,7 +73,7 @@ class Trajectories:
         return _stacked([motion.velocities(times) for motion in self.motions], (len(times), 0, 2))
 
     def travel(self, t: npt.ArrayLike) -> Floats:
-        """How far each mover gets at most between one time and the next, shape (T - 1, M) [m]; jumps do not count.
+        """Return an upper bound of each mover's travel between consecutive times, without jumps, shape (T - 1, M) [m].
 
         Args:
             t: times (T,) [s]
@@ -82,7 +82,7 @@ class Trajectories:
         return _stacked([np.diff(motion.travelled(times)) for motion in self.motions], (max(0, len(times) - 1), 0))
 
     def jumps(self, t: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Whether each mover jumps after one time and no later than the next, shape (T - 1, M).
+        """Return whether each mover jumps in (t[i], t[i + 1]], shape (T - 1, M).
 
         Args:
             t: times (T,) [s]
@@ -92,10 +92,10 @@ class Trajectories:
         return np.stack(rows, axis=1) if rows else np.zeros((max(0, len(times) - 1), 0), dtype=np.bool_)
 
     def jump_times(self, until: float) -> tuple[Floats, ...]:
-        """The times at which each mover jumps, M arrays of shape (J,) [s].
+        """Return the times of each mover's jumps, M arrays of shape (J,) [s].
 
         Args:
-            until: the last time of interest [s]
+            until: end of the interval [s]
         """
         return tuple(motion.jump_times(until) for motion in self.motions)
 

@@ -1,4 +1,4 @@
-"""What a robot drives in: upright cylinders between walls, a start and a goal."""
+"""Worlds (upright cylinders between walls) and tasks (a world with start and goal)."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from antdrive.worlds.motions import Motion, first_cell, motion_of, path_ahead, r
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
 from antdrive.worlds.svg import card, world_svg
 
-DRAWN_TIME = 20.0  # how far ahead notebooks show the ways of movers [s]
+DRAWN_TIME = 20.0  # length of movers' paths in notebooks [s]
 
 
 @dataclass(frozen=True)
 class Disc:
-    """An upright cylinder, seen from above.
+    """An upright cylinder.
 
     Attributes:
         x: the centre's x [m]
         y: the centre's y [m]
-        radius: the radius as built, never inflated [m]
+        radius: true radius, never inflated [m]
         height: the height [m]
 
     Raises:
@@ -48,18 +48,18 @@ class Disc:
 
 @dataclass(frozen=True)
 class World:
-    """Cylinders inside four solid walls; some of them may move.
+    """Static and moving cylinders inside four solid walls.
 
     Attributes:
-        name: what people call the world
+        name: the world's name
         bounds: the walls' inner faces: xmin, ymin, xmax, ymax [m]
-        obstacles: the cylinders that never move
-        source: where the world comes from, free text
-        movers: the cylinders that move; `Trajectories` computes where they are
+        obstacles: the static cylinders
+        source: origin of the world, free text
+        movers: the moving cylinders; `Trajectories` computes their positions
 
     Raises:
-        FieldError: bounds that enclose nothing or are not finite, a mover without room where it begins, or wanderers
-            with more steps behind them than can be drawn at once.
+        FieldError: bounds are empty or not finite, a mover has no room at its start, or wanderers have too many steps
+            before the start.
     """
 
     name: str
@@ -82,10 +82,10 @@ class World:
         self._require_short_walks()
 
     def later(self, seconds: float) -> World:
-        """The same world, with every mover further into its motion when a run starts.
+        """Return the world with all movers' phases advanced.
 
         Args:
-            seconds: how much further [s]
+            seconds: the time to advance [s]
         """
         return dataclasses.replace(self, movers=tuple(later(mover, seconds) for mover in self.movers))
 
@@ -105,7 +105,7 @@ class World:
                 first_cell(mover, self.bounds, self.discs)
 
     def _require_short_walks(self) -> None:
-        """Refuse phases of wanderers that are too many steps: they are drawn one by one before a run starts."""
+        """Raise FieldError if wanderers have too many steps before the start: each one is drawn."""
         steps = {i: math.floor(m.phase / m.period) for i, m in enumerate(self.movers) if isinstance(m, Wandering)}
         if not steps:
             return
@@ -114,8 +114,8 @@ class World:
             i = max(steps, key=lambda i: steps[i])
             raise FieldError(
                 f"movers[{i}].phase",
-                f"{self.movers[i].phase:g} s are {steps[i]} steps before the start; the wanderers of this world may "
-                f"have {most:.0f} together; lower phase, or give another walk.seed",
+                f"{self.movers[i].phase:g} s are {steps[i]} steps before the start; the limit for all wanderers of this "
+                f"world is {most:.0f}; lower phase, or give another walk.seed",
             )
 
     @property
@@ -139,11 +139,11 @@ class World:
         return card(world_svg(self.bounds, self.discs, movers=self.mover_paths()), self.name, facts)
 
     def mover_paths(self, start: Point | None = None, seed: int | None = None) -> list[tuple[Floats, float]]:
-        """The way (N, 2) [m] and the radius [m] of each mover over the next 20 s, to draw.
+        """Return the path over the next 20 s (N, 2) [m] and the radius [m] of each mover, to draw.
 
         Args:
             start: the robot's start [m]
-            seed: the run's random seed; None: wanderers whose way depends on it are left out
+            seed: the run's random seed; None: wanderers that depend on it are omitted
         """
         paths = []
         for i, mover in enumerate(self.movers):
@@ -155,11 +155,11 @@ class World:
 
 
 class PointWorld(World):
-    """A world that was measured, as numbers: its `Disc` records are made when somebody asks for them, which planners do not."""
+    """A world of measured points, which creates its `Disc` records on first use."""
 
     @classmethod
     def of(cls, name: str, bounds: Bounds, discs: Floats) -> PointWorld:
-        """The world of so many cylinders."""
+        """Return the world of the given cylinders (N, 3): x, y, radius [m]."""
         if not (np.isfinite(discs).all() and (discs[:, 2] > 0).all()):
             row = np.flatnonzero(~(np.isfinite(discs).all(axis=1) & (discs[:, 2] > 0)))[0]
             Disc(*discs[row].tolist())
@@ -170,22 +170,22 @@ class PointWorld(World):
 
     @functools.cached_property
     def obstacles(self) -> tuple[Disc, ...]:
-        """The cylinders, one by one."""
+        """The cylinders as records."""
         return tuple(Disc(x, y, radius) for x, y, radius in self._discs.tolist())
 
 
 @dataclass(frozen=True)
 class Task:
-    """A world with a start pose and a goal to reach: what a world file holds.
+    """A world with a start pose and a goal: the content of a world file.
 
     Attributes:
-        world: where the robot drives
-        start: the robot's first pose: x, y [m] and yaw [rad, counter-clockwise from +x]
-        goal: where the robot's centre must stop: x, y [m]
-        goal_tolerance: how close to the goal the robot must stop [m]
-        cell: the grid resolution that planners use unless another is given [m]
-        time_limit: simulated time allowed unless another limit is given [s]; None: ample for the route
-        frame: how the world lies in the map that it was made from, for exports: x, y [m] and yaw [rad] of its frame there
+        world: the world to drive in
+        start: the robot's start pose: x, y [m] and yaw [rad, counter-clockwise from +x]
+        goal: target position of the robot's centre: x, y [m]
+        goal_tolerance: largest distance from the goal at the stop [m]
+        cell: default grid resolution for planners [m]
+        time_limit: default limit of simulated time [s]; None: computed from the route
+        frame: pose of the world's frame in its source map, for exports: x, y [m] and yaw [rad]
 
     Raises:
         FieldError: the start or the goal is out of bounds or inside a cylinder, or a size is not positive.
@@ -211,7 +211,7 @@ class Task:
         for key, (x, y) in (("start", self.start[:2]), ("goal", self.goal)):
             self._require_free(key, x, y)
         if self.goal == self.start[:2]:
-            raise FieldError("goal", "is where the robot starts; choose another place")
+            raise FieldError("goal", "equals the start; choose another position")
         self._require_start_clear_of_movers()
 
     def _require_free(self, key: str, x: float, y: float) -> None:
@@ -229,7 +229,7 @@ class Task:
                 )
 
     def _require_start_clear_of_movers(self) -> None:
-        """Refuse a start inside a mover, and a wanderer without a free first cell."""
+        """Raise FieldError for a start inside a mover, or a wanderer without a free first cell."""
         x, y = self.start[:2]
         discs = self.world.discs if self.world.movers else np.empty((0, 3))
         motions: list[Motion] = []
@@ -244,7 +244,7 @@ class Task:
             if math.hypot(x - mx, y - my) <= motion.radius:
                 raise FieldError(
                     "start",
-                    f"({x:g}, {y:g}) is inside movers[{i}], which begins at ({mx:g}, {my:g}) "
+                    f"({x:g}, {y:g}) is inside movers[{i}], which starts at ({mx:g}, {my:g}) "
                     f"with radius {motion.radius:g}",
                 )
 
@@ -263,5 +263,5 @@ class Task:
 
 
 def by_geometry(world: World) -> Keyed[World]:
-    """The world, equal to all worlds whose walls and standing cylinders have the same bits, seen from above."""
+    """Return the world keyed by the bits of its walls and static cylinders; heights do not count."""
     return Keyed(world, (bits(*world.bounds), world.discs.tobytes()))

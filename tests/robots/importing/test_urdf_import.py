@@ -133,18 +133,18 @@ def limited(tmp_path, words):
         ('velocity="200"', "max_speed", 6.6, "computed: the velocity limit of joint wheel_left_joint, 200 rad/s, times"),
         ('velocity="200"', "max_yaw_rate", 3.14, "assumed: half a turn a second; the velocity limit of joint"),
         ('velocity="400"', "max_speed", 0.5,
-         "assumed: the velocity limit of joint wheel_left_joint, 400 rad/s would be 13.2 m/s, above the 10 m/s that "
-         "a robot's file may say, and is not used"),
+         "assumed: the velocity limit of joint wheel_left_joint, 400 rad/s would be 13.2 m/s, above the 10 m/s limit of "
+         "robot files, not used"),
         ('velocity="400"', "max_wheel_speed", 400.0, "read: the velocity limit of joint wheel_left_joint, 400 rad/s"),
         ('velocity="99999"', "max_wheel_speed", 18.182,
-         "assumed: 1.2 times what the speeds need; the velocity limit of joint wheel_left_joint, 99999 rad/s is above the "
-         "10000 rad/s that a robot's file may say, and is not used"),
+         "assumed: 1.2 times the speeds' requirement; the velocity limit of joint wheel_left_joint, 99999 rad/s is above the "
+         "10000 rad/s limit of robot files, not used"),
         ("", "max_speed", 0.5, "assumed: the file has no limit"),
         ('effort="0.3"', "wheel_torque", 0.3, "read: the effort limit of joint wheel_left_joint, 0.3 N m"),
-        ('effort="0.0001"', "wheel_torque", 0.066, "assumed: 4 times what 1 m/s2 need; the effort limit of joint wheel_left"),
+        ('effort="0.0001"', "wheel_torque", 0.066, "assumed: 4 times the torque for 1 m/s2; the effort limit of joint wheel_lef"),
         ('effort="1e6"', "wheel_torque", 1e6, "read: the effort limit of joint wheel_left_joint, 1000000 N m"),
-        ("", "wheel_torque", 0.066, "assumed: 4 times what 1 m/s2 need"),
-        ('effort="0.01"', "max_acceleration", 0.545455, "computed: nine tenths of what motors and grip reach"),
+        ("", "wheel_torque", 0.066, "assumed: 4 times the torque for 1 m/s2"),
+        ('effort="0.01"', "max_acceleration", 0.545455, "computed: 0.9 times the limit of motors and grip"),
     ],
 )  # fmt: skip
 def test_no_limit_of_a_joint_is_left_out_without_a_word(tmp_path, words, key, value, says):
@@ -157,14 +157,14 @@ def test_no_limit_of_a_joint_is_left_out_without_a_word(tmp_path, words, key, va
     ("tag", "told", "velocity", "key", "value", "says"),
     [
         ("max_linear_velocity", 50, "", "max_speed", 0.5, "assumed: <max_linear_velocity> of the drive plugin, 50 m/s, is above "
-         "the 10 m/s that a robot's file may say, and is not used"),
+         "the 10 m/s limit of robot files, not used"),
         ("max_linear_velocity", 50, 'velocity="7"', "max_speed", 0.231, "computed: the velocity limit of joint "
          "wheel_left_joint, 7 rad/s, times the wheels' radius; <max_linear_velocity> of the drive plugin, 50 m/s, is above"),
         ("max_linear_velocity", 12, 'velocity="400"', "max_speed", 0.5, "assumed: the velocity limit of joint wheel_left_joint, "
-         "400 rad/s would be 13.2 m/s, above the 10 m/s that a robot's file may say, and is not used; <max_linear_velocity>"),
+         "400 rad/s would be 13.2 m/s, above the 10 m/s limit of robot files, not used; <max_linear_velocity>"),
         ("max_linear_velocity", 10, "", "max_speed", 10.0, "read: <max_linear_velocity> of the drive plugin"),
         ("max_angular_velocity", 99, "", "max_yaw_rate", 2.0, "assumed: <max_angular_velocity> of the drive plugin, 99 rad/s, "
-         "is above the 50 rad/s that a robot's file may say, and is not used"),
+         "is above the 50 rad/s limit of robot files, not used"),
     ],
 )  # fmt: skip
 def test_a_speed_that_stands_for_no_limit_is_not_used_but_named(tmp_path, tag, told, velocity, key, value, says):
@@ -216,14 +216,14 @@ def test_ros2_control_names_the_driven_wheels_and_their_limit(tmp_path):
     assert (found.spec.max_wheel_speed, found.spec.max_speed) == (5.0, pytest.approx(5 * 0.1651))
     assert comments(found)["max_wheel_speed"] == "read: the limit of joint rear_right_wheel in <ros2_control>, 5 rad/s"
     for joint, limit, says in (
-        ("rear_wrong_wheel", most, "<ros2_control> drives joint 'rear_wrong_wheel', which there is not"),
+        ("rear_wrong_wheel", most, "<ros2_control> names joint 'rear_wrong_wheel', which does not exist"),
         (
             "rear_right_wheel",
             '<param name="max">-5</param>',
             "max in <ros2_control> must be a number above 0, got '-5'",
         ),
         ("rear_right_wheel", '<param name="max">fast</param>', "must be a number above 0, got 'fast'"),
-        ("front_left_wheel", "", "front_left_wheel and rear_left_wheel are no two wheels on one axle"),
+        ("front_left_wheel", "", "front_left_wheel and rear_left_wheel are not on one axle"),
     ):
         path.write_text(text.replace("</robot>", CONTROL.format(joint, limit, "rear_left_wheel")))
         with pytest.raises(InputError, match=re.escape(says)):
@@ -298,7 +298,7 @@ def test_links_without_a_mass_are_named(tmp_path):
 
 def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle():
     with pytest.raises(
-        InputError, match=r"2 pairs of wheels on axles \(front_left_wheel and front_right_wheel; rear_left"
+        InputError, match=r"2 axles with pairs of wheels \(front_left_wheel and front_right_wheel; rear_left"
     ):
         imported("husky.urdf")
     robot = imported("husky.urdf", left="rear_left_wheel", right="rear_right_wheel").spec
@@ -338,7 +338,7 @@ def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path):
         ('<parent link="base_link"/><child link="left"/>', '<parent link="knuckle"/><child link="left"/>'),
         ("<left_joint>wheel_left_joint</left_joint>", ""),
     )
-    with pytest.raises(InputError, match="steer steer wheels: this is no differential drive"):
+    with pytest.raises(InputError, match="steer steer wheels: not a differential drive"):
         import_urdf(path)
     roller = (
         '<link name="roller"/><joint name="roller_joint" type="continuous"><parent link="left"/><child link="roller"/>'
@@ -347,7 +347,7 @@ def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path):
     path = changed(
         tmp_path, "waffle.urdf", ("<gazebo>", roller + "<gazebo>"), ("<left_joint>wheel_left_joint</left_joint>", "")
     )
-    with pytest.raises(InputError, match="carry 1 rollers, such as roller_joint"):
+    with pytest.raises(InputError, match="have 1 rollers, such as roller_joint"):
         import_urdf(path)
 
 
@@ -356,7 +356,7 @@ def test_a_plugin_for_a_vehicle_that_skids_chooses_no_axle(tmp_path):
         f"<{side}_joint>{end}_{side}_wheel</{side}_joint>" for side in ("left", "right") for end in ("front", "rear")
     ) + "</plugin></gazebo></robot>"  # fmt: skip
     path = changed(tmp_path, "husky.urdf", ("</robot>", plugin))
-    with pytest.raises(InputError, match="2 pairs of wheels on axles"):
+    with pytest.raises(InputError, match="2 axles with pairs of wheels"):
         import_urdf(path)
     one = re.sub(r"<(left|right)_joint>front.*?</(left|right)_joint>", "", plugin)
     path = changed(tmp_path, "husky.urdf", ("</robot>", one))
@@ -365,9 +365,7 @@ def test_a_plugin_for_a_vehicle_that_skids_chooses_no_axle(tmp_path):
 
 def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path):
     body = '<collision><origin xyz="-0.064 0 0.0815"/><geometry><box size="0.281 0.306 0.119"/></geometry></collision>'
-    with pytest.raises(
-        InputError, match="has no collision geometry beside its wheels, from which a footprint could follow"
-    ):
+    with pytest.raises(InputError, match="has no collision geometry other than its wheels, so no footprint"):
         import_urdf(changed(tmp_path, "waffle.urdf", (body, "")))
     with pytest.raises(InputError, match=r"has no collision geometry below 0\.005 m beside its wheels"):
         imported("burger.urdf", below=0.005)
@@ -395,7 +393,7 @@ def test_wheels_can_be_told_by_joint_or_link():
     back = imported("burger.urdf", left="wheel_right_link", right="wheel_left_link").spec  # it drives backwards
     assert back.footprint.bounds == pytest.approx((-0.037, -0.089, 0.101, 0.089), abs=1e-4)
     with pytest.raises(
-        InputError, match="scan: does not turn freely about a level axis; joints that could drive: wheel_left_joint, wh"
+        InputError, match="scan: does not turn freely about a level axis; candidates: wheel_left_joint, wh"
     ):
         imported("burger.urdf", left="scan", right="wheel_right_link")
     with pytest.raises(InputError, match="wheel: no such joint or link"):
@@ -417,7 +415,7 @@ def test_what_lies_higher_is_left_out_and_meshes_too_where_asked(tmp_path):
     )
     found = import_urdf(mesh, without_meshes=True)
     assert found.missing_meshes == ("mast: package://tb/mast.stl",)
-    assert found.text.endswith("# left out, because they were not found: mast: package://tb/mast.stl\n")
+    assert found.text.endswith("# omitted, because not found: mast: package://tb/mast.stl\n")
 
 
 def test_a_mesh_is_read_with_its_scale(tmp_path):
@@ -624,7 +622,7 @@ def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path):
     found = import_urdf(path, arguments={"name": "two"})
     assert found.spec.name == "two"
     (tmp_path / "parts").rename(tmp_path / "elsewhere")
-    with pytest.raises(InputError, match="Package not found: parts; say where it is with --package NAME=FOLDER"):
+    with pytest.raises(InputError, match="Package not found: parts; give its folder with --package NAME=FOLDER"):
         import_urdf(path, arguments={"name": "two"})
     assert import_urdf(path, arguments={"name": "two"}, packages={"parts": tmp_path / "elsewhere"}).spec == found.spec
     with pytest.raises(InputError, match=r"--arg name: burger\.urdf is no \.xacro, and has no arguments"):

@@ -225,7 +225,7 @@ def test_a_task_that_no_file_can_hold_is_not_written(tmp_path):
     ("count", "place", "problem"),
     [
         (36_000, 1 / 3, "not written: 36000 obstacles and 0 movers make 2."),
-        (41_000, 2.0, "values, and a world file has at most 2 MB and 200000 values; use fewer"),
+        (41_000, 2.0, "values; the limits are 2 MB and 200000 values; use fewer"),
     ],
 )
 def test_a_world_that_could_not_be_read_back_is_not_written(tmp_path, count, place, problem):

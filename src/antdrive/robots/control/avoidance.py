@@ -1,16 +1,16 @@
 """Local avoidance of movers: slow down, stop, back off or go around them, then resume the route.
 
-In every control period the controller's own motion is simulated ahead among the predicted movers. If it keeps
-the preferred clearance, it is taken unchanged. Otherwise it competes with other candidates: the same route at
-lower speeds, and pairs of constant twists, forwards and backwards, one after the other, within the robot's
-dynamic window (after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
-IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing
-still is simulated like any other candidate, so the robot moves out of the way of a mover that approaches it.
+In every control period the controller's motion is simulated among the predicted movers. If it keeps the preferred
+clearance, it is used unchanged. Otherwise it competes with other candidates: the same route at lower speeds, and
+sequences of two constant twists, forwards or backwards, within the robot's dynamic window
+(after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
+IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing still is a
+candidate as well, so the robot moves out of the path of an approaching mover.
 
 A mover that turns close by may leave no candidate with the least clearance. While the robot can still stop in time,
-it takes the candidate whose contact comes last. After that it takes the one that stays farthest from movers, and
-stops only if each would touch one (T. Fraichard and H. Asama, *Inevitable collision states*, Advanced Robotics 18,
-2004, judge a state by its best escape in the same way).
+it takes the candidate with the latest contact. After that it takes the one that stays farthest from movers, and
+stops only if all have contact (T. Fraichard and H. Asama, *Inevitable collision states*, Advanced Robotics 18,
+2004, evaluate a state by its best escape in the same way).
 """
 
 from __future__ import annotations
@@ -29,17 +29,16 @@ from antdrive.robots.control._kernels_pursuit import reachable_twist
 from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
 from antdrive.robots.spec import Footprint, RobotSpec
 
-SPEED_WEIGHT = 0.3  # progress that 1 m/s of final speed along the route is worth [m per m/s]
-PERSISTENCE = 0.05  # progress that keeping to the last decision is worth [m]
+SPEED_WEIGHT = 0.3  # worth of final speed along the route, as progress [m per m/s]
+PERSISTENCE = 0.05  # worth of keeping the last decision, as progress [m]
 
 
 class AvoidanceState(NamedTuple):
-    """What avoidance remembers between two control periods.
+    """Avoidance state between two control periods.
 
     Attributes:
-        candidate: the pair of twists that is being executed, a row of the table of candidates; empty if there
-            is none
-        remaining: how long its first twist still lasts [s]
+        candidate: the pair of twists in execution, a row of the candidate table; empty if there is none
+        remaining: remaining time of its first twist [s]
     """
 
     candidate: tuple[float, ...] = ()
@@ -48,19 +47,19 @@ class AvoidanceState(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Avoidance:
-    """The settings of local avoidance. A weight is the progress along the route that a shortcoming costs.
+    """Settings of local avoidance. Weights are costs in metres of progress along the route.
 
     Attributes:
-        horizon: how far ahead movers are predicted [s]
+        horizon: prediction horizon [s]
         step: time between two predicted instants [s]
-        min_clearance: the least clearance to movers; one that is closer already may come only a little closer [m]
-        preferred_clearance: clearance beyond the least from which more makes no difference [m]
-        clearance_weight: progress that each metre short of the preferred clearance costs [m/m]
-        cross_track_weight: progress that each metre off the route costs [m/m]
-        heading_weight: progress that each radian off the route's direction costs [m/rad]
-        reversal_time: how far ahead a sudden reversal of a mover is considered [s]
-        reversal_margin: clearance, beyond `min_clearance`, to keep from where a mover that reverses would be [m]
-        reversal_weight: progress that each metre of this clearance that is missing costs [m/m]; 0 ignores reversals
+        min_clearance: least clearance to movers; one already closer may come only slightly closer [m]
+        preferred_clearance: clearance beyond the least above which the cost is zero [m]
+        clearance_weight: cost of each metre below the preferred clearance [m/m]
+        cross_track_weight: cost of each metre off the route [m/m]
+        heading_weight: cost of each radian off the route's direction [m/rad]
+        reversal_time: horizon for a sudden reversal of a mover [s]
+        reversal_margin: clearance to a reversing mover beyond `min_clearance` [m]
+        reversal_weight: cost of each metre below this clearance [m/m]; 0 ignores reversals
 
     Raises:
         ValueError: a setting is out of range.
@@ -87,7 +86,7 @@ class Avoidance:
 
     @property
     def prediction_times(self) -> Floats:
-        """The times from now (K + 1,) for which `avoid` needs the movers' places [s]."""
+        """Times from now of the predictions that `avoid` needs (K + 1,) [s]."""
         return _instants(self.horizon, self.step)
 
     def avoid(
@@ -104,21 +103,20 @@ class Avoidance:
         speed_limit: float = math.inf,
         backwards: float = math.inf,
     ) -> tuple[Twist, bool, AvoidanceState]:
-        """The next command, whether avoidance changed it, and the state for the next period.
+        """Return the next command, whether avoidance changed it, and the state for the next period.
 
         Args:
-            tracked: the path that the controller follows
+            tracked: the controller's path
             spec: the robot
             pose: its estimated pose
             last: the command of the last period
             before: the controller's state before it chose `wanted`
             wanted: the controller's command for this period
-            state: what this method returned in the last period
-            places: the movers' predicted places at the `prediction_times` (K + 1, M, 2) [m]
+            state: the state returned in the last period
+            places: the movers' predicted positions at the `prediction_times` (K + 1, M, 2) [m]
             radii: their radii (M,) [m]
-            speed_limit: the speed that the schedule of a timed plan allows [m/s]
-            backwards: the highest speed backwards, as long as no mover is met at it, for a robot that does not see what
-                is behind it [m/s]
+            speed_limit: speed limit from the schedule of a timed plan [m/s]
+            backwards: highest speed backwards, for a robot without a view to the rear; lifted if it leads to a contact [m/s]
         """
         candidates = self._candidates(spec, state, speed_limit, backwards)
         situation = (
@@ -134,11 +132,11 @@ class Avoidance:
         stopping = abs(last.speed) / tracked.limits.acceleration
         if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
-        twist, state = _carried_out(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
+        twist, state = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
         return twist, True, state
 
     def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
-        """A contact sooner than this counts as unavoidable [s]: 0 unless a mover is within the least clearance."""
+        """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
         away = np.hypot(*(places - pose[:2]).T) - radii
         close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
         return 2 * self.step if close else 0.0
@@ -146,7 +144,7 @@ class Avoidance:
     def _candidates(
         self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, backwards: float = math.inf
     ) -> Floats:
-        """The robot's candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
+        """Return the candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
         table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
         if backwards < spec.max_speed:
             slowest = table[:, [kernels.SPEED, kernels.NEXT_SPEED]].min(axis=1)
@@ -161,10 +159,10 @@ class Avoidance:
         return table
 
 
-def _carried_out(
+def _execute(
     candidate: Floats | None, wanted: Twist, last: Twist, tracked: TrackedPath
 ) -> tuple[Twist, AvoidanceState]:
-    """The command that carries a candidate out, and what avoidance remembers of it; None: nothing avoids a contact."""
+    """Return a candidate's command and state; None means that no candidate avoids a contact."""
     limits, period = tracked.limits, tracked.tuning.period
     if candidate is None:
         # The robot stops: a contact while standing is attributed to the mover.
@@ -197,12 +195,12 @@ _NOT_NEGATIVE = (
 
 @functools.cache
 def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
-    """What a robot chooses from (N, 6): the controller's motion at full and at lower speeds, and pairs of twists.
+    """Return a robot's candidates (N, 6): the controller's motion at full and lower speeds, and pairs of twists.
 
-    Row 1 repeats row 0, and is where the last decision goes. The second twist of a pair drives straight or stands.
+    Row 1 is a placeholder for the last decision. The second twist of a pair drives straight or stands.
     """
-    shares = (1.0, 1.0, 0.7, 0.45, 0.2)
-    rows = [(kernels.FOLLOW_ROUTE, share * max_speed, 0.0, 0.0, 0.0, 0.0) for share in shares]
+    fractions = (1.0, 1.0, 0.7, 0.45, 0.2)
+    rows = [(kernels.FOLLOW_ROUTE, fraction * max_speed, 0.0, 0.0, 0.0, 0.0) for fraction in fractions]
     rows.append((kernels.TWO_TWISTS, 0.0, 0.0, 0.0, 0.0, 0.0))
     for speed in (1.0, 0.6, 0.3, 0.0, -0.3, -0.6, -1.0):
         v = speed * max_speed
@@ -221,7 +219,7 @@ def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration
 
 @functools.lru_cache(maxsize=64)
 def _instants(horizon: float, step: float) -> Floats:
-    """The times of a prediction (K + 1,) [s], read-only."""
+    """Return the times of a prediction (K + 1,) [s], read-only."""
     times = np.arange(math.ceil(horizon / step - 1e-9) + 1) * np.float64(step)
     times.flags.writeable = False
     return times
@@ -229,7 +227,7 @@ def _instants(horizon: float, step: float) -> Floats:
 
 @functools.lru_cache(maxsize=64)
 def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kernels.AvoidanceWeights:
-    """The settings as they apply to a robot of a circumscribed radius [m]."""
+    """Return the settings for a robot with a given circumscribed radius [m]."""
     return kernels.AvoidanceWeights(
         step=avoidance.step,
         min_distance=radius + avoidance.min_clearance,

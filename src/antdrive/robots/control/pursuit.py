@@ -1,10 +1,9 @@
-"""Pure pursuit that cuts corners only where there is room (after R. C. Coulter, CMU-RI-TR-92-01, 1992).
+"""Pure pursuit with clearance-checked lookahead (after R. C. Coulter, CMU-RI-TR-92-01, 1992).
 
-The carrot is the point of the route at the lookahead distance from the robot, measured straight. Before a drive, the
-controller computes for samples along the route how far ahead the robot may look so that the straight line to
-the carrot keeps clear of obstacles. During the drive it shortens the lookahead further until the arc to the
-carrot is clear. The robot is slow where the lookahead is short, and rotates in place where not even the
-shortest arc is clear.
+The carrot is the point of the route at the lookahead distance from the robot, in a straight line. Before a drive, the
+controller computes the longest clear lookahead at samples along the route: the straight line to the carrot keeps its
+clearance. During the drive it shortens the lookahead until the arc to the carrot is clear. The robot is slow where the
+lookahead is short, and rotates in place if the shortest arc is not clear.
 """
 
 from __future__ import annotations
@@ -29,22 +28,22 @@ from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
 
 SPACING = 0.02  # distance between the samples along a route [m]
-SQUARE = 0.5  # least side of the squares that the obstacles are sorted into [m]
-EVERYTHING = 1e6  # side of a square that holds all obstacles [m]
-MAX_SQUARES = 250_000  # in larger worlds the squares are larger instead
+SQUARE = 0.5  # least side of a square of the obstacle index [m]
+EVERYTHING = 1e6  # side of a single square with all obstacles [m]
+MAX_SQUARES = 250_000  # larger worlds have larger squares
 
-#: The rules that can limit the robot's speed. Logs hold a rule's index.
+#: The rules that can limit the robot's speed. Logs contain the index.
 LIMITERS: tuple[str, ...] = (
     "cruise",  # no rule: the robot drives at its top speed
     "curvature",  # lateral acceleration or yaw rate in a curve
     "route",  # the route's bends, lines of sight or clearance, here or within braking distance
-    "yaw rate",  # the robot has not yet reached the yaw rate that the curve needs
+    "yaw rate",  # the yaw rate is still below the curve's
     "goal",  # braking for the goal
     "rotate",  # rotating in place
-    "creep",  # no arc to the carrot is clear: the robot advances very slowly
-    "braking",  # the arc on which the robot can stop is not clear: full braking
+    "creep",  # no arc to the carrot is clear: creep speed
+    "braking",  # the stopping arc is not clear: full braking
     "done",  # standing at the goal
-    "clearance",  # the obstacles beside the robot are close
+    "clearance",  # obstacles beside the robot are close
     "avoid",  # local avoidance of a mover
 )
 
@@ -62,10 +61,10 @@ class Twist(NamedTuple):
 
 
 class PursuitState(NamedTuple):
-    """What the controller remembers between two control periods.
+    """Controller state between two control periods.
 
     Attributes:
-        arc: how far along the route the robot has got [m]; it never decreases
+        arc: progress along the route [m]; never decreases
         turning: whether the robot rotates in place
         limiter: index into LIMITERS of the rule that limited the speed
     """
@@ -77,16 +76,16 @@ class PursuitState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrackedPath:
-    """A route prepared for tracking: what the controller needs in every period, computed once.
+    """A route prepared for tracking, with everything that is computed once.
 
     Attributes:
         route: the route
-        goal_distance: the robot stops when this much of the route remains [m]
+        goal_distance: remaining route length at which the robot stops [m]
         samples: speed limits, lookaheads and headings along the route
-        obstacles: the obstacles that the controller knows, by place
-        limits: what the robot's drive can do
+        obstacles: index of the known obstacles by position
+        limits: limits of the robot's drive
         tuning: the controller's settings for this robot and route
-        backwards: whether the robot follows it tail first
+        backwards: whether the robot drives backwards
     """
 
     route: Route
@@ -103,10 +102,10 @@ class TrackedPath:
         return float(self.samples.arc[-1])
 
     def with_obstacles(self, obstacles: ObstacleIndex) -> TrackedPath:
-        """The same path among other obstacles.
+        """Return the path with other obstacles.
 
         Args:
-            obstacles: what the controller is to know
+            obstacles: index of the known obstacles
         """
         return TrackedPath(
             self.route, self.goal_distance, self.samples, obstacles, self.limits, self.tuning, self.backwards
@@ -114,37 +113,37 @@ class TrackedPath:
 
     @property
     def ignoring_turn_clearance(self) -> TrackedPath:
-        """The same path for a robot that turns on the spot the shorter way round, whatever is in its way."""
+        """The path with rotations in place by the shorter turn, without contact checks."""
         return replace(self, tuning=self.tuning._replace(half_length=0.0, half_width=0.0, corners=np.empty((0, 2))))
 
     @property
     def preferring_arcs(self) -> TrackedPath:
-        """The same path for a robot that takes every clear arc a driving robot would take, instead of turning first."""
+        """The path with a robot at rest taking every clear arc that a moving robot takes, instead of rotating first."""
         return replace(self, tuning=self.tuning._replace(rotate_above_at_rest=self.tuning.rotate_above))
 
 
 @dataclass(frozen=True, kw_only=True)
 class PurePursuit:
-    """A pure-pursuit controller, given by its settings.
+    """Settings of a pure-pursuit controller.
 
     Attributes:
-        lookahead_time: the lookahead is the speed times this [s]
-        preferred_lookahead_min: shortest lookahead where there is room for it [m]
-        lookahead_min: shortest lookahead anywhere [m]
+        lookahead_time: lookahead divided by speed [s]
+        preferred_lookahead_min: shortest lookahead if it is clear [m]
+        lookahead_min: shortest lookahead [m]
         lookahead_max: longest lookahead [m]
-        lookahead_margin: share of the safety margin that lines and arcs to the carrot keep free
-        stopping_margin: share of the safety margin that the arc on which the robot can stop keeps free
-        rotate_in_place_above: the robot rotates in place when the carrot's bearing exceeds this [rad]
-        rotate_in_place_above_at_rest: the same for a robot that stands [rad]
-        rotate_in_place_until: rotating in place ends when the bearing falls below this [rad]
-        braking: share of the robot's deceleration that planned braking uses
-        blend: distance over which changes of the route's curvature are spread [m]
+        lookahead_margin: fraction of the safety margin kept by lines and arcs to the carrot
+        stopping_margin: fraction of the safety margin kept by the stopping arc
+        rotate_in_place_above: bearing of the carrot above which the robot rotates in place [rad]
+        rotate_in_place_above_at_rest: the same for a robot at rest [rad]
+        rotate_in_place_until: bearing below which the rotation ends [rad]
+        braking: fraction of the robot's deceleration for planned braking
+        blend: distance for averaging the route's curvature [m]
         corner_lookahead_time: `lookahead_time` for routes with corners, such as those through cells [s]
         corner_blend: `blend` for such routes [m]
-        min_speed_near_obstacles: speed allowed without any clearance beside the robot [m/s]
-        clearance_time: the clearance beside the robot, divided by this, is added to that speed [s]
+        min_speed_near_obstacles: speed limit at zero clearance [m/s]
+        clearance_time: clearance divided by this is added to that limit [s]
         creep_speed: slowest forward speed [m/s]
-        goal_distance: the robot stops when this much of the route remains; half the goal's tolerance if less [m]
+        goal_distance: remaining route length at which the robot stops, at most half the goal tolerance [m]
 
     Raises:
         ValueError: a setting is out of range.
@@ -182,7 +181,7 @@ class PurePursuit:
         if not self.rotate_in_place_until < self.rotate_in_place_above < math.pi / 2:
             raise FieldError(
                 "rotate_in_place_above",
-                f"must lie between rotate_in_place_until and pi/2, got {self.rotate_in_place_above:g}",
+                f"must be between rotate_in_place_until and pi/2, got {self.rotate_in_place_above:g}",
             )
 
     def prepare(
@@ -200,13 +199,13 @@ class PurePursuit:
 
         Args:
             route: the route
-            world: the world as the controller knows it
+            world: the world known to the controller
             spec: the robot
-            margin: the safety margin that the route keeps beyond the robot's radius [m]
+            margin: the route's safety margin beyond the robot's radius [m]
             period: control period [s]
-            tolerance: goal tolerance [m]; where it is small, the robot stops closer to the route's end
-            spacing: distance between the samples at which lookaheads and speed limits are worked out [m]
-            indexed: whether the obstacles are sorted by place; that pays where the robot drives among them for long
+            tolerance: goal tolerance [m]; a small one makes the robot stop closer to the route's end
+            spacing: distance between the samples of lookaheads and speed limits [m]
+            indexed: whether to index the obstacles by position, which pays off on long drives
         """
         tuning = self._tuning(route, spec, margin, period, min(self.goal_distance, tolerance / 2))
         tuning = tuning._replace(spacing=spacing)
@@ -246,17 +245,17 @@ class PurePursuit:
         return TrackedPath(route, tuning.goal_distance, samples, obstacles, limits, tuning)
 
     def step(self, tracked: TrackedPath, pose: Pose, command: Twist, state: PursuitState) -> tuple[Twist, PursuitState]:
-        """The next command and the state for the next period.
+        """Return the next command and the state for the next period.
 
         Args:
             tracked: the path to follow, from `prepare`
             pose: the robot's estimated pose
             command: the command of the last period
-            state: the state that the last call returned; at first a `PursuitState()`
+            state: the state returned by the last call; initially `PursuitState()`
         """
-        if tracked.backwards:  # a robot with two driven wheels, seen from behind, is one that drives forwards
-            seen = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
-            ahead, after = self.step(replace(tracked, backwards=False), *seen, state)
+        if tracked.backwards:  # reversed, a differential drive is one that drives forwards
+            reversed_ = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
+            ahead, after = self.step(replace(tracked, backwards=False), *reversed_, state)
             return Twist(-ahead.speed, ahead.yaw_rate), after
         speed, yaw_rate, arc, turning, limiter = _kernels_pursuit.pursue(
             *pose, *command, state.arc, state.turning,
@@ -292,7 +291,7 @@ class PurePursuit:
         )
 
     def _index(self, world: World, clearance: float) -> ObstacleIndex:
-        """The world's obstacles, by the squares from which the longest lookahead can come close to them."""
+        """Index the world's obstacles by the squares from which the longest lookahead reaches them."""
         bounds = np.asarray(world.bounds, dtype=np.float64)
         side = max(SQUARE, math.sqrt(math.prod(world.size) / MAX_SQUARES))
         distance = self.lookahead_max + clearance + side
@@ -301,7 +300,7 @@ class PurePursuit:
 
 
 def unsorted_obstacles(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
-    """Obstacles that all lie in one square."""
+    """Return an obstacle index with a single square."""
     return ObstacleIndex(discs, np.array([0, len(discs)]), np.asarray(bounds, dtype=np.float64), EVERYTHING)
 
 

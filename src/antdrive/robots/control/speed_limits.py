@@ -1,11 +1,10 @@
-"""Speed limits along a route, before it is driven: by the robot's limits, in gaps, and where the lookahead is short.
+"""Speed limits along a route: by the robot's limits, the clearance and the lookahead.
 
-On a fixed path, the fastest speeds follow from a limit at each place: a forward pass lowers them to what
-accelerating can reach, and a backward pass to what braking can still obey (Bobrow, Dubowsky & Gibson,
-*Time-optimal control of robotic manipulators along specified paths*, IJRR 4, 1985; in this form Lipp & Boyd,
-*Minimum-time speed optimisation over a fixed path*, Int. J. Control 87, 2014). Here the yaw acceleration is
-checked with the speed at the slower end of each step, so the result is the fastest up to the length of a
-step. `limits_along` adds the limits beside obstacles; `_kernels_pursuit.speed_limit` applies those of the place at run time.
+On a fixed path, the fastest profile follows from a limit at each point: a forward pass enforces the acceleration, a
+backward pass the deceleration (Bobrow, Dubowsky & Gibson, *Time-optimal control of robotic manipulators along specified
+paths*, IJRR 4, 1985; in this form Lipp & Boyd, *Minimum-time speed optimisation over a fixed path*, Int. J. Control 87,
+2014). Yaw acceleration is checked with the speed at the slower end of each step, so the result is optimal up to the
+length of a step. `limits_along` adds the limits near obstacles; `_kernels_pursuit.speed_limit` applies the limits at run time.
 """
 
 from __future__ import annotations
@@ -25,15 +24,15 @@ from antdrive.worlds import Route, World, point_clearance
 
 @dataclass(frozen=True, eq=False)
 class SpeedProfile:
-    """The speeds along a route and when each place is reached; places where the robot rotates come twice.
+    """Speeds and times along a route; points with a rotation in place occur twice.
 
     Attributes:
         arc: length along the route, from 0 (S,) [m]
         speed: speed, 0 at both ends (S,) [m/s]
-        time: when the place is reached, from 0 (S,) [s]
-        curvature: curvature of the path that is driven, with its corners rounded (S,) [1/m]
-        heading: heading on that path, rotations in place included; it never jumps by a full turn (S,) [rad]
-        limit: the speed that must not be exceeded, however the robot came to drive at it (S,) [m/s]
+        time: arrival time, from 0 (S,) [s]
+        curvature: curvature of the path with rounded corners (S,) [1/m]
+        heading: unwrapped heading on that path, including rotations in place (S,) [rad]
+        limit: speed limit for any approach speed (S,) [m/s]
     """
 
     arc: Floats
@@ -45,7 +44,7 @@ class SpeedProfile:
 
     @property
     def duration(self) -> float:
-        """How long the whole route takes [s]."""
+        """Duration of the route [s]."""
         return float(self.time[-1])
 
     @property
@@ -63,16 +62,16 @@ def speed_profile(
     braking: float = 1.0,
     step: float = 0.02,
 ) -> SpeedProfile:
-    """The fastest speeds along a route, from standing to standing, within all limits of the robot.
+    """Return the fastest speeds along a route, from rest to rest, within all limits of the robot.
 
     Args:
         route: the route
-        spec: its limits are those of speed, acceleration, lateral acceleration, yaw rate, yaw acceleration
-            and wheels
-        blend: the route's curvature is averaged over this distance on both sides, with weights that fall
-            linearly: no robot follows a corner or a jump in curvature at speed [m]
-        rotate_in_place_above: at corners of at least this angle, the robot stops and rotates in place [rad]
-        braking: share of the robot's deceleration that braking may use
+        spec: the robot, with its limits of speed, acceleration, lateral acceleration, yaw rate, yaw acceleration and
+            wheels
+        blend: distance on both sides for averaging the route's curvature with triangular weights, because robots cannot
+            follow a jump in curvature at speed [m]
+        rotate_in_place_above: least angle of a corner at which the robot stops and rotates in place [rad]
+        braking: fraction of the robot's deceleration for braking
         step: longest distance between two samples [m]
 
     Raises:
@@ -100,7 +99,7 @@ def speed_profile(
 
 
 def _speeds(arc: Floats, curvature: Floats, change: Floats, spec: RobotSpec, braking: float) -> tuple[Floats, Floats]:
-    """Speed and limit along a leg that begins and ends standing; the limit may begin at any speed."""
+    """Return speed and limit along a leg from rest to rest; the limit holds for any initial speed."""
     from antdrive.robots.control import _kernels_profile
 
     limit = np.empty(len(arc))
@@ -125,7 +124,7 @@ def _speeds(arc: Floats, curvature: Floats, change: Floats, spec: RobotSpec, bra
 
 
 def turning_time(angle: float, spec: RobotSpec) -> float:
-    """How long the robot takes to rotate in place by an angle [rad], from standing to standing [s]."""
+    """Return the time to rotate in place by an angle [rad], from rest to rest [s]."""
     fastest = min(spec.max_yaw_rate, 2 * spec.max_wheel_speed * spec.wheel_radius / spec.track)
     spin_up = fastest / spec.max_yaw_acceleration
     if abs(angle) >= fastest * spin_up:
@@ -134,10 +133,10 @@ def turning_time(angle: float, spec: RobotSpec) -> float:
 
 
 def _headings(route: Route, rotate_in_place_above: float) -> tuple[Floats, Floats, list[float], list[float]]:
-    """The heading along the route, piecewise linear, and where the robot rotates in place, by how much.
+    """Return the piecewise linear heading along the route, and arc lengths and angles of rotations in place.
 
-    The function is given by places [m] and the headings there [rad]. On an arc the heading grows linearly; at
-    a corner a place comes twice. Rotations in place are left out of it.
+    The heading is given by arc lengths [m] and values [rad]. It is linear on arcs; a corner occurs twice. Rotations in
+    place are omitted from it.
     """
     steps = np.diff(route.xy, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
@@ -160,10 +159,10 @@ def _headings(route: Route, rotate_in_place_above: float) -> tuple[Floats, Float
 
 
 def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple[Floats, Floats, Floats]:
-    """Heading, curvature and its growth per metre at arc lengths s, averaged over `blend` on both sides.
+    """Return heading, curvature and its derivative at arc lengths s, averaged over `blend` on both sides.
 
-    The weights are a triangle. The heading is piecewise linear, so its average and the average's derivatives
-    are exact second differences of its first and second integrals.
+    The weights are triangular. The heading is piecewise linear, so its average and the average's derivatives are exact
+    second differences of its first and second integrals.
     """
     widths = np.diff(places)
     slopes = np.diff(headings) / np.where(widths > 0, widths, 1.0)
@@ -172,7 +171,7 @@ def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple
     second_integral = np.concatenate(([0.0], np.cumsum(growth)))
 
     def at(t: Floats) -> tuple[Floats, Floats, Floats]:
-        """Heading, integral and second integral at t; beyond the ends the heading is constant."""
+        """Return heading, integral and second integral at t; the heading is constant beyond the ends."""
         inside = np.clip(t, places[0], places[-1])
         i = np.clip(np.searchsorted(places, inside, side="right") - 1, 0, len(slopes) - 1)
         d = inside - places[i]
@@ -184,7 +183,7 @@ def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple
 
     change, curvature, heading = (
         (after - 2 * here + before) / blend**2
-        for before, here, after in (np.split(found, 3) for found in at(np.concatenate((s - blend, s, s + blend))))
+        for before, here, after in (np.split(values, 3) for values in at(np.concatenate((s - blend, s, s + blend))))
     )
     return heading, curvature, change
 
@@ -201,7 +200,7 @@ def limits_along(
 ) -> Floats:
     """Return the speed limit at the samples of a route (S,) [m/s]: the least of profile, clearance and lookahead.
 
-    Beside obstacles it is a least speed [m/s] plus the clearance [m] over a time [s]: `near_obstacles` holds both.
+    Near obstacles the limit is a least speed [m/s] plus the clearance [m] divided by a time [s]: `near_obstacles`.
     """
     spacing = tuning.spacing
     at = spacing * np.arange(len(lookahead))

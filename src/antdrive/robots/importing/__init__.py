@@ -1,1 +1,1 @@
-"""Robots out of other programs' files."""
+"""Import of robots from URDF and xacro files."""

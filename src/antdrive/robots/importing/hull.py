@@ -1,4 +1,4 @@
-"""Convex outlines around points in the plane: few corners, and nothing cut off."""
+"""Convex footprints around points in the plane, with few corners."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from collections.abc import Iterable
 from antdrive.base.types import Point
 from antdrive.robots.outline import Footprint
 
-MAX_OUTLINE = 12  # corners of an outline that was computed
-STEP = 1e-5  # of the numbers of an outline that was computed [m]
-LOOSE = 1e-8  # what turns such as 1.5707963, which stand for a quarter, may move a corner by [m]
-ALIKE = 1e-4  # how far the left and the right of an outline may be from mirror images of each other [m]
-CHEAP = 1e-4  # the share of its area that an outline may gain for a corner less
-LIKE = 0.97  # the share of a disc or rectangle that an outline fills which counts as one
+MAX_OUTLINE = 12  # corners of a computed outline
+STEP = 1e-5  # resolution of a computed outline [m]
+LOOSE = 1e-8  # tolerance for rounded quarter turns such as 1.5707963 [m]
+ALIKE = 1e-4  # tolerance of mirror symmetry between left and right [m]
+CHEAP = 1e-4  # fraction of its area that an outline may gain for one corner less
+LIKE = 0.97  # least filled fraction of a disc or rectangle that replaces an outline
 
 
 def convex_hull(points: Iterable[Point]) -> list[Point]:
-    """The corners of the convex hull, counter-clockwise."""
+    """Return the corners of the convex hull, counter-clockwise."""
     ordered = sorted({(round(x, 7), round(y, 7)) for x, y in points})
     halves: list[list[Point]] = []
-    for way in (ordered, ordered[::-1]):
+    for direction in (ordered, ordered[::-1]):
         chain: list[Point] = []
-        for point in way:
+        for point in direction:
             while len(chain) > 1 and _area(chain[-2], chain[-1], point) <= 1e-12:
                 chain.pop()
             chain.append(point)
@@ -31,10 +31,10 @@ def convex_hull(points: Iterable[Point]) -> list[Point]:
 
 
 def fewer_corners(corners: list[Point], most: int) -> list[Point]:
-    """A polygon around a convex one with no more than `most` corners: the edges that cost the least area are left out.
+    """Enclose a convex polygon in one with at most `most` corners by removing the edges that add the least area.
 
-    Edges that cost next to nothing are left out in any case: a wheel whose quarter turn is written 1.57 is a little askew.
-    What is the same on the left as on the right stays so: edges are left out together with their mirror images.
+    Edges that add almost no area are always removed: a wheel with a quarter turn of 1.57 is slightly askew. Symmetry is
+    preserved: edges are removed together with their mirror images.
     """
     corners = list(corners)
     cheap = CHEAP * sum(_area((0.0, 0.0), a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
@@ -42,32 +42,32 @@ def fewer_corners(corners: list[Point], most: int) -> list[Point]:
     while len(corners) > 4:
         costs = [_cost(corners, k) for k in range(len(corners))]
         affordable = [k for k, cost in enumerate(costs) if cost < math.inf and (len(corners) > most or cost <= cheap)]
-        ways = (_left_out(corners, k, symmetric) for k in sorted(affordable, key=lambda k: costs[k]))
-        fewer = next((way for way in ways if way is not None), None)
+        options = (_without_edge(corners, k, symmetric) for k in sorted(affordable, key=lambda k: costs[k]))
+        fewer = next((option for option in options if option is not None), None)
         if fewer is not None:
             corners = fewer
         elif symmetric and len(corners) > most:
-            symmetric = False  # no pair can be left out
+            symmetric = False  # no pair can be removed
         else:
             break
     return corners
 
 
 def _around_edge(corners: list[Point], k: int) -> tuple[Point, Point, Point, Point]:
-    """The corner before the edge from corner k, its two ends, and the corner after it."""
+    """Return the corner before the edge from corner k, its two ends, and the corner after it."""
     a, b, c, d = (corners[(k + j) % len(corners)] for j in (-1, 0, 1, 2))
     return a, b, c, d
 
 
 def _cost(corners: list[Point], k: int) -> float:
-    """The area that a polygon gains without the edge from corner k; inf where it cannot do without."""
+    """Return the area that a polygon gains without the edge from corner k; inf if it cannot be removed."""
     a, b, c, d = _around_edge(corners, k)
     tip = _meeting(a, b, d, c)
     return math.inf if tip is None else _area(b, tip, c)
 
 
-def _left_out(corners: list[Point], k: int, symmetric: bool) -> list[Point] | None:
-    """The corners without the edge from corner k; None where that is impossible."""
+def _without_edge(corners: list[Point], k: int, symmetric: bool) -> list[Point] | None:
+    """Return the corners without the edge from corner k; None if it cannot be removed."""
     n, (a, b, c, d) = len(corners), _around_edge(corners, k)
     tip = _meeting(a, b, d, c)
     if tip is None:
@@ -76,24 +76,24 @@ def _left_out(corners: list[Point], k: int, symmetric: bool) -> list[Point] | No
     if not symmetric:
         return fewer
     twin = _nearest(corners, (c[0], -c[1])), _nearest(corners, (b[0], -b[1]))
-    if twin == (k, (k + 1) % n):  # it is its own mirror image
+    if twin == (k, (k + 1) % n):  # the edge is its own mirror image
         return fewer
     if None in twin or set(twin) & {k, (k + 1) % n} or n < 6:
         return None
     first = corners[twin[0] or 0]
-    return _left_out(fewer, next(j for j, corner in enumerate(fewer) if corner is first), False)
+    return _without_edge(fewer, next(j for j, corner in enumerate(fewer) if corner is first), False)
 
 
 def _nearest(corners: list[Point], place: Point) -> int | None:
-    """The corner at a place; None where there is none."""
+    """Return the index of the corner at a point; None if there is none."""
     k = min(range(len(corners)), key=lambda j: math.dist(corners[j], place))
     return k if math.dist(corners[k], place) <= ALIKE else None
 
 
 def footprint_around(points: Iterable[Point], kind: str = "auto") -> Footprint:
-    """A footprint that holds all points: a disc or a rectangle where they nearly fill one, and else a polygon.
+    """Return a footprint around all points: a disc or rectangle if they nearly fill one, otherwise a polygon.
 
-    Its numbers are multiples of a hundredth of a millimetre, rounded so that no point is outside by more than `LOOSE`.
+    Its values are multiples of 0.01 mm, rounded so that no point is outside by more than `LOOSE`.
     """
     held = list(points)
     hull = convex_hull(held)
@@ -114,41 +114,41 @@ def footprint_around(points: Iterable[Point], kind: str = "auto") -> Footprint:
 
 
 def _polygon_around(held: list[Point], corners: list[Point]) -> Footprint:
-    """A polygon with rounded corners, moved outwards until it holds all points."""
+    """Return a polygon with rounded coordinates, offset outwards until it contains all points."""
     out = 0.0
     while True:
-        # The hull of rounded corners holds them all, although rounding may bend a nearly straight corner inwards.
-        found = Footprint.polygon(convex_hull((_near(x), _near(y)) for x, y in _moved_out(corners, out)))
-        if min(found.depth(x, y) for x, y in held) >= -LOOSE:
-            return found
+        # The hull contains all rounded corners; rounding may make a nearly straight corner concave.
+        polygon = Footprint.polygon(convex_hull((_near(x), _near(y)) for x, y in _moved_out(corners, out)))
+        if min(polygon.depth(x, y) for x, y in held) >= -LOOSE:
+            return polygon
         out += STEP
 
 
 def _moved_out(corners: list[Point], distance: float) -> list[Point]:
-    """A convex polygon whose edges are moved outwards."""
-    found = []
+    """Offset the edges of a convex polygon outwards."""
+    moved = []
     for k, (x, y) in enumerate(corners):
         (ax, ay), (bx, by) = (
             _right_of(*edge) for edge in ((corners[k - 1], (x, y)), ((x, y), corners[k + 1 - len(corners)]))
         )
-        share = distance / (1 + ax * bx + ay * by)
-        found.append((x + share * (ax + bx), y + share * (ay + by)))
-    return found
+        scale = distance / (1 + ax * bx + ay * by)
+        moved.append((x + scale * (ax + bx), y + scale * (ay + by)))
+    return moved
 
 
 def _right_of(a: Point, b: Point) -> Point:
-    """The direction to the right of the way from a to b: outwards, for a polygon's edge."""
+    """Return the unit vector to the right of the direction from a to b: a polygon's outward normal."""
     away = math.dist(a, b)
     return (b[1] - a[1]) / away, (a[0] - b[0]) / away
 
 
 def _near(value: float) -> float:
-    """A coordinate, rounded to the nearest hundredth of a millimetre."""
+    """Round a coordinate to 0.01 mm."""
     return round(value, 5) + 0.0  # no -0.0
 
 
 def _up(value: float) -> float:
-    """A length, rounded up to a hundredth of a millimetre, but for what the arithmetic adds."""
+    """Round a length up to 0.01 mm, except for rounding errors."""
     return math.ceil((value - LOOSE) / STEP) / 1e5
 
 
@@ -157,10 +157,10 @@ def _area(a: Point, b: Point, c: Point) -> float:
 
 
 def _meeting(a: Point, b: Point, d: Point, c: Point) -> Point | None:
-    """Where the ways from a through b and from d through c meet ahead of both; None where they do not."""
+    """Return the intersection of the rays from a through b and from d through c beyond b and c; None without one."""
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - d[0], c[1] - d[1]
     cross = ux * vy - uy * vx
-    if cross >= -1e-12:  # they part, or the turn from one to the other is half a circle
+    if cross >= -1e-12:  # the rays diverge or are antiparallel
         return None
-    share = ((c[0] - b[0]) * vy - (c[1] - b[1]) * vx) / cross
-    return (b[0] + share * ux, b[1] + share * uy) if share >= 0 else None
+    ahead = ((c[0] - b[0]) * vy - (c[1] - b[1]) * vx) / cross
+    return (b[0] + ahead * ux, b[1] + ahead * uy) if ahead >= 0 else None

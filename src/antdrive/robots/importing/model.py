@@ -1,6 +1,6 @@
-"""What a URDF file says, with every link where it is when all joints are at zero. Lengths in metres.
+"""URDF models, with all joints at zero. Lengths in metres.
 
-xacro files are expanded without ROS; packages are found beside the file and above it, or where people say.
+xacro files are expanded without ROS; packages are searched beside the file and in its parent folders, or given.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.formats.xml import parse_xml
 
-MAX_PACKAGES = 100  # that one file may refer to
+MAX_PACKAGES = 100  # referenced by one file
 
 
 def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Path | None:
-    """The folder of a package: as given, or one of that name beside the file or above it; None if there is none."""
+    """Return a package's folder: the given one, or one of its name beside the file or above it; None without one."""
     if name in packages:
         return packages[name]
     above = source.resolve().parents
@@ -35,10 +35,10 @@ def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Pat
 
 
 def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> str:
-    """The URDF text of a xacro file."""
+    """Expand a xacro file to URDF text."""
     if not path.is_file():
         raise input_error(str(path), "no such file")
-    xacrodoc = optional("xacrodoc", "urdf", "xacro files are expanded with it")
+    xacrodoc = optional("xacrodoc", "urdf", "xacro files need it")
     known = dict(packages)
     for _ in range(MAX_PACKAGES):
         xacrodoc.packages.reset()
@@ -46,7 +46,7 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
         try:
             document = xacrodoc.XacroDoc.from_file(str(path), subargs=dict(arguments), resolve_packages=False)
             return str(document.to_urdf_string())
-        except Exception as error:  # xacro raises whatever its expressions raise
+        except Exception as error:  # xacro passes on any exception of its expressions
             missing = _missing_package(error)
             folder = None if missing is None or missing in known else package_folder(path, missing, known)
             if missing is None or folder is None:
@@ -56,7 +56,7 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
-    """An exception and those that it came from."""
+    """Yield an exception and its causes."""
     while error is not None:
         yield error
         inner = getattr(error, "exc", None)
@@ -64,20 +64,20 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 
 def _missing_package(error: Exception) -> str | None:
-    found = (cause for cause in _causes(error) if type(cause).__name__ == "PackageNotFoundError")
-    return next((str(cause.args[0]) for cause in found if cause.args), None)
+    causes = (cause for cause in _causes(error) if type(cause).__name__ == "PackageNotFoundError")
+    return next((str(cause.args[0]) for cause in causes if cause.args), None)
 
 
 def _help(error: Exception) -> str:
-    """What a person can do about it."""
+    """Return how to fix the error; empty if unknown."""
     if _missing_package(error) is not None:
-        return "; say where it is with --package NAME=FOLDER"
+        return "; give its folder with --package NAME=FOLDER"
     missing = next((cause for cause in _causes(error) if type(cause).__name__ == "ArgException"), None)
     return "" if missing is None else "; give it with --arg NAME=VALUE"
 
 
 def _in_one_line(error: Exception) -> str:
-    """What xacro says, without the class and the repetition that it begins with, and without line breaks, real or spelt out."""
+    """Return xacro's message without class name, repetition and line breaks."""
     text = " ".join(str(error).replace("\\n", " ").split()) or type(error).__name__
     text = re.sub(r"^<class '[^']*'>: ", "", text)
     half = len(text) // 2
@@ -87,14 +87,14 @@ def _in_one_line(error: Exception) -> str:
 
 
 def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
-    """Folders of packages, as people gave them."""
+    """Return the given folders of packages as paths; raise InputError for missing ones."""
     for name, folder in given.items():
         if not Path(folder).is_dir():
             raise InputError(f"--package {name}={folder}: no such folder")
     return {name: Path(folder) for name, folder in given.items()}
 
 
-# Around a circle of radius 1, with sides ahead, behind, to the left and to the right: it is as long and as wide as the circle.
+# Polygon around the unit circle, as long and as wide as the circle.
 CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
 MAX_LINKS = 10_000
 
@@ -103,17 +103,16 @@ MAX_LINKS = 10_000
 class UrdfJoint:
     """A joint of a URDF file."""
 
-    name: str  # its name
+    name: str
     kind: str  # fixed, continuous, revolute, prismatic, floating or planar
-    parent: str  # the link that holds it
-    child: str  # the link that it moves
-    place: Floats  # its frame in that of the model's root (4, 4)
-    axis: Floats  # the direction of its axis in the root's frame (3,)
-    velocity: float | None  # the limit of its speed [rad/s]; None where the file has none
-    effort: float | None  # the limit of its torque [N m]; None where the file has none
-    range: float  # how far it turns, from its lower to its upper limit [rad]; inf where it turns freely
-    # the greatest speed that <ros2_control> lets it be given, inf without a limit [rad/s]; None where it is not
-    # driven by speed there
+    parent: str  # parent link
+    child: str  # child link
+    place: Floats  # its frame in the root's frame (4, 4)
+    axis: Floats  # its axis in the root's frame (3,)
+    velocity: float | None  # speed limit [rad/s]; None without one
+    effort: float | None  # torque limit [N m]; None without one
+    range: float  # from its lower to its upper limit [rad]; inf if it turns freely
+    # speed limit in <ros2_control>, inf without one [rad/s]; None without a velocity interface
     commanded: float | None = None
 
 
@@ -121,38 +120,37 @@ class UrdfJoint:
 class CollisionPiece:
     """A piece of collision geometry, in the root's frame."""
 
-    link: str  # the link that it belongs to
+    link: str  # its link
     kind: str  # box, cylinder, sphere or mesh
-    points: Floats  # points whose convex hull holds it (N, 3)
-    centre: Floats  # its middle (3,)
+    points: Floats  # points whose convex hull contains it (N, 3)
+    centre: Floats  # (3,)
     radius: float | None = None  # of a cylinder or sphere [m]
     length: float | None = None  # of a cylinder [m]
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfModel:
-    """A robot as a URDF file describes it."""
+    """A robot in a URDF file."""
 
     source: Path  # the file
-    name: str  # the robot's name in it
-    joints: dict[str, UrdfJoint]  # its joints by name
-    places: dict[str, Floats]  # the frame of each link in that of the root (4, 4)
-    pieces: tuple[CollisionPiece, ...]  # its collision geometry
-    masses: dict[str, float]  # the mass of each link that has one [kg]
-    # what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
-    drive: dict[str, str]
-    missing_meshes: tuple[str, ...]  # meshes that were not found
-    lidars: tuple[UrdfSensor, ...] = ()  # the lidars that Gazebo would simulate
+    name: str  # the robot's name
+    joints: dict[str, UrdfJoint]  # by name
+    places: dict[str, Floats]  # each link's frame in the root's frame (4, 4)
+    pieces: tuple[CollisionPiece, ...]  # collision geometry
+    masses: dict[str, float]  # of the links with a mass [kg]
+    drive: dict[str, str]  # values of Gazebo's drive plugins by tag, without repeated tags
+    missing_meshes: tuple[str, ...]
+    lidars: tuple[UrdfSensor, ...] = ()  # the lidars that Gazebo simulates
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
-        """The joints between a link and the root, from the link on."""
+        """Yield the joints from a link to the root."""
         holders = {joint.child: joint for joint in self.joints.values()}
         while link in holders:
             yield holders[link]
             link = holders[link].parent
 
     def drive_number(self, *tags: str) -> tuple[str, float | None]:
-        """The first of some tags of the drive plugin that has a number greater than 0, and the number; None if none has."""
+        """Return the first tag of the drive plugin with a positive number, and the number; None without one."""
         for tag in tags:
             try:
                 value = float(self.drive.get(tag, ""))
@@ -171,16 +169,16 @@ def read_model(
     arguments: Mapping[str, str] = MappingProxyType({}),
     packages: Mapping[str, Path] = MappingProxyType({}),
 ) -> UrdfModel:
-    """The robot in a URDF or xacro file."""
+    """Read a URDF or xacro file."""
     root = _root_element(path, arguments, packages)
     if root.tag != "robot":
-        raise input_error(str(path), f"its root element is <{root.tag}>; a URDF file begins with <robot>")
+        raise input_error(str(path), f"the root element must be <robot>, got <{root.tag}>")
     links = {_named(path, link): link for link in root.findall("link")}
     if not 0 < len(links) <= MAX_LINKS:
         raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MAX_LINKS}")
-    found = [_joint(path, element) for element in root.findall("joint")]
-    commanded = _commanded(path, root, {joint.name for joint in found})
-    places, joints = _placed(path, set(links), [replace(joint, commanded=commanded.get(joint.name)) for joint in found])
+    local = [_joint(path, element) for element in root.findall("joint")]
+    commanded = _commanded(path, root, {joint.name for joint in local})
+    places, joints = _placed(path, set(links), [replace(joint, commanded=commanded.get(joint.name)) for joint in local])
     reader = _Shapes(path, meshes, without_meshes, packages)
     pieces = [
         piece
@@ -200,30 +198,32 @@ def read_model(
 
 
 def _commanded(path: Path, root: ET.Element, joints: set[str]) -> dict[str, float]:
-    """The joints that <ros2_control> drives by their speed, and the greatest speed that each may be given [rad/s]."""
-    found = {}
+    """Return the speed limits of the velocity-controlled joints in <ros2_control> [rad/s]."""
+    speeds = {}
     for joint in root.findall("ros2_control/joint"):
         name = _named(path, joint)
         for interface in joint.findall("command_interface"):
             if interface.get("name") != "velocity":
                 continue
             if name not in joints:
-                raise input_error(str(path), f"<ros2_control> drives joint {name!r}, which there is not")
+                raise input_error(str(path), f"<ros2_control> names joint {name!r}, which does not exist")
             most = next((param.text for param in interface.findall("param") if param.get("name") == "max"), None)
             try:
-                found[name] = math.inf if most is None else float(most)
+                speeds[name] = math.inf if most is None else float(most)
             except ValueError:
-                found[name] = math.nan
-            if not found[name] > 0:
+                speeds[name] = math.nan
+            if not speeds[name] > 0:
                 raise input_error(
                     str(path), f"joint {name}", f"max in <ros2_control> must be a number above 0, got {most!r}"
                 )
-    return found
+    return speeds
 
 
 def _drive(root: ET.Element) -> dict[str, str]:
-    """What plugins that drive wheels say, by tag. A tag that a plugin repeats, such as the left wheels of a vehicle that
-    skids, is left out: it names no one wheel."""
+    """Return the values of drive plugins by tag.
+
+    Tags that a plugin repeats, such as the left wheels of a skid-steer vehicle, are omitted.
+    """
     drive: dict[str, str] = {}
     for plugin in root.findall("gazebo/plugin"):
         tags = Counter(element.tag for element in plugin)
@@ -235,7 +235,7 @@ def _drive(root: ET.Element) -> dict[str, str]:
 def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> ET.Element:
     if path.suffix.lower() != ".xacro":
         if arguments:
-            raise InputError(f"--arg {next(iter(arguments))}: {path.name} is no .xacro, and has no arguments")
+            raise InputError(f"--arg {next(iter(arguments))}: {path.name} is not a .xacro file and has no arguments")
         return parse_xml(path)
     text = expanded(path, arguments, packages)
     with tempfile.TemporaryDirectory() as folder:
@@ -285,7 +285,7 @@ def _greater_than_0(path: Path, where: str, what: str, value: float) -> float:
 
 
 def _origin(path: Path, element: ET.Element) -> Floats:
-    """The frame (4, 4) that an element's <origin> describes."""
+    """Return the frame (4, 4) of an element's <origin>."""
     origin = element.find("origin")
     place = np.eye(4)
     roll, pitch, yaw = _numbers(path, origin, "rpy", (0.0, 0.0, 0.0))
@@ -302,7 +302,7 @@ def _turn(axis: int, angle: float) -> Floats:
 
 
 def _joint(path: Path, element: ET.Element) -> UrdfJoint:
-    """A joint, with its place and axis in the frame of its parent."""
+    """Read a joint, with frame and axis in its parent's frame."""
     name, kind = _named(path, element), element.get("type", "")
     ends = [element.find(tag) for tag in ("parent", "child")]
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
@@ -314,7 +314,7 @@ def _joint(path: Path, element: ET.Element) -> UrdfJoint:
     )
     axis = _numbers(path, element.find("axis"), "xyz", (1.0, 0.0, 0.0))
     if not np.any(axis):
-        raise input_error(str(path), f"joint {name}", "its axis is 0 0 0")
+        raise input_error(str(path), f"joint {name}", "the axis must not be 0 0 0")
     turns = math.inf if kind == "continuous" else upper - lower
     place = _origin(path, element)
     return UrdfJoint(
@@ -322,13 +322,13 @@ def _joint(path: Path, element: ET.Element) -> UrdfJoint:
     )
 
 
-def _placed(path: Path, links: set[str], found: list[UrdfJoint]) -> tuple[dict[str, Floats], dict[str, UrdfJoint]]:
-    """The frame of each link, and the joints with place and axis, in the frame of the root."""
-    for joint in found:
+def _placed(path: Path, links: set[str], local: list[UrdfJoint]) -> tuple[dict[str, Floats], dict[str, UrdfJoint]]:
+    """Return each link's frame, and the joints with frame and axis, in the root's frame."""
+    for joint in local:
         for link in (joint.parent, joint.child):
             if link not in links:
                 raise input_error(str(path), f"joint {joint.name}", f"there is no link {link!r}")
-    children = [joint.child for joint in found]
+    children = [joint.child for joint in local]
     roots = sorted(links - set(children))
     if len(roots) != 1 or len(children) != len(set(children)):
         raise input_error(
@@ -336,10 +336,10 @@ def _placed(path: Path, links: set[str], found: list[UrdfJoint]) -> tuple[dict[s
         )
     places: dict[str, Floats] = {roots[0]: np.eye(4)}
     joints: dict[str, UrdfJoint] = {}
-    while len(joints) < len(found):
-        ready = [joint for joint in found if joint.parent in places and joint.name not in joints]
+    while len(joints) < len(local):
+        ready = [joint for joint in local if joint.parent in places and joint.name not in joints]
         if not ready:
-            raise input_error(str(path), "two joints have one name, or joints form a ring")
+            raise input_error(str(path), "two joints have the same name, or joints form a loop")
         for joint in ready:
             place = places[joint.parent] @ joint.place
             places[joint.child] = place
@@ -348,14 +348,14 @@ def _placed(path: Path, links: set[str], found: list[UrdfJoint]) -> tuple[dict[s
 
 
 class _Shapes:
-    """Reads collision geometry, meshes among it."""
+    """A reader of collision geometry, including meshes."""
 
     def __init__(self, path: Path, meshes: Path | None, without_meshes: bool, packages: Mapping[str, Path]) -> None:
         self._path, self._meshes, self._without, self._packages = path, meshes, without_meshes, packages
         self.missing_meshes: list[str] = []
 
     def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
-        """The piece of a <collision>; none for a mesh that is left out."""
+        """Yield the piece of a <collision>; nothing for a missing mesh."""
         geometry = element.find("geometry")
         shape = None if geometry is None else next(iter(geometry), None)
         if shape is None:
@@ -392,7 +392,7 @@ class _Shapes:
         return _greater_than_0(self._path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
 
     def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
-        """The vertices (N, 3) of a mesh; None where it is left out."""
+        """Return a mesh's vertices (N, 3); None if it is missing."""
         name = shape.get("filename", "")
         file = next((file for file in self._candidates(name) if file.is_file()), None)
         if file is None:
@@ -400,21 +400,21 @@ class _Shapes:
                 raise input_error(
                     str(self._path),
                     f"link {link}",
-                    f"mesh {name} is not found; say where with --meshes FOLDER or --package NAME=FOLDER, or --without-meshes",
+                    f"mesh {name} not found; give --meshes FOLDER, --package NAME=FOLDER or --without-meshes",
                 )
             self.missing_meshes.append(f"{link}: {name}")
             return None
-        trimesh = optional("trimesh", "urdf", f"mesh {file.name} is read with it")
+        trimesh = optional("trimesh", "urdf", f"mesh {file.name} needs it")
         try:
             vertices = np.asarray(trimesh.load(str(file), force="mesh").vertices, dtype=np.float64)
-        except Exception as error:  # each format has errors of its own
+        except Exception as error:  # each format has its own exceptions
             raise input_error(str(file), f"cannot be read as a mesh: {error or type(error).__name__}") from None
         if not len(vertices) or not np.isfinite(vertices).all():
-            raise input_error(str(file), "has no vertices, or some that are not finite")
+            raise input_error(str(file), "has no vertices, or vertices that are not finite")
         return vertices * _unit(file)
 
     def _candidates(self, name: str) -> Iterator[Path]:
-        """Where a mesh may be: package://NAME/meshes/a.stl is below a folder called NAME, or the folder given."""
+        """Yield candidate paths of a mesh; package://NAME/meshes/a.stl is below a folder NAME or the given folder."""
         bare = name.partition("://")[2] if "://" in name else name
         package, _, inside = bare.partition("/") if name.startswith("package://") else ("", "", bare)
         if package in self._packages:
@@ -427,9 +427,9 @@ class _Shapes:
 
 
 def _unit(file: Path) -> float:
-    """The unit of a mesh file [m]. COLLADA states it, and trimesh leaves it to its caller; other formats have none.
+    """Return the unit of a mesh file [m]. COLLADA states it, but trimesh ignores it; other formats have none.
 
-    The file's up axis is left as it is, as RViz and Gazebo leave it.
+    As in RViz and Gazebo, the file's up axis is ignored.
     """
     if file.suffix.lower() != ".dae":
         return 1.0

@@ -1,4 +1,4 @@
-"""The lidar of a robot out of URDF: what a Gazebo sensor says of it, and where it is on the robot."""
+"""Import of a robot's lidar from the Gazebo sensors of a URDF file."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from antdrive.base.types import Floats
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
 from antdrive.robots.spec import require_on_robot
-from antdrive.worlds.formats.xml import turned
+from antdrive.worlds.formats.xml import rotation_matrix
 
-KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")  # of Gazebo's sensors that are lidars
-LEVEL = 0.99  # the least vertical part of a planar lidar's axis
-RATE = 10.0  # that is assumed where a sensor has none [Hz]
+KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")  # Gazebo's sensor types for lidars
+LEVEL = 0.99  # least vertical component of a planar lidar's axis
+RATE = 10.0  # default scan rate [Hz]
 HALF_TURN = 3.141592  # pi in six digits, rounded down [rad]
-ALL_AROUND = 2 * math.pi - 0.01  # a field of view from here on is meant as a full circle [rad]
+ALL_AROUND = 2 * math.pi - 0.01  # least field of view that means a full circle [rad]
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfSensor:
     """A lidar of a URDF file."""
 
-    name: str  # what messages call it
-    place: Floats  # the frame of its link in that of the root (4, 4)
+    name: str  # for messages
+    place: Floats  # its link's frame in the root's frame (4, 4)
     element: ET.Element  # its <sensor>
 
 
 def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfSensor, ...]:
-    """The lidars that Gazebo would simulate."""
+    """Return the lidars that Gazebo simulates."""
     return tuple(
         UrdfSensor(f"sensor {sensor.get('name', 'without a name')} of link {link}", places[link], sensor)
         for gazebo in root.findall("gazebo")
@@ -44,7 +44,7 @@ def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfS
 def import_lidar(
     sensors: tuple[UrdfSensor, ...], frame: Floats, floor: float, foot: Footprint
 ) -> tuple[Lidar | None, str]:
-    """The first lidar that a robot's file can hold, and where it comes from; none, and why, where there is no such."""
+    """Return the first lidar that fits a robot file, with its origin; or None, with the reasons."""
     problems = []
     for k, sensor in enumerate(sensors):
         try:
@@ -59,7 +59,7 @@ def import_lidar(
 
 
 def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list[str]]:
-    """The lidar, and what is assumed of it."""
+    """Return a sensor's lidar and the assumptions made."""
     scan = sensor.element.find("ray")
     scan = sensor.element.find("lidar") if scan is None else scan
     if scan is None or scan.find("scan/horizontal/samples") is None:
@@ -67,13 +67,13 @@ def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list
     if _number(scan, "scan/vertical/samples", 1.0) > 1:
         raise FieldError("scan", "has several layers")
     x, y, z, *angles = _pose(sensor.element)
-    turn = sensor.place[:3, :3] @ turned(*angles)
+    turn = sensor.place[:3, :3] @ rotation_matrix(*angles)
     if abs(turn[2, 2]) < LEVEL:
         raise FieldError("pose", "its beams are not level")
     spot = sensor.place @ (x, y, z, 1.0)
     low, high = (_number(scan, f"scan/horizontal/{end}_angle", 0.0) for end in ("min", "max"))
     full = high - low >= ALL_AROUND
-    middle = 0.0 if full else (low + high) / 2  # all around it does not matter which beam is the first
+    middle = 0.0 if full else (low + high) / 2  # the first beam of a full circle is arbitrary
     ahead = turn @ (math.cos(middle), math.sin(middle), 0.0)
     (right, left), (away, aside) = frame[1:] @ ahead[:2], frame[1:] @ (spot[:2] - frame[0])
     rate = _number(sensor.element, "update_rate", 0.0)
@@ -94,19 +94,19 @@ def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list
 
 
 def lidar_entry(lidar: Lidar) -> dict[str, str]:
-    """A lidar as it stands in a robot's file."""
+    """Return a lidar's entry in a robot file."""
     values = dataclasses.asdict(lidar)
     return {key: str(value) if key == "beams" else _decimal(value) for key, value in values.items()}
 
 
 def _decimal(value: float) -> str:
-    """A number with a point and without an exponent, as YAML's floats are written."""
+    """Format a number with a decimal point and without exponent, as YAML requires of floats."""
     digits = f"{value:.7f}".rstrip("0")
     return f"{digits}0" if digits.endswith(".") else digits
 
 
 def _pose(sensor: ET.Element) -> tuple[float, ...]:
-    """Where a sensor is on its link: x, y, z [m], roll, pitch, yaw [rad]."""
+    """Return a sensor's pose on its link: x, y, z [m], roll, pitch, yaw [rad]."""
     text = sensor.findtext("pose") or "0 0 0 0 0 0"
     try:
         pose = tuple(float(word) for word in text.split())

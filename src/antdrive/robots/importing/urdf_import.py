@@ -1,6 +1,6 @@
-"""Robot files out of URDF: every value with a comment that says where it comes from.
+"""Conversion of URDF models to robot files, with a comment on the origin of each value.
 
-A limit that is not used is named in the comment of the value that stands in its place.
+The comment of a value also names the limits that it overrides.
 """
 
 from __future__ import annotations
@@ -26,30 +26,30 @@ from antdrive.robots.outline import Footprint
 from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
 from antdrive.robots.spec import GRAVITY, RobotSpec, yaw_inertia_of
 
-ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # that are assumed where the motors allow them [m/s^2], [rad/s^2]
-SPEED, YAW_RATE = 0.5, 2.0  # that are assumed where the file has no limits [m/s], [rad/s]
-DEFAULT_YAW_RATE = 3.14  # that is taken where only the wheels limit it: half a turn a second [rad/s]
-SPARE = 0.9  # the share of what the motors could do that is used
+ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # defaults, if the motors allow them [m/s^2], [rad/s^2]
+SPEED, YAW_RATE = 0.5, 2.0  # defaults without limits in the file [m/s], [rad/s]
+DEFAULT_YAW_RATE = 3.14  # default if only the wheels limit it: half a turn a second [rad/s]
+SPARE = 0.9  # used fraction of the motors' capability
 FRICTION = 1.5  # of wheels
 RANGES = ranges_of(RobotSpec)
 NO_LIMIT = "assumed: the file has no limit"
-MIN_MOTOR_ACCELERATION = 0.05  # the least acceleration that makes an effort limit a motor's [m/s^2]
+MIN_MOTOR_ACCELERATION = 0.05  # effort limits for less are not the motors' [m/s^2]
 
-Found = dict[str, tuple[float, str]]  # values of a robot's file, and where they come from
+Origins = dict[str, tuple[float, str]]  # values of a robot file with their origins
 
 
 class _Limit(NamedTuple):
-    """A limit of a file, and where it stands; inf where there is none."""
+    """A limit and its origin in the file; inf without one."""
 
     value: float
     where: str
 
 
 def add_speeds(
-    model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], found: Found, given: Mapping[str, float]
+    model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], values: Origins, given: Mapping[str, float]
 ) -> None:
-    """Add the limits of the speeds, and of the wheels' speed."""
-    radius, track = found["wheel_radius"][0], found["track"][0]
+    """Add the limits of speed, yaw rate and wheel speed."""
+    radius, track = values["wheel_radius"][0], values["track"][0]
     limit = min(_lowest(wheels, "velocity", "rad/s"), _lowest_commanded(wheels))
     turning = seven_digits(limit.value)
     reach = turning * radius
@@ -57,34 +57,34 @@ def add_speeds(
         ("max_speed", ("max_linear_velocity", "max_linear_speed"), reach, SPEED, "m/s"),
         ("max_yaw_rate", ("max_angular_velocity", "max_angular_speed"), 2 * reach / track, YAW_RATE, "rad/s"),
     ):
-        tag, told = model.drive_number(*tags)
+        tag, stated = model.drive_number(*tags)
         if key in given:
             continue
         beside = ""
-        if told and told > RANGES[key][1]:  # what is faster stands for no limit
-            beside, told = f"<{tag}> of the drive plugin, {told:.7g} {unit}, is {_beyond(key, unit)}", None
-        if told and told > most:
-            found[key] = _five(most), f"computed: {limit.where}; <{tag}> of the drive plugin is {told:g}"
-        elif told:
-            found[key] = told, f"read: <{tag}> of the drive plugin"
+        if stated and stated > RANGES[key][1]:  # higher values mean no limit
+            beside, stated = f"<{tag}> of the drive plugin, {stated:.7g} {unit}, is {_beyond(key, unit)}", None
+        if stated and stated > most:
+            values[key] = _five(most), f"computed: {limit.where}; <{tag}> of the drive plugin is {stated:g}"
+        elif stated:
+            values[key] = stated, f"read: <{tag}> of the drive plugin"
         else:
             value, how = _of_joints(key, limit, reach, most, assumed)
-            found[key] = (
+            values[key] = (
                 value,
                 f"assumed: {beside}" if how == NO_LIMIT and beside else "; ".join(filter(None, (how, beside))),
             )
     if "max_wheel_speed" in given:
         return
-    needs = 1.2 * max(found["max_speed"][0], found["max_yaw_rate"][0] * track / 2) / radius
+    needs = 1.2 * max(values["max_speed"][0], values["max_yaw_rate"][0] * track / 2) / radius
     if turning <= RANGES["max_wheel_speed"][1]:
-        found["max_wheel_speed"] = turning, f"read: {limit.where}"
+        values["max_wheel_speed"] = turning, f"read: {limit.where}"
     else:
         instead = f"; {limit.where} is {_beyond('max_wheel_speed', 'rad/s')}" if turning < math.inf else ""
-        found["max_wheel_speed"] = needs, f"assumed: 1.2 times what the speeds need{instead}"
+        values["max_wheel_speed"] = needs, f"assumed: 1.2 times the speeds' requirement{instead}"
 
 
 def _of_joints(key: str, limit: _Limit, reach: float, most: float, assumed: float) -> tuple[float, str]:
-    """A limit of the speeds as it follows from the joints' alone, and how."""
+    """Return a speed limit derived from the joints' limits, and its origin."""
     if reach == math.inf:
         return assumed, NO_LIMIT
     if reach > RANGES["max_speed"][1]:
@@ -99,39 +99,37 @@ def add_forces(
     model: UrdfModel,
     wheels: tuple[DrivenWheel, DrivenWheel],
     outline: Footprint,
-    found: Found,
+    values: Origins,
     given: Mapping[str, float],
 ) -> None:
-    """Add the motors' torque, and the accelerations that they and the wheels' grip allow."""
-    mass, radius, track = (found[key][0] for key in ("mass", "wheel_radius", "track"))
+    """Add the motors' torque and the accelerations that motors and grip allow."""
+    mass, radius, track = (values[key][0] for key in ("mass", "wheel_radius", "track"))
     if "wheel_torque" not in given:
-        found["wheel_torque"] = _torque(model, wheels, mass, radius)
+        values["wheel_torque"] = _torque(model, wheels, mass, radius)
     inertia = yaw_inertia_of(mass, outline)
-    force = min(found["wheel_torque"][0] / radius, given.get("wheel_friction", FRICTION) * mass * GRAVITY / 2)
+    force = min(values["wheel_torque"][0] / radius, given.get("wheel_friction", FRICTION) * mass * GRAVITY / 2)
     for key, tags, most, usual in (
         ("max_acceleration", ("max_linear_acceleration",), 2 * force / mass, ACCELERATION),
         ("max_yaw_acceleration", ("max_angular_acceleration",), force * track / inertia, YAW_ACCELERATION),
     ):
         if key in given:
             continue
-        usable, (tag, told) = SPARE * most, model.drive_number(*tags)
-        wanted, how = (told, f"read: <{tag}> of the drive plugin") if told else (usual, "assumed")
-        less = f"; <{tag}> of the drive plugin is {told:g}" if told else ""
-        found[key] = (
-            (wanted, how)
-            if wanted <= usable
-            else (usable, f"computed: nine tenths of what motors and grip reach{less}")
+        usable, (tag, stated) = SPARE * most, model.drive_number(*tags)
+        wanted, how = (stated, f"read: <{tag}> of the drive plugin") if stated else (usual, "assumed")
+        less = f"; <{tag}> of the drive plugin is {stated:g}" if stated else ""
+        values[key] = (
+            (wanted, how) if wanted <= usable else (usable, f"computed: 0.9 times the limit of motors and grip{less}")
         )
     if "max_lateral_acceleration" not in given:
-        found["max_lateral_acceleration"] = ACCELERATION, "assumed"
+        values["max_lateral_acceleration"] = ACCELERATION, "assumed"
 
 
 def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: float, radius: float) -> tuple[float, str]:
-    """The lowest limit that moves the robot and that its file may hold, beside all others by name."""
+    """Return the lowest plausible torque limit; its origin names all others."""
     limits = [_lowest(wheels, "effort", "N m")]
-    tag, told = model.drive_number("max_wheel_torque", "wheelTorque", "torque")
-    if told:
-        limits.append(_Limit(told, f"<{tag}> of the drive plugin, {told:.7g} N m"))
+    tag, stated = model.drive_number("max_wheel_torque", "wheelTorque", "torque")
+    if stated:
+        limits.append(_Limit(stated, f"<{tag}> of the drive plugin, {stated:.7g} N m"))
     weakest, strongest = mass * MIN_MOTOR_ACCELERATION * radius, RANGES["wheel_torque"][1]
     limits = sorted(limit for limit in limits if limit.value < math.inf)
     used = next((limit for limit in limits if weakest < limit.value <= strongest), None)
@@ -145,33 +143,33 @@ def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: flo
             beside += f"; {limit.where} is more"
     if used is not None:
         return used.value, f"read: {used.where}{beside}"
-    return 2 * mass * ACCELERATION * radius, f"assumed: 4 times what {ACCELERATION:g} m/s2 need{beside}"
+    return 2 * mass * ACCELERATION * radius, f"assumed: 4 times the torque for {ACCELERATION:g} m/s2{beside}"
 
 
 def _beyond(key: str, unit: str) -> str:
-    """What is said of a limit that no robot's file could hold."""
-    return f"above the {RANGES[key][1]:g} {unit} that a robot's file may say, and is not used"
+    """Return the remark on a limit above the range of robot files."""
+    return f"above the {RANGES[key][1]:g} {unit} limit of robot files, not used"
 
 
 def _lowest(wheels: tuple[DrivenWheel, DrivenWheel], key: str, unit: str) -> _Limit:
-    """The lower of a limit of the two joints, and what it is called."""
+    """Return the lower limit of the two joints, with its origin."""
     value, name = min((getattr(wheel.joint, key) or math.inf, wheel.joint.name) for wheel in wheels)
     return _Limit(value, f"the {key} limit of joint {name}, {value:.7g} {unit}")
 
 
 def _lowest_commanded(wheels: tuple[DrivenWheel, DrivenWheel]) -> _Limit:
-    """The lower limit of what <ros2_control> lets the two joints be given."""
+    """Return the two joints' lower speed limit in <ros2_control>, with its origin."""
     value, name = min((wheel.joint.commanded or math.inf, wheel.joint.name) for wheel in wheels)
     return _Limit(value, f"the limit of joint {name} in <ros2_control>, {value:.7g} rad/s")
 
 
 def seven_digits(value: float) -> float:
-    """A number as the file will have it, in seven digits, so that what follows from it is exactly reached."""
+    """Round a number to seven digits, as in the file, so that derived values match it exactly."""
     return float(f"{value:.7g}")
 
 
 def _five(value: float) -> float:
-    """The largest number of five digits that is not above a value."""
+    """Round a number down to five digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 4)
     near = float(f"{value:.5g}")
     return near if near <= value else float(f"{near - unit:.5g}")
@@ -180,13 +178,13 @@ def _five(value: float) -> float:
 KINDS = ("auto", "disc", "rectangle", "polygon")
 RADII = (("wheel_radius", 1.0), ("wheelRadius", 1.0), ("wheel_diameter", 0.5), ("wheelDiameter", 0.5))
 TRACKS = (("wheel_separation", 1.0), ("wheelSeparation", 1.0))
-DENSITY = 150.0  # of a robot whose file has no masses [kg/m^3]
-DIFFERENT = 0.01  # a drive plugin contradicts the geometry from this share on
-NOISE = "{pose_xy: 0.01, pose_yaw: 0.01, pose_rate: 20.0, encoder: 0.02, slip: 0.02, delay: 0.05}"  # as the catalogue assumes
+DENSITY = 150.0  # assumed without masses in the file [kg/m^3]
+DIFFERENT = 0.01  # relative difference from which a drive plugin contradicts the geometry
+NOISE = "{pose_xy: 0.01, pose_yaw: 0.01, pose_rate: 20.0, encoder: 0.02, slip: 0.02, delay: 0.05}"  # the catalogue's assumption
 
 
 class _Value(NamedTuple):
-    """A value of the robot file, and where it comes from."""
+    """A value of the robot file and its origin."""
 
     key: str
     value: float
@@ -195,15 +193,14 @@ class _Value(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ImportedRobot:
-    """A robot out of a URDF file."""
+    """A robot imported from a URDF file."""
 
     spec: RobotSpec
-    text: str  # its file, with a comment for each value
-    # the collision geometry below the height of the import, from above: points of each piece in the robot's
-    # frame (N, 2) [m]
+    text: str  # the robot file, with a comment for each value
+    # collision geometry below the import's height: points of each piece in the robot's frame, from above (N, 2) [m]
     pieces: tuple[Floats, ...]
-    above: tuple[Floats, ...]  # the same of the pieces that lie above that height
-    missing_meshes: tuple[str, ...]  # meshes that were not found
+    above: tuple[Floats, ...]  # collision geometry above that height
+    missing_meshes: tuple[str, ...]
 
 
 def import_urdf(
@@ -219,7 +216,7 @@ def import_urdf(
     arguments: Mapping[str, str] = MappingProxyType({}),
     packages: Mapping[str, Path] = MappingProxyType({}),
 ) -> ImportedRobot:
-    """A differential-drive robot out of a URDF or xacro file."""
+    """Import a differential-drive robot from a URDF or xacro file."""
     given = _checked(given or {})
     if footprint not in KINDS:
         raise InputError(f"--footprint {footprint}: choose from {', '.join(KINDS)}")
@@ -231,14 +228,12 @@ def import_urdf(
     high = [piece for piece in model.pieces if piece.points[:, 2].min() - floor > below]
     if not {piece.link for piece in low} - {wheel.joint.child for wheel in wheels}:
         where = "" if math.isinf(below) else f" below {below:g} m"
-        raise input_error(
-            str(path), f"has no collision geometry{where} beside its wheels, from which a footprint could follow"
-        )
+        raise input_error(str(path), f"has no collision geometry{where} other than its wheels, so no footprint")
     points = [_from_above(piece.points, frame) for piece in low]
     outline = footprint_around(_with_wheels(points, wheels), footprint)
     names = sorted({piece.link for piece in low})
     kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
-    what = f"{kind} around the collision geometry of {_few(names)}, and around the wheels"
+    what = f"{kind} around the collision geometry of {_few(names)} and the wheels"
     what += "" if math.isinf(below) else f", below {below:g} m"
     values = _values(model, wheels, outline, floor, given)
     text = _text(model, path, outline, what, values, import_lidar(model.lidars, frame, floor, outline))
@@ -270,7 +265,7 @@ def _checked(given: Mapping[str, float]) -> dict[str, float]:
 
 
 def _frame(wheels: tuple[DrivenWheel, DrivenWheel]) -> Floats:
-    """The robot's origin and axes, seen from above, in the root's frame: origin, x and y as rows (3, 2)."""
+    """Return the robot's frame from above, in the root's frame: origin, x and y as rows (3, 2)."""
     left, right = wheels
     across = (left.centre - right.centre)[:2]
     y = across / np.linalg.norm(across)
@@ -282,13 +277,13 @@ def _from_above(points: Floats, frame: Floats) -> Floats:
 
 
 def _with_wheels(points: list[Floats], wheels: tuple[DrivenWheel, DrivenWheel]) -> list[tuple[float, float]]:
-    """All points of the pieces, and the corners of both wheels, seen from above."""
+    """Return the points of all pieces and the corners of both wheels, from above."""
     half = float(np.linalg.norm(wheels[0].centre - wheels[1].centre)) / 2
-    found = [(float(x), float(y)) for piece in points for x, y in piece]
+    corners = [(float(x), float(y)) for piece in points for x, y in piece]
     for side, wheel in zip((1, -1), wheels, strict=True):
         for x in (-wheel.radius, wheel.radius):
-            found += [(x, side * half - wheel.width / 2), (x, side * half + wheel.width / 2)]
-    return found
+            corners += [(x, side * half - wheel.width / 2), (x, side * half + wheel.width / 2)]
+    return corners
 
 
 def _values(
@@ -303,23 +298,23 @@ def _values(
     radius = seven_digits((left.radius + right.radius) / 2)
     top = max((float(piece.points[:, 2].max()) for piece in model.pieces), default=0.0) - floor
     xmin, ymin, xmax, ymax = outline.bounds
-    apart = f"computed: between the middles of {left.joint.child} and {right.joint.child}"
+    apart = f"computed: distance between {left.joint.child} and {right.joint.child}"
     size = f"read: {left.read_from}" + ("" if left.given else _contradiction(model, radius, *RADII))
-    found: Found = {
+    values: Origins = {
         "height": (max(top, 2 * radius), "computed: top of the collision geometry above the floor"),
         "wheel_radius": (radius, size),
         "track": (track, apart + _contradiction(model, track, *TRACKS)),
         "mass": _mass(model, (xmax - xmin) * (ymax - ymin) * max(top, 2 * radius)),
     }
     for key, value in given.items():
-        found[key] = value, "given"
-    add_speeds(model, wheels, found, given)
-    add_forces(model, wheels, outline, found, given)
-    return [_Value(key, *found[key]) for key in ranges_of(RobotSpec) if key in found]
+        values[key] = value, "given"
+    add_speeds(model, wheels, values, given)
+    add_forces(model, wheels, outline, values, given)
+    return [_Value(key, *values[key]) for key in ranges_of(RobotSpec) if key in values]
 
 
 def _robot_in(text: str, path: Path, values: list[_Value]) -> RobotSpec:
-    """The robot; a value that no robot may have is refused with where it came from."""
+    """Parse the robot file; errors name the origin of the value."""
     try:
         return robot_from_text(text, f"{path}, as imported", path.stem)
     except InputError as error:
@@ -328,16 +323,16 @@ def _robot_in(text: str, path: Path, values: list[_Value]) -> RobotSpec:
 
 
 def _contradiction(model: UrdfModel, value: float, *tags: tuple[str, float]) -> str:
-    """What to add where the drive plugin says otherwise: the tags that it may use, and how often the value they have."""
-    for tag, share in tags:
-        _, told = model.drive_number(tag)
-        if told and abs(told * share - value) > DIFFERENT * value:
-            return f"; <{tag}> of the drive plugin is {told:g}"
+    """Return a remark if the drive plugin contradicts a value; tags come with their scale."""
+    for tag, scale in tags:
+        _, stated = model.drive_number(tag)
+        if stated and abs(stated * scale - value) > DIFFERENT * value:
+            return f"; <{tag}> of the drive plugin is {stated:g}"
     return ""
 
 
 def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
-    """The mass, of the links that have one, or of a box of a usual density [m^3]."""
+    """Return the sum of the links' masses, or the mass of a box [m^3] of typical density."""
     heavy = [name for name, mass in model.masses.items() if mass > 0]
     if not heavy:
         return DENSITY * box, f"assumed: {DENSITY:g} kg/m3, as the file has no masses"
@@ -349,7 +344,7 @@ def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
 def _text(
     model: UrdfModel, path: Path, outline: Footprint, what: str, values: list[_Value], sight: tuple[Lidar | None, str]
 ) -> str:
-    """The robot's file."""
+    """Return the text of the robot file."""
     lidar, seen = sight
     name = "".join(c for c in model.name if c.isprintable()).strip() or path.stem
     rows = [("schema: 1", ""), (f"name: {_quoted(name[:200])}", "read: the robot's name")]
@@ -376,12 +371,12 @@ def _text(
         lines.append(f"# no lidar: {''.join(c if c.isprintable() else '?' for c in seen)}")
     if model.missing_meshes:
         left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.missing_meshes)
-        lines.append(f"# left out, because they were not found: {left}")
+        lines.append(f"# omitted, because not found: {left}")
     return "\n".join(lines) + "\n"
 
 
 def _rounded(value: _Value) -> str:
-    """A value in seven digits, with a point, as YAML's floats are written."""
+    """Format a value in seven digits, without exponent."""
     digits = value.value if value.how == "given" else seven_digits(value.value)
     return f"{digits:.10f}".rstrip("0").rstrip(".") if digits < 1e9 else repr(digits)
 

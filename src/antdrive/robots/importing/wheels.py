@@ -1,4 +1,4 @@
-"""Which two wheels drive a robot that a URDF file describes, and why some robots are no differential drive."""
+"""Detection of the two driven wheels in a URDF model."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from antdrive.base.errors import InputError, input_error
 from antdrive.base.types import Floats
 from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
 
-LEVEL = 0.1  # the most that the axis of a wheel may rise, as the sine of an angle
-SAME = 0.02  # two wheels are alike, and on one axle, if they differ by no more than this share of their distance
-SWIVEL = 0.9  # the least vertical part of the axis of a caster or a steering joint
+LEVEL = 0.1  # largest vertical component of a wheel's axis
+SAME = 0.02  # relative tolerance for equal radii and a common axle
+SWIVEL = 0.9  # least vertical component of the axis of a caster or a steering joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,17 +23,17 @@ class DrivenWheel:
     """A driven wheel."""
 
     joint: UrdfJoint  # the joint that turns it
-    centre: Floats  # its middle, in the root's frame (3,) [m]
+    centre: Floats  # in the root's frame (3,) [m]
     radius: float  # [m]
     width: float  # along its axis [m]
-    read_from: str  # where these values come from, in words
-    given: bool = False  # whether the radius was given, or the drive plugin's
+    read_from: str  # origin of these values, as text
+    given: bool = False  # whether the radius comes from the user or the drive plugin
 
 
 def driven_wheels(
     model: UrdfModel, left: str | None = None, right: str | None = None, radius: float | None = None
 ) -> tuple[DrivenWheel, DrivenWheel]:
-    """The left and the right driven wheel."""
+    """Return the left and the right driven wheel."""
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
     if left is not None and right is not None:
@@ -46,14 +46,14 @@ def driven_wheels(
             _wheel(model, _joint_called(model, names[1]), radius),
         )
         if not _on_one_axle(*pair):
-            why = _unlike(pair) or f"{names[0]} and {names[1]} are no two wheels on one axle"
+            why = _unlike(pair) or f"{names[0]} and {names[1]} are not on one axle"
             raise input_error(str(model.source), why)
         return pair if left is not None or _from_plugin(model) else _in_order(model, pair)
     return _in_order(model, _only_pair(model, radius))
 
 
 def _named_in_file(model: UrdfModel) -> tuple[str, str] | None:
-    """The joints that the drive plugin drives, left first, or the only two that <ros2_control> does; None: to be found."""
+    """Return the drive plugin's joints, left first, or the only two of <ros2_control>; None without either."""
     commanded = [joint.name for joint in model.joints.values() if joint.commanded is not None]
     return _from_plugin(model) or ((commanded[0], commanded[1]) if len(commanded) == 2 else None)
 
@@ -64,16 +64,16 @@ def _from_plugin(model: UrdfModel) -> tuple[str, str] | None:
 
 
 def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
-    found = model.joints.get(name) or next((joint for joint in model.joints.values() if joint.child == name), None)
-    if found is None or not _turns_as_wheel(found):
+    match = model.joints.get(name) or next((joint for joint in model.joints.values() if joint.child == name), None)
+    if match is None or not _turns_as_wheel(match):
         some = ", ".join(joint.name for joint in model.joints.values() if _turns_as_wheel(joint)) or "none"
         problem = "no such joint or link"
-        if found is not None:
+        if match is not None:
             problem = "does not turn freely about a level axis"
-            if found.kind == "revolute":
-                problem = f"is revolute, with a range of {found.range:.4g} rad; a driven wheel's joint is continuous"
-        raise input_error(str(model.source), f"{name}: {problem}; joints that could drive: {some}")
-    return found
+            if match.kind == "revolute":
+                problem = f"revolute, with a range of {match.range:.4g} rad; a driven wheel's joint is continuous"
+        raise input_error(str(model.source), f"{name}: {problem}; candidates: {some}")
+    return match
 
 
 def _turns_as_wheel(joint: UrdfJoint) -> bool:
@@ -81,7 +81,7 @@ def _turns_as_wheel(joint: UrdfJoint) -> bool:
 
 
 def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, DrivenWheel]:
-    """The only two wheels that stand on the floor, on one axle, and are neither steered nor on a caster."""
+    """Return the only two wheels on the floor with a common axle, neither steered nor on a caster."""
     where = str(model.source)
     turning = [joint for joint in model.joints.values() if _turns_as_wheel(joint)]
     held = {joint.name: list(model.above(joint.parent)) for joint in turning}
@@ -90,12 +90,12 @@ def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, Dri
         if over.kind == "revolute" and over.range <= 2 * math.pi and abs(over.axis[2]) > SWIVEL
     ]  # fmt: skip
     if steering:
-        raise input_error(where, f"{', '.join(dict.fromkeys(steering))} steer wheels: this is no differential drive")
+        raise input_error(where, f"{', '.join(dict.fromkeys(steering))} steer wheels: not a differential drive")
     fixed = [joint for joint in turning if all(over.kind == "fixed" for over in held[joint.name])]
     rollers = [joint.name for joint in turning if any(over in fixed for over in held[joint.name])]
     if rollers:
         raise input_error(
-            where, f"its wheels carry {len(rollers)} rollers, such as {rollers[0]}: this is no differential drive"
+            where, f"its wheels have {len(rollers)} rollers, such as {rollers[0]}: not a differential drive"
         )
     wheels = [_wheel(model, joint, radius) for joint in fixed if _stands(model, joint)]
     pairs = [pair for pair in itertools.combinations(wheels, 2) if _on_one_axle(*pair)]
@@ -106,20 +106,20 @@ def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, Dri
     if not pairs:
         names = ", ".join(wheel.joint.name for wheel in wheels)
         raise input_error(
-            where, f"no two of its {len(wheels)} wheels share an axle ({names}): this is no differential drive"
+            where, f"no two of its {len(wheels)} wheels share an axle ({names}): not a differential drive"
         )
     if len(pairs) > 1:
         axles = "; ".join(f"{a.joint.name} and {b.joint.name}" for a, b in pairs)
         raise input_error(
             where,
-            f"{len(pairs)} pairs of wheels on axles ({axles}): it turns by skidding, or some are not driven; "
-            "choose the axle that it turns about with --left and --right",
+            f"{len(pairs)} axles with pairs of wheels ({axles}): a skid-steer drive, or some are not driven; "
+            "choose the axle of rotation with --left and --right",
         )
     return pairs[0]
 
 
 def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWheel]) -> str:
-    """Why fewer than two wheels were found: they turn too little, or something reaches lower; and what helps."""
+    """Explain why fewer than two wheels were detected, and how to fix it."""
     fix = "name the joints of its two driven wheels with --left and --right"
     limited = [
         joint
@@ -139,17 +139,17 @@ def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWhee
         names = ", ".join(f"{name} by {height:.4g} m" for name, height in above.items() if math.isfinite(height))
         if names and lowest.link not in {joint.child for joint in turning}:
             lower = f"the collision geometry of link {lowest.link} lies lower than its wheels ({names})"
-            return f"{lower}, which then would not stand on the floor; if they drive it, {fix}"
-    return f"has {len(wheels)} wheels that turn freely and stand on the floor; a differential drive has two; if there are, {fix}"
+            return f"{lower}, so the wheels are not on the floor; if they drive it, {fix}"
+    return f"has {len(wheels)} free-turning wheels on the floor; a differential drive has two; if it has two, {fix}"
 
 
 def _bottom(model: UrdfModel, joint: UrdfJoint) -> float:
-    """The lowest point of what a joint turns [m]; inf where it has no collision geometry."""
+    """Return the lowest point of a joint's child link [m]; inf without collision geometry."""
     return min((float(p.points[:, 2].min()) for p in model.pieces if p.link == joint.child), default=math.inf)
 
 
 def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
-    """Whether what a joint turns is a wheel and not a spinning sensor: round, and among the lowest parts."""
+    """Return whether a joint's child link is a wheel on the floor, not a spinning sensor."""
     own = [piece for piece in model.pieces if piece.link == joint.child]
     if not own:
         return "wheel" in f"{joint.name} {joint.child}".lower()
@@ -159,7 +159,7 @@ def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
 
 
 def _is_round(model: UrdfModel, joint: UrdfJoint) -> bool:
-    """Whether what a joint turns has a cylinder or a sphere as collision geometry."""
+    """Return whether a joint's child link has a cylinder or a sphere as collision geometry."""
     return any(piece.link == joint.child and piece.radius is not None for piece in model.pieces)
 
 
@@ -171,7 +171,7 @@ def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWh
         r = radius or given or (diameter or 0.0) / 2
         if not r:
             raise input_error(
-                str(model.source), f"link {joint.child}", "has no collision geometry; say --wheel-radius METRES"
+                str(model.source), f"link {joint.child}", "has no collision geometry; give --wheel-radius METRES"
             )
         says = "given" if radius else "the drive plugin"
         how = f"{says}; width assumed, position from joint {joint.name}"
@@ -189,7 +189,7 @@ def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWh
 
 
 def _on_one_axle(a: DrivenWheel, b: DrivenWheel) -> bool:
-    """Whether two wheels of one size turn about one line."""
+    """Return whether two wheels have equal radii and a common axis."""
     return _turn_about_one_line(a, b) and abs(a.radius - b.radius) <= SAME * a.radius
 
 
@@ -203,20 +203,22 @@ def _turn_about_one_line(a: DrivenWheel, b: DrivenWheel) -> bool:
 
 
 def _unlike(wheels: Sequence[DrivenWheel]) -> str:
-    """What is wrong with two wheels of different radii that face each other; empty if there are none.
+    """Describe two opposite wheels of different radii; empty if there are none.
 
-    Wheels of different size that stand on one floor have their middles at different heights, so heights do not count.
+    Heights are ignored: wheels of different radii on one floor have centres at different heights.
     """
     for a, b in itertools.combinations(wheels, 2):
         level = replace(b, centre=np.array([*b.centre[:2], a.centre[2]]))
         if _turn_about_one_line(a, level) and abs(a.radius - b.radius) > SAME * a.radius:
             radii = " and ".join(f"{wheel.radius:.4g} m (link {wheel.joint.child})" for wheel in (a, b))
-            return f"its wheels have different radii, {radii}; the two driven wheels of a differential drive are alike"
+            return (
+                f"its wheels have different radii, {radii}; the driven wheels of a differential drive have equal radii"
+            )
     return ""
 
 
 def _in_order(model: UrdfModel, pair: tuple[DrivenWheel, DrivenWheel]) -> tuple[DrivenWheel, DrivenWheel]:
-    """A pair as left and right: along the root's y axis, or by their names where the axle lies otherwise."""
+    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction."""
     a, b = pair
     apart = a.centre - b.centre
     if abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart)):
@@ -226,5 +228,5 @@ def _in_order(model: UrdfModel, pair: tuple[DrivenWheel, DrivenWheel]) -> tuple[
             return first, second
     raise input_error(
         str(model.source),
-        f"it is not clear which of {a.joint.name} and {b.joint.name} is on the left; say so with --left and --right",
+        f"it is not clear which of {a.joint.name} and {b.joint.name} is on the left; give --left and --right",
     )

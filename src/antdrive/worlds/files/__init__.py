@@ -1,1 +1,1 @@
-"""World files: reading, checking and writing them."""
+"""World files."""

@@ -1,4 +1,4 @@
-"""World files: tasks in YAML, read and written, and the catalogue of worlds that comes with the package."""
+"""World files (tasks in YAML) and the package's catalogue of worlds."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ Triple: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
 Start = Annotated[Triple, Field(description="write [x, y, yaw] in metres and radians")]
 Goal = Annotated[Pair, Field(description="write [x, y] in metres")]
 
-FOREIGN_SUFFIXES = (".sdf", ".world", ".map")  # the suffixes of other programs' worlds, which are imported
+FOREIGN_SUFFIXES = (".sdf", ".world", ".map")  # files of other programs; `antdrive worlds import` converts them
 _CATALOG = Path(__file__).parent.with_name("catalog")
 
 
 class WalkEntry(BaseModel):
-    """A random walk: in every period from a cell's centre to that of a random free neighbour."""
+    """A random walk: one step each period, from a cell's centre to a random free neighbour's."""
 
     model_config = STRICT
 
@@ -46,29 +46,27 @@ class WalkEntry(BaseModel):
 
 
 class MoverEntry(BaseModel):
-    """A moving cylinder; exactly one of keyframes, velocity and walk says how it moves."""
+    """A moving cylinder, with exactly one of keyframes, velocity and walk."""
 
     model_config = STRICT
 
     radius: Size = Field(description="the radius as built [m]")
     height: Size = Field(1.0, description="the height [m]")
-    phase: float = Field(
-        0.0, ge=0, le=MAX_PHASE, description="how much of the motion has already passed at the start [s]"
-    )
+    phase: float = Field(0.0, ge=0, le=MAX_PHASE, description="time into the motion at the start of a run [s]")
     keyframes: list[Triple] | None = Field(None, max_length=10_000, description="write [t, x, y] for each")
-    loop: Literal["pingpong", "teleport", "once"] | None = Field(None, description="what follows the last keyframe")
-    interpolation: Literal["linear", "catmull-rom"] | None = Field(None, description="how it moves between keyframes")
-    position: Pair | None = Field(None, description="write [x, y], the centre at first")
-    velocity: Pair | None = Field(None, description="write [vx, vy] in m/s; it bounces off the walls")
+    loop: Literal["pingpong", "teleport", "once"] | None = Field(None, description="behaviour after the last keyframe")
+    interpolation: Literal["linear", "catmull-rom"] | None = Field(None, description="motion between keyframes")
+    position: Pair | None = Field(None, description="write [x, y], the centre at the start")
+    velocity: Pair | None = Field(None, description="write [vx, vy] in m/s; the mover bounces off the walls")
     walk: WalkEntry | None = Field(None, description="write {cell: 0.5, period: 1.0}")
 
 
 class EndsEntry(BaseModel):
-    """Another start and goal in the same world; `--task NAME` chooses it."""
+    """Another start and goal in the same world, chosen by `--task NAME`."""
 
     model_config = STRICT
 
-    name: OneLine = Field(min_length=1, max_length=100, description="what --task calls it")
+    name: OneLine = Field(min_length=1, max_length=100, description="the name for --task")
     start: Triple | None = Field(
         None, description="write [x, y, yaw] in metres and radians; by default the world's own"
     )
@@ -77,87 +75,84 @@ class EndsEntry(BaseModel):
 
 
 class WorldFile(BaseModel):
-    """A world with a start and a goal, as written in a file."""
+    """A world file: a world with a start and a goal."""
 
     model_config = STRICT
 
     # "schema" is also a method of BaseModel, hence the alias.
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
-    name: OneLine = Field(
-        min_length=1, max_length=200, description="what people call the world; by default the file's name"
-    )
-    source: str | None = Field(None, description="where the world comes from, free text")
+    name: OneLine = Field(min_length=1, max_length=200, description="the world's name; by default the file's name")
+    source: str | None = Field(None, description="origin of the world, free text")
     bounds: tuple[Coordinate, Coordinate, Coordinate, Coordinate] = Field(
         description="write [xmin, ymin, xmax, ymax] in metres"
     )
     start: Start
     goal: Goal
     goal_tolerance: Size = Field(0.25, description="how close to the goal the robot must stop [m]")
-    cell: Size = Field(0.5, description="grid resolution for planners unless another is given [m]")
+    cell: Size = Field(0.5, description="default grid resolution for planners [m]")
     obstacles: list[Disc] = Field([], description="upright cylinders")
-    time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default ample for the route")
+    time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default computed from the route")
     movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
     tasks: list[EndsEntry] = Field([], max_length=10_000, description="other starts and goals, by name")
     frame: Triple | None = Field(
         None,
-        description="write [x, y, yaw]: where the world's origin lies in the map that it was made from, in metres and radians; "
-        "exports use it",
+        description="write [x, y, yaw]: the pose of the world's origin in its source map, in metres and radians; used by exports",
     )
 
 
 def list_worlds() -> Mapping[str, Path]:
-    """The worlds that come with the package, by name."""
+    """Return the files of the package's worlds by name."""
     return dict(sorted((path.stem, path) for path in _CATALOG.glob("*.yaml")))
 
 
 def load_task(world: str | os.PathLike[str], name: str | None = None) -> Task:
-    """The task in a world file, or in the catalogue.
+    """Load a task from a world file or the catalogue.
 
     Args:
-        world: a name of the catalogue, or a path; a text that is both means the catalogue
+        world: a catalogue name or a path; catalogue names take precedence
         name: one of the file's `tasks`; None: the world's own start and goal
 
     Raises:
-        InputError: there is no such world or task, or something in the file is wrong.
+        InputError: the world or the task does not exist, or the file is invalid.
     """
-    found = _tasks_of(world)
-    if name not in found:
-        known = [known for known in found if known is not None]
-        hint = suggest(name or "", known) if known else "the world has no tasks beside its own start and goal"
+    tasks = _tasks_of(world)
+    if name not in tasks:
+        known = [known for known in tasks if known is not None]
+        hint = suggest(name or "", known) if known else "the world has no named tasks"
         raise input_error(os.fspath(world), f"no task {name!r:.60}; {hint}")
-    return found[name]
+    return tasks[name]
 
 
 def load_tasks(world: str | os.PathLike[str]) -> Mapping[str, Task]:
-    """The tasks under the key `tasks` of a world file or of a world of the catalogue, by name.
+    """Load the tasks under a world's key `tasks`, by name.
 
     Args:
         world: as for `load_task`
 
     Raises:
-        InputError: there is no such world, or something in the file is wrong.
+        InputError: the world does not exist, or its file is invalid.
     """
     return {name: task for name, task in _tasks_of(world).items() if name is not None}
 
 
 def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
-    """The tasks of a world by name; None is its own."""
+    """Return a world's tasks by name; None is the key of its own start and goal."""
     try:
         path = resolve("world", world, list_worlds())
     except FieldError as error:
         raise input_error(error.problem) from None
     if path.suffix.lower() in FOREIGN_SUFFIXES:
-        raise input_error(str(path), f"is no world file; make one of it with antdrive worlds import {path}")
+        raise input_error(str(path), f"not a world file; convert it with: antdrive worlds import {path}")
     return _tasks_in(read_yaml(path), os.fspath(path), path.stem)
 
 
 @cached(16)
 def _tasks_in(text: str, source: str, stem: str) -> Mapping[str | None, Task]:
-    """The tasks in the text of a world file."""
+    """Parse the tasks of a world file."""
     document = parse_document(text, source)
     if isinstance(document.data, dict):
         if {"image", "resolution", "origin"} <= document.data.keys():
-            raise document.error((), f"is a map of map_server; make a world of it with antdrive worlds import {source}")
+            raise document.error((), f"a map_server map; convert it with: antdrive worlds import {source}")
         document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "world")
     return _tasks_in_document(document)
 
@@ -165,27 +160,27 @@ def _tasks_in(text: str, source: str, stem: str) -> Mapping[str | None, Task]:
 def _tasks_in_document(document: Document) -> dict[str | None, Task]:
     entry = check(WorldFile, document)
     own = _to_task(document, entry)
-    found: dict[str | None, Task] = {None: own}
-    return found | _named_tasks(document, entry, own)
+    tasks: dict[str | None, Task] = {None: own}
+    return tasks | _named_tasks(document, entry, own)
 
 
 def _named_tasks(document: Document, entry: WorldFile, own: Task) -> dict[str | None, Task]:
-    """The tasks beside a world's own."""
-    found: dict[str | None, Task] = {}
+    """Return the tasks under the key `tasks`."""
+    named: dict[str | None, Task] = {}
     for i, ends in enumerate(entry.tasks):
-        if ends.name in found:
-            raise document.error(("tasks", i, "name"), f"{ends.name!r} is the name of two tasks")
+        if ends.name in named:
+            raise document.error(("tasks", i, "name"), f"{ends.name!r} names two tasks; rename one")
         tolerance = ends.goal_tolerance or own.goal_tolerance
         try:
             start = ends.start or own.start
-            found[ends.name] = dataclasses.replace(own, start=start, goal=ends.goal, goal_tolerance=tolerance)
+            named[ends.name] = dataclasses.replace(own, start=start, goal=ends.goal, goal_tolerance=tolerance)
         except FieldError as error:
             raise document.field_error(error, "tasks", i) from None
-    return found
+    return named
 
 
 def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingProxyType({})) -> None:
-    """Write a task as a world file, whole or not at all.
+    """Write a task as a world file, atomically.
 
     Args:
         task: the world with its own start and goal
@@ -193,8 +188,8 @@ def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingP
         tasks: other starts and goals in the same world, by name
 
     Raises:
-        InputError: the file cannot be written, or a world file cannot hold the task, such as one with an empty name or
-            with too many obstacles.
+        InputError: the file cannot be written, or the task does not fit into a world file (empty name, too many
+            obstacles).
     """
     data = task_to_dict(task)
     if tasks:
@@ -207,14 +202,14 @@ def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingP
         raise input_error(
             os.fspath(path),
             f"not written: {len(task.world.obstacles)} obstacles and {len(task.world.movers)} movers make "
-            f"{size / 1e6:.1f} MB and {values} values, and a world file has at most {MAX_BYTES / 1e6:g} MB and "
-            f"{MAX_VALUES} values; use fewer, larger cylinders (for maps, a larger overhang)",
+            f"{size / 1e6:.1f} MB and {values} values; the limits are {MAX_BYTES / 1e6:g} MB and {MAX_VALUES} values; "
+            f"use fewer, larger cylinders (for maps, a larger overhang)",
         )
     write_text(path, text)
 
 
 def ends_to_dict(task: Task) -> dict[str, Any]:
-    """The start and the goal of a task as plain data."""
+    """Return a task's start, goal and tolerance as plain data."""
     return {
         "start": [float(v) for v in task.start],
         "goal": [float(v) for v in task.goal],
@@ -223,7 +218,7 @@ def ends_to_dict(task: Task) -> dict[str, Any]:
 
 
 def task_to_dict(task: Task) -> dict[str, Any]:
-    """A task as plain data with the keys of a world file, ready for JSON."""
+    """Return a task as JSON-ready data with the keys of a world file."""
     world = task.world
     return {
         "schema": 1,
@@ -245,20 +240,20 @@ def task_to_dict(task: Task) -> dict[str, Any]:
 
 
 def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
-    """The task in plain data, as `task_to_dict` returns it.
+    """Return the task in plain data: the inverse of `task_to_dict`.
 
     Args:
         data: mappings, lists, numbers and texts with the keys of a world file
-        source: what error messages call the data
+        source: name of the data in error messages
 
     Raises:
-        InputError: something in the data is wrong.
+        InputError: the data are invalid.
     """
     return _to_task(Document(source, dict(data)))
 
 
 def task_schema() -> dict[str, Any]:
-    """The JSON Schema of a world file, for editors."""
+    """Return the JSON Schema of world files, for editors."""
     schema = schema_of(WorldFile)
     required = [key for key in schema["required"] if key != "name"]
     draft = "https://json-schema.org/draft/2020-12/schema"
@@ -297,14 +292,14 @@ def _to_yaml(data: dict[str, Any]) -> str:
             lines.append(yaml.safe_dump({key: value}, allow_unicode=True, width=100))
     for key, entries in lists.items():
         lines.append(f"{key}:\n" if entries else f"{key}: []\n")
-        # A string of JSON is one of YAML, whatever is in a name.
+        # Every JSON string is a YAML string.
         quoted = [{**entry, "name": json.dumps(entry["name"])} if "name" in entry else entry for entry in entries]
         lines += [f"  - {_flow(entry)}\n" for entry in quoted]
     return "".join(lines)
 
 
 def _flow(value: Any) -> str:
-    """Plain data on one line."""
+    """Format plain data on one line of YAML."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {_flow(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):
@@ -313,7 +308,7 @@ def _flow(value: Any) -> str:
 
 
 def require_no_movers(task: Task, path: str | Path) -> None:
-    """Refuse a task with movers, which no format but our own can hold."""
+    """Raise InputError for a task with movers: only world files can hold them."""
     if task.world.movers:
-        problem = f"cannot hold {task.world.name}'s movers; export a world in which nothing moves"
+        problem = f"cannot hold {task.world.name}'s movers; export a world without movers"
         raise input_error(str(path), problem)

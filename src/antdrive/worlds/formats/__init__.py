@@ -1,1 +1,1 @@
-"""Formats of other programs, one module each: Gazebo SDF, BARN, DynaBARN, ROS map_server and MovingAI."""
+"""Imports and exports: Gazebo SDF, BARN, DynaBARN, ROS map_server and MovingAI."""

@@ -1,4 +1,4 @@
-"""The BARN set (D. Perille, A. Truong, X. Xiao, P. Stone, *Benchmarking metric ground navigation*, SSRR 2020)."""
+"""Import of the BARN set (D. Perille, A. Truong, X. Xiao, P. Stone, *Benchmarking metric ground navigation*, SSRR 2020)."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ BARN_CELL = 0.15
 
 
 def import_barn(path: str | os.PathLike[str], *, cell: float = BARN_CELL) -> Task:
-    """A world of the BARN set, with the challenge's start, goal and tolerance.
+    """Import a world of the BARN set with the challenge's start, goal and tolerance.
 
     Args:
         path: the set's `.world` file
         cell: the task's grid resolution [m]
 
     Raises:
-        InputError: the file cannot be read, or is not a world of static upright cylinders.
+        InputError: the file is unreadable or not a world of static upright cylinders.
     """
     return import_sdf(
         path, start=BARN_START, goal=BARN_GOAL, bounds=BARN_BOUNDS, cell=cell, goal_tolerance=BARN_TOLERANCE

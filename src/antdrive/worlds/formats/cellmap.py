@@ -1,8 +1,7 @@
-"""Maps of square cells, free or blocked: how a map becomes a world of discs, and a world a map.
+"""Conversion between maps of square cells and worlds of discs.
 
-Discs cannot fill squares exactly, so both conversions err to the safe side. A world made from a map has discs that fully
-cover the blocked cells and protrude by a stated length. In a map made from a world, a cell is blocked as soon as a
-disc reaches into it.
+Both directions are conservative. From a map, discs fully cover the blocked cells and protrude by a stated overhang. From
+a world, a cell is blocked if a disc reaches into it.
 """
 
 from __future__ import annotations
@@ -23,23 +22,23 @@ from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import Disc, Task, World
 
-MAX_COVERED = 4_000_000  # cells of the part of a map that is covered; keeps the memory below some 300 MB
-MAX_DISCS = 20_000  # as many obstacles as a world file can hold
+MAX_COVERED = 4_000_000  # cells of a covered map; limits memory to about 300 MB
+MAX_DISCS = 20_000  # as many as a world file can hold
 
-REACHABLE_DONE, DISTANCES_DONE = 0.1, 0.5  # of a conversion's time: free cells are found, distances are known
-SLACK = 1e-9  # discs reach this much farther than necessary, against rounding; a smaller overlap does not count [m]
-CORNER = (math.sqrt(2.0) - 1.0) / 2.0  # how far the disc around a cell protrudes, in cells
-CAP = 32  # how deep inside blocked cells centres are at most [half cells]; larger discs hardly save any
-TOLERANCE = 0.25  # goal tolerance of a map's task when none is given [m]
+REACHABLE_DONE, DISTANCES_DONE = 0.1, 0.5  # progress after the flood fill and after the distance transform
+SLACK = 1e-9  # added to discs' radii against rounding; smaller overlaps are ignored [m]
+CORNER = (math.sqrt(2.0) - 1.0) / 2.0  # overhang of the disc around one cell [cells]
+CAP = 32  # largest depth of a disc's centre in blocked cells [half cells]; deeper ones save few discs
+TOLERANCE = 0.25  # default goal tolerance of a map's task [m]
 
 Cells = npt.NDArray[np.bool_]
 
-_report: ContextVar[Callable[[float], None]] = ContextVar("report", default=lambda share: None)
+_report: ContextVar[Callable[[float], None]] = ContextVar("report", default=lambda fraction: None)
 
 
 @contextmanager
 def conversion_progress(report: Callable[[float], None]) -> Iterator[None]:
-    """A context in which the conversion of a map says how far it is."""
+    """Report a map conversion's progress, as a fraction, within the context."""
     token = _report.set(report)
     try:
         yield
@@ -49,13 +48,13 @@ def conversion_progress(report: Callable[[float], None]) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class CellMap:
-    """Square cells that are free or blocked; everything beyond them is blocked.
+    """A map of free and blocked square cells; everything beyond it is blocked.
 
     Attributes:
-        free: which cells are free (R, C), rows along +y, read-only
+        free: free cells (R, C), rows along +y, read-only
         resolution: side of a cell [m]
         origin: lower left corner of cell (0, 0): x, y [m]
-        frame: where the frame of the cells lies in the map that people know, for messages: x, y [m] and yaw [rad]
+        frame: pose of the cells' frame in the source map, for messages: x, y [m] and yaw [rad]
     """
 
     free: Cells
@@ -65,12 +64,12 @@ class CellMap:
 
     @property
     def bounds(self) -> Bounds:
-        """The rectangle that the cells fill [m]."""
+        """Bounding box of the cells [m]."""
         (x, y), (rows, cols) = self.origin, self.free.shape
         return x, y, x + cols * self.resolution, y + rows * self.resolution
 
     def cell_at(self, x: float, y: float) -> tuple[int, int] | None:
-        """The (row, col) of the cell that holds a point; None outside the map.
+        """Return the (row, col) of the cell that contains a point; None outside the map.
 
         Args:
             x: world coordinate [m]
@@ -84,12 +83,12 @@ class CellMap:
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """Discs that cover all blocked cells next to free ones.
+    """Discs that cover all blocked cells adjacent to free ones.
 
     Attributes:
         discs: (N, 3): x, y, radius [m]
-        cells: how many cells are fully covered
-        overhang: how far a disc reaches beyond blocked cells, at most [m]
+        cells: number of covered cells
+        overhang: largest protrusion of a disc beyond blocked cells [m]
     """
 
     discs: Floats
@@ -98,7 +97,7 @@ class Cover:
 
 
 def cell_map(world: World, resolution: float) -> CellMap:
-    """The map of a world: a cell is free where no disc and no wall reaches into it by more than a nanometre.
+    """Rasterise a world into a map. A cell is blocked if a disc or a wall reaches into it by more than 1 nm.
 
     Args:
         world: the obstacles and walls; movers do not count
@@ -131,7 +130,7 @@ def cell_map(world: World, resolution: float) -> CellMap:
 
 
 def _window(edges: Floats, centre: float, radius: float) -> tuple[int, int]:
-    """The range of cells between the edges that a disc may reach: the first, and the one after the last."""
+    """Return the half-open range of cells that a disc may reach."""
     last = len(edges) - 1
     first = int(np.searchsorted(edges, centre - radius)) - 1
     stop = int(np.searchsorted(edges, centre + radius)) + 1
@@ -139,10 +138,9 @@ def _window(edges: Floats, centre: float, radius: float) -> tuple[int, int]:
 
 
 def cover(cells: CellMap, overhang: float | None = None) -> Cover:
-    """A cover of the blocked cells that touch a free one, with as few discs as a greedy choice finds.
+    """Cover the blocked cells adjacent to free ones with discs, chosen greedily to be few.
 
-    Free cells stay separated where the map separates them: no way leads between or past the discs. Blocked cells that
-    no free cell touches are left out.
+    The discs leave no passage that the map does not have. Blocked cells without a free neighbour are omitted.
     """
     from antdrive.worlds.formats import _kernels_cover as kernels
 
@@ -151,15 +149,14 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
     if overhang is not None and not (math.isfinite(overhang) and overhang >= least):
         raise input_error(
             "overhang",
-            f"must be at least {least:.6g} m, which the disc around a cell of {cell:g} m needs, got {overhang:g}",
+            f"must be at least {least:.6g} m, the overhang of a disc around a cell of {cell:g} m, got {overhang:g}",
         )
     if free.size > MAX_COVERED:
         rows, cols = free.shape
-        raise input_error("map", f"has {rows} x {cols} cells that can be reached; the limit is {MAX_COVERED}")
+        raise input_error("map", f"has {rows} x {cols} reachable cells; the limit is {MAX_COVERED}")
     _report.get()(REACHABLE_DONE)
     needed = _beside(free) & ~free
-    # The map counts as surrounded by free cells here: discs then do not reach beyond it, where they would do no harm
-    # but look as if they did.
+    # The map counts as surrounded by free cells here, so that no disc reaches beyond it.
     distance2 = np.empty((2 * free.shape[0] + 5, 2 * free.shape[1] + 5), dtype=np.int32)
     kernels.squared_distances(np.pad(free, 1, constant_values=True), CAP, distance2)
     distance2 = np.ascontiguousarray(distance2[2:-2, 2:-2])
@@ -175,7 +172,7 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
 
 
 def _beside(cells: Cells) -> Cells:
-    """The given cells and all that share a side or a corner with one of them."""
+    """Return the given cells with their eight neighbours."""
     rows, cols = cells.shape
     padded, near = np.pad(cells, 1), np.zeros_like(cells)
     for r, c in np.ndindex(3, 3):
@@ -194,45 +191,44 @@ def map_task(
     goal_tolerance: float = TOLERANCE,
     cell: float | None = None,
 ) -> Task:
-    """A map as a task: a world of discs, which can be planned and driven, between two points on free cells.
+    """Convert a map to a task: a world of discs with start and goal on free cells.
 
-    Free cells that steps over shared sides do not join to the start or the goal count as blocked. The bounds, which are
-    solid and straight, are drawn in to the free cells that remain. `cover` chooses the discs; the world's source says
-    how many there are and how far they protrude.
+    Free cells not 4-connected to the start or the goal count as blocked. The walls enclose the remaining free cells.
+    `cover` chooses the discs; the world's source states their number and overhang.
 
     Args:
         cells: the map
-        start: the robot's first pose [m, m, rad]
+        start: the robot's start pose [m, m, rad]
         goal: [m]
         name: the world's name
-        source: where the map comes from
-        overhang: how far discs may reach beyond blocked cells [m]; see `cover`
-        goal_tolerance: how close to the goal the robot must stop [m]
-        cell: the task's grid resolution [m]; by default the map's own
+        source: origin of the map
+        overhang: largest protrusion of discs beyond blocked cells [m]; see `cover`
+        goal_tolerance: largest distance from the goal at the stop [m]
+        cell: the task's grid resolution [m]; by default the map's
 
     Raises:
-        InputError: the start or the goal is missing, not on a free cell or inside a disc; or the map is too large or
-            needs too many discs.
+        InputError: the start or the goal is missing, not on a free cell or inside a disc; the map is too large or needs
+            too many discs.
     """
     if start is None or goal is None:
         missing = " and ".join(key for key, end in (("start", start), ("goal", goal)) if end is None)
-        raise input_error(missing, f"maps have none; give it on free ground, within {_span(cells)}")
+        raise input_error(missing, f"missing; give a position on free ground, within {_span(cells)}")
     used, joined = _reachable(cells, start, goal)
-    found = cover(used, overhang)
-    if len(found.discs) > MAX_DISCS:
-        more = f"; a larger overhang than {found.overhang:.3g} m needs fewer" if overhang is None else ""
-        raise input_error("map", f"needs {len(found.discs)} discs; the limit is {MAX_DISCS}{more}")
+    covered = cover(used, overhang)
+    if len(covered.discs) > MAX_DISCS:
+        more = f"; an overhang above {covered.overhang:.3g} m needs fewer" if overhang is None else ""
+        raise input_error("map", f"needs {len(covered.discs)} discs; the limit is {MAX_DISCS}{more}")
     rows, cols = cells.free.shape
     source = (
-        f"{source}, {rows} x {cols} cells of {cells.resolution:g} m; the {found.cells} blocked cells next to free "
-        f"cells are fully covered by {len(found.discs)} cylinders that reach at most {found.overhang:.4g} m "
+        f"{source}, {rows} x {cols} cells of {cells.resolution:g} m; the {covered.cells} blocked cells next to free "
+        f"cells are fully covered by {len(covered.discs)} cylinders that reach at most {covered.overhang:.4g} m "
         "beyond blocked cells" + ("" if joined else "; start and goal are not joined")
     )
     try:
-        world = World(name, used.bounds, tuple(Disc(*map(float, disc)) for disc in found.discs), source)
+        world = World(name, used.bounds, tuple(Disc(*map(float, disc)) for disc in covered.discs), source)
         return Task(world, start, goal, goal_tolerance, cells.resolution if cell is None else cell)
     except FieldError as error:
-        hint = f"; it is within {found.overhang:.4g} m of a blocked cell" if "inside" in error.problem else ""
+        hint = f"; it is within {covered.overhang:.4g} m of a blocked cell" if "inside" in error.problem else ""
         raise input_error(error.key, f"{error.problem}{hint}") from None
 
 
@@ -247,7 +243,7 @@ def file_task(
     cell: float | None,
     goal_tolerance: float | None,
 ) -> Task:
-    """`map_task` for a map from a file, which gives the world's name and is named in errors."""
+    """Convert a map from a file as `map_task` does, with the file's name for the world and for errors."""
     name = "".join(filter(str.isprintable, file.stem))[:200] or "map"
     tolerance = TOLERANCE if goal_tolerance is None else goal_tolerance
     try:
@@ -259,7 +255,7 @@ def file_task(
 
 
 def _reachable(cells: CellMap, start: Pose, goal: Point) -> tuple[CellMap, bool]:
-    """The part of a map that is joined to the start or the goal, and whether they are joined to each other."""
+    """Return the part of a map connected to the start or the goal, and whether the two are connected."""
     from antdrive.worlds.formats import _kernels_cover as kernels
 
     here, there = _free_cell(cells, "start", start[0], start[1]), _free_cell(cells, "goal", goal[0], goal[1])
@@ -277,13 +273,13 @@ def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
         raise input_error(key, f"({there_x:g}, {there_y:g}) is not on the map, which spans {_span(cells)}")
     if not cells.free[spot]:
         raise input_error(
-            key, f"({there_x:g}, {there_y:g}) is on a blocked cell, in row {spot[0]} from below and column {spot[1]}"
+            key, f"({there_x:g}, {there_y:g}) is on a blocked cell: row {spot[0]} from below, column {spot[1]}"
         )
     return spot
 
 
 def _span(cells: CellMap) -> str:
-    """The box around the cells in the map that people know."""
+    """Return the bounding box of the cells in the source map, as text."""
     x0, y0, x1, y1 = cells.bounds
     corners = world_to_map(cells.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
@@ -291,7 +287,7 @@ def _span(cells: CellMap) -> str:
 
 
 def _cropped(cells: CellMap) -> CellMap:
-    """The smallest rectangle of cells with all the free ones; everything beyond it is blocked anyway."""
+    """Crop a map to the bounding box of its free cells."""
     kept = np.argwhere(cells.free)
     (low, left), (high, right) = kept.min(axis=0), kept.max(axis=0) + 1
     x, y = cells.origin

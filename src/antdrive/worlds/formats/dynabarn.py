@@ -1,4 +1,4 @@
-"""The DynaBARN set (A. Nair et al., *DynaBARN*, SSRR 2022), with its trajectories decoded into keyframes."""
+"""Import of the DynaBARN set (A. Nair et al., *DynaBARN*, SSRR 2022), with trajectories as keyframes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DYNABARN_CELL = 0.25  # [m]
 
 
 def import_dynabarn(path: str | os.PathLike[str], *, cell: float = DYNABARN_CELL) -> list[Task]:
-    """The worlds of a DynaBARN set, one task for each.
+    """Import the worlds of a DynaBARN set, one task each.
 
     The file is JSON: a list of mappings with name, bounds, start, goal, goal_tolerance and movers. Each mover has radius,
     length, period, loop and keyframes_t_x_y. The tasks have the challenge's time limit of 100 s.
@@ -26,7 +26,7 @@ def import_dynabarn(path: str | os.PathLike[str], *, cell: float = DYNABARN_CELL
         cell: the tasks' grid resolution [m]
 
     Raises:
-        InputError: the file cannot be read or is not such a set.
+        InputError: the file is unreadable or not a DynaBARN set.
     """
     document = read_json(path)
     if not isinstance(document.data, list) or not document.data:
@@ -52,7 +52,7 @@ def _task(document: Document, index: int, world: Any, cell: float) -> Task:
 
 
 def _mover(document: Document, at: Location, mover: Any) -> dict[str, Any]:
-    """A mover with the keys of a world file, whose values `task_from_dict` checks."""
+    """Return a mover with the keys of a world file; `task_from_dict` validates the values."""
     if not isinstance(mover, dict):
         raise document.error(at, f"must be a mapping with radius, length, loop and keyframes_t_x_y, got {show(mover)}")
     frames = mover.get("keyframes_t_x_y")
@@ -68,11 +68,11 @@ def _mover(document: Document, at: Location, mover: Any) -> dict[str, Any]:
 
 
 def _check_period(document: Document, at: Location, frames: list[Any], period: Any) -> None:
-    """The period must be the time from the first keyframe to the last: a world file has no period of its own."""
+    """Raise InputError unless the period is the keyframes' duration: world files have no period."""
     try:
         duration = float(frames[-1][0]) - float(frames[0][0])
     except (TypeError, ValueError, LookupError):
-        return  # reported with the other faults of keyframes
+        return  # the validation of the keyframes reports it
     if period is not None and not (isinstance(period, int | float) and abs(period - duration) <= 0.01):
         problem = f"must be {duration:g}, the time from the first keyframe to the last, got {show(period)}"
         raise document.error((*at, "period"), problem)

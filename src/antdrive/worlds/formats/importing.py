@@ -1,4 +1,4 @@
-"""Files of other programs: which format a file has, which options belong to it, and the tasks in it."""
+"""Import formats by file suffix, with their options."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from antdrive.worlds.formats.movingai import import_movingai_task
 from antdrive.worlds.formats.sdf import import_sdf
 from antdrive.worlds.world import Task
 
-#: Values that every task has; a format that does not take them as options provides them itself.
+#: Values of every task; a format without these options provides them itself.
 _OF_EVERY_TASK = ("start", "goal", "bounds")
 
 
 @dataclass(frozen=True)
 class Format:
-    """A file format of another program that can be imported."""
+    """A file format that can be imported."""
 
-    name: str  # what messages call a file of this format
-    suffixes: tuple[str, ...]  # the suffixes of its files, in lower case
-    options: tuple[str, ...]  # the options that `read` takes besides the path
-    read: Callable[..., list[Task]]  # the function that reads the tasks in a file
-    is_map: bool = False  # whether a file holds a map of cells, which the import covers with cylinders
+    name: str  # for messages, such as "an SDF world"
+    suffixes: tuple[str, ...]  # in lower case
+    options: tuple[str, ...]  # the options of `read` besides the path
+    read: Callable[..., list[Task]]  # reads the tasks in a file
+    is_map: bool = False  # whether the files are maps of cells, covered with cylinders on import
 
 
 def _read_map_server(path: Path, unknown: str = "blocked", **options: Any) -> list[Task]:
@@ -38,7 +38,7 @@ def _read_map_server(path: Path, unknown: str = "blocked", **options: Any) -> li
     return [import_map_server(path, unknown_is_free=unknown == "free", **options)]
 
 
-#: The formats that can be imported, by name; the first of several that fit a suffix is the default.
+#: The import formats by name; the first one with a suffix is the suffix's default.
 IMPORTS: Mapping[str, Format] = MappingProxyType(
     {
         "sdf": Format(
@@ -70,50 +70,50 @@ IMPORTS: Mapping[str, Format] = MappingProxyType(
 
 
 def import_format(path: str | os.PathLike[str], *, barn: bool = False) -> Format:
-    """The format of a file, by its suffix.
+    """Return a file's format, by its suffix.
 
     Args:
-        path: the file, which need not exist
-        barn: whether an SDF world is one of the BARN set
+        path: the file; it need not exist
+        barn: whether an SDF world belongs to the BARN set
 
     Raises:
-        InputError: files with this suffix cannot be imported.
-        FieldError: `barn` was given for a file that is not an SDF world.
+        InputError: the suffix has no import format.
+        FieldError: `barn` is set for a file other than an SDF world.
     """
     suffix = Path(path).suffix.lower()
     if suffix in (".pgm", ".png", ".bmp"):
-        raise input_error(os.fspath(path), "is an image; give the map's .yaml file, which describes it")
-    found = next((known for known in IMPORTS.values() if suffix in known.suffixes), None)
-    if found is None:
+        raise input_error(os.fspath(path), "is an image; give the map's .yaml file")
+    match = next((known for known in IMPORTS.values() if suffix in known.suffixes), None)
+    if match is None:
         known = ".sdf, .world, .yaml (map_server), .map (MovingAI) and .json (DynaBARN)"
-        raise input_error(os.fspath(path), f"cannot be imported; files that can be end in {known}")
+        raise input_error(os.fspath(path), f"cannot be imported; known suffixes: {known}")
     if not barn:
-        return found
-    if found is not IMPORTS["sdf"]:
-        raise FieldError("barn", f"{found.name} takes {_listed(found.options)} only")
+        return match
+    if match is not IMPORTS["sdf"]:
+        raise FieldError("barn", f"{match.name} takes only {_listed(match.options)}")
     return IMPORTS["barn"]
 
 
 def import_file(path: str | os.PathLike[str], *, barn: bool = False, **options: Any) -> list[Task]:
-    """The tasks in a file of another program: one, or for a DynaBARN set one for each of its worlds.
+    """Import the tasks in a file of another program: one task, or one for each world of a DynaBARN set.
 
-    The file's suffix says which format it has; see `IMPORTS` for the options of each format.
+    The suffix determines the format; see `IMPORTS` for the options of each format.
 
     Args:
         path: the file
-        barn: whether an SDF world is one of the BARN set, with the challenge's start, goal and bounds
+        barn: whether an SDF world belongs to the BARN set, with the challenge's start, goal and bounds
         options: as for `import_sdf`, `import_barn`, `import_map_server`, `import_movingai_task` and `import_dynabarn`,
             but a map_server map takes `unknown`, "blocked" or "free", for its unknown cells; None counts as not given
 
     Raises:
-        InputError: the file cannot be imported, is wrong, or contradicts an option that was given.
-        FieldError: an option that does not belong to the format, or has a value that it cannot have.
+        InputError: the file cannot be imported, is invalid, or contradicts an option.
+        FieldError: an option has an invalid value or does not belong to the format.
     """
     file_format = import_format(path, barn=barn)
     given = {key: value for key, value in options.items() if value is not None}
     for key in given:
         if key not in file_format.options:
-            brings = "brings its own" if key in _OF_EVERY_TASK else f"takes {_listed(file_format.options)} only"
+            brings = "has its own" if key in _OF_EVERY_TASK else f"takes only {_listed(file_format.options)}"
             raise FieldError(key, f"{file_format.name} {brings}")
     return file_format.read(Path(path), **given)
 

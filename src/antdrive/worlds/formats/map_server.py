@@ -1,9 +1,9 @@
-"""Maps of ROS's map_server (wiki.ros.org/map_server, Nav2's nav2_map_server): a YAML file and the image it names.
+"""Maps of ROS's map_server (wiki.ros.org/map_server, Nav2's nav2_map_server): a YAML file and an image.
 
 A pixel of shade s, from 0 (black) to 1 (white), is occupied with probability p = 1 - s, or p = s where `negate` is set.
 Its cell is free when p < free_thresh, occupied when p > occupied_thresh, and unknown in between; the image's last row is
-the lowest. The other modes differ little: in `scale`, pixels that are not opaque are unknown; in `raw`, the shades 0..100
-(of 255) are p in percent, never negated, and higher shades are unknown.
+the lowest. In mode `scale`, pixels that are not opaque are unknown. In mode `raw`, the shades 0..100 (of 255) are p in
+percent, never negated, and higher shades are unknown.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from antdrive.worlds.limits import MAX_CELLS, Size
 from antdrive.worlds.world import Task
 
 FORMATS = ("PPM", "PNG", "BMP")  # Pillow's "PPM" includes PBM and PGM
-MODES = {"1": "L", "P": "RGB"}  # black-and-white images become grey, palettes become colours
+MODES = {"1": "L", "P": "RGB"}  # black-and-white images are read as grey, palettes as colours
 FREE, OCCUPIED = 254, 0  # the shades that map_saver writes
 
 _RULES: ConfigDict = {**STRICT, "extra": "ignore"}
-Share = Annotated[float, Field(ge=0, le=1)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
 class KeptEnds(BaseModel):
-    """Start, goal and tolerance, which `export_map_server` adds to a map for `import_map_server`."""
+    """Start, goal and tolerance in a map file, written by `export_map_server`."""
 
     model_config = _RULES
 
@@ -53,30 +53,28 @@ class KeptEnds(BaseModel):
 
 
 class KeptTask(KeptEnds):
-    """Another start and goal."""
+    """A named start and goal in a map file."""
 
     name: OneLine = Field(min_length=1, max_length=100)
 
 
 class KeptTasks(KeptEnds):
-    """The task of a map, and others."""
+    """All tasks in a map file."""
 
     tasks: list[KeptTask] = Field([], max_length=10_000)
 
 
 class MapFile(BaseModel):
-    """The YAML file of a map. Keys of other tools are ignored, as by map_server."""
+    """A map's YAML file. Unknown keys are ignored, as in map_server."""
 
     model_config = _RULES
 
-    image: str = Field(min_length=1, description="the image's file name, from the YAML file's folder")
+    image: str = Field(min_length=1, description="the image file, relative to the YAML file's folder")
     resolution: Size = Field(description="the side of a cell [m]")
     origin: Triple = Field(description="write [x, y, yaw] of the lower left corner in metres and radians")
     negate: bool = Field(description="write 0, or 1 where black is free")
-    occupied_thresh: Share = Field(
-        description="cells that are occupied with a higher probability are occupied; 0.65 is usual"
-    )
-    free_thresh: Share = Field(description="cells that are occupied with a lower probability are free; 0.196 is usual")
+    occupied_thresh: Fraction = Field(description="cells more likely occupied than this are occupied; 0.65 is usual")
+    free_thresh: Fraction = Field(description="cells less likely occupied than this are free; 0.196 is usual")
     mode: Literal["trinary", "scale", "raw"] = "trinary"
     antdrive: KeptTasks | None = None
 
@@ -96,12 +94,12 @@ class MapFile(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class ServedMap:
-    """A map as map_server would serve it."""
+    """A map as map_server serves it."""
 
-    cells: CellMap  # the free cells; unknown cells are free only where that was asked for
-    unknown: int  # how many cells are neither free nor occupied
-    ends: KeptTasks | None  # start and goal, where antdrive wrote the map
-    # where the frame of the cells lies in that of the map; not zero for a turned map, whose cells begin at the origin
+    cells: CellMap  # unknown cells are free only on request
+    unknown: int  # number of cells neither free nor occupied
+    ends: KeptTasks | None  # tasks, if antdrive wrote the map
+    # pose of the cells' frame in the map's frame; nonzero for a rotated map, whose cells begin at the origin
     frame: Pose = (0.0, 0.0, 0.0)
 
 
@@ -115,21 +113,21 @@ def import_map_server(
     cell: float | None = None,
     goal_tolerance: float | None = None,
 ) -> Task:
-    """A map of map_server as a world of discs; see `map_task`.
+    """Import a map_server map as a world of discs; see `map_task`.
 
-    A map that is turned becomes a world that is not; the task's `frame` says how it lies in its map.
+    A rotated map becomes an axis-aligned world; the task's `frame` is its pose in the map.
 
     Args:
-        path: the YAML file, which names the image
-        start: the robot's first pose in the map [m, m, rad]; needed unless `export_map_server` wrote the map
-        goal: in the map [m]; needed unless `export_map_server` wrote the map
+        path: the YAML file
+        start: the robot's start pose in the map [m, m, rad]; required unless `export_map_server` wrote the map
+        goal: in the map [m]; required unless `export_map_server` wrote the map
         unknown_is_free: whether unknown cells are free instead of blocked
-        overhang: how far discs may reach beyond blocked cells [m]; see `map_task`
-        cell: the task's grid resolution [m]; by default that of the map
-        goal_tolerance: how close to the goal the robot must stop [m]; by default 0.25
+        overhang: largest protrusion of discs beyond blocked cells [m]; see `map_task`
+        cell: the task's grid resolution [m]; by default the map's
+        goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
 
     Raises:
-        InputError: a file is wrong, or `map_task` refuses the map.
+        InputError: a file is invalid, or `map_task` refuses the map.
     """
     file = Path(path)
     served = read_map(file, unknown_is_free=unknown_is_free)
@@ -149,17 +147,17 @@ def import_map_server(
 
 
 def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
-    """The other tasks that `export_map_server` added to a map, by name; empty for a map that antdrive did not write."""
+    """Return the named tasks in a map file by name; empty unless `export_map_server` wrote it."""
     document = read_document(path)
     entry = check(MapFile, document)
-    found = {}
+    tasks = {}
     for i, kept in enumerate(entry.antdrive.tasks if entry.antdrive else ()):
         start, goal = _map_to_world(task.frame, kept.start), _map_to_world(task.frame, kept.goal)
         try:
-            found[kept.name] = dataclasses.replace(task, start=start, goal=goal, goal_tolerance=kept.goal_tolerance)
+            tasks[kept.name] = dataclasses.replace(task, start=start, goal=goal, goal_tolerance=kept.goal_tolerance)
         except FieldError as error:
             raise document.field_error(error, "antdrive", "tasks", i) from None
-    return found
+    return tasks
 
 
 def _map_to_world(frame: Pose, end: Any) -> Any:
@@ -167,10 +165,10 @@ def _map_to_world(frame: Pose, end: Any) -> Any:
 
 
 def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> ServedMap:
-    """The map that a YAML file describes."""
+    """Read a map from its YAML file and image."""
     document = read_document(path)
     if isinstance(document.data, dict) and "image" not in document.data:
-        raise document.error((), "names no image, so it is not a map of map_server")
+        raise document.error((), "image: missing; a map_server map names its image")
     entry = check(MapFile, document)
     try:
         level, opaque = _levels(Path(path).parent / entry.image, average_alpha=entry.mode == "trinary")
@@ -183,20 +181,20 @@ def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> 
     cells.setflags(write=False)
     x, y, yaw = entry.origin
     frame, corner = ((x, y, yaw), (0.0, 0.0)) if yaw else ((0.0, 0.0, 0.0), (x, y))
-    found = CellMap(cells, entry.resolution, corner, frame)
-    return ServedMap(found, int((~free & ~occupied).sum()), entry.antdrive, frame)
+    cell_grid = CellMap(cells, entry.resolution, corner, frame)
+    return ServedMap(cell_grid, int((~free & ~occupied).sum()), entry.antdrive, frame)
 
 
 def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
-    """The brightness of the pixels, 0..255, and which pixels are opaque; both (R, C), the image's top row first.
+    """Return the brightness of the pixels, 0..255, and a mask of opaque pixels; both (R, C), top row first.
 
-    Brightness is the mean of the channels; in its trinary mode map_server counts the alpha channel among them.
+    Brightness is the mean of the channels, including alpha in map_server's trinary mode.
     """
     from PIL import Image, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is lower
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # MAX_CELLS is lower
             with Image.open(path, formats=FORMATS) as stored:
                 width, height = stored.size
                 if width * height > MAX_CELLS:
@@ -226,25 +224,24 @@ def export_map_server(
     tasks: Mapping[str, Task] = MappingProxyType({}),
     replace: bool = False,
 ) -> Path:
-    """Write a world as a map of map_server: a YAML file, and a PGM image of the same name beside it.
+    """Write a world as a map_server map: a YAML file and a PGM image of the same name.
 
-    A cell is occupied when a disc or a wall reaches into it by more than a nanometre; no cell is unknown. Heights are
-    lost. Start, goal and tolerance, and other tasks, are kept under the key `antdrive`, which map_server ignores and
-    `import_map_server` reads. The map covers the world's bounds; positions in it are those in the map that the world
-    was made from.
+    A cell is occupied if a disc or a wall reaches into it by more than 1 nm; no cell is unknown. Heights are lost. Tasks
+    are stored under the key `antdrive`, which map_server ignores and `import_map_server` reads. The map covers the
+    world's bounds, in the frame of the world's source map.
 
     Args:
         task: the world to write
         path: the YAML file
         resolution: side of a cell [m]; by default the task's own
         tasks: other starts and goals in the same world, by name
-        replace: whether files that exist may be replaced; the image may be that of another map
+        replace: whether to replace existing files; the image may be another map's
 
     Returns:
         The image's path.
 
     Raises:
-        InputError: a file exists or cannot be written, the world has movers, or the resolution is not usable.
+        InputError: a file exists or cannot be written, the world has movers, or the resolution is invalid.
     """
     require_no_movers(task, path)
     target = Path(path)
@@ -255,7 +252,7 @@ def export_map_server(
     image = target.with_suffix(".pgm")
     name = image.name.replace("'", "''")
     if not name.isprintable():
-        raise input_error(str(target), "a map's name must be printable")
+        raise input_error(str(target), "the file name of a map must be printable")
     text = (
         f"image: '{name}'\n"
         f"resolution: {yaml_number(cells.resolution)}\n"
@@ -277,7 +274,7 @@ def export_map_server(
 
 
 def _ends(task: Task) -> tuple[str, ...]:
-    """The start, the goal and the tolerance of a task in its map, as keys and values of YAML."""
+    """Return a task's start, goal and tolerance in its map as YAML entries."""
     return (
         f"start: {_yaml_list(world_to_map(task.frame, [task.start])[0].tolist())}",
         f"goal: {_yaml_list(world_to_map(task.frame, [task.goal])[0].tolist())}",

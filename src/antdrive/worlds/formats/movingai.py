@@ -1,7 +1,6 @@
-"""Grid maps and problems of the MovingAI benchmarks (N. Sturtevant, *Benchmarks for grid-based pathfinding*, 2012).
+"""Maps and problems of the MovingAI benchmarks (N. Sturtevant, *Benchmarks for grid-based pathfinding*, 2012).
 
-The first line of cells in a `.map` file is the map's top, so it becomes the last row here: rows grow upwards, as in every
-grid of ours, and the map looks as it does in the benchmark's pictures.
+A `.map` file begins with the map's top line. It becomes the last row: rows grow upwards, as in `Grid`.
 """
 
 from __future__ import annotations
@@ -25,12 +24,12 @@ from antdrive.worlds.formats.cellmap import CellMap, cell_map, file_task
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import Task
 
-if TYPE_CHECKING:  # a grid loads the compiler
+if TYPE_CHECKING:  # importing Grid loads the compiler
     from antdrive.worlds.grid import Grid
 
 MapCell: TypeAlias = tuple[int, int]  # (row, col)
 
-PASSABLE = b".GS"  # ground, the same, swamp that is entered from the ground
+PASSABLE = b".GS"  # ground (two letters), swamp entered from the ground
 BLOCKED = b"@OTW"  # out of bounds (two letters), trees, water
 
 MAX_BYTES = 100_000_000
@@ -38,15 +37,15 @@ MAX_BYTES = 100_000_000
 
 @dataclass(frozen=True)
 class MapProblem:
-    """A start and a goal on a map, with the length of the shortest path.
+    """A planning problem on a map, with the length of the shortest path.
 
     Attributes:
-        start: (row, col) of our grid: row 0 is the map's last line
+        start: (row, col); row 0 is the map's last line
         goal: (row, col)
-        optimal: the length of the shortest path with octile moves that cut no corners [cells], as precise as printed
-        printed: the same length as text, as in the file
+        optimal: length of the shortest octile path without corner cutting [cells], rounded as in the file
+        printed: the same length as text in the file
         map_name: the map's file name
-        bucket: the length divided by 4, rounded down
+        bucket: length / 4, rounded down
     """
 
     start: MapCell
@@ -58,10 +57,10 @@ class MapProblem:
 
 
 def import_movingai_map(path: str | os.PathLike[str]) -> Grid:
-    """The grid of a `.map` file, with cells of 1 m and diagonals that need both orthogonal neighbours free.
+    """Import a `.map` file as a grid with cells of 1 m; diagonals require both orthogonal neighbours free.
 
     Raises:
-        InputError: the file cannot be read or is not such a map.
+        InputError: the file is unreadable or not a MovingAI map.
     """
     from antdrive.worlds.grid import Grid
 
@@ -79,20 +78,20 @@ def import_movingai_task(
     cell: float | None = None,
     goal_tolerance: float | None = None,
 ) -> Task:
-    """A `.map` file as a world of discs; see `map_task`. To plan on the map's own cells, use `import_movingai_map`.
+    """Import a `.map` file as a world of discs; see `map_task`. `import_movingai_map` keeps the map's own cells.
 
     Args:
         path: the `.map` file; its lower left corner becomes (0, 0)
-        start: the robot's first pose [m, m, rad]; needed unless a problem is given
-        goal: [m]; needed unless a problem is given
-        problem: take start and goal from this problem of the `.scen` file beside the map, counted from 0
+        start: the robot's start pose [m, m, rad]; required without a problem
+        goal: [m]; required without a problem
+        problem: index, from 0, of the `.scen` file's problem that gives start and goal
         resolution: side of the map's cells [m]
-        overhang: how far discs may reach beyond blocked cells [m]; see `map_task`
-        cell: the task's grid resolution [m]; by default that of the map
-        goal_tolerance: how close to the goal the robot must stop [m]; by default 0.25
+        overhang: largest protrusion of discs beyond blocked cells [m]; see `map_task`
+        cell: the task's grid resolution [m]; by default the map's
+        goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
 
     Raises:
-        InputError: a file is wrong, an option is not usable, there is no such problem, or `map_task` refuses the map.
+        InputError: a file or an option is invalid, the problem does not exist, or `map_task` refuses the map.
     """
     file = Path(path)
     if not (math.isfinite(resolution) and resolution > 0):
@@ -101,7 +100,7 @@ def import_movingai_task(
     source = f"the MovingAI map {file.name}"
     if problem is not None:
         if start is not None or goal is not None:
-            raise input_error("problem", "brings its own start and goal; give either the problem or the two")
+            raise input_error("problem", "has its own start and goal; give either the problem or start and goal")
         chosen = _problem_beside(file, problem)
         (r0, c0), (r1, c1) = chosen.start, chosen.goal
         start = (c0 + 0.5) * resolution, (r0 + 0.5) * resolution, math.atan2(r1 - r0, c1 - c0)
@@ -113,7 +112,7 @@ def import_movingai_task(
 
 
 def _problem_beside(file: Path, number: int) -> MapProblem:
-    """One of the problems in the `.scen` file beside a map."""
+    """Read one problem of a map's `.scen` file."""
     beside = file.with_name(f"{file.name}.scen")
     problems = import_movingai_problems(beside)
     if not 0 <= number < len(problems):
@@ -122,7 +121,7 @@ def _problem_beside(file: Path, number: int) -> MapProblem:
 
 
 def _read_cells(path: str | os.PathLike[str]) -> npt.NDArray[np.bool_]:
-    """The free cells of a `.map` file, (R, C), the file's last line first."""
+    """Read the free cells of a `.map` file, (R, C), the file's last line first."""
     source, lines = _read_lines(path)
     numbered = iter(enumerate(lines, 1))
     rows, cols = _read_header(source, numbered)
@@ -145,7 +144,7 @@ def _read_cells(path: str | os.PathLike[str]) -> npt.NDArray[np.bool_]:
 
 
 def _read_header(source: str, lines: Iterable[tuple[int, bytes]]) -> tuple[int, int]:
-    """Rows and columns from the numbered lines up to and including the line `map`."""
+    """Read rows and columns from the numbered lines up to the line `map`."""
     header: dict[str, str] = {}
     for number, line in lines:
         words = line.decode("ascii", "replace").split()
@@ -174,10 +173,10 @@ def _size(source: str, key: str, text: str | None) -> int:
 
 
 def import_movingai_problems(path: str | os.PathLike[str]) -> list[MapProblem]:
-    """The problems of a `.scen` file, on the cells of `import_movingai_map`.
+    """Import the problems of a `.scen` file, on the cells of `import_movingai_map`.
 
     Raises:
-        InputError: the file cannot be read or is not such a list.
+        InputError: the file is unreadable or not a list of problems.
     """
     source, lines = _read_lines(path)
     head = lines[0].decode("ascii", "replace").split() if lines else []
@@ -196,18 +195,18 @@ def _problem(place: str, line: bytes) -> MapProblem:
         bucket, width, height, x0, y0, x1, y1 = (int(words[i]) for i in (0, 2, 3, 4, 5, 6, 7))
         optimal = float(words[8])
     except ValueError as error:
-        raise input_error(place, f"must hold whole numbers and a length: {error}") from None
+        raise input_error(place, f"must be whole numbers and a length: {error}") from None
     for key, x, y in (("start", x0, y0), ("goal", x1, y1)):
         if not (0 <= x < width and 0 <= y < height):
             raise input_error(place, f"the {key} ({x}, {y}) is outside the map of width {width} and height {height}")
     if not (math.isfinite(optimal) and optimal >= 0):
-        raise input_error(place, f"the length must be a number that is not negative, got {words[8]}")
+        raise input_error(place, f"the length must be a number of at least 0, got {words[8]}")
     start, goal = (height - 1 - y0, x0), (height - 1 - y1, x1)
     return MapProblem(start, goal, optimal, words[8], words[1].replace("\\", "/").rsplit("/", 1)[-1], bucket)
 
 
 def _read_lines(path: str | os.PathLike[str]) -> tuple[str, list[bytes]]:
-    """The file's name and its lines without their ends."""
+    """Return a file's name and its lines without line ends."""
     content = read_bytes(path, MAX_BYTES)
     return os.fspath(path), [line.removesuffix(b"\r") for line in content.removesuffix(b"\n").split(b"\n")]
 
@@ -217,9 +216,9 @@ def _quote(line: bytes) -> str:
 
 
 def export_movingai_map(task: Task, path: str | Path, *, resolution: float | None = None) -> CellMap:
-    """Write a world as a `.map` file and return its cells. The file holds neither the cells' size nor their place.
+    """Write a world as a `.map` file and return its cells. The file stores neither resolution nor origin.
 
-    A cell is blocked when a disc or a wall reaches into it by more than a nanometre.
+    A cell is blocked if a disc or a wall reaches into it by more than 1 nm.
 
     Args:
         task: the world to write
@@ -227,7 +226,7 @@ def export_movingai_map(task: Task, path: str | Path, *, resolution: float | Non
         resolution: side of a cell [m]; by default the task's own
 
     Raises:
-        InputError: the file cannot be written, the world has movers, or the resolution is not usable.
+        InputError: the file cannot be written, the world has movers, or the resolution is invalid.
     """
     require_no_movers(task, path)
     cells = cell_map(task.world, task.cell if resolution is None else resolution)
@@ -243,7 +242,7 @@ def export_movingai_problems(problems: Iterable[MapProblem], shape: tuple[int, i
     """Write problems as a `.scen` file.
 
     Args:
-        problems: in the order of the file
+        problems: in order
         shape: rows and columns of the map
         path: the `.scen` file
 

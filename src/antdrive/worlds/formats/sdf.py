@@ -1,4 +1,4 @@
-"""Gazebo worlds (SDF, `.sdf` and `.world`): static upright cylinders, in and out; unsupported models are listed."""
+"""Import and export of Gazebo worlds (SDF) with static upright cylinders."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from antdrive.base.errors import FieldError, input_error
 from antdrive.base.plane import map_to_world
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
-from antdrive.worlds.formats.xml import parse_xml, turned
+from antdrive.worlds.formats.xml import parse_xml, rotation_matrix
 from antdrive.worlds.world import Disc, Task, World
 
-MAX_TILT = 1e-3  # how far the axis of an upright cylinder may lean [rad]
+MAX_TILT = 1e-3  # largest tilt of an upright cylinder [rad]
 
 
 class Unsupported(Exception):
-    """The reason why a model cannot become cylinders."""
+    """A model that is not made of upright cylinders; the message is the reason."""
 
 
 @dataclass
@@ -33,36 +33,35 @@ class Models:
     """The models of a world."""
 
     discs: list[Disc] = field(default_factory=list)  # the upright cylinders
-    unsupported: list[str] = field(default_factory=list)  # the models that are something else, each as "name (reason)"
+    unsupported: list[str] = field(default_factory=list)  # all other models, each as "name (reason)"
 
 
 def read_models(world: ET.Element, frame: Pose = (0.0, 0.0, 0.0)) -> Models:
-    """The models of a <world>.
+    """Read the models of a <world>.
 
-    Ground planes and models without collision geometry are ignored. Where the world has a <state>, Gazebo starts from
-    the poses in it, so they replace the models' own: a model's and a link's pose in the state are both in the world's
-    frame, and the state's <scale> stretches the cylinders.
+    Ground planes and models without collision geometry are ignored. As in Gazebo, the poses in a <state> replace the
+    models' own: model and link poses in the state are in the world's frame, and its <scale> applies to the cylinders.
     """
-    found = Models()
+    models = Models()
     wanted = _Wanted(frame)
     states = {s.get("name", ""): s for s in world.findall("state/model")}
     for model in world.findall("model"):
         name = model.get("name", "without a name")
         try:
-            found.discs.extend(_cylinders(model, wanted, False, states.get(name)))
+            models.discs.extend(_cylinders(model, wanted, False, states.get(name)))
         except Unsupported as reason:
-            found.unsupported.append(f"{name} ({reason})")
+            models.unsupported.append(f"{name} ({reason})")
     for include in world.iter("include"):
         uri = (include.findtext("uri") or "").strip()
         if uri.rpartition("/")[2] not in ("sun", "ground_plane"):
-            found.unsupported.append(f"{uri or 'include'} (included from another file)")
+            models.unsupported.append(f"{uri or 'include'} (included from another file)")
     for tag in ("actor", "population", "state/insertions/model"):
-        found.unsupported.extend(f"{e.get('name', tag)} ({tag})" for e in world.findall(tag))
-    return found
+        models.unsupported.extend(f"{e.get('name', tag)} ({tag})" for e in world.findall(tag))
+    return models
 
 
 class _Wanted:
-    """Poses of a <world> as they are in another frame."""
+    """A transform from a <world>'s frame to another frame."""
 
     def __init__(self, frame: Pose) -> None:
         x, y, yaw = frame
@@ -71,14 +70,14 @@ class _Wanted:
         self._back = np.linalg.inv(self._frame)
 
     def __matmul__(self, pose: Floats) -> Floats:
-        """A pose (4, 4), in the other frame. A model that has that frame's own pose is at its origin to the last bit."""
+        """Transform a pose (4, 4). The frame's own pose becomes the exact identity."""
         if self._same:
             return pose
         return np.eye(4) if np.array_equal(pose, self._frame) else np.asarray(self._back @ pose)
 
 
 def _cylinders(model: ET.Element, frame: Floats | _Wanted, static: bool, state: ET.Element | None) -> list[Disc]:
-    """The cylinders of a model and of the models in it; `frame` is the pose (4, 4) of the model around it, or the world's."""
+    """Return the cylinders of a model and its nested models; `frame` is the parent's pose (4, 4) or the world's."""
     static = static or (model.findtext("static") or "").strip().lower() in ("1", "true")
     if model.get("placement_frame"):
         raise Unsupported("has a placement_frame")
@@ -103,7 +102,7 @@ def _cylinders(model: ET.Element, frame: Floats | _Wanted, static: bool, state: 
 
 
 def _shape(collision: ET.Element, pose: Floats, scale: Floats) -> Iterator[Disc]:
-    """The cylinder of a collision; nothing for a floor, and for a cylinder wholly below z = 0."""
+    """Yield the cylinder of a collision; nothing for a floor or a cylinder wholly below z = 0."""
     shape = next(iter(collision.find("geometry") or ()), None)
     if shape is None or shape.tag == "empty":
         return
@@ -118,7 +117,7 @@ def _shape(collision: ET.Element, pose: Floats, scale: Floats) -> Iterator[Disc]
         raise Unsupported("a tilted cylinder")
     radius, length = (float(_numbers(shape.findtext(tag) or "", 1, tag)[0]) for tag in ("radius", "length"))
     if abs(scale[0] - scale[1]) > 1e-9 or not (scale > 0).all():
-        raise Unsupported("scaled out of round")
+        raise Unsupported("scaled to an ellipse")
     radius, length = radius * float(scale[0]), length * float(scale[2])
     if not (radius > 0 and length > 0):
         raise Unsupported(f"a cylinder of radius {radius:g} and length {length:g}")
@@ -129,7 +128,7 @@ def _shape(collision: ET.Element, pose: Floats, scale: Floats) -> Iterator[Disc]
 
 
 def _pose(element: ET.Element) -> Floats:
-    """The (4, 4) transform of an element's <pose>: x y z [m] roll pitch yaw [rad], about the fixed axes."""
+    """Return the transform (4, 4) of an element's <pose>: x y z [m] roll pitch yaw [rad], about fixed axes."""
     pose = element.find("pose")
     if pose is None or not (pose.text or "").strip():
         return np.eye(4)
@@ -143,9 +142,9 @@ def _pose(element: ET.Element) -> Floats:
 
 
 def _matrix(x: float, y: float, z: float, *angles: float) -> Floats:
-    """The (4, 4) transform of a place [m] and of roll, pitch and yaw about the fixed axes [rad]."""
+    """Return the transform (4, 4) of a position [m] and of roll, pitch and yaw about fixed axes [rad]."""
     matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turned(*angles), (x, y, z)
+    matrix[:3, :3], matrix[:3, 3] = rotation_matrix(*angles), (x, y, z)
     return matrix
 
 
@@ -159,14 +158,14 @@ def _numbers(text: str, count: int, key: str) -> Floats:
     return values
 
 
-MARGIN = 1.0  # room left around the cylinders when no bounds are given [m]
-CELL = 0.25  # grid resolution of a task when none is given [m]
-TOLERANCE = 0.25  # goal tolerance when none is given [m]
+MARGIN = 1.0  # from the cylinders to the default bounds [m]
+CELL = 0.25  # default grid resolution of a task [m]
+TOLERANCE = 0.25  # default goal tolerance [m]
 WALL_THICKNESS, WALL_HEIGHT = 0.2, 1.0  # of an exported world's bounds [m]
 
-#: An exported world has an element of our own, as SDF allows, with all of the task that SDF cannot hold.
+#: A custom element, as SDF allows, for the parts of a task that SDF cannot hold.
 TASK_TAG, NAMESPACE = "antdrive:task", "urn:antdrive:task:1"
-#: The model of an exported world's walls. The import ignores it, as the bounds are in the task element.
+#: The model of an exported world's walls, ignored on import: the task element has the bounds.
 WALLS = "antdrive_walls"
 
 
@@ -180,26 +179,23 @@ def import_sdf(
     goal_tolerance: float | None = None,
     skip_unsupported: bool = False,
 ) -> Task:
-    """The upright cylinders of a Gazebo world as a task.
+    """Import the upright cylinders of a Gazebo world as a task.
 
     Poses of models, links and collisions are composed; those in <state> replace the models' own, as in Gazebo.
-    A cylinder's height is that of its top above z = 0. Ground planes, models without collision geometry and
-    everything below the floor are ignored. A world that `export_sdf` wrote brings its own values for everything
-    that is left out here; one that lies in a map is imported with its `frame`.
+    A cylinder's height is its top's above z = 0. Ground planes, models without collision geometry and everything below
+    the floor are ignored. Worlds written by `export_sdf` have their own defaults, including the `frame`.
 
     Args:
         path: the SDF file
-        start: the robot's first pose in the file's coordinates [m, m, rad]; by default at the lower left, towards the goal
+        start: the robot's start pose in the file's coordinates [m, m, rad]; by default at the lower left, towards the goal
         goal: in the file's coordinates [m]; by default at the upper right
-        bounds: the walls' inner faces, in the world's own frame [m]; by default with 1 m of room around the cylinders and
-            the given ends
+        bounds: the walls' inner faces, in the world's own frame [m]; by default 1 m around the cylinders, start and goal
         cell: the task's grid resolution [m]; by default 0.25
-        goal_tolerance: how close to the goal the robot must stop [m]; by default 0.25
-        skip_unsupported: leave out moving and included models and collision shapes other than upright cylinders,
-            instead of refusing the file
+        goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
+        skip_unsupported: skip moving and included models and other collision shapes instead of refusing the file
 
     Raises:
-        InputError: the file cannot be read, or a model in it is not supported.
+        InputError: the file is unreadable, or a model in it is not supported.
     """
     file = Path(path)
     world = _world_element(file)
@@ -232,7 +228,7 @@ def import_sdf(
 
 
 def _in_world(frame: Pose, end: Any) -> Any:
-    """A start or a goal in the file's coordinates as it is in the world's frame."""
+    """Transform a start or a goal from the file's coordinates to the world's frame."""
     return tuple(map_to_world(frame, [end])[0].tolist()) if end is not None and any(frame) else end
 
 
@@ -246,14 +242,14 @@ def _world_element(file: Path) -> ET.Element:
 
 @dataclass(frozen=True)
 class _KeptTask:
-    """What an exported world keeps of its task; empty for any other world."""
+    """The task element of an exported world; empty for other worlds."""
 
     file: Path
     values: Mapping[str, str]
 
     @classmethod
     def take(cls, file: Path, world: ET.Element) -> _KeptTask:
-        """The kept values of a <world>, from which the exported walls are removed."""
+        """Return the task values of a <world>, and remove its exported walls."""
         element = next((e for e in world if e.tag == TASK_TAG), None)
         if element is None:
             return cls(file, {})
@@ -269,7 +265,7 @@ class _KeptTask:
         return self.values.get(key, default)
 
     def numbers(self, key: str, count: int) -> Any:
-        """The numbers under a key as a tuple; None where there is no such key."""
+        """Return the numbers under a key as a tuple; None without the key."""
         if key not in self.values:
             return None
         try:
@@ -282,7 +278,7 @@ class _KeptTask:
         return numbers
 
     def number(self, key: str, default: Any) -> Any:
-        """The one number under a key."""
+        """Return the number under a key."""
         (number,) = self.numbers(key, 1) or (default,)
         return number
 
@@ -290,13 +286,13 @@ class _KeptTask:
 def _about_unsupported(models: Models) -> str:
     more = len(models.unsupported) - 5
     names = ", ".join(models.unsupported[:5]) + (f" and {more} more" if more > 0 else "")
-    return f"only static models of upright cylinders can be imported; leave out or skip {names}"
+    return f"only static models of upright cylinders can be imported; remove or skip {names}"
 
 
 def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
-    """Bounds with `MARGIN` around the cylinders, of which there must be one, and the given ends."""
+    """Return bounds `MARGIN` around the cylinders, start and goal; raise InputError without cylinders."""
     if not discs:
-        raise input_error(str(file), "holds no upright cylinder; give the bounds")
+        raise input_error(str(file), "has no upright cylinder; give the bounds")
     spots = [(d.x, d.y, d.radius) for d in discs]
     spots += [(end[0], end[1], 0.0) for end in (start, goal) if end is not None]
     return (
@@ -310,9 +306,8 @@ def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Poin
 def export_sdf(task: Task, path: str | Path) -> None:
     """Write a world for Gazebo (SDF 1.6): static cylinders, the bounds as four walls, a floor and a sun.
 
-    Everything is where it is in the map that the world was made from: models have the pose of the world's `frame`, and
-    their links the places in the world. Name, frame, bounds, start and goal are kept in an element `antdrive:task`, which
-    Gazebo ignores. `import_sdf` reads it and returns an equal task, every number to the last bit.
+    Positions are those in the world's source map: models have the pose of the world's `frame`, links the positions in
+    the world. The task is stored in an element `antdrive:task`, which Gazebo ignores; `import_sdf` restores it bit by bit.
 
     Raises:
         InputError: the file cannot be written, or the world has movers.
@@ -354,7 +349,7 @@ def _task_element(task: Task) -> str:
 
 
 def _model(name: str, frame: Pose | None, place: str, *parts: Sequence[str]) -> str:
-    """A static model; each part is a shape and, where it differs from the model's, its pose."""
+    """Return a static model; each part is a shape and, unless it is the model's, its pose."""
     bodies = []
     for n, (shape, *at) in enumerate(parts):
         inside = "".join(f"<pose>{p}</pose>" for p in at) + f"<geometry>{shape}</geometry>"
@@ -373,7 +368,7 @@ def _cylinder(number: int, frame: Pose, disc: Disc) -> str:
 
 
 def _walls(task: Task) -> Iterable[tuple[str, str]]:
-    """Shape and pose of each of the four walls."""
+    """Yield shape and pose of each of the four walls."""
     xmin, ymin, xmax, ymax = (float(v) for v in task.world.bounds)
     thick, high = WALL_THICKNESS, WALL_HEIGHT
     x, y, wide, deep = (xmin + xmax) / 2, (ymin + ymax) / 2, xmax - xmin + 2 * thick, ymax - ymin
@@ -391,7 +386,7 @@ def _words(values: Iterable[float]) -> str:
 
 
 def _xml_text(text: str) -> str:
-    """The text with spaces for the characters that XML cannot hold."""
+    """Replace the characters that XML cannot hold by spaces."""
     return "".join(
         c if c in "\t\r\n" or " " <= c < "\ud800" or "\ue000" <= c < "\ufffe" or c > "\uffff" else " " for c in text
     )

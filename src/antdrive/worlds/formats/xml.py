@@ -1,4 +1,4 @@
-"""XML from strangers: bounded in size and depth, without document types and entities; and the turns that it writes."""
+"""Safe XML parsing (bounded size and depth, no document types or entities) and roll-pitch-yaw rotations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_DEPTH = 100
 
 
 def parse_xml(path: Path) -> ET.Element:
-    """The root element of an XML file."""
+    """Parse an XML file and return its root element."""
     content = read_bytes(path, MAX_BYTES, "an XML file")
     parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
 
@@ -36,7 +36,7 @@ def parse_xml(path: Path) -> ET.Element:
         builder.end(tag)
 
     def refuse(*_: Any) -> None:
-        # Entities can stand for gigabytes or read other files; no world needs them.
+        # Entities can expand to gigabytes or read other files; no world needs them.
         place = f"{path}:{parser.CurrentLineNumber}"
         raise input_error(place, "declares a document type or entities; remove the declaration")
 
@@ -54,8 +54,8 @@ def parse_xml(path: Path) -> ET.Element:
     return builder.close()
 
 
-def turned(roll: float, pitch: float, yaw: float) -> Floats:
-    """The turn (3, 3) about the fixed axes x, y and z [rad]."""
+def rotation_matrix(roll: float, pitch: float, yaw: float) -> Floats:
+    """Return the rotation matrix (3, 3) of roll, pitch and yaw about fixed axes [rad]."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in (roll, pitch, yaw))
     return np.array(
         [

@@ -1,1 +1,1 @@
-"""Random worlds: forests of cylinders, and worlds like those of the BARN set."""
+"""Generators of random worlds."""

@@ -1,4 +1,4 @@
-"""Random worlds: the same random state gives the same world."""
+"""Random worlds: forests of cylinders, and BARN-like worlds from a cellular automaton."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from antdrive.worlds.geometry import point_clearance
 from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
 from antdrive.worlds.world import Disc, Task, World
 
-#: The BARN set's fill ratios and smoothing rounds; every pair of them was used for 25 of its 300 worlds.
+#: The BARN set's fill ratios and smoothing rounds; each pair has 25 of its 300 worlds.
 BARN_FILLS = (0.15, 0.20, 0.25, 0.30)
 BARN_ROUNDS = (2, 3, 4)
 
@@ -39,38 +39,38 @@ def forest(
     tries: int = 300,
     name: str = "forest",
 ) -> Task:
-    """A square with random cylinders, crossed from corner to corner.
+    """Generate a square with random cylinders, to be crossed from corner to corner.
 
-    The rule is that of K. Han, *Collision free path planning algorithms for robot navigation problem*, MSc
+    The rule is from K. Han, *Collision free path planning algorithms for robot navigation problem*, MSc
     thesis, Missouri 2007, section 3: cylinders of random size, 1 to 5 grid units, are centred on random grid
-    points, none near the start or the goal. The defaults are his, with 0.5 m to a unit. Here "near" means that
-    a surface lies within `clearance`. A world that the robot cannot cross is thrown away.
+    points, none near the start or the goal. The defaults are Han's, with 0.5 m a unit. Here "near" means a
+    surface within `clearance`. Worlds that the robot cannot cross are discarded.
 
     Args:
         rng: the source of randomness
         size: side of the square [m]
-        count: how many cylinders
+        count: number of cylinders
         radius: smallest and largest radius of a cylinder [m]
         clearance: least distance from the start and the goal to any surface [m]
-        spacing: distance between the grid points on which cylinders are centred [m]
+        spacing: of the grid points for the cylinders' centres [m]
         gap: least distance between the surfaces of two cylinders [m]; None: cylinders may overlap
-        robot_radius: the robot that must be able to cross the world [m]
-        cell: the task's grid resolution, on which crossing is tested [m]
-        tries: how many worlds are tried, and how many places for each cylinder
+        robot_radius: of the robot that must be able to cross the world [m]
+        cell: the task's grid resolution, used to test crossing [m]
+        tries: attempts for the world, and for each cylinder
         name: the world's name
 
     Raises:
-        FieldError: an argument is out of its range, or no world was found (with the key "forest").
+        FieldError: an argument is out of its range, or no attempt succeeded (key "forest").
     """
     for key, value in (("spacing", spacing), ("robot_radius", robot_radius), ("cell", cell)):
         require_positive(key, value)
-    inset = robot_radius + cell  # the ends are one cell away from where the walls stop the robot
+    inset = robot_radius + cell  # start and goal are one cell away from contact with the walls
     rule = _Rule(size, radius, spacing, clearance, gap, tries, inset)
     if not 0 <= count <= 10_000:
         raise FieldError("count", f"must be from 0 to 10000, got {count}")
     start, goal = rule.ends
     source = f"the random worlds of han2007, section 3, with {count} cylinders"
-    # Where so many cylinders hardly fit, all the tries would take minutes and find nothing.
+    # Fewer attempts with many cylinders: all would take minutes.
     for _ in range(min(tries, max(20, 60_000 // max(count, 1)))):
         discs = rule.scatter(rng, count)
         if discs is None:
@@ -82,13 +82,13 @@ def forest(
     raise FieldError(
         "forest",
         f"no world with {count} cylinders of radius {radius[0]:g} to {radius[1]:g} m that a disc of radius "
-        f"{robot_radius:g} m can cross was found in {tries} tries; use fewer or smaller cylinders",
+        f"{robot_radius:g} m can cross in {tries} tries; use fewer or smaller cylinders",
     )
 
 
 @dataclass(frozen=True)
 class _Rule:
-    """How `forest` places cylinders; see there."""
+    """The placement rule of `forest`."""
 
     size: float
     radius: tuple[float, float]
@@ -111,34 +111,34 @@ class _Rule:
 
     @property
     def ends(self) -> tuple[Point, Point]:
-        """The start and the goal [m]."""
+        """Start and goal [m]."""
         far = self.size - self.inset
         return (self.inset, self.inset), (far, far)
 
     def scatter(self, rng: np.random.Generator, count: int) -> tuple[Disc, ...] | None:
-        """Cylinders placed one after the other; None when one of them found no place in `tries` draws."""
+        """Place cylinders one by one; None if one does not fit in `tries` draws."""
         discs: list[Disc] = []
         for _ in range(count):
-            found = next((d for d in (self.draw(rng) for _ in range(self.tries)) if self.fits(d, discs)), None)
-            if found is None:
+            disc = next((d for d in (self.draw(rng) for _ in range(self.tries)) if self.fits(d, discs)), None)
+            if disc is None:
                 return None
-            discs.append(found)
+            discs.append(disc)
         return tuple(discs)
 
     def draw(self, rng: np.random.Generator) -> Disc:
-        """A random cylinder, with a radius in whole millimetres."""
+        """Draw a random cylinder, with a radius in whole millimetres."""
         x, y = rng.integers(0, math.floor(self.size / self.spacing) + 1, size=2) * self.spacing
         return Disc(float(x), float(y), round(float(rng.uniform(*self.radius)), 3))
 
     def fits(self, disc: Disc, others: list[Disc]) -> bool:
-        """Whether a cylinder keeps the distances from both ends and from the other cylinders."""
+        """Return whether a cylinder keeps its distances from start, goal and the other cylinders."""
         if min(_distance(disc, end) for end in self.ends) < self.clearance:
             return False
         return self.gap is None or all(_distance(disc, (o.x, o.y)) - o.radius >= self.gap for o in others)
 
 
 def _distance(disc: Disc, point: Point) -> float:
-    """The distance from a disc's surface to a point [m]."""
+    """Return the distance from a disc's surface to a point [m]."""
     return math.dist((disc.x, disc.y), point) - disc.radius
 
 
@@ -156,25 +156,25 @@ def barn(
     tries: int = 20_000,
     name: str = "barn",
 ) -> Task:
-    """A world like those of the BARN set: a field of cylinders between two walls, grown by a cellular automaton.
+    """Generate a BARN-like world: a field of cylinders between two walls, grown by a cellular automaton.
 
     After D. Perille, A. Truong, X. Xiao, P. Stone, *Benchmarking metric ground navigation*, SSRR 2020: 30 x 30 cells
-    of 0.15 m are filled at random and smoothed in rounds. In each round, a cell with five or more filled neighbours of
-    eight is filled and one with one or none is cleared; the walls at the field's sides stay filled, and all cells
-    beyond them count as filled. Every filled cell holds a cylinder of radius 0.075 m. Layout, start and goal are those
-    of the BARN set. A world that the robot cannot cross is thrown away: with a fill of 0.30 a Jackal crosses one of
-    some hundreds, so such worlds take up to some seconds. (BARN cut a way through them instead.)
+    of 0.15 m are filled at random and smoothed in rounds. In each round, cells with five or more of eight neighbours
+    filled are filled, and cells with at most one are cleared. The walls at the field's sides stay filled, and all cells
+    beyond them count as filled. Each filled cell becomes a cylinder of radius 0.075 m. Layout, start and goal are those
+    of the BARN set. Worlds that the robot cannot cross are discarded (BARN carved a passage instead): at fill 0.30 a
+    Jackal crosses one in several hundred, which takes up to some seconds.
 
     Args:
         rng: the source of randomness
-        fill: the probability that a cell is filled at first; BARN's are `BARN_FILLS`
-        rounds: how many rounds of smoothing follow; BARN's are `BARN_ROUNDS`
-        robot_radius: the robot that must be able to cross the world [m]
-        tries: how many fields are tried
+        fill: initial probability of a filled cell; BARN's are `BARN_FILLS`
+        rounds: rounds of smoothing; BARN's are `BARN_ROUNDS`
+        robot_radius: of the robot that must be able to cross the world [m]
+        tries: attempts
         name: the world's name
 
     Raises:
-        FieldError: an argument is out of its range, or no world was found (with the key "barn").
+        FieldError: an argument is out of its range, or no attempt succeeded (key "barn").
     """
     if not 0 <= fill < 1:
         raise FieldError("fill", f"must be at least 0 and less than 1, got {fill:g}")
@@ -194,7 +194,7 @@ def barn(
             return task
     raise FieldError(
         "barn",
-        f"no world of fill {fill:g} that a disc of radius {robot_radius:g} m can cross was found in "
+        f"no world of fill {fill:g} that a disc of radius {robot_radius:g} m can cross in "
         f"{tries} tries; use a smaller fill or a smaller robot_radius",
     )
 
@@ -206,17 +206,17 @@ GENERATORS: Mapping[str, Callable[..., Task]] = MappingProxyType({"forest": fore
 def generate(
     kind: str, rng: np.random.Generator, options: Mapping[str, str], *, name: str | None = None, note: str = ""
 ) -> Task:
-    """A random world, with options as texts.
+    """Generate a random world, with options as text.
 
     Args:
         kind: a name of `GENERATORS`
         rng: the source of randomness
         options: the generator's arguments by name, such as {"count": "20", "radius": "0.2,0.5"}
         name: the world's name; by default the kind
-        note: a text to add to the world's source
+        note: text appended to the world's source
 
     Raises:
-        InputError: an unknown kind or option, a wrong value, or no such world was found.
+        InputError: an unknown kind or option, an invalid value, or no attempt succeeded.
     """
     if kind not in GENERATORS:
         raise input_error("generate", f"unknown kind {kind!r}; choose from {', '.join(GENERATORS)}")
@@ -240,12 +240,12 @@ def generate(
 
 @cached(64)
 def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
-    """The random world that {generate: KIND, seed: SEED} with options stands for in a file."""
+    """Generate the world of {generate: KIND, seed: SEED} with options in a file."""
     return generate(kind, np.random.default_rng(seed), dict(options), name=f"{kind}-{seed}", note=f"seed {seed}")
 
 
 def _value(kind: str, key: str, text: str, default: Any) -> Any:
-    """An option's text as a value of the default's type."""
+    """Convert an option's text to the default's type."""
     words, convert = text.split(","), int if isinstance(default, int) else float
     count = len(default) if isinstance(default, tuple) else 1
     one = "a whole number" if convert is int else "a number"
@@ -260,20 +260,20 @@ def _value(kind: str, key: str, text: str, default: Any) -> Any:
 
 
 def _connected(grid: Grid, task: Task) -> bool:
-    """Whether allowed moves lead from the start's cell to the goal's, and the robot has room at both ends."""
+    """Return whether start and goal are clear and allowed moves connect their cells."""
     ends = [task.start[:2], task.goal]
     if not (point_clearance(task.world, ends) > grid.inflate).all():
         return False
     start, goal = (grid.cell_at(*end) for end in ends)
-    todo, seen = [start], {start}
+    todo, visited = [start], {start}
     while todo:
         cell = todo.pop()
         if cell == goal:
             return True
         for bit, (dr, dc) in enumerate(DIRECTIONS):
             there = cell[0] + dr, cell[1] + dc
-            if grid.moves[cell] >> bit & 1 and there not in seen:
-                seen.add(there)
+            if grid.moves[cell] >> bit & 1 and there not in visited:
+                visited.add(there)
                 todo.append(there)
     return False
 
@@ -281,12 +281,12 @@ def _connected(grid: Grid, task: Task) -> bool:
 Picture: TypeAlias = npt.NDArray[np.bool_]  # (rows, columns), True where filled
 
 SIDE = 30  # rows and columns of the automaton
-RUNWAY = 34  # rows before the field; the first row is a wall
+RUNWAY = 34  # rows before the field; the first one is a wall
 HEIGHT = 0.5  # of a cylinder [m]
 
 
 def grow_field(rng: np.random.Generator, fill: float, rounds: int) -> Picture:
-    """A random field after smoothing, (30, 30), rows in the direction from start to goal."""
+    """Generate a random field after smoothing, (30, 30), rows in the direction from start to goal."""
     field = rng.random((SIDE, SIDE)) < fill
     field[:, [0, -1]] = True
     for _ in range(rounds):
@@ -297,7 +297,7 @@ def grow_field(rng: np.random.Generator, fill: float, rounds: int) -> Picture:
 
 
 def _neighbours(field: Picture) -> npt.NDArray[np.int64]:
-    """The number of filled neighbours of each cell. Beyond the side walls all cells count as filled, beyond the ends none."""
+    """Count the filled neighbours of each cell. Cells beyond the side walls count as filled, beyond the ends as empty."""
     rows, cols = field.shape
     padded = np.zeros((rows + 2, cols + 2), dtype=np.int64)
     padded[:, [0, -1]] = 1
@@ -309,7 +309,7 @@ def _neighbours(field: Picture) -> npt.NDArray[np.int64]:
 
 
 def crossable(field: Picture, robot_radius: float) -> bool:
-    """Whether cells with room for the robot join the field's ends: a cheap test that every crossable field passes."""
+    """Return whether cells with room for the robot connect the field's ends: a cheap necessary condition."""
     reach = math.floor((robot_radius / BARN_CELL) + 0.5)
     free = np.ones(field.shape, dtype=np.bool_)
     rows, cols = field.shape
@@ -333,7 +333,7 @@ def crossable(field: Picture, robot_radius: float) -> bool:
 
 
 def cylinders(field: Picture) -> tuple[Disc, ...]:
-    """The cylinders of a world: one for each filled cell of the field and of the walled runway before it."""
+    """Return one cylinder for each filled cell of the field and of the walled runway before it."""
     runway = np.zeros((RUNWAY, SIDE), dtype=np.bool_)
     runway[0] = True
     runway[:, [0, -1]] = True
