@@ -367,7 +367,7 @@ def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path):
     body = '<collision><origin xyz="-0.064 0 0.0815"/><geometry><box size="0.281 0.306 0.119"/></geometry></collision>'
     with pytest.raises(InputError, match="has no collision geometry other than its wheels, so no footprint"):
         import_urdf(changed(tmp_path, "waffle.urdf", (body, "")))
-    with pytest.raises(InputError, match=r"has no collision geometry below 0\.005 m beside its wheels"):
+    with pytest.raises(InputError, match=r"has no collision geometry below 0\.005 m other than its wheels"):
         imported("burger.urdf", below=0.005)
 
 
