@@ -32,7 +32,7 @@ ROWS = ("t", "pose", "twist", "command", "clearance", "limiter", "movers", "esti
 
 @dataclass
 class Log:
-    """A log that can be changed at will.
+    """A mutable log.
 
     Attributes:
         arrays: the arrays by name
@@ -60,7 +60,7 @@ class Log:
         return world
 
     def rows(self, chosen: slice | Array) -> Log:
-        """Only some rows, at the times that rows must have; contacts in other rows are left out."""
+        """Keep only some rows, with consistent times, and their contacts."""
         count = len(self["t"])
         where = np.arange(count)[chosen]
         for name in ROWS:
@@ -85,7 +85,7 @@ class Log:
         return self
 
     def write(self, path: Path) -> None:
-        """Write the log with a digest that fits it, as docs/reference/rollout-format.md describes it."""
+        """Write the log with a matching digest (docs/reference/rollout-format.md)."""
         try:
             text = DriveRecord.from_json(json.dumps(self.record)).to_json(without=("digest", "times"))
         except (FieldError, InputError, ValueError):
@@ -152,7 +152,7 @@ def forgery(name: str, level: str, when: str = "") -> Callable[[Callable[..., Lo
 
 
 def breakage(name: str) -> Callable[[Breaker], Breaker]:
-    """Register a function as a way to break a file."""
+    """Register a function that breaks a file."""
 
     def register(breaks: Breaker) -> Breaker:
         KINDS[name] = Kind(name, "load", breaks=breaks)
@@ -298,7 +298,7 @@ def _(log: Log) -> Log:
 
 @forgery("1,000 wanderers that take 20 steps a second", "load", "moving")
 def _(log: Log) -> Log:
-    """In a log of a row per second, whose few rows are hours."""
+    """Forge a log of few rows, one per second, that spans hours."""
     log = log.rows(slice(500))
     walk = {"cell": 0.5, "period": 0.05, "start": [5.2, 0.6]}
     log.world["movers"] = [{"radius": 0.15, "height": 1.0, "walk": walk}] * 1000
@@ -527,7 +527,7 @@ def _bent(log: Log, aside: float, *, follow: bool, seconds: float = 1.0, whole: 
 
 
 def _commanded(log: Log) -> Log:
-    """Commands and targets of the motors that fit the measured speeds."""
+    """Make commands and motor targets consistent with the measured speeds."""
     period = log.hz // int(log.record["control_hz"])
     count = len(log["t"])
     held = 1 + (np.arange(1, count) - 1) // period * period + period - 1
@@ -690,7 +690,7 @@ def _(log: Log) -> Log:
 
 @forgery("a plan along the wall, among movers", "none", "moving")
 def _(log: Log) -> Log:
-    """The robot may leave its route for a mover."""
+    """Let the robot leave its route for a mover."""
     return _along_the_wall(log)
 
 
@@ -777,7 +777,7 @@ def _(log: Log) -> Log:
 
 @forgery("contacts left out, the poses held back", "verify", "collided")
 def _(log: Log) -> Log:
-    """The robot stops 2 cm before the post, at once."""
+    """Stop the robot at once, 2 cm before the post."""
     touch = int(log["contacts"][0, 0])
     last = int(np.flatnonzero(log["clearance"][:touch] > 0.02)[-1])
     for name in ("pose", "twist"):
@@ -804,7 +804,7 @@ def _(log: Log) -> Log:
 
 @forgery("a collision cut off before the contact", "none", "collided")
 def _(log: Log) -> Log:
-    """What is left is what physics gives, and the time limit is the forger's."""
+    """Cut the log where physics is genuine, and forge the time limit."""
     period = log.hz // int(log.record["control_hz"])
     log = log.rows(slice(((int(log["contacts"][0, 0]) - 8) // period - 2) * period + 1))
     log.record["outcome"] = "timed_out"
@@ -926,7 +926,7 @@ def _(log: Log) -> Log:
 
 @forgery("a post that was not there", "none", "arrived")
 def _(log: Log) -> Log:
-    """A cylinder more among those that the planner did not know can make a drive harder only."""
+    """Add an unseen cylinder, which can only make the drive harder."""
     log.record["unseen"] = [{"x": 5.85, "y": 3.35, "radius": 0.05, "height": 1.0}]
     return log.consistent()
 
@@ -1007,7 +1007,7 @@ def _(log: Log) -> None:
 
 @forgery("a pose edited by a picometre", "none")
 def _(log: Log) -> None:
-    """Within rounding; the replay says that it is not bit for bit."""
+    """Change a value within rounding; replay reports a difference in bits."""
     log["pose"][len(log["t"]) // 3, 0] += 1e-12
 
 
@@ -1095,7 +1095,7 @@ def _with_record(data: bytes, text: str) -> bytes:
 def _with_member(
     data: bytes, name: str, change: Callable[[bytes], bytes | None], method: int = zipfile.ZIP_DEFLATED, level: int = 1
 ) -> bytes:
-    """The archive with one member changed, or left out."""
+    """Return the archive with one member changed or omitted."""
     out = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(out, "w") as new:
         for info in old.infolist():

@@ -14,7 +14,7 @@ MISSING = 77  # the exit code where data or packages are missing; test drivers t
 
 
 def command_line(doc: str | None, **settings: tuple[Any, str]) -> argparse.Namespace:
-    """The options of the command line.
+    """Parse the command line.
 
     Args:
         doc: what the benchmark does

@@ -70,7 +70,7 @@ def worst_turn(robot: RobotSpec, hz: int) -> Turn:
 
 
 def stop(robot: RobotSpec, hz: int, *, at_once: bool) -> tuple[float, float]:
-    """The way that a robot takes to stop from its top speed, and the way of its file's deceleration [m].
+    """Return the stopping distance from top speed, and that of the deceleration in the robot's file [m].
 
     Args:
         robot: the robot

@@ -1,9 +1,9 @@
-"""What the example's suite notices: `python -m benchmarks.planted [--only NAME ...]`.
+"""Detection of planted faults by the example's suite: `python -m benchmarks.planted [--only NAME ...]`.
 
 Faults are planted, one at a time, in a copy of `examples/regression_suite` or in the objects of a process that runs its
-tests. Each must fail a test. Where a robot touches something, or comes nearer than in the baseline by more than the tolerance,
-the message must name the thing and the time; a calculation of its own, from the log, says which are right. Harmless changes
-must change nothing: every test passes, and every drive is the same, bit for bit.
+tests. Each must fail a test. After a contact, or a clearance below the baseline by more than the tolerance, the message must
+name the obstacle and the time; an independent calculation from the log verifies both. Harmless changes must pass every test
+with identical drives, bit for bit.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Harmless:
 
 
 def replaced(file: str, *pairs: tuple[str, str]) -> Edit:
-    """An edit that replaces each text in a file by another."""
+    """Return an edit that replaces texts in a file."""
 
     def edit(folder: Path) -> None:
         path = folder / file
@@ -78,7 +78,7 @@ def replaced(file: str, *pairs: tuple[str, str]) -> Edit:
 
 
 def numbers(file: str, pattern: str, change: Callable[[float], float]) -> Edit:
-    """An edit that changes the numbers that a pattern's groups find."""
+    """Return an edit that changes the numbers matched by a pattern's groups."""
 
     def edit(folder: Path) -> None:
         path = folder / file
@@ -98,7 +98,7 @@ def every_world(pattern: str, change: Callable[[float], float]) -> Edit:
 
 
 def controller(**factors: float) -> Callable[[], None]:
-    """A patch that multiplies defaults of the controller."""
+    """Return a patch that multiplies defaults of the controller."""
 
     def patch() -> None:
         from antdrive.robots import PurePursuit
@@ -118,7 +118,7 @@ def less_inflation() -> None:
 
 
 def wider_track() -> None:
-    """The robot is built with a wider track than its file says, which the motors' speeds are computed from."""
+    """Build the robot with a wider track than in its file, from which wheel speeds are computed."""
     import dataclasses
 
     from antdrive.sim.physics import engine
@@ -184,7 +184,7 @@ def rename(folder: Path) -> None:
 
 
 def rewritten(file: str, change: Callable[[Any], Any]) -> Edit:
-    """An edit that writes a YAML file anew from its changed content."""
+    """Return an edit that rewrites a YAML file from its changed content."""
 
     def edit(folder: Path) -> None:
         path = folder / file
@@ -198,7 +198,7 @@ def reordered(task: dict[str, Any]) -> dict[str, Any]:
 
 
 def turned(value: Any) -> Any:
-    """The same mappings with their keys in the opposite order."""
+    """Reverse the order of keys in all mappings."""
     if isinstance(value, dict):
         return {key: turned(value[key]) for key in reversed(value)}
     return value
@@ -221,7 +221,7 @@ def everywhere(change: Callable[[Any], Any]) -> Edit:
 
 
 def elsewhere(folder: Path) -> Tests:
-    """The tests of a copy whose path has a space and a letter outside ASCII."""
+    """Run the tests of a copy whose path has a space and a non-ASCII letter."""
     with tempfile.TemporaryDirectory(prefix="antdrive ü ") as other:
         shutil.copytree(folder, Path(other) / "checkout")
         return with_pytest(Path(other) / "checkout")
@@ -263,7 +263,7 @@ def copied(folder: Path, edit: Edit | None) -> Path:
 
 
 def in_fork(folder: Path, patch: Callable[[], None] | None) -> Tests:
-    """The tests of a folder, in a copy of this process with an optional patch."""
+    """Run the tests of a folder in a copy of this process, with an optional patch."""
     out = folder / "tests.json"
 
     def work() -> None:
@@ -304,7 +304,7 @@ def logs_only() -> None:
 
 
 def things(log: Any) -> dict[str, Any]:
-    """The distance from a disc-shaped robot to each thing at each row of a log, by what messages call it [m]."""
+    """Return the clearance of a disc-shaped robot from each obstacle at each row of a log, by obstacle name [m]."""
     x, y = log.pose[:, 0], log.pose[:, 1]
     world, radius = log.record.world, log.record.robot.radius
     found = {}
@@ -346,7 +346,7 @@ def right_place(test: Mapping[str, Any], baseline: Mapping[str, Any]) -> bool | 
 
 
 def baselines(folder: Path) -> dict[str, Any]:
-    """The baselines of a folder by the names of their tests."""
+    """Load the baselines of a folder by test name."""
     found = {}
     for path in (folder / "baselines").rglob("*.json"):
         content = json.loads(path.read_text())
@@ -377,7 +377,7 @@ def tell(failed: Tests) -> None:
 
 
 def telling(failed: Tests) -> str:
-    """The most telling line of all messages: what was touched, else what came nearer, else the first."""
+    """Return the most informative message line: a contact, else a smaller clearance, else the first."""
     lines = [
         (name.partition("::")[2], line.strip())
         for name, test in failed.items()

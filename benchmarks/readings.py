@@ -1,10 +1,10 @@
-"""Which reading of a paper makes its claims true? `python -m benchmarks.readings [PLANNER ...] [--seeds N]`.
+"""Claims of papers under different readings: `python -m benchmarks.readings [PLANNER ...] [--seeds N]`.
 
-Planners: pfaco (lee2008), as and iaco (suganthi2019), maco (ibraheem2016). Each reading of what the paper leaves open runs
-on the same recreated maps with the same seeds and the same number of ant steps. For pfaco a second table varies the
-constants for which the paper gives no value over two levels each, in a fractional design of eight runs (resolution III,
-generators D = AB, E = AC). A gap is how much longer a path is than the shortest over the same moves; intervals are
-bootstrapped over maps, and p is Wilcoxon's, against the rival on the same maps. The paper's own constants stay as they are.
+Planners: pfaco (lee2008), as and iaco (suganthi2019), maco (ibraheem2016). Each reading of an unspecified detail runs on the
+same recreated maps with the same seeds and number of ant steps. For pfaco a second table varies the unspecified constants
+over two levels each, in a fractional design of eight runs (resolution III, generators D = AB, E = AC). A gap is the excess
+length over the shortest path with the same moves. Intervals are bootstrapped over maps; p is Wilcoxon's, against the rival
+on the same maps. Constants given by the paper are fixed.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ LEE = {
 
 
 def _numbered(experiment: Experiment) -> Callable[[int], Query]:
-    """The experiment's maps, one for each seed."""
+    """Return the experiment's maps, one per seed."""
     return lambda seed: experiment.query(experiment.world(seed))
 
 
@@ -123,7 +123,7 @@ SEARCHES = {
 
 
 def gaps(planner: str, options: Options, search: Search, seeds: int) -> tuple[list[float], list[PaperRun]]:
-    """The gap of every map and seed, and the plans."""
+    """Return the gap of every map and seed, and the plans."""
     trials = [
         solve(planner, options, draw(seed), seed, search.work) for draw in search.maps.values() for seed in range(seeds)
     ]
@@ -131,7 +131,7 @@ def gaps(planner: str, options: Options, search: Search, seeds: int) -> tuple[li
 
 
 def line(name: str, found: Sequence[float], rival: Sequence[float], cpu: float) -> str:
-    """A row of the table: arrivals, median gap with its interval, how often it beat the rival, p."""
+    """Return a table row: arrivals, median gap with its interval, wins against the rival, p."""
     large = np.nan_to_num(np.array([found, rival]), posinf=NO_PATH)
     values = large[0]
     low, high = medians_by_world(values[:, None], np.arange(len(values)))[0]
@@ -153,7 +153,7 @@ def _number(value: float) -> str:
 
 
 def designs(search: Search) -> Iterator[tuple[str, Options]]:
-    """The full factorial of the readings, then the fractional one of the constants under each of the chosen readings."""
+    """Run the full factorial of the readings, then the fractional one of the constants under the chosen readings."""
     for values in itertools.product(*search.readings.values()):
         chosen = dict(zip(search.readings, values, strict=True))
         yield ", ".join(map(str, values)), chosen

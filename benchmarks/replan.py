@@ -1,9 +1,9 @@
-"""The time to repair a plan compared with planning anew: `python -m benchmarks.replan`.
+"""Time to repair a plan relative to planning from scratch: `python -m benchmarks.replan`.
 
-A robot crosses 200 x 200 cells. Again and again it takes a few steps along its path, and a patch of up to 3 x 3 cells
-ahead of it is blocked, or one blocked before is cleared. The time to report the change to the replanner and get the
-repaired path is compared with planning the same query anew, by the same planner and by `astar`; lengths must agree. For
-`ants`, which continue on their trails, there are fewer worlds, and the gap to the optimum is reported. Prints Markdown.
+A robot crosses 200 x 200 cells. It repeatedly takes a few steps along its path; then a patch of up to 3 x 3 cells ahead is
+blocked, or an earlier patch is cleared. The time to report the change and repair the path is compared with planning the same
+query from scratch, by the same planner and by `astar`; lengths must agree. For `ants`, which continue on their trails, there
+are fewer worlds, and the gap to the optimum is reported. Prints Markdown.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def discs(rng: np.random.Generator) -> Grid:
 
 
 def scattered(rng: np.random.Generator) -> Grid:
-    """A fifth of the cells blocked at random."""
+    """Return a grid with a fifth of its cells blocked at random."""
     return Grid.from_free(rng.random((SIDE, SIDE)) >= 0.2)
 
 
@@ -81,7 +81,7 @@ def drive(planner: Planner, query: Query, changes: int, rng: np.random.Generator
 
 
 def measured(planner: Planner, kind: Callable[[np.random.Generator], Grid], worlds: int, changes: int) -> Any:
-    """The columns of `drive` over a number of worlds."""
+    """Return the columns of `drive` over a number of worlds."""
     rng = np.random.default_rng(0)
     drive(planner, corner_to_corner(kind(rng)), changes, rng)  # warms up
     return np.array([row for _ in range(worlds) for row in drive(planner, corner_to_corner(kind(rng)), changes, rng)]).T

@@ -1,4 +1,4 @@
-"""Results in pieces: files with one JSON object in each line, which a benchmark appends to and goes on from."""
+"""Resumable results: JSONL files that a benchmark appends to and resumes from."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 def read_lines(path: Path | None) -> list[dict[str, Any]]:
-    """The objects of a file, without a last line that was cut short; none if there is no file.
+    """Return the objects of a file, ignoring a truncated last line; none without a file.
 
     Args:
         path: the file; None: there is none
@@ -38,7 +38,7 @@ def append_line(path: Path | None, value: Mapping[str, Any]) -> None:
 
 
 def current_commit() -> str:
-    """The commit of antdrive that runs; empty where there is none."""
+    """Return antdrive's commit; empty without one."""
     command = ["git", "rev-parse", "--short", "HEAD"]
     done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
     return done.stdout.strip()

@@ -1,7 +1,7 @@
-"""Robots out of URDF and of the catalogue: what was imported beside public specifications, and who drives through BARN's world 0.
+"""Robots from URDF and catalogue: imported values against public specifications, and drives through BARN's world 0.
 
 python -m benchmarks.robots            # tables for docs/notebook/urdf-robots.md; the drives need the archive of BARN (`--barn`)
-python -m benchmarks.robots --values   # only what was imported
+python -m benchmarks.robots --values   # only imported values
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ TOLD: dict[str, dict[str, Any]] = {"husky.urdf": {"left": "rear_left_wheel", "ri
 
 
 def importable() -> list[str]:
-    """The URDF files, without those that a missing package expands."""
+    """Return the URDF files, except those that need a missing package."""
     if importlib.util.find_spec("xacrodoc"):
         return list(SPECIFICATIONS)
     print("no xacro files: they need the extra `urdf`", file=sys.stderr)
@@ -41,12 +41,12 @@ def importable() -> list[str]:
 
 
 def imported(name: str) -> RobotSpec:
-    """The robot in one of the URDF files."""
+    """Import the robot in a URDF file."""
     return import_urdf(URDF / name, **TOLD.get(name, {})).spec
 
 
 def values_of(robot: RobotSpec) -> dict[str, float]:
-    """The values of a robot that specifications have, in `UNITS`."""
+    """Return a robot's values in public specifications, in `UNITS`."""
     xmin, ymin, xmax, ymax = robot.footprint.bounds
     sizes = {"length": xmax - xmin, "width": ymax - ymin, "swing radius": robot.radius}
     return {key: sizes[key] if key in sizes else float(getattr(robot, key)) for key in UNITS}

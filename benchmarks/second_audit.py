@@ -1,9 +1,9 @@
-"""The least clearance of a drive, found a second time by other means than the certificate's.
+"""Independent computation of a drive's least clearance, without code of the certificate.
 
 It reads the world's file and the robot's file as plain YAML, not through antdrive, and the log's poses and speeds. The
 footprint becomes a cloud of points: its outline every 5 mm and its inside. Between two rows the pose follows the arc of
-the measured twist. Movers are moved step by step. What is found is never less than the true clearance but for the arc,
-and greater by 0.1 mm at most, since two points of the outline are 5 mm apart.
+the measured twist. Movers are moved step by step. Apart from the arc, the result is never below the true clearance and
+exceeds it by at most 0.1 mm, because outline points are 5 mm apart.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def _polygon_cloud(corners: Array) -> tuple[Array, Array]:
 
 
 def along_arcs(pose: Array, twist: Array, hz: int) -> Iterator[tuple[float, Array]]:
-    """The share of a step that has passed, and the poses (T, 3) then; from the last row none goes on."""
+    """Yield fractions of a step and the poses (T, 3) at them; the last row has no step."""
     speed, rate = np.vstack([twist[1:], np.zeros((1, 2))]).T / hz
     for share in np.arange(SUBSTEPS) / SUBSTEPS:
         turned = rate * share
@@ -121,7 +121,7 @@ def track(mover: Mapping[str, Any], bounds: Array, t: Array) -> Array:
 
 
 def _bouncing(x: float, v: float, low: float, high: float, t: Array) -> Array:
-    """A coordinate that goes from wall to wall, bounce by bounce."""
+    """Return a coordinate that bounces between walls."""
     times, places, now = [0.0], [x], 0.0
     while now <= t[-1] and v:
         wall = high if v > 0 else low
@@ -135,7 +135,7 @@ def _bouncing(x: float, v: float, low: float, high: float, t: Array) -> Array:
 def least_clearance(
     world: Mapping[str, Any], footprint: Mapping[str, Any], pose: Array, twist: Array, hz: int
 ) -> Least:
-    """The least distance from a footprint to every cylinder, mover and wall of a world during a drive.
+    """Return the least distance of a footprint from every cylinder, mover and wall during a drive.
 
     Args:
         world: what the world's file says
@@ -196,7 +196,7 @@ def least_clearance(
 
 
 def _walls(edge: Array, reach: float, bounds: Array, arcs: list[Array], hz: int) -> tuple[float, float, float, str]:
-    """The least distance to a wall at the rows and between them [m], when [s], and its name."""
+    """Return the least distance from a wall at and between rows [m], its time [s], and the wall's name."""
     rows = between = math.inf
     at, near = 0.0, ""
     xmin, ymin, xmax, ymax = bounds

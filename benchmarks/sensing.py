@@ -1,7 +1,7 @@
-"""Measure what a scan, its place in the map and the search for movers cost: `python -m benchmarks.sensing`. Prints Markdown.
+"""Cost of scans, mapping and mover detection: `python -m benchmarks.sensing`. Prints Markdown.
 
 The world: a square hall of 20 m with discs of 7.5 to 30 cm in random places, and six movers for the search. The lidar moves
-by a centimetre from scan to scan. Times are processor time; of nine blocks of 200 scans the fastest counts.
+by 1 cm per scan. Times are processor times of the fastest of nine blocks of 200 scans.
 """
 
 from __future__ import annotations

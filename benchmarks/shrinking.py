@@ -1,8 +1,8 @@
-"""How small failures become, and how long it takes: `python -m benchmarks.shrinking [--failures N] [--seconds S]
+"""Size and time of shrunk failures: `python -m benchmarks.shrinking [--failures N] [--seconds S]
 [--robot NAME]`.
 
-Random forests of 60 cylinders on 14 m, driven by `turtlebot` without a margin, without smoothing and with its noise; the first
-drives that fail are shrunk.
+`turtlebot` drives random forests of 60 cylinders on 14 m with noise and without margin or smoothing. The first failures are
+shrunk.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The time to plan among known motions: `python -m benchmarks.space_time`. Prints Markdown.
+"""Planning time among movers with known motions: `python -m benchmarks.space_time`. Prints Markdown.
 
-Corner to corner over cells of 0.2 m, 15 % of them blocked at random, at 0.5 m/s with 0.25 m to be kept. Movers of 0.2 to 0.5 m
-radius go back and forth between two random points, or in circles, at 0.1 to 0.5 m/s. Worlds without a path among
-standing obstacles, or with a mover on the start, are drawn again. Times are the best of three; the compiler has been warmed up.
+Corner to corner over cells of 0.2 m, 15 % of them blocked at random, at 0.5 m/s with a clearance of 0.25 m. Movers of 0.2 to
+0.5 m radius shuttle between two random points, or circle, at 0.1 to 0.5 m/s. Worlds without a path among static obstacles, or
+with a mover on the start, are redrawn. Times are the best of three, after compilation.
 """
 
 from __future__ import annotations

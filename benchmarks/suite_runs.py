@@ -1,7 +1,7 @@
-"""Runs of a suite in other processes, as `benchmarks.planted` and `benchmarks.suites` need them.
+"""Suite runs in other processes, for `benchmarks.planted` and `benchmarks.suites`.
 
-As a plugin of pytest, `-p benchmarks.suite_runs`, it writes what came out of each test into the file that ANTDRIVE_RUN names,
-shuffles the tests with the seed in ANTDRIVE_SHUFFLE, and runs each of them ANTDRIVE_TIMES times.
+As a pytest plugin, `-p benchmarks.suite_runs`, it writes each test's result to the file named by ANTDRIVE_RUN, shuffles the
+tests with the seed in ANTDRIVE_SHUFFLE, and runs each test ANTDRIVE_TIMES times.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 def with_pytest(
     folder: Path, *words: str, flags: Sequence[str] = (), env: Mapping[str, str] | None = None, cwd: Path | None = None
 ) -> Tests:
-    """What came out of each test of a folder, by name.
+    """Run the tests of a folder. Return their results by name.
 
     Args:
         folder: holds the suites
@@ -98,7 +98,7 @@ def rounds_with_pytest(
     env: Mapping[str, str] | None = None,
     cwd: Path | None = None,
 ) -> list[Tests]:
-    """The same where one process runs each test several times, a round for each time.
+    """Run each test several times in one process. Return the results of each round.
 
     Args:
         folder: holds the suites
@@ -121,7 +121,7 @@ def rounds_with_pytest(
 
 
 def with_check(folder: Path, *words: str, env: Mapping[str, str] | None = None) -> Tests:
-    """The same from `antdrive check`, for the suites of a folder."""
+    """Run `antdrive check` on the suites of a folder. Return the results by test."""
     command = [sys.executable, "-m", "antdrive", "check", ".", "--json", "--film", "never", *words]
     env = environment(None, env)
     done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
@@ -136,7 +136,7 @@ def with_check(folder: Path, *words: str, env: Mapping[str, str] | None = None) 
 
 
 def environment(out: Path | None, extra: Mapping[str, str] | None) -> dict[str, str]:
-    """The variables of a run: results go beside the suite, and no bytecode is written."""
+    """Return the environment of a run: results next to the suite, and no bytecode."""
     own = {"PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
     env = {**os.environ, **own, **(extra or {})}
     for name in ("GITHUB_STEP_SUMMARY", "PYTEST_ADDOPTS"):

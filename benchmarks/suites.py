@@ -1,14 +1,13 @@
-"""What suites cost, and whether they flake: `python -m benchmarks.suites [--scenarios 200] [--jobs 2]`, or
+"""Cost and flakiness of suites: `python -m benchmarks.suites [--scenarios 200] [--jobs 2]`, or
 `--repeats N [--within M] [--results FILE.jsonl]`.
 
-`--scenarios` makes a suite of random worlds, accepts it, and checks it without films; collecting it is timed apart. Processor
-seconds are those of all processes, so that they can be compared between busy and quiet machines.
+`--scenarios` generates a suite of random worlds, accepts it, and checks it without films; collection is timed separately.
+Processor seconds cover all processes, so busy and quiet machines are comparable.
 
-`--repeats N` drives the tests of `examples/regression_suite` N times over: in the order of the file and shuffled, in one process
-and with `pytest -n 2`, M times in each run of pytest, and now and then with `antdrive check --jobs 2`. It counts tests that
-failed and drives that were not the first ones, bit for bit. Each round is a line of the file of results, as soon as the run of
-pytest is over; a later call goes on until the file has N rounds, and one without `--repeats` says what the file has. The exit
-code is 1 if a test failed or a drive was another one.
+`--repeats N` runs the tests of `examples/regression_suite` N times: in file order and shuffled, in one process and with
+`pytest -n 2`, M times per pytest run, and occasionally with `antdrive check --jobs 2`. It counts failed tests and drives that
+differ from the first, bit for bit. Each finished round is a line of the results file; a later call resumes until the file has
+N rounds, and a call without `--repeats` summarises the file. The exit code is 1 if a test failed or a drive differed.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ SMALLEST = ("--scenarios 10 --jobs 1", "--repeats 1 --within 1")
 
 
 def suite(scenarios: int) -> str:
-    """A suite of random worlds: forests with a turtlebot and barn worlds with a jackal, five seeds each."""
+    """Write a suite of random worlds: forests with a turtlebot and barn worlds with a jackal, five seeds each."""
     entries = {}
     for k in range(max(1, scenarios // 10)):
         entries[f"forest-{k}"] = {"world": {"generate": "forest", "seed": k}, "robot": "turtlebot"}
@@ -45,7 +44,7 @@ def suite(scenarios: int) -> str:
 
 
 def timed(folder: Path, *words: str) -> tuple[str, str, str]:
-    """The wall time and the processor time of a command, and what it printed last."""
+    """Run a command. Return its wall time, its processor time and its last line."""
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     command = [sys.executable, "-m", *words]
     done = subprocess.run(command, cwd=folder, env=environment(None, None), capture_output=True, text=True, check=False)
@@ -56,7 +55,7 @@ def timed(folder: Path, *words: str) -> tuple[str, str, str]:
 
 
 def speed(scenarios: int, jobs: int) -> Iterator[list[str]]:
-    """A row for each command on a suite of its own."""
+    """Return one row per command, each on its own suite."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "many.drive.yaml").write_text(suite(scenarios))
@@ -80,7 +79,7 @@ def ways(within: int) -> Iterator[tuple[str, Callable[[Path], list[Tests]]]]:
 
 
 def repeats(times: int, within: int, results: Path | None) -> list[Round]:
-    """The rounds of a file of results, and new ones until there are as many as asked for, or a few more.
+    """Return the rounds of a results file, after running at least the missing ones.
 
     Args:
         times: how many rounds
@@ -135,7 +134,7 @@ def others(rounds: Sequence[Round]) -> list[int]:
 
 
 def counted(rounds: Sequence[Round]) -> Iterator[list[str]]:
-    """A row for each way to run the tests."""
+    """Return one row per way to run the tests."""
     other = dict(zip((one.number for one in rounds), others(rounds), strict=True))
     for way in dict.fromkeys(one.way for one in rounds):
         mine = [one for one in rounds if one.way == way]

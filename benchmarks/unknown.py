@@ -1,13 +1,12 @@
-"""Measure drives without a map: `python -m benchmarks.unknown ablations|contacts --results FOLDER [--worlds N] [--jobs N]`.
+"""Mapless drives: `python -m benchmarks.unknown ablations|contacts --results FOLDER [--worlds N] [--jobs N]`.
 
-Prints Markdown. What a folder holds is not driven again, so that an interrupted measurement goes on with the same command.
-With `--films` each drive that did not arrive is filmed into the folder `films` of its results.
+Prints Markdown. Repeat the command to resume from the results in the folder. `--films` films failed drives into the folder
+`films` of their results.
 
-- ablations: BARN's worlds, `jackal`, noise and `--localisation matching`; the lidar's range, beams and field of view, the errors
-  of odometry, or the planner differ from those of the first row. *Price*: ratio of the arrival times, and of the lengths, to the
-  same drives with the map (geometric mean, 95 % interval over worlds). `dstar-lite` repairs its search, `ants` go on with their
-  pheromone.
-- contacts: random forests and worlds of BARN's automaton, half of each, with both robots: contacts while driving.
+- ablations: BARN's worlds, `jackal`, noise and `--localisation matching`; range, beams or field of view of the lidar, odometry
+  errors, or planner differ from the first row. *Price*: ratio of arrival times, and of lengths, to the same drives with the
+  map (geometric mean, 95 % interval over worlds). `dstar-lite` repairs its search; `ants` keep their pheromone.
+- contacts: contacts while driving in random forests and worlds of BARN's automaton, half of each, with both robots.
 """
 
 from __future__ import annotations
@@ -69,7 +68,7 @@ VARIANTS = (
 
 
 def robot_of(variant: Variant, folder: Path) -> str:
-    """The robot of a variant: jackal, or a file that differs in its lidar."""
+    """Return a variant's robot: jackal, or a robot file with another lidar."""
     if not variant.lidar:
         return "jackal"
     data = yaml.safe_load(list_robots()["jackal"].read_text(encoding="utf-8"))
@@ -82,7 +81,7 @@ def robot_of(variant: Variant, folder: Path) -> str:
 
 
 def ablations(given: argparse.Namespace) -> Iterator[str]:
-    """The table of all variants, line by line."""
+    """Yield the table of all variants line by line."""
     if not given.barn.exists():
         missing(f"no worlds at {given.barn}; docs/how-to/data.md says where BARN's are")
     given.results.mkdir(parents=True, exist_ok=True)
@@ -112,14 +111,14 @@ def ablations(given: argparse.Namespace) -> Iterator[str]:
 
 
 def filmed(results: SweepResults, films: bool) -> SweepResults:
-    """The results, after what failed was filmed, if that is wanted."""
+    """Return the results, after filming failures if requested."""
     if films:
         film_failures(results.table.to_pylist(), results.folder, results.folder / "films")
     return results
 
 
 def row(name: str, runs: Any, fastest: Mapping[str, float], known: Any) -> list[str]:
-    """A variant's results beside the same drives with the map."""
+    """Return a variant's results with those of the same drives with the map."""
     line, columns = list(lines(runs, fastest))[-1], runs.to_pydict()
     seen = [area for area in columns["explored_m2"] if area is not None and area == area]
     time, length = "", ""

@@ -93,7 +93,7 @@ sphinx_gallery_conf = {
     "show_memory": False,
     "capture_repr": ("_repr_html_",),
     "remove_config_comments": True,
-    "within_subsection_order": "FileNameSortKey",
+    "within_subsection_order": "antdrive_site.gallery_order",
     "plot_gallery": "True",
     "copyfile_regex": r"a^",
     "min_reported_time": 10_000,

@@ -1,8 +1,8 @@
-"""Check what `make dist` has built: `python -m tools.dist dist`.
+"""Check the distribution built by `make dist`: `python -m tools.dist dist`.
 
-The folder holds one sdist and the wheel that was built from it, both of the version in pyproject.toml. The wheel is
-installed into a fresh environment, and there, in an empty folder and without the checkout, the command tells its version,
-drives, and certifies the log.
+The folder holds one sdist and the wheel built from it, both of the version in pyproject.toml. The wheel is installed into a
+fresh environment. There, in an empty folder and without the checkout, the command prints its version, drives, and certifies
+the log.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def version_of(pyproject: str) -> str:
-    """The version that the text of a pyproject.toml states."""
+    """Return the version in the text of a pyproject.toml."""
     found = re.search(r'^\[project\]\n(?:.+\n)*?version = "([^"]+)"', pyproject, re.MULTILINE)
     if not found:
         raise ValueError("pyproject.toml: [project] states no version")
@@ -28,7 +28,7 @@ def version_of(pyproject: str) -> str:
 
 
 def built(folder: Path, version: str) -> Path:
-    """The wheel in a folder that holds nothing but it and its sdist.
+    """Return the wheel in a folder that holds exactly the wheel and its sdist.
 
     Raises:
         ValueError: the folder holds something else.
@@ -43,7 +43,7 @@ def built(folder: Path, version: str) -> Path:
 
 
 def drive_outside(wheel: Path, version: str, home: Path) -> list[str]:
-    """What goes wrong with a wheel in a fresh environment; empty if nothing does.
+    """Return the problems of a wheel in a fresh environment.
 
     Args:
         wheel: the wheel
@@ -76,7 +76,7 @@ def drive_outside(wheel: Path, version: str, home: Path) -> list[str]:
 
 
 def main(folder: Path) -> int:
-    """Check the folder; 1 if something is wrong."""
+    """Check the folder. Return 1 if there are problems."""
     version = version_of((ROOT / "pyproject.toml").read_text())
     try:
         wheel = built(folder, version)

@@ -1,26 +1,24 @@
-"""Run the code of Markdown pages: `python -m tools.pages docs/tutorials/*.md` tells what does not run or prints something else.
+"""Run the code blocks of Markdown pages and check their output: `python -m tools.pages docs/tutorials/*.md`.
 
-Blocks of a page run from top to bottom in one empty folder, Python's in one namespace:
+The blocks of a page run from top to bottom in one empty folder, Python blocks in one namespace:
 
-- `python`: what it prints is compared with a block `text` that follows directly.
-- `console`: lines that begin with `$ ` are commands, the others what they print. `|| echo ...` says that a command must
-  fail, with exit code 1 or with the one that `echo "exit code 2"` names; `> FILE` writes to a file. Commands are
-  `antdrive`, which runs in this process, `python`, `pytest`, and some of the shell's.
-- `sh`: every line is a command, and its output does not matter.
-- `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`, or added to its end after
-  `<!-- added to: FILE -->`; a `python` block after such a comment is, too, and is not run by itself.
+- `python`: its output is compared with a directly following block `text`.
+- `console`: lines with `$ ` are commands, the others their output. `|| echo ...` requires failure, with exit code 1 or the
+  one in `echo "exit code 2"`; `> FILE` writes to a file. Commands are `antdrive`, which runs in this process, `python`,
+  `pytest`, and some shell commands.
+- `sh`: every line is a command; output is ignored.
+- `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`, or appended after
+  `<!-- added to: FILE -->`. A `python` block after such a comment is also written, and not run.
 
-`...` in an output stands for anything. A page that runs for 20 minutes is ended and named. More comments
-say what a page needs:
+`...` in an output matches anything. A page has a time limit of 20 minutes. Further comments:
 
-- `<!-- before: COMMAND -->` runs a command that the page does not show, for what its readers have already. `{root}` is
-  the folder of the repository.
-- `<!-- not run: REASON -->` before a block leaves it out; the site shows the reason.
-- `<!-- run by: FILE::TEST -->` before a block says which test runs it.
+- `<!-- before: COMMAND -->` runs a hidden command, for files that readers already have. `{root}` is the repository.
+- `<!-- not run: REASON -->` skips the next block; the site shows the reason.
+- `<!-- run by: FILE::TEST -->` names the test that runs the next block.
 
-`--all` runs every page with code (`pages_with_code`), `--jobs 2` two at a time. `--kept FILE` keeps what ran without a
-fault and leaves a page out while it and the code are as they were then. `--update` writes what was printed into the
-page, apart from outputs with `...` that agree.
+`--all` runs every page with code (`pages_with_code`), `--jobs 2` two at a time. `--kept FILE` caches pages without problems
+and skips them while page and code are unchanged. `--update` writes the printed output into the page, except matching outputs
+with `...`.
 """
 
 from __future__ import annotations
@@ -46,7 +44,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 MARK = re.compile(r"<!-- (file|added to|before|not run|run by): (.+?) -->\s*$")
 SHELL = ("ls", "cat", "mkdir", "cp", "sed")
-CODE = ("src", "examples", "tools")  # what pages run
+CODE = ("src", "examples", "tools")  # code that pages run
 RUN = ("python", "console", "sh")  # languages that run
 #: Pages whose blocks tests run, each with the tests' file.
 TESTED = {
@@ -54,24 +52,24 @@ TESTED = {
     "examples/bridges/README.md": "tests/examples/test_bridges.py",
     "examples/regression_suite/README.md": "tests/examples/test_regression_suite.py",
 }
-COMPILING = "antdrive: compiling the planners"  # what only the first command of an installation says
-WIDTH = "100"  # of the terminal that commands believe in
-LIMIT = 1200.0  # how long a page may run [s]: it ends what hangs, while the slowest page takes one minute
+COMPILING = "antdrive: compiling the planners"  # printed only by the first command of an installation
+WIDTH = "100"  # terminal width for commands
+LIMIT = 1200.0  # time limit of a page [s], against hangs; the slowest page takes one minute
 
 
 @dataclasses.dataclass
 class Block:
-    """A block of a page."""
+    """A fenced block of a page."""
 
-    language: str  # the word after the fence
-    text: str  # the lines within
-    line: int  # the number of its first line, from 1
-    marks: dict[str, str]  # what the comments before it say, by their first word or two
-    follows: bool  # whether only empty lines lie between it and the block before
+    language: str  # word after the fence
+    text: str  # lines inside
+    line: int  # number of its first line, from 1
+    marks: dict[str, str]  # comments before it, by their first one or two words
+    follows: bool  # whether only empty lines separate it from the previous block
 
 
 def blocks_of(page: str) -> list[Block]:
-    """The fenced blocks of a page."""
+    """Return the fenced blocks of a page."""
     found: list[Block] = []
     marks: dict[str, str] = {}
     opened: tuple[str, int, bool] | None = None
@@ -97,13 +95,13 @@ def blocks_of(page: str) -> list[Block]:
 
 
 def agrees(shown: str, printed: str) -> bool:
-    """Whether what a page shows is what was printed; `...` stands for anything."""
+    """Return whether the output shown on a page matches the printed output; `...` matches anything."""
     plain = ["\n".join(line.rstrip() for line in text.strip("\n").splitlines()) for text in (shown, printed)]
     return re.fullmatch(re.escape(plain[0]).replace(r"\.\.\.", ".*?"), plain[1], flags=re.DOTALL) is not None
 
 
 def commands_of(block: Block) -> Iterator[tuple[str, str, int]]:
-    """Each command of a block, what it prints there, and its line's number."""
+    """Yield each command of a block with its shown output and line number."""
     command, shown, at = "", "", 0
     for number, line in enumerate(block.text.splitlines(), start=block.line):
         begins = line.startswith("$ ") if block.language == "console" else bool(line.strip())
@@ -120,7 +118,7 @@ def commands_of(block: Block) -> Iterator[tuple[str, str, int]]:
 
 
 def run_antdrive(words: list[str]) -> tuple[int, str]:
-    """Call the command line in this process; its exit code and what it printed."""
+    """Call the command line in this process. Return its exit code and output."""
     from antdrive.cli.app import main
 
     out, code, before, sys.argv = io.StringIO(), 0, sys.argv, words
@@ -135,10 +133,10 @@ def run_antdrive(words: list[str]) -> tuple[int, str]:
 
 
 def run_words(words: list[str]) -> tuple[int, str]:
-    """Run a command; its exit code and what it printed."""
+    """Run a command. Return its exit code and output."""
     if words[0] == "antdrive":
         return run_antdrive(words)
-    if words[:2] == ["pip", "install"]:  # what the page runs next needs what the extra brings
+    if words[:2] == ["pip", "install"]:  # later blocks need the extra
         extra = re.fullmatch(r"antdrive\[(\w+)\]", words[2])
         known = extra and f"\n{extra[1]} = [" in (ROOT / "pyproject.toml").read_text()
         return (0, "") if known else (1, f"pip install {words[2]}: no extra of antdrive\n")
@@ -147,13 +145,13 @@ def run_words(words: list[str]) -> tuple[int, str]:
     elif words[0] == "pytest":
         words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words[1:]]
     elif words[0] not in SHELL:
-        return 127, f"{words[0]}: not a command that pages may use; mark the block with <!-- not run: REASON -->\n"
+        return 127, f"{words[0]}: not allowed on pages; mark the block with <!-- not run: REASON -->\n"
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)  # noqa: S603 (the repository's own pages)
     return done.returncode, done.stdout
 
 
 def run_command(command: str) -> tuple[bool, str]:
-    """Run a line of a shell; whether it ended as the line says, and what it printed."""
+    """Run a shell line. Return whether its exit code is as stated, and its output."""
     line = re.sub(r"\s+#.*$", "", command)
     head, fails, said = line.partition("||")
     head, _, target = head.partition(" > ")
@@ -169,7 +167,7 @@ def run_command(command: str) -> tuple[bool, str]:
 
 
 def write(block: Block) -> None:
-    """Write a block to its file, or add it to the file's end."""
+    """Write a block to its file, or append it."""
     path = Path(block.marks.get("file") or block.marks["added to"])
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w" if "file" in block.marks else "a", encoding="utf-8") as file:
@@ -181,11 +179,9 @@ class Page:
     """The run of a page."""
 
     path: Path
-    problems: list[str] = dataclasses.field(default_factory=list)  # each with its line
-    printed: dict[int, tuple[str, str]] = dataclasses.field(
-        default_factory=dict
-    )  # what is shown and was printed, by line
-    line: int = 0  # of the block or the command that runs
+    problems: list[str] = dataclasses.field(default_factory=list)  # with line numbers
+    printed: dict[int, tuple[str, str]] = dataclasses.field(default_factory=dict)  # shown and printed output, by line
+    line: int = 0  # of the running block or command
 
     def run(self) -> Page:
         """Run all blocks."""
@@ -207,7 +203,7 @@ class Page:
         return self
 
     def run_python(self, block: Block, space: dict[str, Any]) -> str:
-        """Run a block of Python in the page's namespace; what it printed."""
+        """Run a Python block in the page's namespace. Return its output."""
         out = io.StringIO()
         try:
             with contextlib.redirect_stdout(out):
@@ -222,18 +218,18 @@ class Page:
             line = self.line
             right, printed = run_command(command)
             if not right:
-                self.problems.append(f"{self.path}:{line}: {command}: did not end as the page says\n{printed}")
+                self.problems.append(f"{self.path}:{line}: {command}: exit code differs from the page\n{printed}")
             elif block.language == "console":
                 self.compare(shown, printed, line + 1)
 
     def compare(self, shown: str, printed: str, line: int) -> None:
-        """Compare what the page shows with what was printed."""
+        """Compare shown with printed output."""
         if not agrees(shown, printed):
             self.problems.append(f"{self.path}:{line}: shows\n{shown}but printed was\n{printed}")
             self.printed[line] = shown, printed
 
     def update(self) -> None:
-        """Write what was printed into the page, from its end to its beginning."""
+        """Write the printed output into the page, from its end to its beginning."""
         lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
         for line, (shown, printed) in sorted(self.printed.items(), reverse=True):
             new = [f"{one.rstrip()}\n" for one in printed.strip("\n").splitlines()]
@@ -242,11 +238,11 @@ class Page:
 
 
 class OutOfTime(BaseException):
-    """A page has run for too long. No `except Exception` of what it runs takes it for a fault of its own."""
+    """The time limit of a page was exceeded. Not an `Exception`, so that the page's code cannot catch it."""
 
 
 def run_page(path: Path, limit: float = LIMIT) -> Page:
-    """Run a page in an empty folder, which is gone afterwards, for so long at most [s]."""
+    """Run a page in a temporary folder, with a time limit [s]."""
 
     def end(*_: object) -> None:
         raise OutOfTime
@@ -254,7 +250,7 @@ def run_page(path: Path, limit: float = LIMIT) -> Page:
     page, before, variables = Page(path.resolve()), Path.cwd(), dict(os.environ)
     os.environ.update(COLUMNS=WIDTH, MPLBACKEND="agg")
     handler = signal.signal(signal.SIGALRM, end)
-    timer = signal.setitimer(signal.ITIMER_REAL, limit)  # what was set is that of a test
+    timer = signal.setitimer(signal.ITIMER_REAL, limit)  # the previous timer is a test's
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
@@ -271,7 +267,7 @@ def run_page(path: Path, limit: float = LIMIT) -> Page:
 
 
 def pages_with_code() -> list[Path]:
-    """Every page of the site and of the examples with a block that runs, apart from those that tests run."""
+    """Return every page of the site and examples with a block to run, except those run by tests."""
 
     def runs(page: Path) -> bool:
         blocks = blocks_of(page.read_text(encoding="utf-8"))
@@ -283,7 +279,7 @@ def pages_with_code() -> list[Path]:
 
 
 def digest_of(paths: Iterable[Path]) -> str:
-    """SHA-256 of files' contents."""
+    """Return the SHA-256 of the contents of files."""
     found = hashlib.sha256()
     for path in paths:
         found.update(path.read_bytes() + b"\0")
@@ -291,23 +287,23 @@ def digest_of(paths: Iterable[Path]) -> str:
 
 
 def run_pages(paths: list[Path], jobs: int) -> Iterator[Page]:
-    """Run pages in processes of their own, in the order in which they were given."""
+    """Run pages in separate processes, in the given order."""
     from joblib import Parallel, delayed
 
-    # A process that has grown is replaced between two pages, which is no fault.
+    # The pool may replace a large process between two pages.
     warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
     parallel = Parallel(n_jobs=jobs, return_as="generator", pre_dispatch="n_jobs", batch_size=1)
     yield from parallel(delayed(run_page)(path) for path in paths)
 
 
 def main(words: list[str]) -> int:
-    """Run pages; 1 if one is wrong."""
+    """Run pages. Return 1 if one has problems."""
     asked = argparse.ArgumentParser(prog="python -m tools.pages", description="Run the code of pages.")
     asked.add_argument("pages", nargs="*", type=Path)
     asked.add_argument("--all", action="store_true", help="every page with code")
     asked.add_argument("--jobs", type=int, default=1, help="pages at a time")
-    asked.add_argument("--kept", type=Path, help="file that keeps what ran without a fault")
-    asked.add_argument("--update", action="store_true", help="write what was printed into the pages")
+    asked.add_argument("--kept", type=Path, help="cache file of pages without problems")
+    asked.add_argument("--update", action="store_true", help="write the printed output into the pages")
     given = asked.parse_args(words)
     pages = [*given.pages, *(pages_with_code() if given.all else [])]
     files = (path for folder in CODE for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".yaml"))

@@ -1,8 +1,8 @@
-"""Write what `antdrive reproduce all` found into the papers' pages: `python -m tools.paper_tables FOLDER`.
+"""Write the results of `antdrive reproduce all` into the papers' pages: `python -m tools.paper_tables FOLDER`.
 
-FOLDER is the one that the command wrote. In `docs/papers/PAPER.md` the lines between `<!-- claims -->` and `<!-- end -->`
-become the table of the paper's claims, in `docs/papers/README.md` those between `<!-- counts -->` and `<!-- end -->` that of
-their number. `--check` needs no folder: it says which claims the pages do not show, or show with other printed figures.
+FOLDER is the output of that command. In `docs/papers/PAPER.md` the table of the paper's claims replaces the lines between
+`<!-- claims -->` and `<!-- end -->`; in `docs/papers/README.md` their counts replace the lines between `<!-- counts -->` and
+`<!-- end -->`. `--check` needs no folder: it lists claims that the pages omit or show with other printed figures.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ END = "<!-- end -->"
 
 
 def claims_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
-    """The table of a paper's claims as lines of Markdown."""
+    """Return the table of a paper's claims as lines of Markdown."""
     cells = [[row[head] for head in HEADS] for row in rows]
     for line in cells:
         line[4] = f"**{line[4]}**"
@@ -31,7 +31,7 @@ def claims_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
 
 
 def counts_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
-    """How many claims of each paper came out how, as lines of Markdown."""
+    """Return the counts of each paper's claims by verdict as lines of Markdown."""
     papers = dict.fromkeys(row["paper"] for row in rows)
     lines = [_line(["paper", "rows", *VERDICTS]), _line(["---"] * 5)]
     for paper in (*papers, "all"):
@@ -42,14 +42,14 @@ def counts_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
 
 
 def replaced(text: str, name: str, lines: Sequence[str]) -> str:
-    """A page whose lines between a mark and the end are others."""
+    """Replace the lines of a page between a mark and the end."""
     before, _, rest = text.partition(f"<!-- {name} -->\n")
     _, _, after = rest.partition(END)
     return f"{before}<!-- {name} -->\n\n" + "\n".join(lines) + f"\n\n{END}{after}"
 
 
 def missing(claims: Sequence[Claim], pages: Mapping[str, str]) -> list[str]:
-    """The claims whose row a page does not show, with their reading and the printed figures."""
+    """Return claims without a row on their page, with reading and printed figures."""
     found = []
     for claim in claims:
         start = _line([claim.sentence, claim.reading, claim.printed]).removesuffix(" |")

@@ -1,9 +1,8 @@
-"""Make the pictures that pages show from the repository: `python -m tools.pictures` writes `docs/pictures`.
+"""Generator of the pictures in `docs/pictures`: `python -m tools.pictures [NAME ...]`.
 
-README and pages are read where no build has run, so these pictures are kept in the repository; the figures and films of the
-gallery are made by each build of the site. Names choose some of them: `python -m tools.pictures plaza report`. The report's
-picture needs a Chromium. `FROM_PAPERS` are copied from what `antdrive reproduce PAPER` writes, and `BY_HAND` show other
-programs.
+README and pages show these pictures without a build, so the repository holds them; each build of the site makes the gallery's
+figures and films. The report's picture needs Chromium. `FROM_PAPERS` are copies of the output of `antdrive reproduce PAPER`,
+and `BY_HAND` are screenshots of other programs.
 """
 
 from __future__ import annotations
@@ -36,21 +35,21 @@ from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
-SIZE = (1120, 630)  # of most of them [px]
+SIZE = (1120, 630)  # of most pictures [px]
 FROM_PAPERS = ("hasan-maps.png", "ibraheem2016-history.png", "lee2008-maps.png")
 BY_HAND = ("foxglove.webp",)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def drive(world: str, planner: str, **settings: Any) -> Rollout:
-    """The log of a drive."""
+    """Drive a scenario and return its log."""
     log = run(Scenario.of(world, planner, **settings)).rollout
     assert log is not None
     return log
 
 
 def saved(picture: Any, path: Path) -> None:
-    """Write a picture (H, W, 3) as `still` writes them."""
+    """Write a picture (H, W, 3) with the settings of `still`."""
     from PIL import Image
 
     Image.fromarray(picture).save(path, format="webp", **STILLS[".webp"])
@@ -64,7 +63,7 @@ def hero(path: Path) -> None:
 
 
 def worlds(path: Path) -> None:
-    """Draw every world of the catalogue from above, a file each."""
+    """Draw a top view of every world of the catalogue, one file each."""
     from matplotlib.collections import PatchCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle
@@ -86,7 +85,7 @@ def worlds(path: Path) -> None:
 
 
 def robots(path: Path) -> None:
-    """Film a frame of every robot of the catalogue, a file each."""
+    """Render a frame of every robot of the catalogue, one file each."""
     path.with_suffix("").mkdir(exist_ok=True)
     for name in list_robots():
         shot = Shot(drive("empty", "astar", robot=name), **asdict(FilmOptions("follow", (640, 480)).checked()))
@@ -94,26 +93,26 @@ def robots(path: Path) -> None:
 
 
 def plaza(path: Path) -> None:
-    """A robot that has just found a new route among movers."""
+    """Render a robot among movers just after a replan."""
     log = drive("plaza-moving", "dstar-lite")
-    found = next(replan.t for replan in log.record.replans if replan.t > 3.0)
-    still(log, path, found + 0.3, size=SIZE, note=caption(log))
+    replanned = next(replan.t for replan in log.record.replans if replan.t > 3.0)
+    still(log, path, replanned + 0.3, size=SIZE, note=caption(log))
 
 
 def unknown(path: Path) -> None:
-    """What a robot without a map has seen."""
+    """Render a mapless robot's occupancy map."""
     log = drive("forest", "astar", robot="jackal", map="none", localisation="matching", noise=1.0, seed=1)
     still(log, path, 3.2, size=(960, 540), note=caption(log))
 
 
 def pheromone(path: Path) -> None:
-    """Pheromone on the ground, iteration 30 of 50."""
+    """Render pheromone on the ground at iteration 30 of 50."""
     frames = planning_frames(drive("forest", "aco-han"), {"camera": "oblique", "size": SIZE}, 50)
     saved(next(itertools.islice(frames, 29, None)), path)
 
 
 def comparison(path: Path) -> None:
-    """Four planners in the same forest."""
+    """Render four planners in the same forest."""
     logs = [drive("forest", name, smoothing="none") for name in ("astar", "aco-han", "ants", "tangent")]
     screen = SplitScreen(logs, "oblique", SIZE)
     for at in (6.0, 12.0):
@@ -122,7 +121,7 @@ def comparison(path: Path) -> None:
 
 
 def report(path: Path) -> None:
-    """The upper part of a report on six runs, as a browser shows it."""
+    """Take a browser's screenshot of the upper part of a report of six runs."""
     from PIL import Image
 
     scenarios = [
@@ -145,14 +144,14 @@ def report(path: Path) -> None:
             picture.convert("RGB").save(path, format="webp", **STILLS[".webp"])
 
 
-#: What makes each picture, by the name of its file.
+#: Generator of each picture, by file name.
 MADE: Mapping[str, Callable[[Path], None]] = MappingProxyType(
     {made.__name__: made for made in (hero, worlds, robots, plaza, unknown, pheromone, comparison, report)}
 )
 
 
 def main(words: list[str]) -> int:
-    """Make the pictures that words name, or all."""
+    """Make the named pictures, or all."""
     asked = argparse.ArgumentParser(prog="python -m tools.pictures", description="Make the pictures of pages.")
     asked.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(MADE)}; all by default")
     given = asked.parse_args(words)

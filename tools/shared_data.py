@@ -1,6 +1,6 @@
-"""Where the worlds and maps are that nobody here made: BARN, DynaBARN and MovingAI (docs/how-to/data.md).
+"""Location of third-party worlds and maps: BARN, DynaBARN and MovingAI (docs/how-to/data.md).
 
-Tests and benchmarks read them there. Without them the tests that need them skip, and the benchmarks ask for a path.
+Tests and benchmarks read them. Without them, tests that need them are skipped, and benchmarks require a path.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def data_folder() -> Path:
-    """The folder that the environment variable `ANTDRIVE_DATA` names, else `shared/data` beside the checkout."""
+    """Return the folder in the environment variable `ANTDRIVE_DATA`, else `shared/data` next to the checkout."""
     named = os.environ.get("ANTDRIVE_DATA")
     return Path(named).expanduser() if named else Path(__file__).parents[2] / "shared" / "data"
 

@@ -1,13 +1,12 @@
-"""Check the site that was built: `python -m tools.site docs/_build/html`.
+"""Check the built site: `python -m tools.site docs/_build/html`.
 
-Every link within the site leads to a file and, with an anchor, to a place in it. No page loads anything from elsewhere.
-The first page, with all that it loads, is under 3 MB, its hero film included. Films are under 1 MB.
+Internal links and anchors must resolve. Pages load no external resources. The first page loads less than 3 MB, including its
+hero film. Films are under 1 MB.
 
-`--browser` opens every page from the disk in a Chromium, light at the width of a desktop and dark at the width of a phone, and
-tells errors on the console, exceptions, pictures that do not load, films that do not load or play, text that differs too little
-from what lies behind it, and a page that is wider than its window. The search is asked for some words, and must find pages.
-`--shots FOLDER` keeps a picture of each page, light and dark, wide and narrow. This needs `pip install playwright` and a
-Chromium: the one on the path, or `playwright install chromium`.
+`--browser` opens every page from the disk in Chromium, light at desktop width and dark at phone width. It reports console
+errors, exceptions, images and films that do not load or play, low contrast, and pages wider than the window. Test searches
+must find their pages. `--shots FOLDER` saves screenshots of each page, light and dark, wide and narrow. This needs
+`pip install playwright` and Chromium: the one on the path, or `playwright install chromium`.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ LOADING = {
     *(("source", "src"), ("iframe", "src")),
 }
 WIDE, NARROW, HIGH = 1280, 390, 900  # [px]
-CONTRAST = 3.0  # the least between a text and what lies behind it; WCAG asks 4.5 of small text, 3 of large
+CONTRAST = 3.0  # least contrast of text and background; WCAG requires 4.5 for small and 3 for large text
 #: Searches, each with the page of the first result.
 ASKED = {
     "replan": "how-to/movers",
@@ -100,7 +99,7 @@ PROBE = """async () => {
 
 
 class Parsed(HTMLParser):
-    """What a page names: places that anchors lead to, targets of links, and what the browser fetches with it."""
+    """Parser of a page's anchors, links and loaded resources."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -110,7 +109,7 @@ class Parsed(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note what an element names."""
+        """Record an element's anchor, link or resource."""
         for key, value in attrs:
             if value is None:
                 continue
@@ -123,7 +122,7 @@ class Parsed(HTMLParser):
 
 
 def problems_of(site: Path) -> list[str]:
-    """What is wrong with the files of a site, a line each."""
+    """Return the problems of a site's files, one line each."""
     pages = {
         path: Parsed(path.read_text(encoding="utf-8"))
         for path in sorted(site.rglob("*.html"))
@@ -150,7 +149,7 @@ def problems_of(site: Path) -> list[str]:
 
 
 def broken(path: Path, target: str, pages: dict[Path, Parsed]) -> str:
-    """Why a link leads nowhere; empty where it leads somewhere or out of the site."""
+    """Return why a link is broken; empty for valid and external links."""
     parts = urlsplit(target)
     if parts.scheme or parts.netloc:
         return ""
@@ -165,13 +164,13 @@ def broken(path: Path, target: str, pages: dict[Path, Parsed]) -> str:
 
 
 def weight(path: Path, page: Parsed) -> int:
-    """What a page weighs with its scripts, styles and pictures; films load when they are played [B]."""
+    """Return the size of a page with scripts, styles and images; films load when played [B]."""
     files = {(path.parent / unquote(urlsplit(one).path)).resolve() for tag, one in page.loads if tag != "video"}
     return path.stat().st_size + sum(file.stat().st_size for file in files if file.is_file())
 
 
 class Looking:
-    """A browser (playwright's) with a window for each view; pictures of pages go to `shots`."""
+    """Playwright browser with one window per view; screenshots go to `shots`."""
 
     def __init__(self, browser: Any, site: Path, shots: Path | None) -> None:
         self.site, self.shots = site, shots
@@ -191,7 +190,7 @@ class Looking:
         self.faults.append(fault)
 
     def page(self, path: Path) -> list[str]:
-        """What is wrong with a page, a line each."""
+        """Return the problems of a page, one line each."""
         found: dict[str, str] = {}
         for view, window in self.windows.items():
             self.faults.clear()
@@ -206,7 +205,7 @@ class Looking:
         return [f"{path.relative_to(self.site)}: {view}: {fault}" for fault, view in found.items()]
 
     def search(self, wait: float = 10_000) -> list[str]:
-        """What the search does not find within a time [ms]."""
+        """Return searches without the expected result within a time limit [ms]."""
         window, found = next(iter(self.windows.values())), []
         links = "page => document.querySelector('#search-results a')?.href.includes(page)"
         for words, page in ASKED.items():
@@ -220,13 +219,13 @@ class Looking:
 
 
 def opened(playwright: Any) -> Any:
-    """A browser: the Chromium on the path, or playwright's own."""
+    """Launch the Chromium on the path, or playwright's own."""
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     return playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
 
 
 def look(site: Path, shots: Path | None) -> list[str]:
-    """What a browser finds wrong with a site, a line each."""
+    """Return a site's problems in a browser, one line each."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -240,11 +239,11 @@ def look(site: Path, shots: Path | None) -> list[str]:
 
 
 def main(words: list[str]) -> int:
-    """Print what is wrong; 1 if something is, 2 without a browser."""
+    """Print problems. Return 1 if there are any, 2 without a browser."""
     asked = argparse.ArgumentParser(prog="python -m tools.site", description="Check the built site.")
-    asked.add_argument("site", type=Path, help="the folder with index.html")
-    asked.add_argument("--browser", action="store_true", help="open every page in a Chromium, too")
-    asked.add_argument("--shots", type=Path, help="folder for pictures of the pages, for which it is opened")
+    asked.add_argument("site", type=Path, help="folder with index.html")
+    asked.add_argument("--browser", action="store_true", help="also open every page in Chromium")
+    asked.add_argument("--shots", type=Path, help="folder for screenshots; implies --browser")
     given = asked.parse_args(words)
     site = given.site.resolve()
     found = problems_of(site)
@@ -256,7 +255,7 @@ def main(words: list[str]) -> int:
         except ImportError:
             sys.stderr.write("playwright is missing: pip install playwright\n")
             return 2
-    sys.stdout.write(("\n".join(found) or f"{given.site}: nothing is wrong") + "\n")
+    sys.stdout.write(("\n".join(found) or f"{given.site}: no problems") + "\n")
     return int(bool(found))
 
 

@@ -78,6 +78,19 @@ def scrape(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any])
     return "\n" + "\n".join(shown) + "\n"
 
 
+#: Pages of the gallery with the best pictures, in their order; the others follow by name.
+LEADING = (
+    *("plaza", "crowded_without_a_map", "collision_explained", "crowded_with_a_map", "suganthi2019_exploring"),
+    *("office_tasks", "hasan_spreading", "lee2008_valleys", "ants_of_a_thesis", "margin_budget", "six_planners"),
+)
+
+
+def gallery_order(name: str) -> tuple[int, str]:
+    """Return the sort key of a gallery script."""
+    stem = Path(name).stem
+    return LEADING.index(stem) if stem in LEADING else len(LEADING), stem
+
+
 def films_copied(app: Sphinx, exception: Exception | None) -> None:
     """Put films and posters into the site."""
     if exception is None and app.builder.format == "html":

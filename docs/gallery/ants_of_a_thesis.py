@@ -1,9 +1,9 @@
 """
-Ants of a thesis, and their drive
-=================================
+Ants with a sense of direction (Han 2007)
+=========================================
 
-Han's ants choose the next cell by pheromone and by the direction of the goal (Han 2007, §4.2). Here a hundred of them
-search his map with fourteen obstacles, and a robot drives what they found.
+Han's ants choose the next cell by pheromone and by the direction of the goal (Han 2007, §4.2). Here 100 ants search the
+thesis' map of 14 obstacles, and a robot drives their path.
 """
 
 from antdrive import Scenario, film, plan, run
@@ -16,8 +16,8 @@ scenario = Scenario.of(
 # %%
 # The plan
 # --------
-# The colony's pheromone lies under the path that it found; the chart shows the best length by iteration. Ants walk from
-# cell to cell, so the path is a staircase.
+# Colours show the colony's pheromone, the chart the path length by iteration. Ants walk from cell to cell, so the path is a
+# staircase.
 
 grid, found = plan(scenario)
 print(f"{found.cost:.2f} m over {len(found.cells)} cells")
@@ -26,14 +26,12 @@ plan_found = plan_figure(scenario.task, grid, found, scenario.robot)
 # %%
 # The drive
 # ---------
-# Before it is driven, the plan is pulled taut within its corridor and moved away from obstacles where there is room.
+# Smoothing pulls the plan taut within its corridor and moves it away from obstacles.
 
 result = run(scenario)
 print(result.outcome.value)
 print(
     f"{result.metrics['driven_length_m']:.2f} m driven in {result.metrics['duration_s']:.1f} s"
 )
-print(
-    f"never nearer than {result.certificate.bound:.3f} m to anything, proved from the log"
-)
+print(f"certified clearance: at least {result.certificate.bound:.3f} m")
 film(result.rollout, "ants.mp4", camera="top", size=(640, 480), speed=6)

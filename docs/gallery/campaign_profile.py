@@ -1,9 +1,9 @@
 """
-A campaign's profile
-====================
+Performance profile of a campaign
+=================================
 
-A campaign drives every combination of worlds, planners and seeds. A performance profile (Dolan and Moré 2002) sums it
-up: for each planner the share of instances that it solves at no more than x times the best planner's value.
+A campaign drives every combination of worlds, planners and seeds. A performance profile (Dolan and Moré 2002) shows for each
+planner the fraction of instances that it solves within x times the best planner's value.
 """
 
 import tempfile
@@ -27,11 +27,11 @@ with tempfile.TemporaryDirectory() as folder:
 print(f"{results.size} runs, {results.succeeded} of them certified at the goal")
 
 # %%
-# The profile of driven lengths
-# -----------------------------
-# Where a curve begins on the left is the share of worlds in which no other planner's drive was shorter. A failed run is
-# never solved, so it holds its curve down for good. The shortest plan is not always the shortest drive: the robot rounds
-# corners, so of two plans of equal length the one with more corners is driven shorter.
+# Driven lengths
+# --------------
+# A curve starts at the fraction of worlds in which the planner's drive was the shortest. Failed runs keep a curve below 1. The
+# shortest plan is not always the shortest drive: the robot rounds corners, so of two plans of equal length the one with more
+# corners gives the shorter drive.
 
 worlds = sorted({row["world"] for row in table})
 planners = list(dict.fromkeys(row["planner"] for row in table))
@@ -60,10 +60,10 @@ for planner, curve in zip(planners, performance_profiles(cost), strict=True):
 axes.set(
     xlim=(0.998, 1.1),
     ylim=(0, 1.02),
-    xlabel="driven length, times the best",
-    ylabel="share of worlds",
+    xlabel="driven length, relative to the best",
+    ylabel="fraction of worlds",
 )
 _ = axes.legend(frameon=False)
 
 # %%
-# ``antdrive report FOLDER -o page.html`` makes a page with these profiles, tests and intervals; see :doc:`/how-to/campaigns`.
+# ``antdrive report FOLDER -o page.html`` writes a page with profiles, tests and intervals; see :doc:`/how-to/campaigns`.

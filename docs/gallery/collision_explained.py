@@ -2,7 +2,7 @@
 A collision explained
 =====================
 
-A check that cannot fail is worth nothing. So here is a cylinder that neither the planner nor the controller knows of.
+The certificate must detect a collision. This cylinder is unknown to planner and controller, so the robot hits it.
 """
 
 from antdrive import Disc, Scenario, film, run
@@ -14,18 +14,18 @@ print(result.outcome.value)
 film(result.rollout, "collision.mp4", size=(640, 480))
 
 # %%
-# What the log says
-# -----------------
-# Physics reports a contact, and the distance in closed form reaches zero at the same step. The certificate names both.
+# The certificate
+# ---------------
+# Physics reports a contact, and the closed-form distance reaches zero at the same step. The certificate lists both.
 
 for line in result.certificate.problems:
     print(line)
-readings = certificate_figure(result.rollout, result.certificate)
+checks = certificate_figure(result.rollout, result.certificate)
 
 # %%
-# The same place with a lidar
-# ---------------------------
-# Without a map the robot believes only what it sees. It finds the cylinder and passes it.
+# With a lidar
+# ------------
+# A mapless robot relies on its lidar. It detects the cylinder and passes it.
 
 passed = run(Scenario.of("empty", "astar", unseen=(hidden,), map="none"))
 print(passed.outcome.value)

@@ -1,9 +1,9 @@
 """
-A crowded corridor, with its map
-================================
+A crowded corridor, with a map
+==============================
 
-The generator ``barn`` makes worlds like those of the BARN challenge: a corridor of small cylinders, grown by a cellular
-automaton, with room for a Jackal to pass. Here the robot knows the world.
+The generator ``barn`` makes worlds like those of the BARN challenge: a cellular automaton fills a corridor with small
+cylinders and leaves a passage for a Jackal. Here the robot has the map.
 """
 
 import numpy as np
@@ -20,8 +20,8 @@ print(
 film(result.rollout, "crowded-map.mp4", size=(640, 480), speed=2)
 
 # %%
-# What limited its speed
-# ----------------------
-# Colours in the lowest strip name the rule that held the robot back at each moment. Between cylinders that is the clearance.
+# Speed limits
+# ------------
+# The lowest strip shows the speed-limiting rule over time. Between cylinders it is the clearance.
 
 drive = overview(result.rollout)

@@ -1,10 +1,10 @@
 """
-The same corridor, without a map
-================================
+A crowded corridor, mapless
+===========================
 
-The world of :doc:`crowded_with_a_map`, and nothing but a lidar, odometry and the goal. The robot plans through ground
-that it has not seen as if it were free, plans anew when a scan shows otherwise, and never drives faster than it could
-stop on ground that it has seen.
+The world of :doc:`crowded_with_a_map`, but the robot has only a lidar, odometry and the goal. It plans through unknown
+ground as if it were free (freespace assumption) and re-plans when a scan shows an obstacle. The stopping constraint limits
+its speed to what it can stop within known free ground.
 """
 
 import numpy as np
@@ -19,14 +19,14 @@ scenario = Scenario.of(
 result = run(scenario)
 print(result.outcome.value)
 print(
-    f"{result.metrics['duration_s']:.1f} s, {result.metrics['replans']:.0f} new routes on the way"
+    f"{result.metrics['duration_s']:.1f} s, {result.metrics['replans']:.0f} replans"
 )
 film(result.rollout, "crowded-lidar.mp4", camera="top", size=(480, 360), speed=3)
 
 # %%
-# What it had seen
-# ----------------
-# On the left the map that the robot had at the end, made of the scans in its log. On the right how its size grew, and
-# from how far it first saw the obstacles that it later came nearest to.
+# Occupancy map and detections
+# ----------------------------
+# Left: the robot's final occupancy map, reconstructed from the scans in its log. Right: the explored area over time, and the
+# first detections of the obstacles with the closest approaches.
 
 seen = sight_figure(result.rollout)

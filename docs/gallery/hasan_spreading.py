@@ -2,9 +2,9 @@
 Pheromone that spreads from the goal (Hasan)
 ============================================
 
-In Hasan's planner pheromone spreads from the goal over all free cells, and a single ant follows it, cell by cell. Where
-something stands in the way it is spread anew, much as D* repairs its costs. Here are the paper's curved walls, recreated,
-with the paper's mover: it goes to a random neighbouring cell every 0.8 s.
+In Hasan's planner, pheromone spreads from the goal over all free cells, and a single ant follows it cell by cell. A blocked
+cell triggers a local repair, much as in D*. This world recreates the paper's curved walls with its mover, which steps to
+a random neighbouring cell every 0.8 s.
 """
 
 from antdrive import Scenario, film, plan, run
@@ -15,8 +15,8 @@ scenario = Scenario.of("hasan-1a-moving", "mmas-dstar", seed=0)
 # %%
 # The field
 # ---------
-# The ant goes to the neighbour with the least pheromone, weighed with the straight distance to the goal. As the field grows
-# along the way around walls, it need not search.
+# The ant moves to the neighbour with the least pheromone, weighted with the straight-line distance to the goal. The field
+# grows along the paths around walls, so the ant needs no search.
 
 grid, found = plan(scenario)
 print(f"{found.status.value}: {found.cost:.2f} m")
@@ -29,12 +29,12 @@ field = plan_figure(scenario.task, grid, found, scenario.robot)
 result = run(scenario)
 print(result.outcome.value)
 print(
-    f"{result.metrics['duration_s']:.0f} s, {result.metrics['replans']:.0f} new routes"
+    f"{result.metrics['duration_s']:.0f} s, {result.metrics['replans']:.0f} replans"
 )
 film(result.rollout, "spreading.mp4", camera="top", size=(640, 560), speed=6)
 
 # %%
-# What slowed it down
+# Clearance and speed
 # -------------------
 
 drive = overview(result.rollout)

@@ -2,8 +2,8 @@
 Ants that age (Ibraheem 2016)
 =============================
 
-Ibraheem and Ajeil (2016) let ants deposit less pheromone the older they are, in the hope of fewer early
-commitments. Here their colony and the ant system search a map of 20 × 20 cells with ten obstacles.
+Ibraheem and Ajeil (2016) let older ants deposit less pheromone to delay convergence. Here their colony and the ant system
+search a map of 20 × 20 cells with 10 obstacles.
 """
 
 from antdrive import Scenario, film, plan, run
@@ -14,10 +14,10 @@ from antdrive.views.papers import paper_scenario
 ageing = paper_scenario("ibraheem2016")
 
 # %%
-# Both on the same map
-# --------------------
-# Lines are medians of six seeds, bands the range. :doc:`The paper's page </papers/ibraheem2016>` has every claim with its
-# verdict.
+# Path length by iteration
+# ------------------------
+# Lines are medians of six seeds, bands their range. See :doc:`the paper's page </papers/ibraheem2016>` for the verdict on each
+# claim.
 
 runs = {
     name: [plan(Scenario.of(ageing.task, name, seed=seed))[1] for seed in range(6)]
@@ -30,8 +30,8 @@ iterations = history_figure(
 )
 
 # %%
-# Where the pheromone lies in the end
-# -----------------------------------
+# Final pheromone
+# ---------------
 
 grid, found = plan(ageing)
 trail = plan_figure(ageing.task, grid, found, ageing.robot)

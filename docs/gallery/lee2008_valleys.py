@@ -2,8 +2,8 @@
 Ants in a potential field (Lee 2008)
 ====================================
 
-A potential field pulls the robot to the goal and pushes it away from obstacles. Descending it is quick, and ends in the
-first valley. Lee, Kim, Choi and Lee (2008) let ants take the field as their heuristic instead.
+A potential field attracts the robot to the goal and repels it from obstacles. Gradient descent is fast, but ends in the
+first local minimum. Lee, Kim, Choi and Lee (2008) use the field as the ants' heuristic.
 """
 
 from antdrive import Scenario, film, plan, run
@@ -11,9 +11,9 @@ from antdrive.views import plan_figure
 from antdrive.views.figures.plan_figures import contours_figure
 
 # %%
-# A valley
-# --------
-# The goal lies behind a U that opens towards the start. The descent ends inside the U, where every way leads uphill.
+# A local minimum
+# ---------------
+# The goal lies behind a U that opens towards the start. The descent ends inside the U, where all directions lead uphill.
 
 descent = Scenario.of("u-trap", "apf")
 grid, stuck = plan(descent)
@@ -21,10 +21,10 @@ print(f"apf: {stuck.status.value}")
 valley = plan_figure(descent.task, grid, stuck, descent.robot)
 
 # %%
-# Ants leave it
-# -------------
-# Ants choose by pheromone and by the field, at random, so some of them climb out. Behind the U the field is nearly flat, and
-# they wander. The contours are their pheromone.
+# Ants escape
+# -----------
+# Ants choose at random by pheromone and field, so some climb out. Behind the U the field is nearly flat, and ants wander. The
+# contours show their pheromone.
 
 colony = Scenario.of("u-trap", "pfaco", options={"ants": 200}, seed=1)
 grid, found = plan(colony)
@@ -34,7 +34,7 @@ pheromone = contours_figure(colony.task, grid, found, colony.robot)
 # %%
 # The drive
 # ---------
-# The option `shortcut`, which the paper does not have, cuts the loops out of each tour.
+# The option `shortcut`, an addition to the paper, removes the loops of each tour.
 
 result = run(
     Scenario.of("u-trap", "pfaco", options={"ants": 200, "shortcut": True}, seed=1)

@@ -1,9 +1,9 @@
 """
-A margin's budget
-=================
+Margin budget
+=============
 
-Planning keeps 6 cm free around the disc that holds the robot. Where did they go? The drive's log has the planned
-route, the true pose and the pose in which the robot believed, so every loss has a cause.
+Planning adds a margin of 6 cm to the robot's radius. The log holds the route, the true pose and the estimated pose, so every
+loss of clearance has a cause.
 """
 
 from antdrive import Scenario, film, run
@@ -20,10 +20,10 @@ print(
 )
 
 # %%
-# Cause by cause
-# --------------
-# Blue is what a cause took where it took most. Orange is what it took at the place where least was left, negative where
-# it helped; these add up to the difference between what was planned and what was left.
+# Losses by cause
+# ---------------
+# Blue: each cause's largest loss. Orange: its loss at the tightest place, negative for a gain. The orange losses add up to the
+# difference between planned and remaining margin.
 
 figure = Figure(figsize=(7.2, 3.4), layout="constrained")
 axes = figure.add_subplot(label="budget")
@@ -48,7 +48,9 @@ _ = axes.legend(frameon=False)
 # %%
 # The drive
 # ---------
-# The robot believes its wheels and a pose that is fixed now and then; both are wrong by three times what its file documents.
+# The robot fuses wheel odometry with pose fixes. Both have three times the errors documented in its file.
+
+# sphinx_gallery_thumbnail_number = -1
 
 film(
     result.rollout, "budget.mp4", camera="follow", size=(480, 360), fps=20, speed=2

@@ -1,9 +1,9 @@
 """
-An office and its tasks
-=======================
+Tasks in an office
+==================
 
-A floor plan is a picture of free and blocked cells, as map_server has it. It becomes a world of cylinders that cover
-every blocked cell beside free ground, and one world serves many tasks.
+A floor plan is a grid of free and blocked cells, as in map_server's files. It becomes a world of cylinders that cover every
+blocked cell next to free ground. One world serves many tasks.
 """
 
 from dataclasses import replace
@@ -16,7 +16,7 @@ from antdrive.worlds import CellMap, map_task
 # %%
 # The floor plan
 # --------------
-# Six rooms of 4 × 4 m on both sides of a corridor, with doors of 1 m and a table in each; a pixel is 0.1 m.
+# Six rooms of 4 × 4 m on both sides of a corridor, each with a door of 1 m and a table. A pixel is 0.1 m.
 
 free = np.zeros((106, 126), dtype=bool)  # (rows along y, columns along x)
 free[43:63, 1:125] = True  # the corridor
@@ -50,7 +50,9 @@ for name, result in runs.items():
 drives = comparison_figure({name: result.rollout for name, result in runs.items()})
 
 # %%
-# One of them
-# -----------
+# One drive
+# ---------
+
+# sphinx_gallery_thumbnail_number = -1
 
 film(runs["room, upper right"].rollout, "office.mp4", size=(640, 480), speed=2)

@@ -1,10 +1,9 @@
 """
-Across a plaza, among six movers
-================================
+A plaza with six movers
+=======================
 
-Movers follow keyframes, bounce between walls, or wander. The robot sees where they are and how fast they go, and nothing
-of what they are about to do. Local avoidance looks ahead sixty times a second; a new route is planned when the present
-one is obstructed.
+Movers follow keyframes, bounce between walls, or wander. The robot is given their ground-truth positions and velocities,
+but not their future motions. Local avoidance runs at 60 Hz, and the robot re-plans when a mover obstructs its route.
 """
 
 from antdrive import Scenario, film, run
@@ -20,6 +19,6 @@ film(result.rollout, "plaza.mp4", size=(640, 480), speed=2)
 # %%
 # Clearance and speed over time
 # -----------------------------
-# Where the speed falls and the strip below says *avoid*, a mover was in the way.
+# The speed drops where the strip below says *avoid*: a mover was in the way.
 
 drive = overview(result.rollout)

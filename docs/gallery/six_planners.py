@@ -2,8 +2,8 @@
 Six planners in one world
 =========================
 
-The same world, robot and controller, and six planners. Smoothing is switched off, so that the robot drives what each
-planner found.
+Six planners drive the same world with the same robot and controller. Without smoothing, the robot drives each planner's path
+as planned.
 """
 
 from antdrive import Scenario, run

@@ -2,9 +2,9 @@
 Ants that explore (Suganthi 2019)
 =================================
 
-Suganthi and Subha (2019) send two kinds of ants: common ones that follow pheromone, and exploratory ones that prefer
-ground with little of it. Here are their colony, the ant system and Lee's ants on one of the paper's maps of 20 × 20
-cells, drawn from the paper's printed lengths.
+Suganthi and Subha (2019) use two kinds of ants: common ants follow pheromone, exploratory ants prefer cells with little of
+it. Here their colony, the ant system and Lee's ants search one of the paper's maps of 20 × 20 cells, recreated from the
+printed lengths.
 """
 
 import numpy as np
@@ -18,9 +18,9 @@ grid, _ = plan(scenario)
 query = Query.between(grid, scenario.task)
 
 # %%
-# Five seeds each
-# ---------------
-# Lines are medians, bands the range over seeds.
+# Path length by iteration
+# ------------------------
+# Lines are medians of five seeds, bands their range.
 
 planners = {
     "iaco": scenario.planner,
@@ -42,8 +42,8 @@ iterations = history_figure(
 )
 
 # %%
-# Their paths
-# -----------
+# Paths
+# -----
 
 paths = maps_figure(
     {
@@ -55,9 +55,11 @@ paths = maps_figure(
 )
 
 # %%
-# The search and the drive
-# ------------------------
-# The first three seconds of the film show the colony at work.
+# Search and drive
+# ----------------
+# The first 3 s of the film show the colony's search.
+
+# sphinx_gallery_thumbnail_number = -1
 
 result = run(scenario)
 print(result.outcome.value)

@@ -66,7 +66,7 @@ def test_a_page_may_name_the_exit_code_with_which_a_command_must_fail(tmp_path):
         ("'''python\nprint(1)\n'''\n\n'''text\n2\n'''\n", "printed was\n1"),
         ("'''python\n1 / 0\n'''\n", "page.md:2: ZeroDivisionError"),
         ("'''console\n$ ls\nsomething\n'''\n", "shows\nsomething"),
-        ("'''sh\ncurl example.org\n'''\n", "curl: not a command that pages may use"),
+        ("'''sh\ncurl example.org\n'''\n", "curl: not allowed on pages"),
         ("'''sh\nantdrive schema nonsense\n'''\n", "unknown kind"),
     ],
 )

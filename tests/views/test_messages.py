@@ -1,4 +1,4 @@
-"""What is said of wrong films, figures, exports and reports: all of it is in `messages.yml`."""
+"""Messages of invalid films, figures, exports and reports; `messages.yml` holds all."""
 
 from antdrive.sim.log.record import ComponentRecord
 from antdrive.views.export.exporting import export
@@ -21,7 +21,7 @@ EXPORTS = (("ros1", "bag"), ("mcap", "drive.bag"), ("csv", "drive.csv"), ("rosba
 RESULTS = ("{", "[]", "[" * 100_000, '{"seed": ' + "9" * 5000 + "}", "{" + " " * 10_000_001)
 
 
-def test_wrong_films_figures_exports_and_reports_are_refused_in_one_line(made_up_drive, tmp_path, data_regression):
+def test_invalid_films_figures_exports_and_reports_are_rejected_in_one_line(made_up_drive, tmp_path, data_regression):
     def preluded(name, settings):
         other = changed(drive, "record", planner=ComponentRecord(name=name, settings=settings))
         film(other, out / "a.mp4", prelude=1.0)

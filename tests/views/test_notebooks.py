@@ -1,4 +1,4 @@
-"""The HTML that notebooks show for worlds, plans and rollouts; and the colours of planners."""
+"""HTML of worlds, plans and rollouts in notebooks, and planners' colours."""
 
 import itertools
 import pydoc
@@ -80,7 +80,7 @@ def moving():
 
 
 def drawn(html):
-    """The discs of movers (M, 3) and the points of their dotted ways."""
+    """Return the discs of movers (M, 3) and the points of their dotted paths."""
     root = ElementTree.fromstring(html)
     discs = [[float(e.get(k)) for k in ("cx", "cy", "r")] for e in root.iter() if e.get("class") == "mover"]
     lines = [

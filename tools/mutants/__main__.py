@@ -1,12 +1,11 @@
-"""`make mutants`: how many small faults do the tests notice?
+"""Mutation score of the tests: `make mutants`.
 
-Mutants are drawn by a seed from every file of `plans.py`; those of `named.yaml` are always run. Each runs the tests of its file
-in a copy of the project. A mutant that a test notices is killed, one that outlasts its time limit too, and one that is in
-`equivalent.yaml` counts apart. What stays alive is listed. With `--results FILE` an interrupted run goes on where it ended.
+Mutants are sampled by a seed from every file of `plans.py`; those of `named.yaml` always run. Each runs the tests of its file
+in a copy of the project. A mutant is killed if a test fails or its time limit passes. Mutants in `equivalent.yaml` are counted
+separately. Survivors are listed. `--results FILE` resumes an interrupted run.
 
-The generator is ours because neither of the known tools fits. mutmut leaves out decorated functions, and all kernels are
-decorated. cosmic-ray changes the files of the tree that it runs in, with every mutant of a kernel the stamp of the cache changes,
-and all kernels would compile anew for each.
+Existing tools do not fit: mutmut skips decorated functions, and all kernels are decorated. cosmic-ray edits the tree that it
+runs in, which invalidates the kernel cache and recompiles all kernels for each mutant.
 """
 
 from __future__ import annotations
@@ -70,7 +69,7 @@ def main(
 
 
 def chosen(only: list[str] | None, per_file: int | None, seed: int) -> dict[str, list[Mutant]]:
-    """The mutants to run, file by file.
+    """Return the mutants to run, file by file.
 
     Raises:
         StaleTable: one of the files has no plan.
@@ -87,7 +86,7 @@ def chosen(only: list[str] | None, per_file: int | None, seed: int) -> dict[str,
 
 
 def judged(mutants: dict[str, list[Mutant]], jobs: int, results: Path | None) -> Fates:
-    """The fate of every mutant; those that `results` holds are taken as they are, and new ones are added to it."""
+    """Return the fate of every mutant: from `results`, or determined and appended to it."""
     processes, equivalent, known = Processes(), equivalents(), kept(results)
     waiting: dict[str, list[Mutant]] = {}
     fates: Fates = {}
@@ -133,25 +132,25 @@ def judged(mutants: dict[str, list[Mutant]], jobs: int, results: Path | None) ->
 
 
 def kept(results: Path | None) -> dict[tuple[str, ...], str]:
-    """What a file of results says of each mutant with its stamp."""
+    """Read the fate of each mutant with its stamp from a results file."""
     lines = results.read_text().splitlines() if results and results.exists() else []
     return {tuple(entry[:-1]): entry[-1] for entry in map(json.loads, lines)}
 
 
 @functools.cache
 def stamp(file: str) -> str:
-    """A hash of a file and its tests: what became of its mutants holds as long as these are the same."""
+    """Return a hash of a file and its tests; fates are valid while it is unchanged."""
     texts = [(ROOT / name).read_bytes() for name in (f"{SOURCE}/{file}", *PLANS[file].files)]
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 
 
 def line_of(mutant: Mutant) -> str:
-    """A mutant as one line: where it is, what was there and what is."""
+    """Describe a mutant in one line: place, original and mutated code."""
     return f"{mutant.file}:{mutant.line} [{mutant.operator}] {mutant.was}  ->  {mutant.now}"
 
 
 def counts(group: list[tuple[Mutant, str]]) -> dict[str, Any]:
-    """How many mutants met which fate, and the share killed, timeouts too, of those judged; None if there are none."""
+    """Count mutants by fate. Return the counts and the fraction killed, including timeouts; None without valid mutants."""
     found = Counter(fate for _, fate in group)
     killed = found["killed"] + found["timeout"]
     score = killed / (killed + found["alive"]) if killed + found["alive"] else None
@@ -159,7 +158,7 @@ def counts(group: list[tuple[Mutant, str]]) -> dict[str, Any]:
 
 
 def as_data(fates: Fates) -> dict[str, Any]:
-    """The result as plain values, for JSON."""
+    """Return the result as plain values for JSON."""
     everything = [entry for group in fates.values() for entry in group]
     names = ("file", "line", "function", "operator", "was", "now")
     return {
@@ -170,7 +169,7 @@ def as_data(fates: Fates) -> dict[str, Any]:
 
 
 def as_text(fates: Fates) -> str:
-    """The result as a table in Markdown and the list of survivors."""
+    """Return the result as a Markdown table and the list of survivors."""
     everything = [entry for group in fates.values() for entry in group]
     heads = ("file", "mutants", "killed", "of these by timeout", "equivalent", "alive", "not judged", "score")
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]

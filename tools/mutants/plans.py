@@ -1,4 +1,4 @@
-"""Which files are mutated, by how much, and which tests should notice. `named.yaml` and `equivalent.yaml` belong to it."""
+"""Plans of mutation testing: files, sample sizes and tests, with `named.yaml` and `equivalent.yaml`."""
 
 from __future__ import annotations
 
@@ -74,11 +74,11 @@ PLANS: dict[str, Plan] = {
 
 
 class StaleTable(Exception):
-    """A table names a piece of code that its file no longer holds, or no file."""
+    """A table names missing code or a missing file."""
 
 
 def named_mutants(root: Path = ROOT) -> list[Mutant]:
-    """The mutants of `named.yaml`: faults written by hand, each with a piece of its file that occurs once.
+    """Load the mutants of `named.yaml`: handwritten faults, each with a unique piece of its file.
 
     Raises:
         StaleTable: a piece does not.
@@ -94,13 +94,13 @@ def named_mutants(root: Path = ROOT) -> list[Mutant]:
 
 
 def equivalents() -> set[tuple[str, str, str, str]]:
-    """The keys of the mutants in `equivalent.yaml`, which no test can notice, because the program does the same."""
+    """Load the keys of equivalent mutants in `equivalent.yaml`, which change no result."""
     table = yaml.safe_load((HERE / "equivalent.yaml").read_text())
     return {(entry["file"], entry["function"], entry["was"], entry["now"]) for entry in table}
 
 
 def drawn(file: str, count: int, seed: int = SEED, root: Path = ROOT) -> list[Mutant]:
-    """A sample of the mutants of a file: one of each function in turn, so that every function has its share."""
+    """Sample the mutants of a file, cycling through its functions."""
     rng = random.Random(f"{seed} {file}")  # noqa: S311 - nothing is kept secret
     by_function: dict[str, list[Mutant]] = {}
     for mutant in mutants_of(file, (root / SOURCE / file).read_text()):
@@ -116,7 +116,7 @@ def drawn(file: str, count: int, seed: int = SEED, root: Path = ROOT) -> list[Mu
 
 
 def check_tables(root: Path = ROOT) -> None:
-    """See that every table speaks of code that exists.
+    """Check that all tables name existing code.
 
     Raises:
         StaleTable: one does not.

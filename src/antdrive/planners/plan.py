@@ -32,7 +32,7 @@ END_BATCH = 16  # candidate lines from an end to free cells checked per batch, s
 
 
 class PlanStatus(enum.Enum):
-    """How planning ended. The value is the sentence shown to people."""
+    """The outcome of planning. Each value is the displayed sentence."""
 
     SOLVED = "found a path"
     NO_PATH = "no path on this grid"
@@ -297,7 +297,7 @@ class Capabilities:
 
 
 class PlannerError(RuntimeError):
-    """An exception raised by a planner, or a return value of the wrong type; the message is one line.
+    """An exception raised by a planner, or a return value of an invalid type; the message is one line.
 
     Attributes:
         planner: the planner's name

@@ -228,11 +228,11 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
     steps = np.diff(cells, axis=0)
     bits = _bits()[tuple(np.clip(steps, -1, 1).T + 1)]
     bits[(np.abs(steps) > 1).any(axis=1)] = 8
-    wrong = bits == 8
+    invalid = bits == 8
     if not off_grid:
-        wrong |= grid.moves[tuple(cells[:-1].T)].astype(np.int64) >> bits & 1 == 0
-    if wrong.any():
-        k = int(wrong.argmax())
+        invalid |= grid.moves[tuple(cells[:-1].T)].astype(np.int64) >> bits & 1 == 0
+    if invalid.any():
+        k = int(invalid.argmax())
         why = "is no allowed move" if bits[k] < 8 else "does not lead to a neighbour"
         return f"cells: step {k} from {_cell(cells[k])} to {_cell(cells[k + 1])} {why}"
     cost = path_cost(cells, grid.cell)
@@ -354,10 +354,10 @@ def _times(query: Query, plan: TimedPlan) -> str:
         times = getattr(plan, key)
         if not (_floats(times) and times.shape == (count,) and np.isfinite(times).all()):
             return f"{key}: must be a finite time for each of the {count} cells, got {_kind(times)}"
-    wrong = plan.leave < plan.arrive
-    wrong[1:] |= plan.arrive[1:] <= plan.leave[:-1]
-    if wrong.any():
-        k = int(wrong.argmax())
+    invalid = plan.leave < plan.arrive
+    invalid[1:] |= plan.arrive[1:] <= plan.leave[:-1]
+    if invalid.any():
+        k = int(invalid.argmax())
         return (
             f"times: cell {k} is reached at {plan.arrive[k]:g} s and left at {plan.leave[k]:g} s, which do not increase"
         )

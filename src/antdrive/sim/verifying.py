@@ -89,7 +89,7 @@ def verify_log(
     """Certify a log; compare it with a world, a robot, its `result.json` and, with `replay`, its replay."""
     rollout = Rollout.load(log)
     certificate = certify(rollout)
-    found = certificate.as_dict()
+    results = certificate.as_dict()
     problems = [*certificate.problems, *differences(rollout.record, task=task, robot=robot)]
     if result is not None and result.exists():
         problems += false_claims(read_result(result), rollout, rollout.digest)
@@ -102,13 +102,13 @@ def verify_log(
         except ValueError as error:  # the record is of no drive
             problems.append(f"replay: {error}")
         else:
-            found["replay"] = check.as_dict()
+            results["replay"] = check.as_dict()
             problems += check.problems
             sentence += f"; {check.sentence}"
     if problems and certificate.certified:
         sentence = f"NOT verified; the log alone is {sentence}"
     return {
-        **found,
+        **results,
         "readable": True,
         "certified": not problems,
         "problems": problems,

@@ -1,4 +1,4 @@
-"""Exported bags, read back by two programs that share no code with the export or with each other."""
+"""Exported bags, read back by two independent libraries."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FRAME = (10.0, -4.0, 0.3)
 
 
 class Said(NamedTuple):
-    """A message as a reader gave it."""
+    """Message from a reader."""
 
     topic: str
     at: int
@@ -39,7 +39,7 @@ class Said(NamedTuple):
 
 @pytest.fixture(scope="module")
 def log(made_up_drive):
-    """A drive of a second with movers, noise, a replan, an unseen cylinder and a contact, in a world turned in its map."""
+    """A drive of 1 s with movers, noise, a replan, an unseen cylinder and a contact, in a world rotated in its map."""
     plain = made_up_drive(obstacles=6, collide=True, movers=2)
     hidden = Disc(3.5, 0.4, 0.1)
     task = replace(plain.record.task, frame=FRAME)
@@ -97,7 +97,7 @@ def heading(q):
 
 
 def to_map(points):
-    """Points of the world in the map, by complex numbers."""
+    """Transform points of the world to the map, as complex numbers."""
     z = np.asarray(points, dtype=np.float64)
     turned = (z[..., 0] + 1j * z[..., 1]) * np.exp(1j * FRAME[2]) + complex(FRAME[0], FRAME[1])
     return np.stack([turned.real, turned.imag], axis=-1)
@@ -165,7 +165,7 @@ def test_the_map_is_the_grid_that_was_planned_on(said, log):
     assert np.array_equal(np.array(entry.message.data).reshape(grid.shape) == 0, grid.free)
 
 
-def test_each_route_comes_when_it_is_followed(said, log):
+def test_each_route_is_sent_at_its_start_time(said, log):
     first, second = of(said, "/plan")
     assert (first.at, second.at) == (0, 250_000_000)
     for entry, route in ((first, log.route), (second, log.record.replans[0].route)):
@@ -239,7 +239,7 @@ def test_scans_are_taken_at_export_only_if_asked_for(folder):
         assert [note.metadata for note in mcap_reader.make_reader(file).iter_metadata()] == [{"scans": OMITTED}]
 
 
-def test_late_subscribers_get_what_is_sent_once(folder):
+def test_late_subscribers_get_latched_messages(folder):
     once = {"/tf_static", "/map", "/robot_description", "/obstacles", "/movers", "/plan"}
     for path in (folder / "bag", folder / "drive.mcap"):
         with rosbag2.Reader(path) as reader:

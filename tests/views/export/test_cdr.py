@@ -1,4 +1,4 @@
-"""Messages laid out by columns are those of rosbags' own serialiser, byte for byte."""
+"""Messages serialised by columns equal those of rosbags' serialiser, byte for byte."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_numbers():
 
 
 def log_with_scans(beams, field_of_view):
-    """As much of a log with scans as the export of scans reads."""
+    """The part of a log that the export of scans reads."""
     lidar = Lidar(beams=beams, field_of_view=field_of_view, rate=50.0, min_range=0.1, max_range=5.0)
     scans = np.random.default_rng(5).integers(0, 5000, size=(2, beams)).astype(np.uint16)
     scans[0, :2] = 0, 1

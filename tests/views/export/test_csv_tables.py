@@ -1,4 +1,4 @@
-"""Tables of a drive, places that cannot be written to, and the robot's description."""
+"""Tables of a drive, unwritable targets, and the robot's description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The layout's panels have the keys and values of foxglove-sdk's typed panels."""
+"""The layout's panels match foxglove-sdk's typed panels."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TOPICS = {
 
 @pytest.fixture(scope="module", autouse=True)
 def strict_types():
-    """Types that refuse keys which they do not know."""
+    """Types that reject unknown keys."""
     for kind in vars(layouts).values():
         if inspect.isclass(kind) and dataclasses.is_dataclass(kind):
             kind.__pydantic_config__ = pydantic.ConfigDict(extra="forbid")
@@ -41,7 +41,7 @@ def panels(made_up_drive):
 
 
 def snake(value, named=True):
-    """With the types' names of keys; the keys of `topics` and the like are people's own names."""
+    """Convert keys to the types' names, except the user-defined keys of `topics` and others."""
     if isinstance(value, list):
         return [snake(entry) for entry in value]
     if not isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Exported scans, read back and laid out through the exported transforms, end on what stands in the world."""
+"""Exported scans, transformed by the exported transforms, end on the world's obstacles."""
 
 import math
 from dataclasses import replace
@@ -16,7 +16,7 @@ mcap_ros2 = pytest.importorskip("mcap_ros2.decoder", reason="mcap-ros2-support i
 
 @pytest.fixture(scope="module")
 def log(made_up_drive):
-    """A drive with a lidar that sits off the middle and looks aside."""
+    """A drive with an off-centre, rotated lidar."""
     return scanned(made_up_drive(size=(6.0, 4.0), obstacles=30), x=0.06, y=-0.03, yaw=0.4, max_range=2.5)
 
 
@@ -34,7 +34,7 @@ def read(log, place):
 
 
 def placed(transform, points):
-    """Points of the child frame in its parent, as complex numbers."""
+    """Transform points from the child frame to its parent, as complex numbers."""
     q, at = transform.rotation, transform.translation
     return points * complex(q.w, q.z) ** 2 + complex(at.x, at.y)
 
@@ -47,7 +47,7 @@ def test_scans_come_at_their_rate(log, said):
 
 
 def off_surfaces(log, points):
-    """How far the farthest of the points is from every cylinder and wall [m]."""
+    """Return the largest distance of the points from the nearest cylinder or wall [m]."""
     discs, (x0, y0, x1, y1) = log.record.world.discs, log.record.world.bounds
     away = np.abs(np.abs(points[:, None] - (discs[:, 0] + 1j * discs[:, 1])) - discs[:, 2]).min(axis=1)
     walls = np.abs([points.real - x0, points.real - x1, points.imag - y0, points.imag - y1]).min(axis=0)
@@ -82,7 +82,7 @@ def test_scans_taken_at_export_are_those_that_the_drive_would_have_taken(log, sa
 
 
 def middles(grid, value):
-    """The middles of a grid's cells that have a value, in the grid's frame, as complex numbers."""
+    """Return the centres of a grid's cells with a value, in the grid's frame, as complex numbers."""
     info = grid.info
     rows, cols = np.nonzero(np.array(grid.data).reshape(info.height, info.width) == value)
     q, at = info.origin.orientation, info.origin.position
@@ -90,7 +90,7 @@ def middles(grid, value):
 
 
 def within_cylinders(log, points):
-    """How deep the deepest of the points lies in a cylinder [m]."""
+    """Return the largest depth of the points in a cylinder [m]."""
     discs = log.record.world.discs
     return float((discs[:, 2] - np.abs(points[:, None] - (discs[:, 0] + 1j * discs[:, 1]))).max())
 

@@ -1,4 +1,4 @@
-"""Figures of plans, papers and drives, of what a robot without a map knew, and of a drive and an earlier one."""
+"""Figures of plans, papers, drives, occupancy maps and comparisons with a baseline."""
 
 import math
 import re
@@ -57,7 +57,7 @@ def searched(planned):
 
 
 def pixels(figure):
-    """What was written, from the file, or as the figure's canvas still holds it."""
+    """Return the words of a figure, from its file or its canvas."""
     if isinstance(figure, Path):
         with Image.open(figure) as picture:
             return np.asarray(picture.convert("RGB")).astype(int)
@@ -131,7 +131,7 @@ def test_a_long_reason_covers_nothing_of_the_map(planned):
 
 
 def test_the_first_plan_of_a_robot_without_a_map_is_said_to_be_one_and_lies_in_the_picture(planned):
-    """It leads through a cylinder that was not seen, and out of the world."""
+    """It leads through an undetected cylinder and out of the world."""
     task, _, _ = planned
     wider = rasterise(World("seen", (-4.0, -4.0, 9.0, 8.0)), 0.25, 0.23)
     cells = np.array([wider.cell_at(*task.start[:2]), wider.cell_at(1.5, -3.0), wider.cell_at(*task.goal)])
@@ -386,7 +386,7 @@ def test_an_overview_calls_the_first_route_one_and_shows_all_of_it(log):
 
 
 def test_the_words_beside_the_curves_lie_in_the_picture_and_on_nothing_else(log):
-    """Every rule limited the speed in turn."""
+    """Every rule limits the speed in turn."""
     count = len(log.record.limiters)
     busy = replace(log, limiter=(np.arange(len(log.t)) % count).astype(np.uint8))
     figure = overview(busy)

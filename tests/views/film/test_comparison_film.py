@@ -21,7 +21,7 @@ def drives(made_up_drive):
 
 
 def shaped(log, high):
-    """The log in a world whose height is `high` times its width."""
+    """Return the log in a world whose height is `high` times its width."""
     xmin, ymin, xmax, _ = log.record.world.bounds
     return changed(log, "record.task.world", bounds=(xmin, ymin, xmax, ymin + high * (xmax - xmin)))
 

@@ -57,7 +57,7 @@ def test_a_moved_camera_keeps_its_scale(scene):
     assert np.abs(at).max() < 1e-9
 
 
-def test_bodies_that_reach_behind_the_camera_are_left_out(scene):
+def test_bodies_behind_the_camera_are_omitted(scene):
     view = camera(scene)
     eye = -view.view[:3, :3].T @ view.view[:3, 3]
     centres = np.array([(2.0, 1.5, 0.0), eye, (2.0, -40.0, 0.0), (60.0, 1.5, 0.0)])
@@ -137,7 +137,7 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 def rendered(bodies, camera, box, fine):
-    """What PyBullet's TinyRenderer draws: picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none."""
+    """Render with PyBullet's TinyRenderer: picture (h, w, 4), depth (h, w) and body indices (h, w), -1 for none."""
     p, (x0, y0, x1, y1), (wide, high) = bullet(), box, camera.size
     across, down = (x0 + x1) / wide - 1, 1 - (y0 + y1) / high
     projection = camera.projection.copy()
@@ -201,7 +201,7 @@ def test_robots_are_drawn_as_tiny_renderer_draws_them(robot, yaw, wheels):
 
 
 def test_a_body_that_reaches_behind_the_camera_is_cut_off_there():
-    """A wide cylinder below the camera: what is ahead is drawn, and it hides what stands behind its wall."""
+    """A wide cylinder below the camera: its front is drawn and hides the bodies behind it."""
     camera = camera_for("follow", (-1, -0.6), (1, 0.6), 0.3, (240, 180))
     eye = np.linalg.inv(camera.view)[:3, 3]
     wide = cylinder(1.0, 0.0, float(eye[2]) - 0.2)

@@ -1,6 +1,6 @@
-"""Stored pictures that somebody looked at and approved, one per camera.
+"""Approved pictures, one per camera.
 
-`python -m tests.views.film.test_golden` renders them anew.
+`python -m tests.views.film.test_golden` renders them again.
 """
 
 from pathlib import Path
@@ -24,7 +24,7 @@ def picture(camera, **changes):
 
 
 def differs(one, other):
-    """The fraction of pixels that differ clearly; rounding and another compiler's last digits do not count."""
+    """Return the fraction of clearly different pixels, beyond rounding and compilers."""
     return float((np.abs(one - other).max(axis=-1) > 24).mean())
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a robot without a map: what it has not seen looks different until it has."""
+"""Films of mapless robots: unknown ground and undetected obstacles look different until detected."""
 
 import math
 from dataclasses import replace
@@ -19,7 +19,7 @@ SIZE = (480, 320)
 
 
 def known_ground(reconstruction, points):
-    """Whether places lie on ground that was seen free or hit; all of them lie on the map."""
+    """Return whether points of the map lie on known ground, free or hit."""
     cols, rows = np.floor((points - reconstruction.map.origin) / reconstruction.map.cell).astype(int).T
     return reconstruction.seen[rows, cols]
 
@@ -36,7 +36,7 @@ def picture(log, camera, *moments):
 
 @pytest.fixture(scope="module")
 def spots(log):
-    """Rows and columns where places (N, 2) on the ground appear to the camera `top`."""
+    """Return rows and columns of ground points (N, 2) in the camera `top`."""
     shot = Shot(log, camera="top", size=SIZE, bare=True)
     camera = shot._camera
 
@@ -110,7 +110,7 @@ def test_what_stands_inside_a_cylinder_looks_like_it(log):
     assert around.tolist() == [0, 0, 2, 3]
 
 
-def test_the_legend_names_what_is_painted(log):
+def test_the_legend_names_all_painted_objects(log):
     scene = Scene.of(log)
     assert not scene.has_no_go_area
     plain = {entry.text for entry in legend_entries(scene, 0.5, 0.01)}
@@ -123,7 +123,7 @@ def test_the_legend_names_what_is_painted(log):
     assert none - plain == {"not in the world file"}
 
 
-def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log):
+def test_only_tracked_movers_get_rings(log):
     shot = Shot(log, camera="top", size=SIZE, bare=True)
     pose, movers = shot.playback.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
     plain = shot._compositor.frame(pose).astype(int)
@@ -136,8 +136,8 @@ def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log):
     assert np.abs(away[ring] - math.dist(x, y)).max() < 4
     red, green, blue = ringed[rows, cols].mean(axis=0)
     assert min(red, blue) > green + 25
-    followed = {entry.text for entry in legend_entries(Scene.of(log), 0.5, 0.01, tracked=True)}
-    assert "mover tracked by lidar, next 1.5 s" in followed
+    labels = {entry.text for entry in legend_entries(Scene.of(log), 0.5, 0.01, tracked=True)}
+    assert "mover tracked by lidar, next 1.5 s" in labels
 
 
 def test_of_a_robot_with_a_map_only_the_beams_are_painted(log, spots, monkeypatch):
@@ -164,7 +164,7 @@ def far(made_up_drive):
 
 
 def bodies_met(far, k):
-    """The cylinders that the beams of scan k end on: the least root of each beam's quadratic for each cylinder."""
+    """Return the cylinders hit by scan k: the least root of each beam's quadratic for each cylinder."""
     lidar, discs = far.record.robot.lidar, far.record.world.discs
     x, y, yaw = lidar.pose_on(tuple(far.pose[far.scan_rows[k]]))
     angles = yaw - lidar.yaw + lidar.angles

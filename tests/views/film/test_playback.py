@@ -1,4 +1,4 @@
-"""Reading a log between its rows, at jumps and at contacts."""
+"""Playback of a log between its rows, at jumps and at contacts."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from antdrive.views.scene import Scene, contact_point, jumps, mover_tracks
 
 @pytest.fixture(scope="module")
 def jumped(made_up_drive):
-    """Two movers: one at 0.5 m/s that jumps back before row 120, one that stands."""
+    """Two movers: one at 0.5 m/s that jumps back before row 120, one at rest."""
     drive = made_up_drive(movers=2)
     movers = drive.movers.copy()
     movers[:, 0] = np.column_stack([0.5 * drive.t, 0 * drive.t])
@@ -85,8 +85,8 @@ def test_the_least_clearance_is_that_of_the_rows_so_far(made_up_drive):
     assert shown == [0.5, 0.5, 0.1, 0.1]
 
 
-def test_movers_that_are_followed_are_those_of_the_last_scan(jumped):
-    """Turtlebot's lidar scans at 5 Hz: after two periods without a mover, none is followed."""
+def test_tracked_movers_are_those_of_the_last_scan(jumped):
+    """Turtlebot's lidar scans at 5 Hz: after two periods without a mover, none is tracked."""
     rows = [(0, 0, 1.0, 0.5, 0.5, 0, 0.2), (48, 0, 1.1, 0.5, 0.5, 0, 0.2), (48, 1, 3.0, 2.0, 0, 0.1, 0.3)]
     playback = Playback(replace(jumped, tracks=np.array(rows, dtype=np.float32)))
     assert np.allclose(playback.tracked(0.1), [[1.0, 0.5, 0.5, 0.0, 0.2]])

@@ -1,4 +1,4 @@
-"""Films: their format, their words, and what is shown before, between and after."""
+"""Films: format, captions, prelude, slow motion and end."""
 
 import os
 import re
@@ -55,7 +55,7 @@ def ffmpeg(*arguments):
 
 
 def decoded(path):
-    """ffmpeg's description of the video stream, and the frames."""
+    """Return ffmpeg's description of the video stream, and the frames."""
     stream = next(line for line in ffmpeg("-i", path).stderr.decode().splitlines() if " Video: " in line)
     width, height = (int(side) for side in re.search(r", (\d+)x(\d+)", stream).groups())
     raw = ffmpeg("-v", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-").stdout
@@ -297,7 +297,7 @@ def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
 
 
 def test_a_replan_shows_its_new_route_and_its_cause(drive):
-    """The new route replaces the old one, a dot marks the place, and the cause is shown for a while."""
+    """The new route replaces the old one, a dot marks the place, and the caption shows the cause."""
     new = ReplanRecord(t=0.3, trigger="obstructed", solved=True, cost_m=2.5, work=1, route=((1.0, 0.4), (3.5, 0.4)))
     unsolved = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
     replanned = changed(drive, "record", replans=(new, unsolved))

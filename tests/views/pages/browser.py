@@ -1,4 +1,4 @@
-"""A page in a headless browser: what a probe in it finds."""
+"""Probes of pages in a headless browser."""
 
 import html
 import json
@@ -15,14 +15,14 @@ needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this 
 
 
 def found_by(probe, page, *words):
-    """What a script finds that ends by writing JSON into an element `#found`."""
+    """Run a script that writes JSON into an element `#found`, and return the JSON."""
     probed = page.with_name("probed.html")
     probed.write_text(page.read_text().replace("<head>", "<head>" + probe, 1))
     return shown_in(probed, *words)
 
 
 def shown_in(page, *words):
-    """The JSON in the element `#found` of a page."""
+    """Return the JSON in the element `#found` of a page."""
     common = ("--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", "--dump-dom")
     done = subprocess.run(
         [BROWSER, *common, "--window-size=1280,900", *words, page.as_uri()],
@@ -37,7 +37,7 @@ def shown_in(page, *words):
 
 
 def overflow_on_a_phone(probe, page, *words, wait=0):
-    """How much wider than a phone's screen a page is [px]."""
+    """Return a page's excess width over a phone's screen [px]."""
     found_by(probe, page, *words)
     copy = "document.body.append(f.contentDocument.querySelector('#found').cloneNode(true))"
     phone = page.with_name("phone.html")

@@ -1,4 +1,4 @@
-"""A campaign's page: in a real browser it sorts, filters, opens runs and cells, and fits a phone; its charts are SVG."""
+"""A campaign's page in a browser: sorting, filtering, dialogs, phone layout and SVG charts."""
 
 import json
 import re
@@ -83,7 +83,7 @@ def page(summary, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(page):
-    """What the probe finds in the page."""
+    """Results of the probe in the page."""
     return found_by(PROBE, page)
 
 
@@ -201,7 +201,7 @@ def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths
         assert ("(4, 4, 4 from" in chart.note) == ("area" in says)
 
 
-def test_charts_do_without_what_is_not_there():
+def test_charts_need_no_optional_columns():
     columns = made_up_columns({"a": Skill(0.0), "b": Skill(0.0)}, worlds=2, seeds=2)
     assert campaign_charts(summarise(RunTable(columns), title="t"), label_styles("ab", "ab")) == []
     bare = {name: columns[name] for name in ("world", "planner", "seed", "outcome", "succeeded")}

@@ -1,4 +1,4 @@
-"""The report as text and in a real browser: it loads without errors, sorts, filters, plays films and fits a phone."""
+"""The report of runs as text and in a browser: loading, sorting, filtering, films and phone layout."""
 
 import html
 import json
@@ -64,7 +64,7 @@ window.onload = async () => {
 
 @pytest.fixture(scope="module")
 def runs(made_up_drive, tmp_path_factory):
-    """Three runs without logs, one with a film, one that collided."""
+    """Three runs without logs, one with a film, one with a collision."""
     folder = tmp_path_factory.mktemp("runs")
     for k, (planner, outcome) in enumerate((("mmas", "succeeded"), ("astar", "collided"), ("<b>odd</b>", "succeeded"))):
         drive = made_up_drive(collide=outcome == "collided", outcome=outcome)
@@ -145,7 +145,7 @@ def test_the_markdown_is_a_table_with_pictures_and_commands(runs, tmp_path):
 
 
 def write_run(run, folder, **claims):
-    """A run as the command line leaves it, with some claims of result.json edited."""
+    """A run of the command line, with edited claims in result.json."""
     folder.mkdir(parents=True)
     run.rollout.save(folder / "rollout.npz")
     facts = {**run.as_dict(), "command": "antdrive run small", **claims}
@@ -264,7 +264,7 @@ def test_files_that_cannot_be_read_are_one_line(small_run, tmp_path):
 
 
 def columns_of(page):
-    """The values of the columns of a page, and the names of those that it shows."""
+    """Return a page's columns and the names of the shown ones."""
     data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.S)[1])
     found = {c["name"]: c.get("numbers") or [c["texts"][k] for k in c.get("places", range(data["rows"]))]
              for c in data["columns"]}  # fmt: skip
@@ -293,13 +293,13 @@ def test_settings_that_differ_between_runs_get_columns(small_scenario, tmp_path)
 @pytest.mark.parametrize(
     ("key", "value"), [("noise", 0.25), ("smoothing", "taut"), ("options", {"ants": 3}), ("seed", 9)]
 )
-def test_a_setting_that_the_log_contradicts_is_told(small_run, tmp_path, key, value):
+def test_settings_that_contradict_the_log_are_reported(small_run, tmp_path, key, value):
     write_run(small_run, tmp_path / "runs" / "a", **{key: value})
     assert f"result.json: {key}: differs from the log, which says" in reported(tmp_path / "runs", tmp_path)
 
 
 def fake_run(folder, *, outcome="succeeded", **more):
-    """The result.json of a run that is claimed, with a film beside it."""
+    """Write the result.json of a claimed run, with a film beside it."""
     folder.mkdir(parents=True)
     facts = {"world": "w", "planner": "astar", "robot": "turtlebot", "seed": 0, "command": "antdrive run w"}
     (folder / "result.json").write_text(json.dumps({**facts, "outcome": outcome, **more}))
@@ -345,7 +345,7 @@ def test_runs_made_in_python_become_a_report_together_with_folders(small_run, co
     assert "1 / 1" in (tmp_path / "page.md").read_text()
 
 
-def test_a_run_that_was_edited_is_certified_anew(small_run, tmp_path):
+def test_an_edited_run_is_certified_again(small_run, tmp_path):
     shifted = replace(small_run.rollout, pose=small_run.rollout.pose + (0.0, 0.2, 0.0))
     write_report(replace(small_run, rollout=shifted), tmp_path / "page.html", figures=False)
     assert "0 / 1" in (tmp_path / "page.html").read_text()
@@ -353,7 +353,7 @@ def test_a_run_that_was_edited_is_certified_anew(small_run, tmp_path):
 
 @pytest.mark.parametrize("kind", ["html", "md"])
 def test_a_run_that_a_test_drove_says_why_the_test_failed(small_run, tmp_path, kind):
-    """The drive itself succeeded; what result.json claims is text and nothing else."""
+    """The drive succeeded; claims of result.json are plain text."""
     folder = tmp_path / "results"
     write_run(small_run, folder / "plain")
     assert "test failed" not in reported(folder, tmp_path, kind)

@@ -78,7 +78,7 @@ def test_markdown_lists_failures_with_their_commands_and_stays_short(tmp_path):
     assert len(tables) == 4 * 2 + 17 + 17 + 60 + 60
 
 
-def test_what_is_not_known_is_said(tmp_path):
+def test_notes_state_the_limits_of_the_tables(tmp_path):
     alone = summarise(made_up_runs({"a": Skill()}, worlds=1, seeds=3), title="t", size=10)
     assert alone.comparisons == {}
     assert alone.notes[0] == "7 of 10 runs are not done yet."
@@ -92,7 +92,7 @@ def test_what_is_not_known_is_said(tmp_path):
 
 
 def table_of(planners, worlds, seeds=4):
-    """Planners of which in every world each one is faster than the next."""
+    """Planners, each faster than the next in every world."""
     skills = {name: Skill(1.0, 1.0 + 0.3 * k) for k, name in enumerate(planners)}
     return summarise(made_up_runs(skills, worlds=worlds, seeds=seeds), title="t", metrics=["duration_s"])
 

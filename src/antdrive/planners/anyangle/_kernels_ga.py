@@ -1,7 +1,7 @@
-"""Compiled evolution of via points: arrays in, arrays out, nothing validated.
+"""Compiled evolution of via points: arrays in, arrays out, no validation.
 
-A chromosome is a row of via points between the two fixed ends. Random numbers come from one xorshift64 state;
-every function that draws some returns the new state.
+A chromosome is a sequence of via points between the two fixed ends. Random numbers come from one xorshift64
+state; every function that draws some returns the new state.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ PER_BIT = 1.0 / 9007199254740992.0
 
 @inline
 def uniform(state: Any) -> Any:
-    """The random number in [0, 1) that a state stands for."""
+    """Return the random number in [0, 1) of a state."""
     return (state >> np.uint64(11)) * PER_BIT
 
 
 @kernel
 def length_of(via: Array, ends: Array) -> float:
-    """The length of the line from ends[0] over the via points (n, 2) to ends[1]."""
+    """Return the length of the line from ends[0] over the via points (n, 2) to ends[1]."""
     total, x, y = 0.0, ends[0, 0], ends[0, 1]
     for k in range(via.shape[0]):
         total += math.hypot(via[k, 0] - x, via[k, 1] - y)
@@ -36,7 +36,7 @@ def length_of(via: Array, ends: Array) -> float:
 
 @kernel
 def feasible(via: Array, ends: Array, land: Terrain) -> bool:
-    """Whether every segment of the line from ends[0] over the via points to ends[1] is clear."""
+    """Return whether every segment of the line from ends[0] over the via points to ends[1] is clear."""
     x, y = ends[0, 0], ends[0, 1]
     for k in range(via.shape[0]):
         if not clear_line(land, x, y, via[k, 0], via[k, 1]):
@@ -49,12 +49,12 @@ def feasible(via: Array, ends: Array, land: Terrain) -> bool:
 def refill(
     population: Array, lengths: Array, size: int, points: Array, ends: Array, land: Terrain, tries: int, state: Any
 ) -> tuple[int, int, Any]:
-    """Add random feasible chromosomes until the population is full or `tries` were drawn; size, draws, state."""
+    """Add random feasible chromosomes until the population is full or after `tries`; returns size, draws, state."""
     n = population.shape[1]
     drawn = 0
     while size < population.shape[0] and drawn < tries:
         drawn += 1
-        # A via point is drawn only when the line to the one before it is clear: most draws fail at the first segment.
+        # Draw a via point only after a clear line to the one before: most draws fail at the first segment.
         x, y = ends[0, 0], ends[0, 1]
         clear = True
         for k in range(n):
@@ -73,14 +73,14 @@ def refill(
 
 @inline
 def copy_points(points: Array, first: int, into: Array) -> None:
-    """into[first:] = points[first:], for points (n, 2)."""
+    """Assign into[first:] = points[first:] for points (n, 2)."""
     for k in range(first, points.shape[0]):
         into[k, 0], into[k, 1] = points[k, 0], points[k, 1]
 
 
 @inline
 def shortest_of(lengths: Array, size: int) -> int:
-    """The index of the shortest of the first `size` lengths."""
+    """Return the index of the shortest of the first `size` lengths."""
     first = 0
     for i in range(1, size):
         first = i if lengths[i] < lengths[first] else first
@@ -100,12 +100,12 @@ def next_generation(
     elitism: bool,
     state: Any,
 ) -> tuple[int, Any]:
-    """Clone, cross, mutate and eliminate in place (Han 2007, section 4.1); how many survive, state.
+    """Clone, cross, mutate and eliminate in place (Han 2007, section 4.1); returns the number of survivors, state.
 
     The survivors fill the front of `population`; with elitism the best of the last generation comes first.
     """
     room, n = population.shape[0], population.shape[1]
-    # Natural selection: as many clones as there is room, drawn by fitness 1 / length.
+    # Natural selection: fill the population with clones drawn by fitness 1 / length.
     share, total = np.empty(size, dtype=np.float64), 0.0
     for i in range(size):
         total += 1.0 / lengths[i]
@@ -118,7 +118,7 @@ def next_generation(
         state = next_random(state)
         parent = np.searchsorted(share, uniform(state) * share[size - 1], side="right")
         copy_points(population[min(parent, size - 1)], 0, bred[i])
-    # Crossover after the same via point for all parents, who receive the tails in reverse order.
+    # Crossover after the same via point for all parents; they receive the tails in reverse order.
     if n > 1:
         state = next_random(state)
         head = 1 + int(uniform(state) * (n - 1))
@@ -154,7 +154,7 @@ def next_generation(
 
 @inline
 def neighbours(via: Array, k: int, ends: Array) -> tuple[float, float, float, float]:
-    """The points before and after a via point."""
+    """Return the points before and after a via point."""
     ax, ay = ends[0, 0], ends[0, 1]
     if k > 0:
         ax, ay = via[k - 1, 0], via[k - 1, 1]
@@ -166,7 +166,7 @@ def neighbours(via: Array, k: int, ends: Array) -> tuple[float, float, float, fl
 
 @kernel
 def tighten(via: Array, k: int, ends: Array, land: Terrain) -> None:
-    """Move one via point towards the line between its neighbours, as far as both its segments stay clear."""
+    """Move one via point towards the line between its neighbours while both its segments stay clear."""
     ax, ay, bx, by = neighbours(via, k, ends)
     x, y = via[k, 0], via[k, 1]
     dx, dy = bx - ax, by - ay
@@ -186,7 +186,7 @@ def tighten(via: Array, k: int, ends: Array, land: Terrain) -> None:
 
 @kernel
 def tighten_all(via: Array, ends: Array, land: Terrain, rounds: int) -> float:
-    """Tighten all via points one after the other, `rounds` times; the length of the line."""
+    """Tighten all via points in sequence, `rounds` times; returns the length of the line."""
     for _ in range(rounds):
         for k in range(via.shape[0]):
             tighten(via, k, ends, land)
@@ -195,7 +195,7 @@ def tighten_all(via: Array, ends: Array, land: Terrain, rounds: int) -> float:
 
 @kernel
 def shift(via: Array, k: int, ends: Array, land: Terrain, max_shift: float, state: Any) -> Any:
-    """Move one via point at random, by `max_shift` down to a ten-thousandth of it, if its segments stay clear; state."""
+    """Shift one via point at random by 1e-4 to 1 times `max_shift` if its segments stay clear; returns the state."""
     ax, ay, bx, by = neighbours(via, k, ends)
     state = next_random(state)
     step = max_shift * 10.0 ** (-4.0 * uniform(state))
@@ -218,11 +218,11 @@ def breed_feasible(
     max_shift: float,
     state: Any,
 ) -> Any:
-    """Breed feasible chromosomes from feasible ones in place, the best one kept in front; state.
+    """Breed feasible chromosomes from feasible ones in place, the best one in front; returns the state.
 
-    A parent is the shorter of two chromosomes drawn at random. A tail is taken over where the new segment is
-    clear. A gene mutates by tightening or by a random shift, and only as far as its segments stay clear, so
-    no chromosome needs to be eliminated.
+    A parent is the shorter of two random chromosomes. Crossover takes a tail if the new segment is clear. A gene
+    mutates by tightening or by a random shift, only while its segments stay clear, so no chromosome needs to be
+    eliminated.
     """
     room, n = population.shape[0], population.shape[1]
     bred = np.empty_like(population)

@@ -1,4 +1,4 @@
-"""Compiled straight lines and corridors: arrays in, arrays out, nothing validated."""
+"""Compiled straight lines and corridors: arrays in, arrays out, no validation."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ EDGE = 1e-9  # cells: a line this close to a cell's border touches the cell behi
 
 
 class Terrain(NamedTuple):
-    """Where a straight line may run, in the form that compiled code takes.
+    """Obstacles of straight lines, for compiled code.
 
     Attributes:
         discs: x, y and radius + inflation of each disc [m] (N, 3)
         bounds: the walls [m] (4,)
-        inflate: the distance that a line keeps from the walls [m]
+        inflate: the clearance from the walls [m]
         free: the grid (R, C)
         x0: x of the centre of cell (0, 0) [m]
         y0: y of the centre of cell (0, 0) [m]
         cell: the side of a cell [m]
-        bare: whether there is no world, so that `free` decides instead of discs and walls
+        bare: whether `free` decides instead of discs and walls, as there is no world
     """
 
     discs: Array
@@ -38,7 +38,7 @@ class Terrain(NamedTuple):
 
 @kernel
 def clear_line(land: Terrain, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a robot that follows the segment ab touches nothing; contact counts as touching."""
+    """Return whether the segment ab is collision-free; contact counts as collision."""
     if land.bare:
         return clear_cells(
             land.free,
@@ -62,7 +62,7 @@ def clear_line(land: Terrain, ax: float, ay: float, bx: float, by: float) -> boo
 
 @kernel
 def clear_cells(free: Array, r0: float, c0: float, r1: float, c1: float) -> bool:
-    """Whether every cell that the segment touches, if only at a corner, is free."""
+    """Return whether every cell that the segment touches, even at a corner, is free."""
     rows, cols = free.shape
     first = math.ceil(min(r0, r1) - 0.5 - EDGE)
     last = math.floor(max(r0, r1) + 0.5 + EDGE)
@@ -87,10 +87,9 @@ def clear_cells(free: Array, r0: float, c0: float, r1: float, c1: float) -> bool
 
 @kernel
 def pull(land: Terrain, xy: Array) -> Array:
-    """The indices of the points that remain when a polyline (M, 2) is pulled straight, first and last included.
+    """Return the indices of the points that remain when a polyline (M, 2) is pulled straight, ends included.
 
-    Each point kept is joined to the last point that a clear line from it reaches, or to the next if there is
-    none.
+    Each kept point connects to the last point in clear line of sight, or to the next if there is none.
     """
     n = xy.shape[0]
     kept = np.empty(n, dtype=np.int64)
@@ -107,7 +106,7 @@ def pull(land: Terrain, xy: Array) -> Array:
 
 @kernel
 def corridor_moves(moves: Array, line: Array, width: float) -> Array:
-    """The moves between cells whose centres lie within `width` of a polyline (M, 2), all in cells."""
+    """Return the moves between cells whose centres lie within `width` of a polyline (M, 2), all in cells."""
     rows, cols = moves.shape
     inside = np.zeros((rows, cols), dtype=np.bool_)
     for s in range(line.shape[0] - 1):
@@ -116,7 +115,7 @@ def corridor_moves(moves: Array, line: Array, width: float) -> Array:
             max(0, math.ceil(min(r0, r1) - width)),
             min(rows - 1, math.floor(max(r0, r1) + width)) + 1,
         ):
-            # In a row, the cells near a segment lie beside the part of it that is within `width` of the row.
+            # In a row, the cells near a segment lie beside its part within `width` of the row.
             t0, t1 = 0.0, 1.0
             if r1 != r0:
                 ta, tb = (r - width - r0) / (r1 - r0), (r + width - r0) / (r1 - r0)
@@ -140,7 +139,7 @@ def corridor_moves(moves: Array, line: Array, width: float) -> Array:
 
 @kernel
 def visits(lines: Array, shape: tuple[int, int]) -> Array:
-    """How many of the polylines (K, M, 2), in cells, pass through each cell."""
+    """Count the polylines (K, M, 2), in cells, that pass through each cell."""
     rows, cols = shape
     count = np.zeros((rows, cols), dtype=np.float64)
     seen = np.full((rows, cols), -1, dtype=np.int64)

@@ -1,8 +1,8 @@
-"""Compiled search for the shortest path among discs: arrays in, arrays out, nothing validated.
+"""Compiled search for the shortest path among discs: arrays in, arrays out, no validation.
 
-A shortest path consists of straight lines and of arcs along the rims of the discs that it bends around. A
-turn to the left around a disc is `1`, to the right `-1`. A line in direction `a` touches a disc at the angle
-`a - turn * pi / 2`, seen from the disc's centre. Angles lie in [0, 2 pi).
+A shortest path consists of straight lines and of arcs along the rims of discs. A left turn around a disc is
+`1`, a right turn `-1`. A line in direction `a` touches a disc at the angle `a - turn * pi / 2` about the disc's
+centre. Angles lie in [0, 2 pi).
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ import numpy as np
 
 from antdrive.worlds._kernels import Array, doubled, doubled_rows, inline, kernel, segment_distance2
 
-EPS = 5e-10  # m: a gap no wider than this is closed; a line may enter a disc by this much
+EPS = 5e-10  # m: gaps up to this are closed; a line may enter a disc by this much
 TURN = 2.0 * math.pi
-ANGLE = 1e-9  # rad: an angle this close to the end of a free arc does not lie on the arc
-BACK = 1e-7  # rad: going backwards along a rim by less than this is rounding and counts as no length
-SECTORS = 512  # of directions, for each of which a disc is remembered that was in the way
-SAME = 1e-12  # m: lengths that differ by less are equal
+ANGLE = 1e-9  # rad: an angle this close to the end of a free arc is off the arc
+BACK = 1e-7  # rad: smaller backward motion along a rim is rounding and has length 0
+SECTORS = 512  # direction sectors, each with the last blocking disc
+SAME = 1e-12  # m: tolerance of equal lengths
 
 
 class Rims(NamedTuple):
-    """The free arcs of all rims, the parts that no other disc and no wall covers.
+    """The free arcs of all rims: the parts not covered by other discs or walls.
 
     Attributes:
         first: disc i has the arcs first[i] to first[i + 1] (N + 1,)
-        begin: the angle at which each arc begins (A,)
-        width: the angle that each arc covers, 2 pi where the whole rim is free (A,)
-        ends: cosine and sine of the angle at which each arc begins, and of that at which it ends (A, 4)
+        begin: the start angle of each arc (A,)
+        width: the angular width of each arc, 2 pi if the whole rim is free (A,)
+        ends: cosine and sine of the start angle and of the end angle of each arc (A, 4)
     """
 
     first: Array
@@ -39,10 +39,10 @@ class Rims(NamedTuple):
 
 
 class Sweep(NamedTuple):
-    """The discs from left to right, in which those near a place are a slice.
+    """The discs sorted by x, so that the discs near a place form a slice.
 
     Attributes:
-        order: the discs by x (N,)
+        order: the discs sorted by x (N,)
         x: the x of each, ascending [m] (N,)
         widest: the largest radius [m]
     """
@@ -56,7 +56,7 @@ class Bins(NamedTuple):
     """Square bins over the bounds, row by row, each with a list of the discs in it.
 
     Attributes:
-        start: where each bin's discs begin in `items` (rows * columns + 1,)
+        start: index in `items` of each bin's first disc (rows * columns + 1,)
         items: the discs of all bins
         shape: rows and columns (2,)
         side: the side of a bin [m]
@@ -69,14 +69,14 @@ class Bins(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """What tangents must not cross.
+    """The obstacles of tangents.
 
     Attributes:
         discs: x, y and radius of each inflated disc [m] (N, 3)
         bounds: the walls [m] (4,)
         rims: the free arcs of the discs
         bins: the discs by place
-        gates: segments between discs or walls that just touch, which no path crosses [m] (G, 4)
+        gates: segments between touching discs or walls, which no path crosses [m] (G, 4)
         goals: -1 for the goal, then the discs that a path may touch
     """
 
@@ -89,7 +89,7 @@ class Obstacles(NamedTuple):
 
 
 class Lines(NamedTuple):
-    """The tangents found so far, a row each, and what the search knows of them. There may be unused rows at the end.
+    """The known tangents, one row each, with their search state. Rows at the end may be unused.
 
     Attributes:
         leave: the angle at which the line leaves its disc
@@ -100,10 +100,10 @@ class Lines(NamedTuple):
         disc: the disc that it reaches, -1 at the goal
         turn: the turn around that disc
         arc: the free arc that it reaches, -1 at the goal
-        before: the line before it on the shortest way found, -1 at the start
-        best: the length of that way, this line included [m]
-        done: whether that way is final
-        earlier: the line that was followed before this one to the same arc and turn, -1 if none
+        before: the previous line on the shortest known path, -1 at the start
+        best: the length of that path, including this line [m]
+        done: whether that path is final
+        earlier: the line expanded before this one to the same arc and turn, -1 if none
     """
 
     leave: Array
@@ -124,7 +124,7 @@ class Heap(NamedTuple):
     """A binary heap of lines by length; entries beyond its size are unused.
 
     Attributes:
-        key: the least length of a path by way of each line [m]
+        key: lower bound of the length of a path through each line [m]
         line: the lines
     """
 
@@ -134,14 +134,14 @@ class Heap(NamedTuple):
 
 @inline
 def wrapped(angle: float) -> float:
-    """The angle within [0, 2 pi)."""
+    """Wrap an angle to [0, 2 pi)."""
     angle = angle % TURN
     return angle if angle < TURN else 0.0
 
 
 @kernel
 def swept(discs: Array) -> Sweep:
-    """The discs from left to right."""
+    """Sort the discs by x."""
     order = np.argsort(discs[:, 0])
     x = np.empty(len(order), dtype=np.float64)
     widest = 0.0
@@ -153,14 +153,14 @@ def swept(discs: Array) -> Sweep:
 
 @inline
 def slice_near(sweep: Sweep, x: float, reach: float) -> tuple[int, int]:
-    """Where in `Sweep.order` the discs begin and end that may come within `reach` of a point with this x."""
+    """Return the slice of `Sweep.order` with the discs that may come within `reach` of a point at this x."""
     apart = reach + sweep.widest + 1e-6
     return int(np.searchsorted(sweep.x, x - apart)), int(np.searchsorted(sweep.x, x + apart, side="right"))
 
 
 @kernel
 def keep_outer(discs: Array, bounds: Array) -> Array:
-    """Which discs (N, 3) have a rim that is at least partly outside all other discs and inside the bounds."""
+    """Return which discs (N, 3) have a rim partly outside all other discs and inside the bounds."""
     n = discs.shape[0]
     sweep = swept(discs)
     keep = np.ones(n, dtype=np.bool_)
@@ -175,10 +175,10 @@ def keep_outer(discs: Array, bounds: Array) -> Array:
             if j == i or not keep[j]:
                 continue
             room = discs[j, 2] - r
-            if room < -EPS or abs(x - discs[j, 0]) > room + 1e-3:  # nearly all discs, without a root
+            if room < -EPS or abs(x - discs[j, 0]) > room + 1e-3:  # rejects nearly all discs without a root
                 continue
             if math.hypot(x - discs[j, 0], y - discs[j, 1]) <= room + EPS:
-                # Of two equal discs the first stays.
+                # Of two equal discs, keep the first.
                 if room <= EPS and j > i:
                     continue
                 keep[i] = False
@@ -188,7 +188,7 @@ def keep_outer(discs: Array, bounds: Array) -> Array:
 
 @kernel
 def free_arcs(discs: Array, bounds: Array) -> Rims:
-    """The parts of each rim that no other disc and no wall covers; contact ends an arc."""
+    """Return the parts of each rim not covered by other discs or walls; contact ends an arc."""
     n = discs.shape[0]
     first = np.zeros(n + 1, dtype=np.int64)
     begin = np.empty(4 * n + 16, dtype=np.float64)
@@ -249,7 +249,7 @@ def free_arcs(discs: Array, bounds: Array) -> Rims:
             begin[size], width[size] = 0.0, TURN
             size += 1
             continue
-        for q in range(m):  # sort by insertion: there are few
+        for q in range(m):  # insertion sort of few elements
             at = q
             while at > 0 and low[order[at - 1]] > low[q]:
                 order[at] = order[at - 1]
@@ -263,7 +263,7 @@ def free_arcs(discs: Array, bounds: Array) -> Rims:
                 begin[size], width[size] = reach, low[here] - reach
                 size += 1
             reach = max(reach, high[here])
-        rest = min(low[order[0]] + TURN - reach, TURN - ANGLE)  # less than a full rim, as one contact cuts it
+        rest = min(low[order[0]] + TURN - reach, TURN - ANGLE)  # less than a full rim, as a contact cuts it
         if rest > 2.0 * ANGLE:
             begin[size], width[size] = wrapped(reach), rest
             size += 1
@@ -277,7 +277,7 @@ def free_arcs(discs: Array, bounds: Array) -> Rims:
 
 @inline
 def arc_at(first: Array, begin: Array, width: Array, i: int, angle: float) -> int:
-    """The free arc of disc i that an angle lies on, -1 if none."""
+    """Return the free arc of disc i that contains an angle, -1 if none."""
     found = -1
     for a in range(first[i], first[i + 1]):
         if width[a] >= TURN:
@@ -291,12 +291,11 @@ def arc_at(first: Array, begin: Array, width: Array, i: int, angle: float) -> in
 
 @kernel
 def misses(rims: Rims, i: int, turn: int, dx: float, dy: float, across: float) -> bool:
-    """Whether the tangent in direction of (dx, dy) surely touches disc i, with this turn, on no free arc; without an angle.
+    """Return whether the tangent along (dx, dy) certainly touches disc i on no free arc, without computing its angle.
 
-    A line that leaves a disc and touches it at the angle `a` passes the other disc at the distance
-    turn * (cos a * dx + sin a * dy) + across beside where it should. Over an arc that holds the tangent, this distance
-    changes from negative to positive, if the arc is no wider than 120 degrees and the tangent no more than 30 degrees off
-    the direction of (dx, dy). For other arcs and tangents the answer is no.
+    A line that touches disc i at the angle `a` misses the other disc's tangent point by
+    turn * (cos a * dx + sin a * dy) + across. Over an arc that contains the tangent, this changes from negative to
+    positive if the arc is at most 2 rad wide and the tangent at most 30 degrees off (dx, dy). Otherwise return False.
     """
     if 4.0 * across * across > dx * dx + dy * dy:
         return False
@@ -313,7 +312,7 @@ def misses(rims: Rims, i: int, turn: int, dx: float, dy: float, across: float) -
 
 @inline
 def along_rim(rims: Rims, arc: int, turn: int, here: float, there: float) -> float:
-    """The angle from `here` to `there` on a free arc in the direction of `turn`; inf if the arc ends in between."""
+    """Return the angle from `here` to `there` on a free arc in the direction of `turn`; inf if the arc ends between."""
     ahead = (turn * (there - here)) % TURN
     if ahead > TURN - BACK:
         ahead = 0.0
@@ -326,7 +325,7 @@ def along_rim(rims: Rims, arc: int, turn: int, here: float, there: float) -> flo
 
 @kernel
 def gates(discs: Array, bounds: Array) -> Array:
-    """The segments (G, 4) between discs, or between a disc and a wall, that just touch: no path crosses them."""
+    """Return the segments (G, 4) between touching discs, or a disc and a touching wall: no path crosses them."""
     n = discs.shape[0]
     out = np.empty((16, 4), dtype=np.float64)
     sweep = swept(discs)
@@ -370,13 +369,13 @@ def gates(discs: Array, bounds: Array) -> Array:
 
 @inline
 def side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> float:
-    """Positive if p lies to the left of the line from a to b."""
+    """Return a positive number if p lies to the left of the line from a to b."""
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
 
 
 @kernel
 def bins(discs: Array, bounds: Array) -> Bins:
-    """Discs by place: every bin that a disc touches has it in its list."""
+    """Sort discs into bins: every bin that a disc touches lists it."""
     n = discs.shape[0]
     wide, tall = bounds[2] - bounds[0], bounds[3] - bounds[1]
     cell = max(math.sqrt(wide * tall / max(n, 1)), max(wide, tall) / 200.0, 1e-9)
@@ -411,7 +410,7 @@ def bins(discs: Array, bounds: Array) -> Bins:
 
 @inline
 def enters(discs: Array, k: int, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether the segment ab enters disc k."""
+    """Return whether the segment ab enters disc k."""
     r = discs[k, 2] - EPS
     return bool(r > 0.0 and segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by) < r * r)
 
@@ -420,7 +419,7 @@ def enters(discs: Array, k: int, ax: float, ay: float, bx: float, by: float) -> 
 def blocked_by(
     ax: float, ay: float, bx: float, by: float, i: int, j: int, discs: Array, bounds: Array, grid: Bins, gates: Array
 ) -> int:
-    """A disc that the segment ab enters, other than i and j, to which it is tangent; -2 if it crosses a gate, or -1."""
+    """Return a disc that the segment ab enters, except its tangent discs i and j; -2 if it crosses a gate; else -1."""
     start, items, bin_side = grid.start, grid.items, grid.side
     rows, cols = grid.shape[0], grid.shape[1]
     px, py = (ax - bounds[0]) / bin_side, (ay - bounds[1]) / bin_side
@@ -431,7 +430,7 @@ def blocked_by(
     last_row = min(max(math.floor(qy), 0), rows - 1)
     dx, dy = qx - px, qy - py
     step_col, step_row = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
-    # As fractions of the segment: where the next column and the next row begin, and how far apart columns and rows are.
+    # Fractions of the segment: the start of the next column and row, and the spacing of columns and rows.
     next_x = ((col + (1 if dx > 0.0 else 0)) - px) / dx if dx != 0.0 else np.inf
     next_y = ((row + (1 if dy > 0.0 else 0)) - py) / dy if dy != 0.0 else np.inf
     per_x = abs(1.0 / dx) if dx != 0.0 else np.inf
@@ -462,7 +461,7 @@ def blocked_by(
 
 @kernel
 def push(heap: Heap, size: int, key: float, line: int) -> int:
-    """Add a line to a heap that has room for it; its new size."""
+    """Push a line onto a heap with free capacity; returns the new size."""
     at = size
     while at > 0:
         up = (at - 1) >> 1
@@ -476,7 +475,7 @@ def push(heap: Heap, size: int, key: float, line: int) -> int:
 
 @kernel
 def drop_first(heap: Heap, size: int) -> int:
-    """Remove the first line from a heap; its new size."""
+    """Remove the first line from a heap; returns the new size."""
     size -= 1
     key, line = heap.key[size], heap.line[size]
     at = 0
@@ -496,7 +495,7 @@ def drop_first(heap: Heap, size: int) -> int:
 
 @kernel
 def empty_lines(room: int) -> Lines:
-    """A table with `room` unused rows."""
+    """Allocate a table with `room` unused rows."""
     return Lines(
         np.empty(room, dtype=np.float64),
         np.empty(room, dtype=np.float64),
@@ -515,7 +514,7 @@ def empty_lines(room: int) -> Lines:
 
 @kernel
 def doubled_lines(lines: Lines) -> Lines:
-    """The same table with twice the rows."""
+    """Return the table with twice the rows."""
     return Lines(
         doubled(lines.leave),
         doubled(lines.reach),
@@ -534,10 +533,10 @@ def doubled_lines(lines: Lines) -> Lines:
 
 @inline
 def least_by(ends: Array, least: float, ax: float, ay: float, bx: float, by: float, length: float) -> float:
-    """A length that every path still to be found which takes the line from a to b exceeds.
+    """Return a lower bound of every undiscovered path through the line from a to b.
 
-    The way to `a` is no shorter than the straight line from the start. It is no shorter, too, than `least` without the
-    straight line from `a` to the goal: A* finds the ways in the order of their length with that line added.
+    The path to `a` is no shorter than the straight line from the start. It is also no shorter than `least` minus the
+    straight line from `a` to the goal, as A* expands paths in the order of their length plus that line.
     """
     to_a = math.hypot(ax - ends[0, 0], ay - ends[0, 1])
     to_a = max(to_a, least - math.hypot(ends[1, 0] - ax, ends[1, 1] - ay))
@@ -548,18 +547,18 @@ def least_by(ends: Array, least: float, ax: float, ay: float, bx: float, by: flo
 def add_tangents(
     obstacles: Obstacles, ends: Array, line: int, lines: Lines, count: int, limit: float
 ) -> tuple[int, int]:
-    """Add the tangents that leave the disc and turn which `line` reaches; for -1, those from the start.
+    """Add the tangents that leave the disc and turn reached by `line`; for -1, those from the start.
 
-    There are 2 N + 1 at most, one to the goal and two to each disc; `lines` has room for them. Tangents that are no part of
-    a path of at most `limit` are left out, those of which it is sure. Returns the number of lines in the table, and the
-    number of lines that were checked against the other discs.
+    There are at most 2 N + 1: one to the goal and two to each disc; `lines` has capacity for them. Tangents that
+    certainly belong to no path of at most `limit` are omitted. Returns the number of lines in the table and the number
+    of lines checked against the other discs.
     """
     discs, bounds, grid, gates, checked = obstacles.discs, obstacles.bounds, obstacles.bins, obstacles.gates, 0
     rims = obstacles.rims
     first, begin, width = rims.first, rims.begin, rims.width
     blockers = np.full(SECTORS, -1, dtype=np.int64)
     i, s, x, y, r = -1, 1, ends[0, 0], ends[0, 1], 0.0
-    least = math.hypot(ends[1, 0] - x, ends[1, 1] - y)  # the length of every path that is still to be found
+    least = math.hypot(ends[1, 0] - x, ends[1, 1] - y)  # lower bound of every undiscovered path
     if line >= 0:
         i, s = lines.disc[line], lines.turn[line]
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
@@ -601,7 +600,7 @@ def add_tangents(
                 continue
             checked += 1
             sector = min(int(wrapped(heading) * (SECTORS / TURN)), SECTORS - 1)
-            k = blockers[sector]  # what was in the way of another line in this direction often is again
+            k = blockers[sector]  # the last blocker in this direction often blocks again
             if k >= 0 and k not in (i, j) and enters(discs, k, ax, ay, bx, by):
                 continue
             k = blocked_by(ax, ay, bx, by, i, j, discs, bounds, grid, gates)
@@ -623,7 +622,7 @@ def add_tangents(
 def relax(
     obstacles: Obstacles, ends: Array, line: int, lines: Lines, first: int, last: int, heap: Heap, waiting: int
 ) -> int:
-    """Extend the way that ends with `line` by the lines `first` to `last`, which leave its disc; the heap's new size."""
+    """Extend the path ending in `line` by lines `first` to `last`, which leave its disc; returns the heap's new size."""
     g, r = 0.0, 0.0
     if line >= 0:
         g, r = lines.best[line], obstacles.discs[lines.disc[line], 2]
@@ -649,11 +648,10 @@ def relax(
 
 @kernel
 def next_line(obstacles: Obstacles, lines: Lines, latest: Array, heap: Heap, waiting: int) -> tuple[int, int]:
-    """The most promising line to follow, -1 if there is none, and the heap's new size.
+    """Return the most promising line to expand, -1 if there is none, and the heap's new size.
 
-    A line is passed over if one that was followed earlier reaches the same point of the rim by a way as
-    short. Lines that were followed form a linked list per arc and turn, from `latest` (2 A,) on by
-    `Lines.earlier`.
+    A line is skipped if an earlier expanded line reaches the same point of the rim by a path at most as long.
+    Expanded lines form a linked list per arc and turn, from `latest` (2 A,) on by `Lines.earlier`.
     """
     while waiting > 0:
         e = heap.line[0]
@@ -681,7 +679,7 @@ def next_line(obstacles: Obstacles, lines: Lines, latest: Array, heap: Heap, wai
 
 @kernel
 def way_to(line: int, lines: Lines) -> Array:
-    """The lines of the way that ends with `line`, as `shortest_path` returns them."""
+    """Return the lines of the path ending in `line`, in the format of `shortest_path`."""
     count, e = 0, line
     while e >= 0:
         count += 1
@@ -698,7 +696,7 @@ def way_to(line: int, lines: Lines) -> Array:
 
 @kernel
 def touchable(discs: Array, rims: Rims, ends: Array, limit: float) -> Array:
-    """-1 for the goal, then the discs with a free arc that a path of at most `limit` from ends[0] to ends[1] may touch."""
+    """Return -1 for the goal, then the discs with a free arc that a path of at most `limit` between the ends may touch."""
     found = np.empty(len(discs) + 1, dtype=np.int64)
     found[0], size = -1, 1
     for i in range(len(discs)):
@@ -713,14 +711,13 @@ def touchable(discs: Array, rims: Rims, ends: Array, limit: float) -> Array:
 
 @kernel
 def shortest_path(discs: Array, bounds: Array, ends: Array, limit: float) -> tuple[Array, float, int]:
-    """The shortest path from point ends[0] to ends[1]: its lines (L, 6), its length, how many lines were checked.
+    """Return the shortest path from ends[0] to ends[1]: its lines (L, 6), its length, the number of lines checked.
 
-    `discs` are inflated, `bounds` shrunk; none of the discs lies within another (`keep_outer`). A line is x,
-    y where it begins, x, y where it ends, and the disc that it reaches with the turn (1 left, -1 right)
-    around it; the disc is -1 at the goal. There is no path of at most `limit` if there are no lines; a limit that is little
-    more than the length of the path saves most of the search.
+    `discs` are inflated, `bounds` shrunk; no disc lies within another (`keep_outer`). A line is its start x, y,
+    its end x, y, and the disc that it reaches with the turn (1 left, -1 right) around it; the disc is -1 at the goal.
+    No lines: there is no path of at most `limit`. A limit slightly above the path's length saves most of the search.
 
-    A* over the tangents between discs. The tangents from a disc are found when the search first reaches that
+    A* over the tangents between discs. The tangents from a disc are computed when the search first reaches that
     disc and turn; every line that arrives there tries all that leave the same free arc ahead of it.
     """
     n = discs.shape[0]
@@ -728,7 +725,7 @@ def shortest_path(discs: Array, bounds: Array, ends: Array, limit: float) -> tup
     near = touchable(discs, rims, ends, limit)
     obstacles = Obstacles(discs, bounds, rims, bins(discs, bounds), gates(discs, bounds), near)
     lines = empty_lines(max(256, 2 * n + 1))
-    span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # the lines that leave each disc by turn, the start last
+    span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # the lines that leave each disc by turn; last, the start
     latest = np.full(2 * len(obstacles.rims.begin), -1, dtype=np.int64)
     heap = Heap(np.empty(256, dtype=np.float64), np.empty(256, dtype=np.int64))
     count, waiting, checked, line = 0, 0, 0, -1

@@ -119,7 +119,7 @@ class Hybrid(ViaPointPlanner):
         return dataclasses.replace(colonies()[self.colony], ants=self.ants)
 
     def _pulled(self, query: Query, ends: RouteEnds, cells: Cells) -> Floats:
-        """The via points (n, 2) [m] of a path of cells that is pulled straight."""
+        """Return the via points (n, 2) [m] of a path of cells pulled straight."""
         from antdrive.planners.anyangle import _kernels_lines
 
         xy = np.vstack([ends.start, query.grid.xy(cells), ends.goal])

@@ -1,8 +1,8 @@
-"""Compiled ants: arrays in, arrays out, nothing validated.
+"""Compiled ants: arrays in, arrays out, no validation.
 
-Cells are flat indices. The rules of a colony reach its ants as one table `weights` (cells, 8) of float32: how
-much each move attracts, 0 where the move is not allowed. The table is filled once per iteration, so
-`walk_ants` serves every rule.
+Cells are flat indices. The table `weights` (cells, 8) of float32 holds the attraction of each move, 0 where the
+move is not allowed. It encodes all rules of a colony and is filled once per iteration, so `walk_ants` serves every
+colony.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel
 
-MIN_WEIGHT = 1e-30  # relative to the largest weight of a cell; float32 still holds it, so no allowed move is lost
+MIN_WEIGHT = 1e-30  # relative to the largest weight of a cell; within float32, so allowed moves keep a weight
 UNIT = np.float32(1.0 / 16777216.0)
 ZERO = np.float32(0.0)
 
 
 @inline
 def next_random(state: Any) -> Any:
-    """The next state of Marsaglia's xorshift64 generator; its upper bits are the random number."""
+    """Return the next state of Marsaglia's xorshift64 generator; its upper bits are the random number."""
     state ^= state << np.uint64(13)
     state ^= state >> np.uint64(7)
     state ^= state << np.uint64(17)
@@ -30,7 +30,7 @@ def next_random(state: Any) -> Any:
 
 @kernel
 def offsets(cols: int) -> Array:
-    """What each of the eight moves adds to a flat index."""
+    """Return the flat index offset of each of the eight moves."""
     out = np.empty(8, dtype=np.int64)
     for k in range(8):
         out[k] = DROW[k] * cols + DCOL[k]
@@ -39,7 +39,7 @@ def offsets(cols: int) -> Array:
 
 @kernel
 def walk_length(walk: Array, size: int, cols: int) -> float:
-    """The length of a walk [cells]."""
+    """Return the length of a walk [cells]."""
     straight, diagonal = 0, 0
     for s in range(size - 1):
         step = abs(walk[s + 1] - walk[s])
@@ -65,19 +65,18 @@ def walk_ants(
     sizes: Array,
     lengths: Array,
 ) -> int:
-    """Send one ant per seed from start to goal; the steps that all of them took.
+    """Send one ant per seed from start to goal; returns the total number of steps.
 
     Row a of `walks` receives the cells of ant a, sizes[a] their number and lengths[a] the length [cells]. An
-    ant that does not arrive, because it dies where no move has any weight or has taken `limit` steps, has
-    size 0 and length inf. A cell that the ant has visited weighs `revisit`; at 0 it is never visited again.
-    With `backtrack` an ant steps back where it would die: the dead cell is no longer part of the walk, but
-    counts as visited.
+    ant that dies where no move has any weight, or reaches `limit` steps, has size 0 and length inf. A visited
+    cell has the weight `revisit`; at 0 it is never visited again. With `backtrack` an ant steps back instead of
+    dying: the dead cell leaves the walk, but counts as visited.
 
-    The eight moves are written out and summed in pairs. A loop over them was measured 1 to 2 % slower and, as
-    it adds in another order, would round differently and so change plans.
+    The eight moves are unrolled and summed in pairs. A loop is 1 to 2 % slower; its order of summation would
+    round differently and change plans.
     """
-    pad = offset[1]  # no move leads farther, so the cells around the grid can be read without a check
-    visited = np.zeros(len(mask) + 2 * pad, dtype=np.int32)  # the number of the last ant at each cell, from 1
+    pad = offset[1]  # the longest move, so cells around the grid can be read without a check
+    visited = np.zeros(len(mask) + 2 * pad, dtype=np.int32)  # number of the last ant at each cell, from 1
     again = np.float32(revisit)
     taken = 0
     for a in range(len(seeds)):
@@ -119,7 +118,7 @@ def walk_ants(
                 i = np.int64(walk[n - 1])
                 continue
             state = next_random(state)
-            # The roulette wheel as three halvings: there is no branch for the processor to mispredict.
+            # The roulette wheel as three branch-free halvings.
             spin = np.float32(state >> np.uint64(40)) * UNIT * total
             upper = spin >= q0
             spin = spin - q0 if upper else spin
@@ -133,7 +132,7 @@ def walk_ants(
             wa = wc if second else wa
             wb = wd if second else wb
             last = spin >= wa
-            if (wb if last else wa) <= ZERO:  # rounding chose a move that is not allowed: spin again
+            if (wb if last else wa) <= ZERO:  # rounding chose a forbidden move: spin again
                 continue
             i += offset[4 * upper + 2 * second + last]
             visited[i + pad] = ant
@@ -147,7 +146,7 @@ def walk_ants(
 
 @kernel
 def summarise(lengths: Array) -> tuple[int, float, int]:
-    """How many walks arrived, their mean length, and the row of the shortest; a walk that did not arrive has length inf."""
+    """Return the number of walks that arrived, their mean length, and the row of the shortest; others have length inf."""
     count, total, first = 0, 0.0, 0
     for a in range(len(lengths)):
         if lengths[a] < np.inf:
@@ -162,7 +161,7 @@ def summarise(lengths: Array) -> tuple[int, float, int]:
 def cut_loops(
     walks: Array, sizes: Array, mask: Array, offset: Array, tours: Array, tour_sizes: Array, lengths: Array
 ) -> None:
-    """Row a of `tours` receives walk a without loops: where it returns to a cell, everything in between is dropped."""
+    """Write walk a without loops to row a of `tours`: cells between two visits of a cell are dropped."""
     place = np.full(len(mask), -1, dtype=np.int32)
     for a in range(len(sizes)):
         n = 0
@@ -184,11 +183,11 @@ def cut_loops(
 
 @kernel
 def cut_one_short(walk: Array, size: int, mask: Array, offset: Array, first: int, place: Array, tour: Array) -> int:
-    """`tour` receives the walk cut short: from each cell it goes straight to the neighbour that comes last in the walk.
+    """Write the walk cut short to `tour`: from each cell straight to the neighbour that comes last in the walk.
 
-    Returns the size of the tour. A tour is never longer than its walk: what is left out has at least two
-    steps, and the move that replaces it measures sqrt(2) at most. `place` holds the position of each cell in
-    the walk, counted from `first`; entries that earlier walks left there are below `first`.
+    Returns the size of the tour. A tour is never longer than its walk: a move of length at most sqrt(2) replaces at
+    least two steps. `place` holds the position of each cell in the walk, counted from `first`; entries of earlier
+    walks are below `first`.
     """
     for s in range(size):
         place[walk[s]] = first + s
@@ -209,9 +208,9 @@ def cut_one_short(walk: Array, size: int, mask: Array, offset: Array, first: int
 def cut_short(
     walks: Array, sizes: Array, mask: Array, offset: Array, tours: Array, tour_sizes: Array, lengths: Array
 ) -> None:
-    """Row a of `tours` receives walk a cut short."""
+    """Write walk a cut short to row a of `tours`."""
     place = np.full(len(mask), -1, dtype=np.int64)
-    first: Any = np.int64(0)  # a literal 0 would make numba compile `cut_one_short` a second time
+    first: Any = np.int64(0)  # a literal 0 would compile `cut_one_short` a second time
     for a in range(len(sizes)):
         n = cut_one_short(walks[a], sizes[a], mask, offset, first, place, tours[a])
         first += sizes[a]
@@ -235,7 +234,7 @@ def clamp(trail: Array, least: float, most: float) -> None:
 
 @kernel
 def deposit_on_cells(trail: Array, walks: Array, sizes: Array, amounts: Array) -> None:
-    """Add amounts[a] to each cell that walk a visits, once per cell however often the walk visits it."""
+    """Add amounts[a] once to each cell that walk a visits."""
     last = np.full(len(trail), -1, dtype=np.int32)
     for a in range(len(sizes)):
         for s in range(sizes[a]):
@@ -247,7 +246,7 @@ def deposit_on_cells(trail: Array, walks: Array, sizes: Array, amounts: Array) -
 
 @inline
 def row_and_move(i: Any, j: Any, row: Any, cols: int) -> tuple[Any, Any]:
-    """The row of cell j, and the move that leads to j from its neighbour i in row `row`."""
+    """Return the row of cell j, and the move to j from its neighbour i in row `row`."""
     next_row = j // cols
     up = next_row - row
     right = j - i - up * cols
@@ -272,7 +271,7 @@ def deposit_on_arcs(trail: Array, cols: int, walks: Array, sizes: Array, amounts
 
 @kernel
 def deposit_in_passing(trail: Array, walks: Array, sizes: Array, amounts: Array, evaporation: float) -> None:
-    """Add amounts[a] to each cell of walk a as the program of han2007 does: a cell evaporates only when it is added to."""
+    """Add amounts[a] to each cell of walk a as in the program of han2007: a cell evaporates only on deposits."""
     for a in range(len(sizes)):
         for s in range(sizes[a]):
             i = walks[a, s]
@@ -281,7 +280,7 @@ def deposit_in_passing(trail: Array, walks: Array, sizes: Array, amounts: Array,
 
 @kernel
 def strongest(trail: Array, out: Array) -> None:
-    """out[i] = the strongest trail that leaves cell i; `trail` is (cells, 8)."""
+    """Set out[i] to the strongest trail that leaves cell i; `trail` is (cells, 8)."""
     for i in range(len(out)):
         most = trail[i, 0]
         for k in range(1, 8):
@@ -291,7 +290,7 @@ def strongest(trail: Array, out: Array) -> None:
 
 @kernel
 def arc_weights(trail: Array, heuristic: Array, alpha: float, weights: Array) -> None:
-    """weights[i, k] = trail^alpha * heuristic, scaled so that the largest weight of each cell is 1."""
+    """Set weights[i, k] to trail^alpha * heuristic, scaled to a maximum of 1 per cell."""
     for i in range(len(weights)):
         most = 0.0
         for k in range(8):
@@ -306,7 +305,7 @@ def arc_weights(trail: Array, heuristic: Array, alpha: float, weights: Array) ->
 
 @inline
 def _power(trail: float, alpha: float) -> float:
-    """trail^alpha, fast for alpha 1 and -1; the bound keeps negative powers of evaporated trails finite."""
+    """Return trail^alpha, fast for alpha 1 and -1; the bound keeps negative powers of evaporated trails finite."""
     trail = max(trail, 1e-100)
     return trail if alpha == 1.0 else (1.0 / trail if alpha == -1.0 else trail**alpha)
 
@@ -328,7 +327,7 @@ def union_moves(walks: Array, sizes: Array, cols: int, moves: Array) -> None:
 
 @inline
 def _octile(rows: int, cols: int) -> float:
-    """The length of the shortest path over open ground [cells]."""
+    """Return the length of the shortest path over open ground [cells]."""
     rows, cols = abs(rows), abs(cols)
     return max(rows, cols) + (SQRT2 - 1.0) * min(rows, cols)
 
@@ -346,11 +345,10 @@ def detour_weights(
     to_goal: Array,
     weights: Array,
 ) -> None:
-    """weights[i, k] = exp(-greed * detour), the detour being how much longer than necessary move k makes the path.
+    """Set weights[i, k] to exp(-greed * detour), with detour the excess length of the path through move k.
 
-    The path from a cell to the goal counts as long as over open ground plus `lane_pull` times the distance to
-    a lane: the line parallel to that from start to goal, `lane` cells to its side. `to_goal` (cells,) is
-    working memory.
+    The length of the path from a cell to the goal is that over open ground plus `lane_pull` times the distance to a
+    lane: a parallel to the line from start to goal, offset by `lane` cells. `to_goal` (cells,) is working memory.
     """
     r0, c0, r1, c1 = start // cols, start % cols, goal // cols, goal % cols
     distance = max(math.hypot(r1 - r0, c1 - c0), 1.0)
@@ -369,7 +367,7 @@ def detour_weights(
 
 @kernel
 def goal_pull(mask: Array, cols: int, r1: int, c1: int, out: Array) -> None:
-    """out[i, k] = the cosine between move k and the direction from cell i to the goal, at least 0."""
+    """Set out[i, k] to the cosine between move k and the direction from cell i to the goal, at least 0."""
     for i in range(len(mask)):
         dr, dc = r1 - i // cols, c1 - i % cols
         distance = math.hypot(dr, dc)
@@ -382,7 +380,7 @@ def goal_pull(mask: Array, cols: int, r1: int, c1: int, out: Array) -> None:
 
 @kernel
 def fixed_pull(mask: Array, dr: float, dc: float, out: Array) -> None:
-    """out[i, k] = the dot product of move k (not normalised) and the same direction for all cells, at least 0."""
+    """Set out[i, k] to the dot product of move k (not normalised) and a direction common to all cells, at least 0."""
     for i in range(len(mask)):
         for k in range(8):
             out[i, k] = max(0.0, DROW[k] * dr + DCOL[k] * dc) if mask[i] & (1 << k) else 0.0
@@ -399,7 +397,7 @@ def attracted_weights(
     min_weight: float,
     weights: Array,
 ) -> None:
-    """weights[i, k] = the neighbour's trail + attraction * omega; with `shares`, the trail's share of all neighbours'."""
+    """Set weights[i, k] to trail + attraction * omega; with `shares`, the trail's fraction of all neighbours' trails."""
     for i in range(len(mask)):
         scale = 1.0
         if shares:

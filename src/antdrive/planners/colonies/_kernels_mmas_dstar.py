@@ -1,4 +1,4 @@
-"""Compiled spreading of pheromone from the goal: arrays in, arrays out, nothing validated."""
+"""Compiled spreading of pheromone from the goal: arrays in, arrays out, no validation."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ FIFTHS = np.array([5, 7, 5, 7, 5, 7, 5, 7], dtype=np.int64)  # cost of each move
 
 @kernel
 def close_gates(free: Array, moves: Array, start_row: int, start_col: int, goal_row: int, goal_col: int) -> int:
-    """Remove the moves to and from gate cells, which lie between two diagonally opposite blocked cells.
+    """Remove the moves to and from gate cells: those between two diagonally opposite blocked cells.
 
-    Returns the number of cells closed; start and goal stay open.
+    Returns the number of closed cells; start and goal stay open.
     """
     rows, cols = free.shape
     closed = 0
@@ -38,9 +38,9 @@ def close_gates(free: Array, moves: Array, start_row: int, start_col: int, goal_
 def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float, pheromone: Array) -> int:
     """Spread pheromone, `retained` times the cost of the path to the goal, until the start's is final.
 
-    Returns how many cells got some; the others have inf, where the paper writes 10000. Cells are taken from
-    the open list by cost, as D* does. Costs are multiples of 1/5, so the list is a ring of eight buckets,
-    each a linked list.
+    Returns the number of cells that received some; the others have inf, 10000 in the paper. Cells leave the open list
+    in the order of cost, as in D*. Costs are multiples of 1/5, so the list is a ring of eight buckets, each a
+    linked list.
     """
     cost = np.full(len(mask), -1, dtype=np.int64)
     closed = np.zeros(len(mask), dtype=np.bool_)
@@ -83,7 +83,7 @@ def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float
 def decide(
     mask: Array, offset: Array, cols: int, here: int, goal: int, alpha: float, beta: float, pheromone: Array
 ) -> int:
-    """The allowed neighbour of the smallest pheromone^alpha * distance^beta; -1 if none has any pheromone."""
+    """Return the allowed neighbour with the smallest pheromone^alpha * distance^beta; -1 if none has pheromone."""
     r1, c1 = goal // cols, goal % cols
     least, to = np.inf, -1
     for k in range(8):
@@ -111,10 +111,9 @@ def descend(
     pheromone: Array,
     walk: Array,
 ) -> int:
-    """Fill `walk` with cells, each the neighbour of the one before with the smallest pheromone^alpha * distance^beta.
+    """Fill `walk` with cells, each the last one's neighbour with the smallest pheromone^alpha * distance^beta.
 
-    Returns how many there are. If the walk is about to return to one of its cells, it is a circle, and the
-    number is negative.
+    Returns their number; it is negative if the walk would return to one of its cells.
     """
     been = np.zeros(len(mask), dtype=np.bool_)
     walk[0], n = start, 1

@@ -1,4 +1,4 @@
-"""Compiled ants without generations: arrays in, arrays out, nothing validated."""
+"""Compiled ants without generations: arrays in, arrays out, no validation."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ LISTED, ENTRIES = 0, 1  # indices of `Ranking.counts`
 
 
 class Graph(NamedTuple):
-    """The graph that ants walk on; cells are flat indices.
+    """The ants' graph; cells are flat indices.
 
     Attributes:
         mask: the allowed moves of each cell, one bit per direction (cells,)
-        offset: what each of the eight moves adds to an index (8,)
+        offset: the index offset of each of the eight moves (8,)
         start: the start cell
         goal: the goal cell
     """
@@ -34,14 +34,14 @@ class Rules(NamedTuple):
 
     Attributes:
         alpha: the exponent of the pheromone
-        evaporation: the share of the pheromone that is lost per tick
-        min_pheromone: the pheromone does not decay below this
-        deposit: what a walk of the first rank leaves on each of its cells
-        limit: the steps after which a walk ends
-        tabu: whether an ant avoids the cells that it has visited
+        evaporation: the fraction of pheromone lost per tick
+        min_pheromone: the lower bound of the pheromone
+        deposit: the deposit of a first-rank walk on each of its cells
+        limit: step limit of a walk
+        tabu: whether an ant avoids visited cells
         backtrack: whether an ant in a dead end steps back
         shortcut: whether walks that arrive are cut short
-        quota: the iteration ends when this many walks have ended
+        quota: number of ended walks that ends the iteration
     """
 
     alpha: float
@@ -61,8 +61,8 @@ class Ants(NamedTuple):
     Attributes:
         states: the state of each ant's random numbers (ants,)
         walks: the cells of each walk (ants, room)
-        sizes: how many cells each walk has (ants,)
-        taken: the steps each ant has taken since it left the start, those back included (ants,)
+        sizes: number of cells of each walk (ants,)
+        taken: steps of each ant since it left the start, including steps back (ants,)
         lengths: the length of each walk [cells] (ants,)
         visited: the cells that each ant has visited, one bit per cell (ants, cells / 8 + 1)
     """
@@ -80,10 +80,10 @@ class Ranking(NamedTuple):
 
     Attributes:
         walks: the cells of each walk in the list (ranks, room)
-        sizes: how many cells each walk has (ranks,)
+        sizes: number of cells of each walk (ranks,)
         costs: the cost of each walk, its length times its size (ranks,)
         order: the row of each rank, the best first (ranks,)
-        counts: how many walks are in the list (LISTED), and how many were ever entered (ENTRIES)
+        counts: number of walks in the list (LISTED), and of all entries so far (ENTRIES)
     """
 
     walks: Array
@@ -95,7 +95,7 @@ class Ranking(NamedTuple):
 
 @kernel
 def obstacle_distance(free: Array, reach: int) -> Array:
-    """The distance from each cell to the nearest blocked cell [cells], inf beyond `reach`."""
+    """Return the distance from each cell to the nearest blocked cell [cells], inf beyond `reach`."""
     rows, cols = free.shape
     out = np.full((rows, cols), np.inf)
     for r in range(rows):
@@ -111,7 +111,7 @@ def obstacle_distance(free: Array, reach: int) -> Array:
 
 @inline
 def _power(value: float, exponent: float) -> float:
-    """value^exponent, fast for the exponents 1, 2 and 3."""
+    """Return value^exponent, fast for the exponents 1, 2 and 3."""
     if exponent == 1.0:
         return value
     if exponent == 2.0:
@@ -132,7 +132,7 @@ def leave(ant: int, start: int, ants: Ants) -> None:
 
 @kernel
 def enter(walk: Array, size: int, length: float, ranking: Ranking) -> int:
-    """Enter a walk into the ranking by its cost (lee2008 eq. 15); its rank, or -1 if the list is full of better walks."""
+    """Enter a walk into the ranking by cost (lee2008 eq. 15); returns its rank, or -1 if the list is full of better ones."""
     order, costs, counts = ranking.order, ranking.costs, ranking.counts
     cost = length * size
     listed, room = counts[LISTED], len(order)
@@ -158,7 +158,7 @@ def enter(walk: Array, size: int, length: float, ranking: Ranking) -> int:
 
 @kernel
 def longest_listed(ranking: Ranking) -> float:
-    """The length of the longest walk of a full list."""
+    """Return the length of the longest walk of a full list."""
     longest = 0.0
     for row in range(len(ranking.order)):
         longest = max(longest, ranking.costs[row] / ranking.sizes[row])
@@ -178,7 +178,7 @@ def cumulate(
     alpha: float,
     out: Array,
 ) -> float:
-    """out[k] = the attraction of the moves 0 to k from cell i, with `tabu` to cells not visited; that of all."""
+    """Fill out[k] with the attraction of moves 0 to k from cell i, with `tabu` without visited cells; returns the total."""
     total = 0.0
     for k in range(8):
         if mask[i] & (1 << k):
@@ -191,7 +191,7 @@ def cumulate(
 
 @inline
 def draw(cumulated: Array, state: Any, total: float) -> int:
-    """The move that a random number points to."""
+    """Return the move selected by a random number."""
     spin = (state >> np.uint64(11)) * (1.0 / 9007199254740992.0) * total
     k = 0
     while cumulated[k] <= spin and k < 7:
@@ -201,7 +201,7 @@ def draw(cumulated: Array, state: Any, total: float) -> int:
 
 @kernel
 def cut_walk_short(ant: int, ants: Ants, graph: Graph, first: int, place: Array, tour: Array) -> None:
-    """Cut the walk of an ant short; `first`, `place` and `tour` are those of `cut_one_short`."""
+    """Cut an ant's walk short; `first`, `place` and `tour` are those of `cut_one_short`."""
     walk = ants.walks[ant]
     size = cut_one_short(walk, ants.sizes[ant], graph.mask, graph.offset, first, place, tour)
     for s in range(size):
@@ -212,7 +212,7 @@ def cut_walk_short(ant: int, ants: Ants, graph: Graph, first: int, place: Array,
 
 @kernel
 def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
-    """`tour` receives the walk, which goes on from the last visit of each cell; the size of the tour.
+    """Write the walk without loops to `tour`, continuing from the last visit of each cell; returns the tour's size.
 
     `last` (cells,) is working memory.
     """
@@ -228,7 +228,7 @@ def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
 
 @kernel
 def reward(walk: Array, size: int, length: float, trail: Array, ranking: Ranking, deposit: float) -> bool:
-    """Enter a walk into the ranking and deposit by its rank on each of its cells; whether it has a rank."""
+    """Enter a walk into the ranking and deposit by rank on each of its cells; returns whether it has a rank."""
     rank = enter(walk, size, length, ranking)
     if rank < 0:
         return False
@@ -240,7 +240,7 @@ def reward(walk: Array, size: int, length: float, trail: Array, ranking: Ranking
 
 @kernel
 def decay(trail: Array, mask: Array, min_pheromone: float, evaporation: float) -> None:
-    """Evaporate the pheromone of one tick."""
+    """Evaporate pheromone for one tick."""
     for i in range(len(trail)):
         if mask[i]:
             trail[i] = max(min_pheromone, trail[i] * (1.0 - evaporation))
@@ -258,16 +258,16 @@ def run_colony(
     best: Array,
     arrivals: Array,
 ) -> tuple[int, float, int, int]:
-    """Move every ant by a cell per tick until `rules.quota` walks have ended.
+    """Move every ant by one cell per tick until `rules.quota` walks have ended.
 
     A walk ends at the goal, in a dead end, after `rules.limit` steps, or when it is longer than every walk of
-    the full ranking; the ant then starts again. `best` receives the cells of the best walk if it is shorter
-    than `shortest`, `arrivals` the lengths of the walks that arrived.
+    the full ranking; the ant then restarts. `best` receives the cells of the best walk if it is shorter than
+    `shortest`, `arrivals` the lengths of the walks that arrived.
 
-    Returns the size of the new best walk (0: none), the length of the best walk, the steps taken, and how
-    many arrived.
+    Returns the size of the new best walk (0: none), the length of the best walk, the number of steps, and the
+    number of arrivals.
     """
-    # Arrays are taken out of their tuples here: the loop below runs once per step of every ant.
+    # Arrays are unpacked here, as the loop below runs once per step of every ant.
     mask, offset, goal = graph.mask, graph.offset, graph.goal
     states, walks, sizes, taken = ants.states, ants.walks, ants.sizes, ants.taken
     lengths, visited = ants.lengths, ants.visited
@@ -275,10 +275,10 @@ def run_colony(
     cumulated = np.empty(8, dtype=np.float64)
     place, tour = np.full(len(mask), -1, dtype=np.int64), np.empty_like(best)
     last = np.empty_like(place)
-    first: Any = np.int64(0)  # a literal 0 would make numba compile `cut_one_short` a second time
+    first: Any = np.int64(0)  # a literal 0 would compile `cut_one_short` a second time
     ended, steps, arrived, new = 0, 0, 0, 0
-    worst = np.inf  # the longest walk of the ranking once it is full
-    stale = True  # whether the ranking has changed since `worst` was found
+    worst = np.inf  # the longest walk of a full ranking
+    stale = True  # whether the ranking has changed since `worst` was computed
     while ended < rules.quota:
         for ant in range(len(states)):
             size = sizes[ant]

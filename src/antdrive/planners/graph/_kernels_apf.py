@@ -1,4 +1,4 @@
-"""Compiled potential field: arrays in, arrays out, nothing validated.
+"""Compiled potential field: arrays in, arrays out, no validation.
 
 Equation numbers as in Lee et al. 2008.
 """
@@ -14,14 +14,14 @@ from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel
 
 @inline
 def parabola(x: int, site: int, height: Array) -> int:
-    """Squared distance from column x of a row to the nearest blocked cell in column `site`."""
+    """Return the squared distance from column x of a row to the nearest blocked cell in column `site`."""
     distance2: int = (x - site) * (x - site) + height[site]
     return distance2
 
 
 @kernel
 def squared_distances(free: Array, out: Array) -> bool:
-    """Fill `out` with squared distances in cells to the nearest blocked cell; returns whether there is one.
+    """Fill `out` with squared distances to the nearest blocked cell [cells^2]; returns whether there is one.
 
     Exact, in integers and linear time: A. Meijster, J. Roerdink and W. Hesselink, *A general algorithm for
     computing distance transforms in linear time*, 2000. Cells outside the grid do not count as blocked.
@@ -93,9 +93,9 @@ def potential(
     influence: float,
     out: Array,
 ) -> None:
-    """The potential U (eq. 7): attraction to the goal (eq. 9) and repulsion from obstacles (eq. 11).
+    """Fill `out` with the potential U (eq. 7): attraction to the goal (eq. 9) and repulsion from obstacles (eq. 11).
 
-    It is infinite where blocked.
+    It is infinite in blocked cells.
     """
     rows, cols = free.shape
     for r in range(rows):
@@ -112,7 +112,7 @@ def potential(
 
 @kernel
 def roll_down(moves: Array, field: Array, r0: int, c0: int, r1: int, c1: int) -> Array:
-    """Cells (N, 2) along the steepest descent of the potential (eq. 5), to the goal or a local minimum."""
+    """Return the cells (N, 2) along the steepest descent of the potential (eq. 5), to the goal or a local minimum."""
     cells = np.empty((64, 2), dtype=np.int32)
     r, c, n = r0, c0, 1
     cells[0, 0], cells[0, 1] = r, c

@@ -1,8 +1,8 @@
-"""Compiled D*: arrays in, arrays out, nothing validated.
+"""Compiled D*: arrays in, arrays out, no validation.
 
 A. Stentz, *Optimal and efficient path planning for partially-known environments*, ICRA 1994; names and line
-numbers as there. Moves go both ways. `h` is the cost to the goal and `back` the backpointer b as a direction,
-8 for none; `heap` and `place` are the OPEN list by k, `size` its length. A state that is NEW has h = NEVER
+numbers as in the paper. Moves are bidirectional. `h` is the cost to the goal and `back` the backpointer b as a
+direction, 8 for none; `heap` and `place` are the OPEN list by k, `size` its length. A NEW state has h = NEVER
 and is not on the list.
 """
 
@@ -18,7 +18,7 @@ from antdrive.worlds._kernels import DCOL, DROW, Array, inline, kernel
 
 @inline
 def insert(x: int, cost: int, h: Array, heap: Array, place: Array, size: int) -> int:
-    """INSERT(X, h_new): the key k is the least h since X was put on the list; returns the list's length."""
+    """Do INSERT(X, h_new): the key k is the least h since X joined the list; returns the list's length."""
     k = min(heap[place[x], 0], cost) if place[x] >= 0 else min(h[x], cost)
     h[x] = cost
     return put(heap, place, size, x, k, k)
@@ -26,9 +26,9 @@ def insert(x: int, cost: int, h: Array, heap: Array, place: Array, size: int) ->
 
 @kernel
 def settle(moves: Array, start: int, h: Array, back: Array, heap: Array, place: Array, size: int) -> tuple[int, int]:
-    """PROCESS-STATE until k_min reaches h(start).
+    """Repeat PROCESS-STATE until k_min reaches h(start).
 
-    Returns the list's length and how many states were processed.
+    Returns the list's length and the number of processed states.
     """
     rows, cols = moves.shape
     mask, offset = moves.ravel(), offsets(cols)
@@ -39,7 +39,7 @@ def settle(moves: Array, start: int, h: Array, back: Array, heap: Array, place: 
         processed += 1
         row = x // cols
         col = x - row * cols
-        if k_old < h[x]:  # L4 to L7: a RAISE state may be lowered by a neighbour whose cost is final
+        if k_old < h[x]:  # L4 to L7: a neighbour with final cost may lower a RAISE state
             for k in range(8):
                 if mask[x] & (1 << k):
                     y = x + offset[k]
@@ -71,7 +71,7 @@ def settle(moves: Array, start: int, h: Array, back: Array, heap: Array, place: 
 
 @kernel
 def follow(cols: int, start: int, goal: int, back: Array) -> tuple[Array, int]:
-    """The path (N, 2) along the backpointers and its diagonal steps; the goal must be reachable."""
+    """Return the path (N, 2) along the backpointers and its number of diagonal steps; the goal must be reachable."""
     offset = offsets(cols)
     n, diagonal = 1, 0
     u = start
@@ -90,10 +90,10 @@ def follow(cols: int, start: int, goal: int, back: Array) -> tuple[Array, int]:
 
 @kernel
 def begin(goal: int, state: Array, h: Array, back: Array, heap: Array, place: Array) -> None:
-    """Initialise: only the goal is known, and it is on the OPEN list."""
+    """Initialise: only the goal is known and on the OPEN list."""
     h[:], back[:], place[:] = NEVER, 8, -1
     h[goal] = 0
-    none: Any = np.int64(0)  # the compiler would treat a plain 0 as a type of its own
+    none: Any = np.int64(0)  # the compiler would treat a literal 0 as a separate type
     state[0] = put(heap, place, none, goal, none, none)
 
 
@@ -101,7 +101,7 @@ def begin(goal: int, state: Array, h: Array, back: Array, heap: Array, place: Ar
 def repair(
     changed: Array, moves: Array, start: int, goal: int, state: Array, h: Array, back: Array, heap: Array, place: Array
 ) -> tuple[Array, int, int]:
-    """The path (N, 2) after cells changed their moves, its diagonal steps, and how many states were processed.
+    """Return the path (N, 2) after moves changed, its number of diagonal steps, and the number of processed states.
 
     The path is empty if there is none. `state` holds the length of the OPEN list.
     """

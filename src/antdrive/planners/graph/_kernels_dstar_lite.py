@@ -1,7 +1,7 @@
-"""Compiled D* Lite: arrays in, arrays out, nothing validated.
+"""Compiled D* Lite: arrays in, arrays out, no validation.
 
-S. Koenig and M. Likhachev, *D\\* Lite*, AAAI 2002, the optimised version (Figure 4); names as there. Moves go
-both ways. `g` and `rhs` are costs to the goal; `heap` and `place` are the queue U, `size` its length.
+S. Koenig and M. Likhachev, *D\\* Lite*, AAAI 2002, the optimised version (Figure 4); names as in the paper. Moves
+are bidirectional. `g` and `rhs` are costs to the goal; `heap` and `place` are the queue U, `size` its length.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from antdrive.worlds._kernels import DCOL, DROW, Array, inline, kernel
 
 @inline
 def update_vertex(u: int, h: int, km: int, g: Array, rhs: Array, heap: Array, place: Array, size: int) -> int:
-    """UpdateVertex with CalculateKey; `h` is the heuristic of u. Returns the queue's size."""
+    """Do UpdateVertex with CalculateKey; `h` is the heuristic of u. Returns the queue's size."""
     if g[u] != rhs[u]:
         least = min(g[u], rhs[u])
         size = put(heap, place, size, u, least + h + km, least)
@@ -27,7 +27,7 @@ def update_vertex(u: int, h: int, km: int, g: Array, rhs: Array, heap: Array, pl
 
 @inline
 def lookahead(u: int, mask: Array, offset: Array, g: Array) -> int:
-    """The least cost to the goal by way of a neighbour of u."""
+    """Return the least cost to the goal through a neighbour of u."""
     best = NEVER
     for k in range(8):
         if mask[u] & (1 << k):
@@ -39,9 +39,9 @@ def lookahead(u: int, mask: Array, offset: Array, g: Array) -> int:
 def settle(
     moves: Array, r0: int, c0: int, goal: int, km: int, g: Array, rhs: Array, heap: Array, place: Array, size: int
 ) -> tuple[int, int]:
-    """ComputeShortestPath from the start cell (r0, c0).
+    """Do ComputeShortestPath from the start cell (r0, c0).
 
-    Returns the queue's size and how many cells were expanded.
+    Returns the queue's size and the number of expanded cells.
     """
     cols = moves.shape[1]
     mask, offset = moves.ravel(), offsets(cols)
@@ -91,7 +91,7 @@ def settle(
 
 @kernel
 def descend(moves: Array, start: int, goal: int, g: Array) -> tuple[Array, int]:
-    """The path (N, 2) by least cost to the goal and its diagonal steps; the goal must be reachable."""
+    """Return the path (N, 2) by least cost to the goal and its number of diagonal steps; the goal must be reachable."""
     cols = moves.shape[1]
     mask, offset = moves.ravel(), offsets(cols)
     cells = np.empty((64, 2), dtype=np.int32)
@@ -114,12 +114,12 @@ def descend(moves: Array, start: int, goal: int, g: Array) -> tuple[Array, int]:
 
 @kernel
 def begin(moves: Array, start: int, goal: int, state: Array, g: Array, rhs: Array, heap: Array, place: Array) -> None:
-    """Initialize: only the goal is known, and it is in the queue."""
+    """Initialize: only the goal is known and in the queue."""
     cols = moves.shape[1]
     g[:], rhs[:], place[:] = NEVER, NEVER, -1
     rhs[goal] = 0
     h = octile(goal // cols - start // cols, goal % cols - start % cols)
-    none: Any = np.int64(0)  # the compiler would treat a plain 0 as a type of its own
+    none: Any = np.int64(0)  # the compiler would treat a literal 0 as a separate type
     state[0], state[1], state[2] = put(heap, place, none, goal, h, none), 0, start
 
 
@@ -127,7 +127,7 @@ def begin(moves: Array, start: int, goal: int, state: Array, g: Array, rhs: Arra
 def repair(
     changed: Array, moves: Array, start: int, goal: int, state: Array, g: Array, rhs: Array, heap: Array, place: Array
 ) -> tuple[Array, int, int]:
-    """Main: the path (N, 2) after cells changed their moves, its diagonal steps, and how many cells were expanded.
+    """Do Main: return the path (N, 2) after moves changed, its number of diagonal steps, and that of expanded cells.
 
     The path is empty if there is none. `state` holds the queue's size, k_m and s_last.
     """

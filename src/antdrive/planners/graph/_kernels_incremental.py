@@ -1,4 +1,4 @@
-"""Compiled parts that the incremental searches share: exact costs, an indexed heap, moves after an edit."""
+"""Compiled parts of the incremental searches: exact costs, an indexed heap, moves after an edit."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, Array, inline, kernel
 
-# Costs are integers, so that no key is ever rounded. STRAIGHT is a Pell number: DIAGONAL / STRAIGHT differs
-# from sqrt(2) by 2e-19, and two sums of fewer than a billion steps compare as a + b sqrt(2) does.
+# Costs are integers, so keys are exact. STRAIGHT is a Pell number: DIAGONAL / STRAIGHT differs from sqrt(2) by
+# 2e-19, and sums of fewer than a billion steps compare like a + b sqrt(2).
 STRAIGHT = 1_311_738_121
 DIAGONAL = 1_855_077_841
-NEVER = 1 << 62  # more than the cost of any path; the sum of both still fits 64 bits
+NEVER = 1 << 62  # above the cost of any path; their sum fits 64 bits
 
 COST = np.array([STRAIGHT, DIAGONAL] * 4, dtype=np.int64)  # by direction
 
 
 @inline
 def octile(rows: int, cols: int) -> int:
-    """Cost of the shortest path on an empty grid, in the same integers.
+    """Return the cost of the shortest path on an empty grid, in the same integers.
 
-    `_kernels_search.octile` is the same distance in cells, which is rounded.
+    `_kernels_search.octile` is the same distance in cells, with rounding.
     """
     rows, cols = abs(rows), abs(cols)
     return STRAIGHT * max(rows, cols) + (DIAGONAL - STRAIGHT) * min(rows, cols)
@@ -29,7 +29,7 @@ def octile(rows: int, cols: int) -> int:
 
 @kernel
 def offsets(cols: int) -> Array:
-    """Index differences of the eight moves in a grid of `cols` columns."""
+    """Return the index offsets of the eight moves in a grid of `cols` columns."""
     offset = np.empty(8, dtype=np.int64)
     for k in range(8):
         offset[k] = DROW[k] * cols + DCOL[k]
@@ -37,13 +37,13 @@ def offsets(cols: int) -> Array:
 
 
 # The heap holds rows of (first key, second key, cell), the smallest first. `place` holds the row of each
-# cell, -1 if the cell is not in the heap. The open list of `_kernels_sipp` differs: its entries never
-# get a new key, so it needs no `place`.
+# cell, -1 if the cell is not in the heap. The entries of `_kernels_sipp`'s open list have fixed keys, so it needs
+# no `place`.
 
 
 @inline
 def before(heap: Array, i: int, first: int, second: int) -> bool:
-    """Whether entry i comes strictly before a key."""
+    """Return whether entry i comes strictly before a key."""
     return bool(heap[i, 0] < first or (heap[i, 0] == first and heap[i, 1] < second))
 
 
@@ -81,7 +81,7 @@ def sink(heap: Array, place: Array, size: int, i: int, first: int, second: int, 
 
 @kernel
 def put(heap: Array, place: Array, size: int, cell: int, first: int, second: int) -> int:
-    """Insert a cell or give it a new key; returns the new size."""
+    """Insert a cell or update its key; returns the new size."""
     i: Any = np.int64(place[cell])
     if i < 0:
         rise(heap, place, size, first, second, cell)
@@ -110,9 +110,9 @@ def take(heap: Array, place: Array, size: int, cell: int) -> int:
 
 @inline
 def moves_between_free(free: Array, r: int, c: int) -> int:
-    """The moves of a cell that the free cells alone allow.
+    """Return the moves of a cell between free cells.
 
-    A diagonal also needs both of its orthogonal neighbours.
+    A diagonal also needs both its orthogonal neighbours free.
     """
     rows, cols = free.shape
     mask = 0
@@ -129,7 +129,7 @@ def moves_between_free(free: Array, r: int, c: int) -> int:
 
 @kernel
 def closed_moves(free: Array, moves: Array, closed: Array) -> None:
-    """Fill `closed` with the moves that are forbidden although the cells are free."""
+    """Fill `closed` with the forbidden moves between free cells."""
     rows, cols = free.shape
     for r in range(rows):
         for c in range(cols):
@@ -138,10 +138,10 @@ def closed_moves(free: Array, moves: Array, closed: Array) -> None:
 
 @kernel
 def mark(free: Array, closed: Array, moves: Array, cells: Array, value: bool, changed: Array) -> tuple[int, int]:
-    """Make cells (N, 2) free or blocked, and list in `changed` the cells that now have other moves.
+    """Make cells (N, 2) free or blocked, and list in `changed` the cells whose moves changed.
 
-    Returns how many these are, and the index of the first cell outside the grid. If there is none, it is -1;
-    if there is one, nothing is changed.
+    Returns their number, and the index of the first cell outside the grid or -1. If a cell lies outside, nothing
+    changes.
     """
     rows, cols = free.shape
     count = 0
@@ -163,7 +163,7 @@ def mark(free: Array, closed: Array, moves: Array, cells: Array, value: bool, ch
 
 @kernel
 def adopt(moves: Array, new: Array, changed: Array) -> int:
-    """Replace the moves by new ones and list in `changed` the cells where they differ; returns how many."""
+    """Replace the moves by new ones and list in `changed` the cells where they differ; returns their number."""
     rows, cols = moves.shape
     count = 0
     for r in range(rows):

@@ -1,4 +1,4 @@
-"""Compiled graph search over `Grid.moves`: arrays in, arrays out, nothing validated."""
+"""Compiled graph search over `Grid.moves`: arrays in, arrays out, no validation."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled, inline, kernel
 
-# Path costs are a + b sqrt(2) with whole a and b. Two different costs that could meet in one search differ by
-# far more than this, and rounding errors are far smaller.
+# Path costs are a + b sqrt(2) with integers a and b. Different costs in one search differ by far more than this;
+# rounding errors are far smaller.
 TIE = 1e-6
 
 # The open list is a ring of buckets, each a stack. One bucket spans 1/16 of a cell side; a move raises g + h
-# by at most 2 sqrt(2) = 2.83 cell sides, so 64 buckets never wrap onto each other.
+# by at most 2 sqrt(2) = 2.83 cell sides, so 64 buckets never overlap.
 BUCKETS = 64
 PER_CELL = 16.0
 
@@ -21,9 +21,9 @@ CLOSED = 16
 
 
 def _shunned() -> Array:
-    """The moves out of a cell that need not be tried, by the move into it and the allowed moves of the cell before.
+    """Return the redundant moves out of a cell, by the move into it and the allowed moves of its predecessor.
 
-    They lead back, or to a cell that the cell before reaches by one move of its own, at no higher cost.
+    They lead back, or to a cell that the predecessor reaches by a single move at no higher cost.
     """
     step = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(DROW, DCOL, strict=True))}
     table = np.zeros((8, 256), dtype=np.uint8)
@@ -43,14 +43,14 @@ SHUNNED = _shunned()
 
 @inline
 def octile(rows: int, cols: int) -> float:
-    """Length of the shortest path on an empty grid between cells this many rows and columns apart [cells]."""
+    """Return the length of the shortest path on an empty grid between cells `rows` and `cols` apart [cells]."""
     rows, cols = abs(rows), abs(cols)
     return max(rows, cols) + (SQRT2 - 1.0) * min(rows, cols)
 
 
 @kernel
 def traced(mark: Array, offset: Array, cols: int, start: int, goal: int) -> tuple[Array, int]:
-    """The path (N, 2) along the moves by which cells were entered, and its diagonal steps."""
+    """Return the path (N, 2) along the moves by which cells were entered, and its number of diagonal steps."""
     n = 1
     i = goal
     while i != start:
@@ -70,13 +70,12 @@ def traced(mark: Array, offset: Array, cols: int, start: int, goal: int) -> tupl
 
 @kernel
 def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bool) -> tuple[Array, int, int, int]:
-    """The shortest path (N, 2), empty if there is none; its straight and diagonal steps; the number of cells expanded.
+    """Return the shortest path (N, 2), empty without one; its straight and diagonal steps; the expanded cells.
 
-    A* with the octile heuristic if `informed`, else Dijkstra's algorithm. Cells may leave a bucket out of
-    order, so a cell whose cost drops after it was closed is opened again, and the search ends only when
-    nothing cheaper is open.
+    A* with the octile heuristic if `informed`, else Dijkstra's algorithm. Cells may leave a bucket out of order, so a
+    closed cell is reopened if its cost drops, and the search ends only when nothing cheaper is open.
 
-    The open list is written out in the loop, which the speed of most planners depends on.
+    The open list is inlined in the loop for speed, as most planners use this search.
     """
     rows, cols = moves.shape
     mask = moves.ravel()
@@ -90,7 +89,7 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
     head = np.full(BUCKETS, -1, dtype=np.int32)
     entry_cell = np.empty(1024, dtype=np.int32)
     entry_next = np.empty(1024, dtype=np.int32)
-    entries, spare = 0, -1  # how many entries there are, and the first of those that can be used again
+    entries, spare = 0, -1  # the number of entries, and the first reusable one
 
     origin = octile(r1 - r0, c1 - c0) if informed else 0.0
     mark[start] = SEEN
@@ -122,7 +121,7 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
             continue
         row = i // cols
         col = i - row * cols
-        if limit < np.inf:  # the goal is closed; its own bucket is finished
+        if limit < np.inf:  # the goal is closed; finish its bucket
             h = octile(r1 - row, c1 - col) if informed else 0.0
             if g + h >= limit:
                 continue
@@ -164,7 +163,7 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
 
 @kernel
 def connected(moves: Array, r0: int, c0: int, r1: int, c1: int) -> bool:
-    """Whether allowed moves lead from one cell to another, by a flood fill."""
+    """Return whether allowed moves lead from one cell to another, by a flood fill."""
     rows, cols = moves.shape
     mask = moves.ravel()
     start, goal = r0 * cols + c0, r1 * cols + c1

@@ -1,8 +1,8 @@
-"""Compiled safe-interval path planning: arrays in, arrays out, nothing validated.
+"""Compiled safe-interval path planning: arrays in, arrays out, no validation.
 
-A mover's motion is given as legs, on each of which it moves in a straight line at constant speed. The robot
-also does, while it waits or makes one move. So the instants at which the two come too close form an interval
-whose ends have a closed form, and nothing here is sampled. Times are in seconds, positions in metres.
+A mover's motion consists of straight legs at constant speed. So does the robot's: waits and moves. The conflicts of
+a leg and a move form an interval with ends in closed form; nothing is sampled. Times are in seconds, positions in
+metres.
 """
 
 from __future__ import annotations
@@ -17,17 +17,15 @@ from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled_rows, inl
 
 INSTANT = 1e-9  # s: shorter gaps count as closed
 
-# Columns of a leg: when it begins and ends, position at its beginning, velocity, distance that the robot's
-# centre keeps.
+# Columns of a leg: start and end time, start position, velocity, clearance of the robot's centre.
 BEGIN, END, X, Y, VX, VY, KEEP = range(7)
 
-# Columns of an entry of the open list: the earliest possible arrival at the goal, the arrival here, the safe
-# interval.
+# Columns of an open-list entry: lower bound of the arrival at the goal, arrival here, safe interval.
 F, G, INTERVAL = range(3)
 
 
 class Frame(NamedTuple):
-    """Where the grid's cells lie: the centre of cell (0, 0) and the side of a cell [m]."""
+    """The grid's frame: the centre of cell (0, 0) and the side of a cell [m]."""
 
     x0: float
     y0: float
@@ -35,7 +33,7 @@ class Frame(NamedTuple):
 
 
 class NearLegs(NamedTuple):
-    """By cell, the legs that may come too close: of cell i those numbered number[first[i] : first[i + 1]]."""
+    """The legs that may come too close to each cell: number[first[i] : first[i + 1]] for cell i."""
 
     legs: Array  # (L, 7)
     first: Array  # (cells + 1,)
@@ -43,7 +41,7 @@ class NearLegs(NamedTuple):
 
 
 class Intervals(NamedTuple):
-    """When a robot can stand in cell i: from since[k] to until[k] for first[i] <= k < first[i + 1]."""
+    """Safe intervals of cell i: from since[k] to until[k] for first[i] <= k < first[i + 1]."""
 
     first: Array  # (cells + 1,)
     since: Array  # (K,) [s]
@@ -62,15 +60,15 @@ class Trip(NamedTuple):
 
 
 class Tree(NamedTuple):
-    """By safe interval, the best way into it that is known."""
+    """The best known path into each safe interval."""
 
-    reached: Array  # (K,) when it is reached, inf while it is not [s]
-    parent: Array  # (K,) the interval before, -1 at the root
-    left: Array  # (K,) when the parent's cell is left [s]
+    reached: Array  # (K,) arrival time, inf while unreached [s]
+    parent: Array  # (K,) the previous interval, -1 at the root
+    left: Array  # (K,) departure time from the parent's cell [s]
 
 
 class Move(NamedTuple):
-    """A move: first and last possible departure, duration, and the least time from its end to the goal."""
+    """A move: earliest and latest departure, duration, and the minimum time from its end to the goal."""
 
     now: float
     latest: float
@@ -80,10 +78,10 @@ class Move(NamedTuple):
 
 @kernel
 def legs_within(t: Array, xy: Array, jump: Array, tolerance: float) -> tuple[Array, Array, int]:
-    """First and last sample of each leg when samples are joined to legs that are as long as possible, and their number.
+    """Join samples to legs as long as possible; returns each leg's first and last sample, and the number of legs.
 
-    Samples `xy` (T, 2) at `t` (T,) lie no farther than `tolerance` from the leg over them. No leg spans a
-    jump, which is between samples i and i + 1 where jump[i].
+    Samples `xy` (T, 2) at `t` (T,) lie within `tolerance` of their leg. No leg spans a jump; jump[i] marks one
+    between samples i and i + 1.
     """
     first, last = np.empty(len(t), dtype=np.int64), np.empty(len(t), dtype=np.int64)
     count, a = 0, 0
@@ -91,7 +89,7 @@ def legs_within(t: Array, xy: Array, jump: Array, tolerance: float) -> tuple[Arr
         if jump[a]:
             a += 1
             continue
-        # The velocities for which the leg passes every sample so far within the tolerance, as a box.
+        # The box of velocities for which the leg passes every sample so far within the tolerance.
         low_x, high_x, low_y, high_y = -np.inf, np.inf, -np.inf, np.inf
         b = a
         while b < len(t) - 1 and not jump[b]:
@@ -111,9 +109,9 @@ def legs_within(t: Array, xy: Array, jump: Array, tolerance: float) -> tuple[Arr
 
 @kernel
 def near_legs(legs: Array, free: Array, frame: Frame) -> tuple[Array, Array]:
-    """`first` and `number` of `NearLegs`: by free cell, the legs that may come too close to a robot there.
+    """Compute `first` and `number` of `NearLegs`: the legs that may come too close to a robot in each free cell.
 
-    They include those that may come too close during a move from there. Legs keep their order.
+    They include legs that may come too close during a move from the cell. Legs keep their order.
     """
     rows, cols = free.shape
     first = np.zeros(rows * cols + 1, dtype=np.int64)
@@ -157,7 +155,7 @@ def near_legs(legs: Array, free: Array, frame: Frame) -> tuple[Array, Array]:
 
 @inline
 def within(qx: float, qy: float, vx: float, vy: float, reach: float, span: float) -> tuple[float, float]:
-    """The part of [0, span] in which |q + v s| < reach, as (lo, hi); lo > hi if there is none."""
+    """Return the part of [0, span] in which |q + v s| < reach, as (lo, hi); lo > hi if there is none."""
     a = vx * vx + vy * vy
     b = qx * vx + qy * vy
     c = qx * qx + qy * qy - reach * reach
@@ -177,7 +175,7 @@ def within(qx: float, qy: float, vx: float, vy: float, reach: float, span: float
 
 @kernel
 def conflict(leg: Array, x: float, y: float, ux: float, uy: float, lasts: float) -> tuple[float, float]:
-    """The departures between lo and hi for which a move from (x, y) at velocity u over `lasts` comes too close to a leg.
+    """Return the departures (lo, hi) for which a move from (x, y) at velocity u over `lasts` comes too close to a leg.
 
     With w the time since the leg began and s the time since the departure, the robot is too close where
     |q + v w - u s| < reach: a convex region, cut by the rectangle 0 <= w <= span, 0 <= s <= lasts.
@@ -222,7 +220,7 @@ def insert(lows: Array, highs: Array, count: int, lo: float, hi: float) -> int:
 
 @kernel
 def most_legs(near: NearLegs) -> int:
-    """The largest number of legs near one cell."""
+    """Return the largest number of legs near one cell."""
     most = 0
     for i in range(len(near.first) - 1):
         most = max(most, near.first[i + 1] - near.first[i])
@@ -231,7 +229,7 @@ def most_legs(near: NearLegs) -> int:
 
 @kernel
 def safe_intervals(near: NearLegs, free: Array, frame: Frame, start: float, end: float) -> tuple[Array, Array, Array]:
-    """The fields of `Intervals`: when a robot can stand in each free cell between two times."""
+    """Compute the fields of `Intervals`: when a robot can stand in each free cell between two times."""
     rows, cols = free.shape
     room = rows * cols + len(near.number)
     first = np.empty(rows * cols + 1, dtype=np.int64)
@@ -266,7 +264,7 @@ def safe_intervals(near: NearLegs, free: Array, frame: Frame, start: float, end:
 
 @inline
 def sooner(heap: Array, a: int, b: int) -> bool:
-    """Whether entry a of the open list comes before entry b: by lower f, then by later arrival."""
+    """Return whether entry a of the open list precedes entry b: by lower f, then by later arrival."""
     return bool(heap[a, F] < heap[b, F] or (heap[a, F] == heap[b, F] and heap[a, G] > heap[b, G]))
 
 
@@ -281,7 +279,7 @@ def swap(heap: Array, a: int, b: int) -> None:
 def push(heap: Array, size: int, f: float, g: float, interval: int) -> Array:
     """Add an entry to the `size` entries of the open list.
 
-    Returns the list, which has grown if it was full.
+    Returns the list, enlarged if it was full.
     """
     if size == len(heap):
         heap = doubled_rows(heap)
@@ -295,7 +293,7 @@ def push(heap: Array, size: int, f: float, g: float, interval: int) -> Array:
 
 @kernel
 def drop_first(heap: Array, size: int) -> int:
-    """Remove the first of the `size` entries of the open list; returns how many are left."""
+    """Remove the first of the `size` entries of the open list; returns the new size."""
     size -= 1
     for column in range(3):
         heap[0, column] = heap[size, column]
@@ -319,7 +317,7 @@ def conflicts(
 ) -> int:
     """Fill `lows` and `highs` with the departures that conflict with a leg, sorted.
 
-    Returns how many intervals they form.
+    Returns the number of intervals.
     """
     count = 0
     for e in range(near.first[i], near.first[i + 1]):
@@ -345,9 +343,9 @@ def relax(
     heap: Array,
     size: int,
 ) -> tuple[Array, int]:
-    """Reach the safe intervals of cell `to` from interval `state` between conflicts; the open list and its size.
+    """Reach the safe intervals of cell `to` from interval `state` between conflicts; returns the open list and its size.
 
-    Between two conflicts the robot can leave at any instant, and all of these reach one interval of the next
+    Between two conflicts the robot can leave at any instant; all these departures reach one interval of the next
     cell.
     """
     leave, n = move.now, 0
@@ -374,7 +372,7 @@ def relax(
 
 @kernel
 def traced(tree: Tree, cell_of: Array, cols: int, found: int) -> tuple[Array, Array, Array]:
-    """The cells (N, 2) from the root to interval `found`, and when each is reached and left.
+    """Return the cells (N, 2) from the root to interval `found`, with their arrival and departure times.
 
     All are empty if `found` is -1.
     """
@@ -398,10 +396,10 @@ def traced(tree: Tree, cell_of: Array, cols: int, found: int) -> tuple[Array, Ar
 def earliest(
     moves: Array, frame: Frame, near: NearLegs, intervals: Intervals, trip: Trip
 ) -> tuple[Array, Array, Array, int]:
-    """The path that arrives first: its cells, when each is reached and left, and how many intervals were expanded.
+    """Return the earliest-arrival path: cells, arrival and departure times, and the number of expanded intervals.
 
-    Phillips and Likhachev's A* over the safe intervals of cells; of all ways into an interval only the first
-    to arrive matters, since the robot can wait there. The path is empty if none arrives by `trip.end`.
+    Phillips and Likhachev's A* over the safe intervals of cells; of all paths into an interval only the earliest
+    counts, as the robot can wait there. The path is empty if none arrives by `trip.end`.
     """
     rows, cols = moves.shape
     mask = moves.ravel()

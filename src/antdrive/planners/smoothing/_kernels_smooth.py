@@ -1,9 +1,9 @@
-"""Compiled string pulling among discs: arrays in, arrays out, nothing validated.
+"""Compiled string pulling among discs: arrays in, arrays out, no validation.
 
-A taut string consists of straight links and of contacts, at each of which it bends around a disc by a sweep:
-to the left, turn 1, or to the right, turn -1. Link i leads from contact i - 1 to contact i; the first leaves
-the start and the last reaches the goal, so there is one more link than contacts. A link that leaves a disc in
-direction `a` leaves its rim at the angle `a - turn * pi / 2`. Angles are in radians, lengths in metres.
+A taut string consists of straight links and of contacts. At a contact it bends around a disc by a sweep: to the
+left, turn 1, or to the right, turn -1. Link i leads from contact i - 1 to contact i; the first leaves the start
+and the last reaches the goal, so there is one more link than contacts. A link that leaves a disc in direction
+`a` leaves its rim at the angle `a - turn * pi / 2`. Angles are in radians, lengths in metres.
 """
 
 from __future__ import annotations
@@ -30,26 +30,24 @@ from antdrive.worlds._kernels import (
 )
 
 TURN = 2.0 * math.pi
-GRAZE = 1e-9  # rad: a link that has turned past a disc by less than this touches it
-DEEP = 2e-10  # m: what enters a disc by less than this only touches it
-NOT_INSIDE = (
-    1e-3  # m: a disc whose centre is farther away than radii allow by this is not within another, whatever the rounding
-)
-STRIPS = 64  # of the plane, by which segments are sorted
-LOOSE = -1e-11  # rad: a contact whose sweep is less than this does not bend the string
-NONE, OFF, HIT = range(3)  # events while a link turns: it reaches its target, leaves its disc, or meets another disc
+GRAZE = 1e-9  # rad: a link turned past a disc by less than this touches it
+DEEP = 2e-10  # m: an entry into a disc by less than this is a touch
+NOT_INSIDE = 1e-3  # m: margin on centre distances beyond which a disc is certainly not within another
+STRIPS = 64  # number of strips of the plane that index segments
+LOOSE = -1e-11  # rad: a contact with a smaller sweep does not bend the string
+NONE, OFF, HIT = range(3)  # events of a turning link: it reaches its target, leaves its disc, or meets another disc
 
 
 class Contacts(NamedTuple):
     """The bends of a string with K contacts."""
 
-    disc: Array  # (K,) index of the disc that it bends around
+    disc: Array  # (K,) index of the disc
     turn: Array  # (K,) 1 left, -1 right
     sweep: Array  # (K,) [rad]
 
 
 class String(NamedTuple):
-    """A string: its contacts, links (K + 1, 4) as x, y from and x, y to, and discs (N, 3)."""
+    """A string: contacts, links (K + 1, 4) as x, y from and x, y to, and discs (N, 3)."""
 
     contacts: Contacts
     links: Array
@@ -57,7 +55,7 @@ class String(NamedTuple):
 
 
 class Link(NamedTuple):
-    """The last link while it turns: the disc it leaves, -1 at the start of the string, and its direction."""
+    """The turning last link: the disc it leaves, -1 at the start of the string, and its direction."""
 
     base: Any
     x: float
@@ -69,16 +67,16 @@ class Link(NamedTuple):
 
 @inline
 def signed(angle: float) -> float:
-    """The angle within [-pi, pi]."""
+    """Wrap an angle to [-pi, pi]."""
     return float(angle - TURN * np.round(angle / TURN))
 
 
 @inline
 def tangent(x: float, y: float, r: float, s: float, px: float, py: float, q: float, t: float) -> tuple[float, float]:
-    """Direction and length of the line that leaves one disc (x, y, r) and reaches another (px, py, q).
+    """Return direction and length of the line that leaves one disc (x, y, r) and reaches another (px, py, q).
 
-    It passes the first on the side given by the turn s, the second by the turn t. A disc of radius 0 is a
-    point. The length is negative if there is no such line.
+    Its turn around the first is s, around the second t. A disc of radius 0 is a point. The length is negative if there
+    is no such line.
     """
     dx, dy = px - x, py - y
     d = math.hypot(dx, dy)
@@ -96,9 +94,9 @@ def tangent(x: float, y: float, r: float, s: float, px: float, py: float, q: flo
 def first_event(
     link: Link, rest: float, way: float, sweep: float, ax: float, ay: float, bx: float, by: float, discs: Array
 ) -> tuple[int, float, int, float]:
-    """What happens first while a link turns by at most `rest` in the sense `way`, as its end goes along the leg ab.
+    """Return the first event while a link turns by at most `rest` in the sense `way`, with its end on the leg ab.
 
-    Returns the event, the angle turned until then, and for HIT the disc and the link's direction.
+    Also returns the angle turned until then, and for HIT the disc and the link's direction.
     """
     base, x, y, r, s, heading = link
     event, first, closest, met, met_heading = NONE, rest, np.inf, -1, 0.0
@@ -121,24 +119,23 @@ def first_event(
             continue
         leave = direction - 0.5 * math.pi * way
         if way * (vx * (ky + q * math.sin(leave) - ay) - vy * (kx + q * math.cos(leave) - ax)) <= 0.0:
-            continue  # the disc lies beyond the leg, so the link does not reach it
+            continue  # the disc lies beyond the leg, out of the link's reach
         event, first, closest, met, met_heading = HIT, ahead, length, k, direction
     return event, first, met, met_heading
 
 
 @kernel
 def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
-    """Whether the shortest line homotopic to a clear polyline (M, 2) was found, and its contacts.
+    """Return whether the shortest line homotopic to a clear polyline (M, 2) was found, and its contacts.
 
-    One end of the string stays at the first point, the other is carried along the polyline. Only the last
-    link moves: on each straight leg of the polyline it turns about the last contact in one sense, until it
-    meets a disc, which becomes a contact, or is in line with the link before it, which removes the contact
-    between them. The discs (N, 3) must lie off the polyline; they may overlap, but none may lie within
-    another.
+    One end of the string stays at the first point, the other moves along the polyline. Only the last link
+    moves: on each leg of the polyline it turns about the last contact in one sense. A disc that it meets becomes
+    a contact; alignment with the previous link removes the contact between them. The discs (N, 3) must lie off the
+    polyline; they may overlap, but none may lie within another.
     """
     events = 10_000 + 100 * (
         discs.shape[0] + line.shape[0]
-    )  # far more than any string has; rounding could make it circle
+    )  # far above the number in any string; stops cycles caused by rounding
     disc = np.empty(32, dtype=np.int64)
     turn = np.empty(32, dtype=np.float64)
     sweep = np.empty(32, dtype=np.float64)
@@ -159,10 +156,9 @@ def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
             if way == 0.0:
                 way = 1.0 if rest > 0.0 else -1.0
             rest *= way
-            met: Any = np.int64(-1)  # the compiler would treat a plain -1 as a type of its own
+            met: Any = np.int64(-1)  # the compiler would treat a literal -1 as a separate type
             event, turned, met_heading = NONE, rest, 0.0
-            # At the very start the end may be carried past the pin itself: then the link has no length and
-            # sweeps nothing.
+            # At the start the moving end may pass the fixed end: the link then has no length and sweeps nothing.
             if rest > 0.0 and not (count == 0 and rest > math.pi - GRAZE):
                 bend = sweep[count - 1] if count > 0 else 0.0
                 event, turned, met, met_heading = first_event(link, rest, way, bend, ax, ay, bx, by, discs)
@@ -190,11 +186,11 @@ def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
 
 @kernel
 def outermost(discs: Array) -> Array:
-    """Which discs (N, 3) do not lie within another; of equal discs only the first is kept."""
+    """Return which discs (N, 3) do not lie within another; of equal discs only the first is kept."""
     n = discs.shape[0]
     keep = np.ones(n, dtype=np.bool_)
-    axis = 1 if n > 0 and np.ptp(discs[:, 1]) > np.ptp(discs[:, 0]) else 0  # along which most discs are far apart
-    order = np.argsort(discs[:, axis])  # so that those whose centres have nearly the same place on it are side by side
+    axis = 1 if n > 0 and np.ptp(discs[:, 1]) > np.ptp(discs[:, 0]) else 0  # the axis with the larger spread
+    order = np.argsort(discs[:, axis])
     x = discs[order, axis]
     largest = 0.0
     for i in range(n):
@@ -216,7 +212,7 @@ def outermost(discs: Array) -> Array:
 
 @inline
 def drop(count: int, i: int, contacts: Contacts) -> int:
-    """Remove contact i; returns how many remain."""
+    """Remove contact i; returns the new count."""
     disc, turn, sweep = contacts
     for j in range(i, count - 1):
         disc[j], turn[j], sweep[j] = disc[j + 1], turn[j + 1], sweep[j + 1]
@@ -225,7 +221,7 @@ def drop(count: int, i: int, contacts: Contacts) -> int:
 
 @inline
 def insert(count: int, i: int, contacts: Contacts, k: int, t: float, a: float) -> int:
-    """Insert a contact with disc k, turn t and sweep a before contact i; returns how many there are now."""
+    """Insert a contact with disc k, turn t and sweep a before contact i; returns the new count."""
     disc, turn, sweep = contacts
     for j in range(count, i, -1):
         disc[j], turn[j], sweep[j] = disc[j - 1], turn[j - 1], sweep[j - 1]
@@ -235,28 +231,28 @@ def insert(count: int, i: int, contacts: Contacts, k: int, t: float, a: float) -
 
 @inline
 def past(x: float, y: float, cx: float, cy: float, bx: float, by: float, turn: float) -> float:
-    """The angle from (bx, by) to (x, y) about a centre (cx, cy), in the sense of `turn` [rad]."""
+    """Return the angle from (bx, by) to (x, y) about a centre (cx, cy), in the sense of `turn` [rad]."""
     return (turn * (math.atan2(y - cy, x - cx) - math.atan2(by - cy, bx - cx))) % TURN
 
 
 @inline
 def wedge_of(bx: float, by: float, turn: float, sweep: float) -> tuple[float, float, float, float, float]:
-    """The directions at which an arc about the origin begins and ends, and its turn; 0 if it is no less than a quarter."""
+    """Return the directions of both ends of an arc about the origin, and its turn; 0 for a quarter circle or more."""
     cos, sin = math.cos(sweep), turn * math.sin(sweep)
     return bx, by, cos * bx - sin * by, sin * bx + cos * by, turn if sweep < 1.5 else 0.0
 
 
 @inline
 def outside(x: float, y: float, wedge: tuple[float, float, float, float, float]) -> bool:
-    """Whether (x, y) surely lies in a direction that an arc does not sweep; never for one of a quarter or more."""
+    """Return whether (x, y) certainly lies outside an arc's directions; always False for a quarter circle or more."""
     bx, by, ex, ey, turn = wedge
-    least = -GRAZE * (abs(bx) + abs(by)) * (abs(x) + abs(y))  # far more than what rounding can do
+    least = -GRAZE * (abs(bx) + abs(by)) * (abs(x) + abs(y))  # far above rounding errors
     return bool(turn * (bx * y - by * x) < least or turn * (x * ey - y * ex) < least)
 
 
 @kernel
 def merge_repeats(count: int, contacts: Contacts) -> int:
-    """Merge consecutive contacts with one disc; returns how many remain."""
+    """Merge consecutive contacts with one disc; returns the new count."""
     disc, turn, sweep = contacts
     for i in range(count - 1, 0, -1):
         if disc[i] == disc[i - 1] and turn[i] == turn[i - 1]:
@@ -269,7 +265,7 @@ def merge_repeats(count: int, contacts: Contacts) -> int:
 def place_links(count: int, contacts: Contacts, discs: Array, ends: Array, links: Array, heading: Array) -> bool:
     """Fill `links` and their directions with the tangents between consecutive contacts.
 
-    Returns False if there is none.
+    Returns False if a tangent does not exist.
     """
     disc, turn, _ = contacts
     for i in range(count + 1):
@@ -293,7 +289,7 @@ def place_links(count: int, contacts: Contacts, discs: Array, ends: Array, links
 def loosest(count: int, contacts: Contacts, heading: Array) -> int:
     """Measure the sweeps between links.
 
-    Returns the contact that bends the string least if it is loose, else -1.
+    Returns the contact with the smallest sweep if it is loose, else -1.
     """
     _, turn, sweep = contacts
     least, loose = LOOSE, -1
@@ -307,9 +303,9 @@ def loosest(count: int, contacts: Contacts, heading: Array) -> int:
 
 @kernel
 def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array, boxes: Array) -> tuple[int, int, bool]:
-    """The disc that the string enters most, -1 if none; the link or contact that enters it.
+    """Return the disc that the string enters most deeply, -1 if none; the link or contact that enters it.
 
-    The third value is whether a contact enters it, not a link. `boxes` are the rectangles around the discs.
+    The third value is True for a contact, False for a link. `boxes` are the rectangles around the discs.
     """
     disc, turn, sweep = contacts
     most, at, entered, on_arc = DEEP, -1, -1, False
@@ -347,13 +343,13 @@ def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array, bo
 
 @kernel
 def add_contact(count: int, contacts: Contacts, links: Array, discs: Array, entered: int, at: int, on_arc: bool) -> int:
-    """Make a disc that the string enters a contact, on the side where its centre lies.
+    """Turn a disc that the string enters into a contact, on the side of its centre.
 
-    Returns how many there are now.
+    Returns the new count.
     """
     disc, turn, sweep = contacts
     kx, ky = discs[entered, 0], discs[entered, 1]
-    if on_arc:  # the contact is split in two, before and after the disc
+    if on_arc:  # split the contact in two, before and after the disc
         i = disc[at]
         bend, t = sweep[at], turn[at]
         ahead = past(kx, ky, discs[i, 0], discs[i, 1], links[at, 2], links[at, 3], t)
@@ -367,10 +363,10 @@ def add_contact(count: int, contacts: Contacts, links: Array, discs: Array, ente
 
 @kernel
 def settle(first: Contacts, discs: Array, ends: Array) -> tuple[bool, Array, Array, Array, Array]:
-    """The taut string near given contacts when the discs (N, 3) are not quite those that it was pulled among.
+    """Compute the taut string near given contacts among slightly different discs (N, 3).
 
     Returns whether it was found, its contacts, and its links (K + 1, 4). Until nothing changes, the loosest
-    contact is removed, or else the disc that the string enters most becomes a contact.
+    contact is removed, or else the disc that the string enters most deeply becomes a contact.
     """
     count = len(first.disc)
     room = 2 * count + 64
@@ -402,7 +398,7 @@ def settle(first: Contacts, discs: Array, ends: Array) -> tuple[bool, Array, Arr
 
 @kernel
 def string_length(string: String) -> float:
-    """The length of a string."""
+    """Return the length of a string."""
     disc, sweep, links, discs = string.contacts.disc, string.contacts.sweep, string.links, string.discs
     total = 0.0
     for i in range(links.shape[0]):
@@ -414,7 +410,7 @@ def string_length(string: String) -> float:
 
 @kernel
 def string_clearance(string: String, built: Array, bounds: Array) -> float:
-    """The exact distance from a string to the nearest wall or surface of the discs as built (N, 3)."""
+    """Return the exact distance from a string to the nearest wall or surface of the discs as built (N, 3)."""
     (disc, turn, sweep), links, discs = string
     boxes = boxes_around(built)
     best = np.inf
@@ -425,7 +421,7 @@ def string_clearance(string: String, built: Array, bounds: Array) -> float:
             continue
         x, y, r = discs[disc[i], 0], discs[disc[i], 1], discs[disc[i], 2]
         bx, by = links[i, 2], links[i, 3]
-        for quarter in range(4):  # where the arc may be nearest to a wall, apart from its ends
+        for quarter in range(4):  # candidates for the arc's nearest point to a wall, besides its ends
             px, py = x + r * math.cos(0.5 * math.pi * quarter), y + r * math.sin(0.5 * math.pi * quarter)
             if past(px, py, x, y, bx, by, turn[i]) < sweep[i]:
                 best = min(best, wall_distance(px, py, bounds))
@@ -444,7 +440,7 @@ def string_clearance(string: String, built: Array, bounds: Array) -> float:
 
 @kernel
 def with_point(xy: Array, curvature: Array, size: int, x: float, y: float, bend: float) -> tuple[Array, Array, int]:
-    """A polyline of `size` points with one more, and the curvature from that point on.
+    """Append a point and the curvature from there on to a polyline of `size` points.
 
     The arrays grow when full.
     """
@@ -456,7 +452,7 @@ def with_point(xy: Array, curvature: Array, size: int, x: float, y: float, bend:
 
 @inline
 def discs_beside(x: float, y: float, reach: float, discs: Array, boxes: Array, out: Array) -> Array:
-    """The discs whose surfaces are within reach of a point, in their order; `out` has room for all."""
+    """Return the discs whose surfaces are within reach of a point, in their order; `out` has capacity for all."""
     count = 0
     for box in range(boxes.shape[0]):
         if is_beyond(reach + ROUNDING, x, y, boxes[box]):
@@ -471,10 +467,10 @@ def discs_beside(x: float, y: float, reach: float, discs: Array, boxes: Array, o
 
 @kernel
 def string_points(string: String, built: Array, bounds: Array, clearance: float, bulge: float) -> tuple[Array, Array]:
-    """A string as a polyline (M, 2) and the curvature from each of its points on (M,).
+    """Return a string as a polyline (M, 2) and the curvature from each of its points on (M,).
 
-    An arc becomes the corners where its tangents meet. They stand off the arc by at most `bulge`, and by less
-    where the polyline would come closer than `clearance` to a wall or a disc as built.
+    An arc becomes the corners where its tangents meet. They lie at most `bulge` from the arc, and closer
+    where the polyline would come within `clearance` of a wall or a disc as built.
     """
     (disc, turn, sweep), links, discs = string
     boxes = boxes_around(built)
@@ -482,7 +478,7 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
     xy = np.empty((256, 2), dtype=np.float64)
     curvature = np.zeros(256, dtype=np.float64)
     size = 0
-    cuts = np.empty(64, dtype=np.float64)  # where the next pieces of the arc end, the nearest last
+    cuts = np.empty(64, dtype=np.float64)  # ends of the next pieces of the arc, the nearest last
     for i in range(links.shape[0]):
         for end in range(2):
             px, py = links[i, 2 * end], links[i, 2 * end + 1]
@@ -501,7 +497,7 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
         around = boxes_around(near)
         at = 0.0
         waiting = 0  # entries of `cuts`
-        pieces = 0  # of even size that have been begun
+        pieces = 0  # number of even pieces begun
         while at < sweep[i] - 1e-12:
             if waiting == 0:
                 pieces += 1
@@ -528,7 +524,7 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
 
 @inline
 def crosses(xy: Array, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a polyline crosses the segment ab."""
+    """Return whether a polyline crosses the segment ab."""
     dx, dy = bx - ax, by - ay
     before = dx * (xy[0, 1] - ay) - dy * (xy[0, 0] - ax)
     found = False
@@ -546,13 +542,12 @@ def crosses(xy: Array, ax: float, ay: float, bx: float, by: float) -> bool:
 
 @kernel
 def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, out: Array) -> None:
-    """out[i] = how much disc i may grow, up to `most`, if each gap that the polyline passes is shared fairly.
+    """Set out[i] to the growth of disc i, up to `most`, if each gap that the polyline passes is split evenly.
 
-    `discs` (N, 3) are inflated and `box` is shrunk. Both ends of the polyline must stay outside of the grown
-    discs.
+    `discs` (N, 3) are inflated and `box` is shrunk. Both ends of the polyline stay outside the grown discs.
     """
     n = discs.shape[0]
-    share = 0.49  # of a gap for each side, so that some of it is left to pass through
+    share = 0.49  # fraction of a gap per side, which keeps the gap open
     for i in range(n):
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
         grow = most
@@ -576,10 +571,10 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
                 continue
             if crosses(xy, x, y, bx, by):
                 out[i] = share * gap
-    axis = 0 if np.ptp(xy[:, 0]) > np.ptp(xy[:, 1]) else 1  # along which most discs are far apart
+    axis = 0 if np.ptp(xy[:, 0]) > np.ptp(xy[:, 1]) else 1  # the axis with the larger spread
     order = np.argsort(discs[:, axis])
     widest = 0.0
-    away = np.empty(n)  # of the centres from the polyline
+    away = np.empty(n)  # distance of each centre from the polyline
     for i in range(n):
         widest = max(widest, discs[i, 2])
         away2 = math.inf
@@ -595,7 +590,7 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
                 break
             x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
             reach = r + discs[j, 2] + 2.05 * max(out[i], out[j])  # 2.05 > 1 / share
-            if reach < away[i] + away[j] - ROUNDING:  # a line between the centres that crosses the polyline is longer
+            if reach < away[i] + away[j] - ROUNDING:  # a line between the centres across the polyline is longer
                 continue
             dx, dy, touching = discs[j, 0] - x, discs[j, 1] - y, r + discs[j, 2] - 2.0 * ROUNDING
             if abs(dx) > reach or abs(dy) > reach or (touching > 0.0 and dx * dx + dy * dy < touching * touching):
@@ -610,9 +605,9 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
 
 @kernel
 def fault(string: String, xy: Array, line: Array, built: Array, bounds: Array, least: float, longest: float) -> int:
-    """What is wrong with a string and the polyline `xy` that is drawn for it, as an index into `smooth.FAULTS`.
+    """Return the reason to reject a string and its polyline `xy`, as an index into `smooth.REJECTIONS`.
 
-    They must come no closer than `least`, be no longer than `longest`, and pass all discs as `line` does.
+    They must come no closer than `least`, be no longer than `longest`, and pass all discs on the same side as `line`.
     """
     length = 0.0
     for i in range(1, xy.shape[0]):
@@ -629,7 +624,7 @@ def widest(
     contacts: Contacts, discs: Array, room: Array, extra: float, line: Array, built: Array, bounds: Array,
     clearance: float, slack: float, longest: float, bulge: float,
 ) -> tuple[bool, Array, Array]:  # fmt: skip
-    """The drawn string with the most clearance that has no fault: whether there is one, its points and its curvature.
+    """Find the usable string with the most clearance; returns whether there is one, its points and its curvature.
 
     All discs (N, 3) grow by the same fraction of `extra`, each by at most its `room`; bisection finds the largest fraction.
     """
@@ -659,7 +654,7 @@ def widest(
 
 @kernel
 def near_polyline(xy: Array, discs: Array, reach: float) -> Array:
-    """Which discs (N, 3) come within `reach` of a polyline (M, 2)."""
+    """Return which discs (N, 3) come within `reach` of a polyline (M, 2)."""
     near = np.zeros(discs.shape[0], dtype=np.bool_)
     x_min, y_min, x_max, y_max = xy[:, 0].min(), xy[:, 1].min(), xy[:, 0].max(), xy[:, 1].max()
     for k in range(discs.shape[0]):
@@ -675,7 +670,7 @@ def near_polyline(xy: Array, discs: Array, reach: float) -> Array:
 
 @kernel
 def encloses(there: Array, back: Array, points: Array) -> bool:
-    """Whether the loop along one polyline and back along another winds around any of the points (N, 2+)."""
+    """Return whether the loop along one polyline and back along another winds around any of the points (N, 2+)."""
     y_min, y_max = min(there[:, 1].min(), back[:, 1].min()), max(there[:, 1].max(), back[:, 1].max())
     x_max = max(there[:, 0].max(), back[:, 0].max())
     starts, listed = by_strip(there, back, y_min, y_max)
@@ -702,19 +697,19 @@ def encloses(there: Array, back: Array, points: Array) -> bool:
 
 @inline
 def strip_of(y: float, y_min: float, y_max: float) -> int:
-    """The number of the strip of the plane that holds y: never less for a larger y."""
+    """Return the index of the strip of the plane that contains y; monotonic in y."""
     return int((STRIPS - 1) * ((y - y_min) / max(y_max - y_min, ROUNDING)))
 
 
 @kernel
 def by_strip(there: Array, back: Array, y_min: float, y_max: float) -> tuple[Array, Array]:
-    """The segments of two polylines by the strips that they meet: each strip's first place in the list, and the list.
+    """Index the segments of two polylines by strips: returns each strip's start in the list, and the list.
 
-    The segments of the second polyline are counted down from -1.
+    The segments of the second polyline count down from -1.
     """
     starts = np.zeros(STRIPS + 1, dtype=np.int64)
     listed, fill = np.empty(0, dtype=np.int64), starts
-    for filling in range(2):  # first the segments of each strip are counted, then entered where its count says
+    for filling in range(2):  # first count the segments of each strip, then list them
         for part in range(2):
             xy = there if part == 0 else back
             for i in range(xy.shape[0] - 1):

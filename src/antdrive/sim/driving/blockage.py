@@ -219,11 +219,11 @@ class Blockage:
         """Return the noted movers as discs, enlarged so that plans keep the clearance of avoidance."""
         noted = self._noted(tick, (float(ends[0, 0]), float(ends[0, 1])))
         wanted = np.setdiff1d(noted if only is None else np.intersect1d(noted, only), list(self._passed))
-        found: list[Disc] = []
+        discs: list[Disc] = []
         for m in wanted:
             wider = self._widths[int(m)] - self._grid.inflate
-            found += covered_discs(self._predictor, tick, ends, 0.0, self._grid, np.array([m]), wider)
-        return found
+            discs += covered_discs(self._predictor, tick, ends, 0.0, self._grid, np.array([m]), wider)
+        return discs
 
     def clearance_reduction(self, tick: int, position: Point) -> Floats:
         """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""

@@ -230,11 +230,11 @@ class MoversAhead:
         if self._traffic is not None:
             self._traffic.observe(tick, pose[:2])
         if not waiting:
-            self.wait_anew()
+            self.reset_wait()
         elif math.isnan(self._waiting_since):
             self._waiting_since = tick / self._hz
 
-    def wait_anew(self) -> None:
+    def reset_wait(self) -> None:
         """Reset the waiting time."""
         self._waiting_since = math.nan
 
@@ -242,7 +242,7 @@ class MoversAhead:
         """Return why movers make a new route due; empty if they do not."""
         policy = self._policy
         if tick / self._hz - self._waiting_since >= policy.max_wait:
-            self.wait_anew()
+            self.reset_wait()
             return WAITED
         if close_route(self.discs(tick, pose), tracked, arc, policy.obstruction_range, self._grid.inflate):
             return OBSTRUCTED

@@ -128,23 +128,23 @@ class Tracked(PerceivedMovers):
 
     def visible(self, tick: int) -> Floats:
         """Return the positions of the movers hit by the last scan (N, 2) [m], in a tick; hidden movers are omitted."""
-        return self._now(tick)[1][self._followed.met]
+        return self._now(tick)[1][self._tracks.met]
 
     def radius_of(self, mover: int) -> float:
         """Return the radius of a tracked mover [m]."""
-        return float(self._followed.radii[self._followed.numbers == mover][0])
+        return float(self._tracks.radii[self._tracks.numbers == mover][0])
 
     def name_of(self, mover: int) -> str:
         """Return the name of a mover in messages."""
         return f"tracked mover {mover}"
 
     @property
-    def _followed(self) -> TrackedMovers:
+    def _tracks(self) -> TrackedMovers:
         """The movers at the last scan."""
         return self.tracking.tracker.movers()
 
     def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
-        found = self._followed
-        velocities = np.where(np.hypot(*found.velocities.T)[:, None] < STANDS, 0.0, found.velocities)
-        places = found.positions + (tick - self.tracking.tick) / self._hz * velocities
-        return found.numbers, places, velocities, found.radii
+        tracks = self._tracks
+        velocities = np.where(np.hypot(*tracks.velocities.T)[:, None] < STANDS, 0.0, tracks.velocities)
+        places = tracks.positions + (tick - self.tracking.tick) / self._hz * velocities
+        return tracks.numbers, places, velocities, tracks.radii

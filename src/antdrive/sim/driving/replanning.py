@@ -113,7 +113,7 @@ class Replanning(OneRoute):
         """Return a new path from a pose [m, m, rad]; None if there is none."""
         now = tick / self._hz
         self._replanned_at = now
-        self._ahead.wait_anew()
+        self._ahead.reset_wait()
         started = time.perf_counter()
         # Near the goal, local avoidance is enough.
         around_movers = self.policy.around_movers and trigger != MISSED and not self._timed

@@ -165,7 +165,7 @@ def _check_movers_known(rollout: Rollout) -> Iterator[str]:
     if (record.perception is not None) != moving:
         yield f"record.perception: must {'not ' if moving else ''}be null {'among' if moving else 'without'} movers"
     if len(rollout.tracks) and not watching:
-        yield "tracks: must be empty, since the robot did not look for movers with its lidar"
+        yield "tracks: must be empty, since the lidar did not track movers"
     if len(rollout.scans) and not (watching or record.exploring):
         yield "scans: must be empty, since the robot did not use its lidar"
     if watching and len(rollout.tracks) and not (rollout.tracks[:, 6] > 0).all():

@@ -141,7 +141,7 @@ class _Chunk(NamedTuple):
     positions: Floats  # positions before each step (K, M, 2) [m]
     changes: dict[int, list[Change]]  # velocity changes by physics step
     changed: npt.NDArray[np.bool_]  # whether a mover's velocity is set in a step (K, M)
-    set_anew: npt.NDArray[np.bool_]  # whether its position is set as well (K, M)
+    repositioned: npt.NDArray[np.bool_]  # whether its position is set as well (K, M)
     velocity: Floats  # velocity to the next position (K, M, 2) [m/s]
     came_from: Floats  # starting position of that velocity (K, M, 2) [m]
     low: Floats  # least x and y of each mover in each window (W, M, 2) [m]
@@ -162,11 +162,11 @@ class _Chunk(NamedTuple):
         differs = np.abs(velocity[1:-1] - velocity[:-2]) > SAME_VELOCITY
         changed[1:] = differs[..., 0] | differs[..., 1] | jumps[:-2] | jumps[1:-1]
         # The first step of a chunk also sets positions, so that rounding does not accumulate.
-        set_anew = jumps[:-1].copy()
-        set_anew[0] = True
+        repositioned = jumps[:-1].copy()
+        repositioned[0] = True
         changes: dict[int, list[Change]] = {}
         for k, m in np.argwhere(changed).tolist():
-            jump = tuple(came_from[k, m].tolist()) if set_anew[k, m] else None
+            jump = tuple(came_from[k, m].tolist()) if repositioned[k, m] else None
             changes.setdefault(first + k, []).append((m, *velocity[k, m].tolist(), jump))
         windows = (CHUNK // WINDOW, WINDOW, len(trajectories), 2)
         begin, end = positions[:-2].reshape(windows), positions[WINDOW:-1:WINDOW]  # a window's last step ends there
@@ -174,14 +174,14 @@ class _Chunk(NamedTuple):
         squares = velocity[:-1].reshape(windows) ** 2
         fastest = np.sqrt((squares[..., 0] + squares[..., 1]).max(axis=(1, 2), initial=0.0)).tolist()
         return cls(
-            first, first + CHUNK, hz, positions[:-2], changes, changed, set_anew, velocity[:-1], came_from[:-1],
+            first, first + CHUNK, hz, positions[:-2], changes, changed, repositioned, velocity[:-1], came_from[:-1],
             low, high, fastest,
         )  # fmt: skip
 
     def state(self, m: int, step: int) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return position [m] and velocity [m/s] of a mover's body before a step, bit for bit as if it had always existed."""
         k = step - self.first
-        begin = int(np.flatnonzero(self.set_anew[: k + 1, m])[-1])
+        begin = int(np.flatnonzero(self.repositioned[: k + 1, m])[-1])
         latest = np.maximum.accumulate(np.where(self.changed[: k + 1, m], np.arange(k + 1), 0))
         velocity = self.velocity[latest, m]
         moves = np.vstack([self.came_from[begin, m], velocity[begin:k] * (1.0 / self.hz)])

@@ -170,7 +170,7 @@ def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
 
 
 def _drum(radius: float, tread: float) -> Mesh:
-    """A closed cylinder about the z axis, centred at the origin."""
+    """Return a closed cylinder about the z axis, centred at the origin."""
     upper = cylinder(radius, -tread / 2, tread / 2, sides=28)
     flip = np.array([1.0, -1.0, -1.0])
     return join(upper, Mesh(upper.vertices * flip, upper.normals * flip, upper.triangles))
