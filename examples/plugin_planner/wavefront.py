@@ -1,4 +1,4 @@
-"""A planner of one's own in a few lines: breadth-first search over the grid's moves."""
+"""A minimal custom planner: breadth-first search over the grid's moves."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from antdrive.worlds import DIRECTIONS
 
 @dataclass(frozen=True, kw_only=True)
 class Wavefront(GridPlanner):
-    """The path with the fewest moves, by breadth-first search."""
+    """Breadth-first search for the path with the fewest moves."""
 
-    straight: bool = False  # leave out the diagonals
+    straight: bool = False  # no diagonal moves
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         before, queue = {query.start: query.start}, deque([query.start])

@@ -1,4 +1,4 @@
-"""The courier's own planner: the shortest way, where ground close to obstacles counts as longer."""
+"""The courier's planner: shortest paths with a penalty near obstacles."""
 
 import heapq
 import math
@@ -14,10 +14,10 @@ LENGTHS = [1.0 if 0 in step else math.sqrt(2) for step in DIRECTIONS]  # of the 
 
 @dataclass(frozen=True, kw_only=True)
 class WideBerth(GridPlanner):
-    """Dijkstra's search with a price on cells beside obstacles."""
+    """Dijkstra's search with a penalty on cells near obstacles."""
 
-    price: float = 1.5  # how much longer the cells right beside an obstacle count, as a factor
-    reach: int = 3  # cells from an obstacle at which the price has fallen to nothing
+    price: float = 1.5  # relative extra cost of cells next to an obstacle
+    reach: int = 3  # distance from obstacles at which the penalty ends [cells]
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         prices, moves = 1.0 + self.price * self._closeness(query.grid.free), query.grid.moves
@@ -45,7 +45,7 @@ class WideBerth(GridPlanner):
         return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=path_cost(cells, query.grid.cell), work=len(done))
 
     def _closeness(self, free: np.ndarray) -> np.ndarray:
-        """1 on cells beside a blocked one, falling to 0 at `reach` cells from it."""
+        """Return 1 on cells next to a blocked one, falling to 0 at `reach` cells."""
         near = np.pad(~free, 1, constant_values=True)
         closeness = np.zeros(free.shape)
         for k in range(self.reach):

@@ -1,4 +1,4 @@
-"""What the courier must do, as tests in Python."""
+"""Python tests of the courier."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What is said of wrong drives, settings and logs: all of it is in `messages.yml`."""
+"""Messages about invalid drives, settings and logs, all listed in `messages.yml`."""
 
 import io
 import json

@@ -37,7 +37,7 @@ def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_wo
     assert run(replace(tight, margin=0.035, cell=0.0125)).succeeded, "the advice is right"
 
 
-def test_a_robot_that_is_wider_than_the_gate_is_told_so(turtlebot):
+def test_the_reason_names_a_robot_wider_than_the_gate(turtlebot):
     assert run(gate(turtlebot, 0.3)).reason.endswith("this robot does not fit through")
 
 
@@ -110,7 +110,7 @@ class GivesUp(GridPlanner):
         return PlanResult(status=PlanStatus.NO_PATH, reason="too tired")
 
 
-def test_a_planner_that_misses_a_path_is_told_from_a_world_without_one(small_scenario):
+def test_an_incomplete_planner_is_distinguished_from_a_world_without_a_path(small_scenario):
     done = run(replace(small_scenario, planner=GivesUp(), planner_name="lazy"))
     assert done.reason == (
         "lazy found no path for a disc of 0.21 m (radius 0.18 + margin 0.03): too tired; astar finds one on these cells of 0.2 m"

@@ -78,7 +78,7 @@ def test_a_large_world_is_driven_in_the_fast_suite_too():
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", sorted(set(list_worlds()) - set(STATIC)))
 def test_the_outcome_of_every_world_with_movers_is_certain(name, seed):
-    """Not every drive succeeds, but all three readings agree on whether something was touched."""
+    """Not every drive succeeds, but all three checks agree on whether something was touched."""
     result = run(Scenario.of(name, seed=seed))
     assert result.outcome in (Outcome.SUCCEEDED, Outcome.COLLIDED, Outcome.HIT_WHILE_STANDING)
     assert result.succeeded == (result.outcome is Outcome.SUCCEEDED) == result.certificate.certified
@@ -211,7 +211,7 @@ def test_no_obstacle_is_too_low_to_be_touched(small_scenario, collided_run):
 
 @pytest.mark.parametrize("gap", [-0.03, -0.08, -0.15])
 def test_a_start_that_touches_is_a_collision_at_once(turtlebot, gap, monkeypatch):
-    """Physics and the certificate see it, too, should a scenario ever let it pass."""
+    """Physics and the certificate detect it even if a scenario lets it pass."""
     monkeypatch.setattr("antdrive.sim.scenario.overlap_at", lambda *_: "")
     start = (0.6 + 0.1 + turtlebot.radius + gap, 1.5, 0)
     task = Task(World("w", (0, 0, 4, 3), (Disc(0.6, 1.5, 0.1),)), start, (3.4, 1.5), cell=0.2)
@@ -272,7 +272,7 @@ def motion_problems(found):
     return [problem for problem in found.certificate.problems if "do not follow from" in problem]
 
 
-def test_a_fast_robot_that_slides_as_physics_has_it_is_not_said_to_be_forged(monkeypatch):
+def test_the_sliding_of_a_fast_robot_is_no_forgery(monkeypatch):
     """While it speeds up at a low rate it slides aside; the check of its motion knows by how much."""
     robots = ((0.5, 2.5, 8.0), (0.35, 4.0, 7.0), (0.6, 4.0, 6.0))
     drives = [driven(fast(*numbers), 60, control) for numbers in robots for control in (10, 60)]
@@ -284,7 +284,7 @@ def test_a_fast_robot_that_slides_as_physics_has_it_is_not_said_to_be_forged(mon
     assert sum("do not follow from" in str(found.problems) for found in refused) >= 2
 
 
-def test_a_robot_that_may_have_slid_is_said_to(monkeypatch):
+def test_a_possible_slide_is_reported(monkeypatch):
     monkeypatch.setattr(certificate, "SKID", 0.0)
     monkeypatch.setattr(certificate, "SPINNING", 0.0)
     says = "the robot may have slid: 8 m/s2 along and {} m/s2 across are {} % of what a wheel friction of {} holds"

@@ -1,12 +1,11 @@
-"""`make mutants`: how many small faults do the tests notice?
+"""Mutation score of the tests: `make mutants`.
 
-Mutants are drawn by a seed from every file of `plans.py`; those of `named.yaml` are always run. Each runs the tests of its file
-in a copy of the project. A mutant that a test notices is killed, one that outlasts its time limit too, and one that is in
-`equivalent.yaml` counts apart. What stays alive is listed. With `--results FILE` an interrupted run goes on where it ended.
+Mutants are sampled by a seed from every file of `plans.py`; those of `named.yaml` always run. Each runs the tests of its file
+in a copy of the project. A mutant is killed if a test fails or its time limit passes. Mutants in `equivalent.yaml` are counted
+separately. Survivors are listed. `--results FILE` resumes an interrupted run.
 
-The generator is ours because neither of the known tools fits. mutmut leaves out decorated functions, and all kernels are
-decorated. cosmic-ray changes the files of the tree that it runs in, with every mutant of a kernel the stamp of the cache changes,
-and all kernels would compile anew for each.
+Existing tools do not fit: mutmut skips decorated functions, and all kernels are decorated. cosmic-ray edits the tree that it
+runs in, which invalidates the kernel cache and recompiles all kernels for each mutant.
 """
 
 from __future__ import annotations
@@ -70,7 +69,7 @@ def main(
 
 
 def chosen(only: list[str] | None, per_file: int | None, seed: int) -> dict[str, list[Mutant]]:
-    """The mutants to run, file by file.
+    """Return the mutants to run, file by file.
 
     Raises:
         StaleTable: one of the files has no plan.
@@ -151,7 +150,7 @@ def line_of(mutant: Mutant) -> str:
 
 
 def counts(group: list[tuple[Mutant, str]]) -> dict[str, Any]:
-    """How many mutants met which fate, and the share killed, timeouts too, of those judged; None if there are none."""
+    """Count mutants by fate. Return the counts and the fraction killed, including timeouts; None without valid mutants."""
     found = Counter(fate for _, fate in group)
     killed = found["killed"] + found["timeout"]
     score = killed / (killed + found["alive"]) if killed + found["alive"] else None

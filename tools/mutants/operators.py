@@ -1,4 +1,4 @@
-"""Small faults for a Python source file, each a replacement of one piece of its text."""
+"""Mutation operators for Python source files, each a replacement of one piece of text."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ PLAIN = (ast.Name, ast.Constant, ast.Call, ast.Attribute, ast.Subscript, ast.Tup
 
 @dataclass(frozen=True)
 class Mutant:
-    """One fault in one file.
+    """A mutant: one fault in one file.
 
     Attributes:
         file: the file, relative to the root of the project
@@ -58,7 +58,7 @@ class Mutant:
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """What names the fault however many lines the file gains or loses above it."""
+        """Return a key of the fault that does not depend on line numbers."""
         return self.file, self.function, self.was, self.now
 
 
@@ -80,7 +80,7 @@ class Edit:
 
 
 def mutants_of(file: str, source: str) -> list[Mutant]:
-    """Every mutant of a file, in the order of the text, each different from the others and from the original.
+    """Return every distinct mutant of a file, in text order.
 
     Args:
         file: the file, relative to the root of the project
@@ -116,7 +116,7 @@ def described(file: str, operator: str, function: str, source: str, text: str) -
 
 
 class _Finder(ast.NodeVisitor):
-    """Collects the edits of a source with the function that each is in."""
+    """Collector of a source's edits and their functions."""
 
     def __init__(self, source: str) -> None:
         self.found: list[tuple[str, Edit]] = []
@@ -230,7 +230,7 @@ class _Finder(ast.NodeVisitor):
 
     @staticmethod
     def _deletable(node: ast.AST) -> bool:
-        """Whether a statement can go without leaving a name undefined."""
+        """Return whether removing a statement leaves all names defined."""
         if isinstance(node, ast.Expr):
             return not isinstance(node.value, ast.Constant)
         if isinstance(node, ast.Assign):
@@ -253,7 +253,7 @@ class _Finder(ast.NodeVisitor):
         return Edit(operator, *self._place(node), text)
 
     def _between(self, operator: str, left: ast.AST, right: ast.AST, symbol: str, other: str) -> Edit:
-        """Replace the operator between two operands, from which parentheses and comments may separate it."""
+        """Replace the operator between two operands, with parentheses and comments around it."""
         start, end = self._place(left)[1], self._place(right)[0]
         gap = self._data[start:end].decode()
         word = re.escape(symbol).replace(r"\ ", r"\s+")

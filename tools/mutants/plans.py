@@ -1,4 +1,4 @@
-"""Which files are mutated, by how much, and which tests should notice. `named.yaml` and `equivalent.yaml` belong to it."""
+"""Plans of mutation testing: files, sample sizes and tests, with `named.yaml` and `equivalent.yaml`."""
 
 from __future__ import annotations
 
@@ -74,11 +74,11 @@ PLANS: dict[str, Plan] = {
 
 
 class StaleTable(Exception):
-    """A table names a piece of code that its file no longer holds, or no file."""
+    """A table names missing code or a missing file."""
 
 
 def named_mutants(root: Path = ROOT) -> list[Mutant]:
-    """The mutants of `named.yaml`: faults written by hand, each with a piece of its file that occurs once.
+    """Load the mutants of `named.yaml`: handwritten faults, each with a unique piece of its file.
 
     Raises:
         StaleTable: a piece does not.
@@ -116,7 +116,7 @@ def drawn(file: str, count: int, seed: int = SEED, root: Path = ROOT) -> list[Mu
 
 
 def check_tables(root: Path = ROOT) -> None:
-    """See that every table speaks of code that exists.
+    """Check that all tables name existing code.
 
     Raises:
         StaleTable: one does not.

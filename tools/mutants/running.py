@@ -1,8 +1,8 @@
-"""Run tests on mutants, each in a copy of the project in which one file is changed.
+"""Test runs on mutants, each in a copy of the project with one changed file.
 
-The copy keeps the machine code of the kernels, and `sources_stamp` in it always gives the stamp of the original, because
-an entry of the cache is otherwise valid for one text of all kernel files and every mutant would compile every kernel.
-Instead exactly those entries are deleted that depend on the changed file. Copies share nothing.
+A copy keeps the machine code of the kernels, and its `sources_stamp` returns the original's stamp. Otherwise each mutant
+would invalidate the cache and recompile every kernel. Instead, only cache entries that depend on the changed file are
+deleted. Copies share nothing.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ WAITING = 10.0  # a run that waits for ever uses no processor time, and may take
 
 
 class BaselineUnfit(Exception):
-    """The tests of a file do not pass on the original, or there are none, so they can judge no mutant of it."""
+    """The tests of a file fail on the original, or do not exist, so its mutants cannot be evaluated."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run of tests ended."""
+    """End of a test run."""
 
     code: int | None  # pytest's exit code, negative if a signal ended it; None if its time limit passed
     seconds: float  # its processor time [s], infinite if the time limit passed
@@ -51,7 +51,7 @@ class Ended:
 
     @property
     def reason(self) -> str:
-        """Why the tests did not pass, as a clause."""
+        """Return the reason for failing as a clause."""
         if self.code is None:
             return "do not end within their time limit"
         if self.code == FAILED:
@@ -63,7 +63,7 @@ class Ended:
 
 @dataclass(frozen=True)
 class Plan:
-    """How the mutants of a file are judged."""
+    """Plan for evaluating the mutants of a file."""
 
     tests: tuple[str, ...]  # arguments for pytest, the tests that are quick and notice much first
     count: int  # how many mutants are drawn
@@ -72,12 +72,12 @@ class Plan:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files that hold the tests."""
+        """Return the files with the tests."""
         return tuple(dict.fromkeys(test.split("::")[0] for test in self.tests if test.startswith("tests/")))
 
 
 class Processes:
-    """The processes that run at the moment, each with its children in a group of its own."""
+    """Running processes, each in its own process group with its children."""
 
     def __init__(self) -> None:
         self.stopped = False  # whether all were told to end and no more may start
@@ -103,7 +103,7 @@ class Processes:
             _kill(process)
 
     def stop(self) -> None:
-        """End every process, and start no more."""
+        """End all processes and refuse to start others."""
         with self._lock:
             self.stopped = True
             for process in self._running:
@@ -121,7 +121,7 @@ def _kill(process: subprocess.Popen[str]) -> None:
 
 
 class Copy:
-    """A copy of the project in which one file at a time is changed."""
+    """A copy of the project with one changed file at a time."""
 
     def __init__(self, original: Path, root: Path, processes: Processes) -> None:
         self.root = root
@@ -131,7 +131,7 @@ class Copy:
         _write(cache, f"{cache.read_text()}\n\ndef sources_stamp() -> str:\n    return {stamp_of(original)!r}\n")
 
     def fates(self, mutants: list[Mutant], plan: Plan) -> Iterator[tuple[Mutant, str]]:
-        """What becomes of each mutant, all of one file: "killed", "timeout" or "alive".
+        """Return the fate of each mutant of a file: "killed", "timeout" or "alive".
 
         Raises:
             BaselineUnfit: the tests fail on the unchanged file, or there are none.
@@ -157,7 +157,7 @@ class Copy:
             self._restore(kernels)
 
     def _restore(self, kernels: list[Path]) -> None:
-        """Bring back the machine code that mutants have replaced by their own."""
+        """Restore the machine code replaced by mutants."""
         _forget(kernels)
         for kernel in kernels:
             cache = kernel.parent / "__pycache__"
@@ -166,7 +166,7 @@ class Copy:
 
 
 class Server:
-    """A process that runs pytest in forks of itself, as `server.py` says.
+    """A process that runs pytest in forks of itself (`server.py`).
 
     pytest loads no plugins by itself: antdrive is one, and pytest warns, which is an error here, that it is loaded already.
     """
@@ -180,7 +180,7 @@ class Server:
         self._start()
 
     def run(self, tests: tuple[str, ...], limit: float) -> Ended:
-        """Run tests, which may take so much processor time [s]."""
+        """Run tests within a limit of processor time [s]."""
         arguments = ["-x", "--tb=line", "--no-header", "-rfE", "--timeout=0", "-p", "no:cacheprovider", *tests]
         if self._plain:
             arguments += ["-W", "ignore"]  # numpy's numbers warn where compiled ones wrap around
@@ -286,7 +286,7 @@ def _forget(kernels: list[Path]) -> None:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a source file, and drop its bytecode, which Python would take for current within the same second."""
+    """Write a source file and delete its bytecode, whose timestamp may be equal."""
     path.write_text(text)
     for entry in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
         entry.unlink()

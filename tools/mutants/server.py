@@ -1,10 +1,10 @@
-"""Runs pytest again and again, each time in a fork that has the libraries and the unchanged modules loaded already.
+"""Server that runs pytest in forks with preloaded libraries and unchanged modules.
 
-Loading them takes longer than most tests. The first line of the standard input says which modules to load and which must not be
-loaded, as it will be changed; each further line is a run. The answer to a run is a line: pytest's exit code, or the negative
-number of the signal that ended the run, and the processor time that it took [s].
+Loading them takes longer than most tests. The first line of the standard input names the modules to load and the module to
+exclude, which will change; each further line is a run. The answer to a run is a line: pytest's exit code, or the negative
+number of the signal that ended it, and its processor time [s].
 
-A run is limited by its processor time: a fault that never ends uses it up, and a machine that is busy with other work does not.
+Runs are limited by processor time, which endless loops exhaust and load from other programs does not affect.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PLUGINS = ("pytest_timeout",)
 
 
 def serve() -> None:
-    """Load modules, then run pytest as often as asked."""
+    """Load modules, then run pytest for each request."""
     answers = os.fdopen(os.dup(1), "w")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     spoken = os.dup(2)

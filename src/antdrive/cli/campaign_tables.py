@@ -91,11 +91,11 @@ def refuse_campaign_options(names: Iterable[str], folder: str | Path) -> None:
         raise InputError(f"--{name}: applies to campaign folders only; {folder} is not one")
 
 
-def campaign_folders(words: Sequence[str], context: typer.Context, asked: CampaignQuery) -> list[Path]:
+def campaign_folders(words: Sequence[str], context: typer.Context, query: CampaignQuery) -> list[Path]:
     """Return the campaign folders given to `antdrive compare`; an empty list for worlds."""
     folders = [Path(word) for word in words if is_campaign(Path(word))]
     if not folders:
-        refuse_campaign_options(sorted(asked.given), words[0])
+        refuse_campaign_options(sorted(query.given), words[0])
         return []
     if len(folders) < len(words):
         raise InputError(f"{' '.join(words)}: mixes campaign folders and worlds; name one kind")
@@ -109,11 +109,11 @@ def campaign_folders(words: Sequence[str], context: typer.Context, asked: Campai
     return folders
 
 
-def compare_campaigns(folders: Sequence[Path], planners: Sequence[str], asked: CampaignQuery, json: bool) -> None:
+def compare_campaigns(folders: Sequence[Path], planners: Sequence[str], query: CampaignQuery, json: bool) -> None:
     """Print each planner's success and the comparison of each pair."""
     from antdrive.views.pages.campaign_report import summarise_campaign
 
-    summary = summarise_campaign(folders, planners=planners, strict=True, **asked.arguments)
+    summary = summarise_campaign(folders, planners=planners, strict=True, **query.arguments)
     show(json, summary.as_dict(), _tables(summary))
 
 
@@ -129,12 +129,12 @@ def _tables(summary: "CampaignSummary") -> Iterator[str]:
 
 
 def report_campaigns(
-    folders: Sequence[Path], out: Path, json: bool, title: str | None, planners: Sequence[str], asked: CampaignQuery
+    folders: Sequence[Path], out: Path, json: bool, title: str | None, planners: Sequence[str], query: CampaignQuery
 ) -> None:
     """Write the report of one or several campaigns."""
     from antdrive.views.pages.campaign_report import report_campaign
 
-    files = report_campaign(folders, out, title=title, planners=planners, **asked.arguments)
+    files = report_campaign(folders, out, title=title, planners=planners, **query.arguments)
     size = sum(path.stat().st_size for path in files)
     facts = {"file": str(files[0]), "files": [str(path) for path in files], "bytes": size}
     names = dict(zip(("report", "pairs"), files, strict=False))

@@ -111,9 +111,9 @@ class Setup:
             chosen[group][name] = value
         controller = {name: parse(f"controller.{name}", float, text) for name, text in chosen["controller"].items()}
         auto = given.get("margin") == "auto"
-        asked = {**given, "controller": controller, **({"margin": 0.0} if auto else {})}
+        values = {**given, "controller": controller, **({"margin": 0.0} if auto else {})}
         try:
-            fields = scenario_fields(asked)
+            fields = scenario_fields(values)
             scenario = Scenario.of(world, self.planner, self.robot, options=chosen["planner"], **fields)
             return with_chosen_margin(scenario) if auto else scenario
         except FieldError as error:

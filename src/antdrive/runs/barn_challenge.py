@@ -83,9 +83,9 @@ def unpacked(source: Path, folder: Path) -> Path:
     """Return the folder with the worlds of a folder or archive; unpack an archive."""
     archives = [source] if source.is_file() else sorted(source.glob("*.tar.*")) if source.is_dir() else []
     if not archives or (source.is_dir() and any(source.rglob(WORLDS))):
-        found = source
+        worlds = source
     else:
-        found = folder
+        worlds = folder
         try:
             with tarfile.open(archives[0]) as archive:
                 members = archive.getmembers()
@@ -94,9 +94,9 @@ def unpacked(source: Path, folder: Path) -> Path:
                 archive.extractall(folder, members, filter="data")
         except (tarfile.TarError, OSError, EOFError) as error:
             raise input_error(str(archives[0]), f"not a readable archive ({' '.join(str(error).split())})") from None
-    if not any(found.rglob(WORLDS)):
+    if not any(worlds.rglob(WORLDS)):
         raise input_error(str(source), f"no {WORLDS} here; name the folder of the challenge's worlds, or their archive")
-    return found
+    return worlds
 
 
 def campaign_data(

@@ -37,13 +37,13 @@ def run_on_cluster(
     """Run the work for each item on a cluster; yield the results in order of arrival."""
     distributed = optional("distributed", "cluster", "--dask spreads runs over machines")
     with _client(distributed, address) as client:
-        waiting, at_work, asked = Waiting(items, 1), dict[Any, list[Ticket[Item]]](), -math.inf
+        waiting, at_work, counted = Waiting(items, 1), dict[Any, list[Ticket[Item]]](), -math.inf
         suspects: list[Ticket[Item]] = []
         tried: Ticket[Item] | None = None
         since = math.inf  # start of the run that is retried alone
         while waiting or at_work or suspects:
-            if time.monotonic() - asked > WORKERS_EVERY:
-                waiting.processes, asked = _workers(client, address), time.monotonic()
+            if time.monotonic() - counted > WORKERS_EVERY:
+                waiting.processes, counted = _workers(client, address), time.monotonic()
             while waiting and len(at_work) < CHUNKS_EACH * waiting.processes:
                 _submit(client, work, waiting.chunk(), at_work, limit)
             # A dead worker leaves all runs of its chunk under suspicion: each is retried alone.
@@ -95,13 +95,13 @@ def _ended_after(limit: float | None) -> Iterator[None]:
     if limit is None:
         yield
         return
-    watch = threading.Timer(limit, os.kill, (os.getpid(), signal.SIGKILL))
-    watch.daemon = True
-    watch.start()
+    timer = threading.Timer(limit, os.kill, (os.getpid(), signal.SIGKILL))
+    timer.daemon = True
+    timer.start()
     try:
         yield
     finally:
-        watch.cancel()
+        timer.cancel()
 
 
 def _received(future: Any, chunk: list[Ticket[Item]], waiting: Waiting[Item], slow: bool) -> Iterator[Done[Item, Any]]:

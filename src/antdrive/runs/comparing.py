@@ -62,7 +62,7 @@ def differences(runs: Sequence[Compared]) -> list[dict[str, Any]]:
     """
     first = runs[0].label
     reference = {(run.world, run.seed): run for run in runs if run.label == first}
-    found = []
+    entries = []
     for label in dict.fromkeys(run.label for run in runs):
         mine = [run for run in runs if run.label == label]
         pairs = [(run, reference[run.world, run.seed]) for run in mine]
@@ -76,8 +76,8 @@ def differences(runs: Sequence[Compared]) -> list[dict[str, Any]]:
         for name in COMPARED:
             apart = [a.facts["metrics"][name] - b.facts["metrics"][name] for a, b in both]
             entry[name] = [statistics.median(apart), min(apart), max(apart)] if apart and label != first else None
-        found.append(entry)
-    return found
+        entries.append(entry)
+    return entries
 
 
 def difference_cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
@@ -100,10 +100,10 @@ def same_drives(runs: Sequence[Compared], smoothing: str) -> list[str]:
             if len(same) > 1:
                 names = " and ".join(run.label for run in same)
                 groups.setdefault((names, len({run.plan for run in same}) == 1), []).append(f"{world}, seed {seed}")
-    told = []
+    sentences = []
     for (names, planned_alike), where in groups.items():
         place = f"in all {len(cases)} cases" if len(where) == len(cases) > 1 else "; ".join(where[:5])
         more = f" and {len(where) - 5} more" if len(where) > 5 and not place.startswith("in all") else ""
         why = "the same plan" if planned_alike else f"different plans, but the same route after --smoothing {smoothing}"
-        told.append(f"{names}: the same drive ({why}): {place}{more}")
-    return told
+        sentences.append(f"{names}: the same drive ({why}): {place}{more}")
+    return sentences

@@ -87,22 +87,22 @@ class Waiting(Generic[Item]):
 
     def chunk(self, group: Hashable = None) -> list[Ticket[Item]]:
         """Take the next runs for a process; empty if none is left."""
-        found: list[Ticket[Item]] = []
+        tickets: list[Ticket[Item]] = []
         most = self._chunk_length()
-        while self._length and len(found) < most:
+        while self._length and len(tickets) < most:
             if self._first:
                 # One by one: if one of these kills its process, only that one is under suspicion.
-                found, most = [self._first.popleft()], 1
+                tickets, most = [self._first.popleft()], 1
                 self._length -= 1
             else:
-                group = self._next_group(found[-1].group if found else group)
+                group = self._next_group(tickets[-1].group if tickets else group)
                 runs = self._groups[group]
-                taken = [runs.popleft() for _ in range(min(most - len(found), len(runs)))]
-                found += taken
+                taken = [runs.popleft() for _ in range(min(most - len(tickets), len(runs)))]
+                tickets += taken
                 self._length -= len(taken)
                 if not runs:
                     del self._groups[group]
-        return found
+        return tickets
 
     def _chunk_length(self) -> int:
         if self._mean is None:

@@ -16,12 +16,12 @@ from antdrive.base.files import write_json
 def free_folder(folder: Path, manifest: str, own: str) -> Path:
     """Return the folder; if its manifest has another fingerprint, one with ours in its name."""
     try:
-        found = json.loads((folder / manifest).read_text(encoding="utf-8"))
+        data = json.loads((folder / manifest).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return folder
     except (OSError, ValueError, RecursionError):
-        found = None
-    same = isinstance(found, dict) and found.get("fingerprint") == own
+        data = None
+    same = isinstance(data, dict) and data.get("fingerprint") == own
     return folder if same else folder.with_name(f"{folder.name}-{own}")
 
 

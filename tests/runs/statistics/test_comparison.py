@@ -104,7 +104,7 @@ def test_runs_that_differ_in_anything_are_no_pairs(key):
     ]
     if isinstance(columns[key][0], str):
         columns[key] = [f"{value} of {name}" for name, value in zip(columns["planner"], columns[key], strict=True)]
-    with pytest.raises(FieldError, match="only paired runs are compared"):
+    with pytest.raises(FieldError, match="no two share a run"):
         pairs_of(PairedRuns.of(RunTable(columns)))
 
 

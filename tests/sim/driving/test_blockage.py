@@ -62,7 +62,7 @@ def test_a_mover_that_is_known_to_leave_is_waited_for_without_end(turtlebot):
     assert among(leaves, robot=turtlebot, replanning=policy, perception=Perception(kind="motions")).succeeded
 
 
-def test_patience_begins_anew_when_the_mover_moves_on(turtlebot):
+def test_patience_restarts_when_the_mover_moves_on(turtlebot):
     frames = ((0.0, 5.0, 0.6), (10.0, 5.0, 0.6), (12.0, 5.6, 0.6))
     moves_on = Keyframed(radius=0.3, keyframes=frames, loop="once")
     done = among(moves_on, robot=turtlebot, replanning=ReplanPolicy(patience=12.0))

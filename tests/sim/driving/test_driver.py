@@ -65,8 +65,8 @@ def test_the_stuck_clock_counts_driving_and_turning_without_progress_and_no_wait
     assert StuckClock(farthest=1.0, driving=9, turning=4).after(PursuitState(**state), waiting=waiting) == after
 
 
-def test_that_sight_held_the_robot_is_said_where_it_did_so_for_most_of_the_time():
-    """Progress begins the count anew; a robot that waits counts as nothing."""
+def test_the_reason_names_the_stopping_constraint_where_it_held_the_robot_for_most_of_the_time():
+    """Progress restarts the count; waiting does not count."""
     held, free = PursuitState(limiter=SIGHT_LIMIT), PursuitState()
     for states, said in (
         ([held] * 6 + [free] * 5, True),
@@ -157,7 +157,7 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
 
 
-def test_a_robot_without_a_map_backs_off_slowly_where_its_lidar_does_not_look(jackal, turtlebot, monkeypatch):
+def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, turtlebot, monkeypatch):
     """`jackal` sees 270 degrees, `turtlebot` all round. A robot that is told of movers knows what is behind it."""
     for robot, perception in itertools.product((jackal, turtlebot), (Perception(kind="lidar"), Perception())):
         unknown = Scenario.of(
@@ -305,7 +305,7 @@ def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
 
 
 class Watcher(Guide):
-    """A guide that notes whether the robot waits, and where it is asked for a way because the robot missed the goal."""
+    """Guide that notes waiting, and replans after a missed goal."""
 
     may_wait = True
 
@@ -339,7 +339,7 @@ def test_a_robot_waits_if_it_stands_to_give_way(turtlebot, avoids, speed, waits)
 
 @pytest.mark.parametrize(("true", "outcome"), [(0.4, Outcome.STUCK), (0.1, Outcome.SUCCEEDED)])
 @pytest.mark.parametrize(("off", "knows"), [(0.0, False), (0.25, False), (0.26, True), (0.4, True)])
-def test_a_robot_looks_for_a_new_route_to_a_goal_that_it_believes_it_missed(turtlebot, off, knows, true, outcome):
+def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, true, outcome):
     """It stands `true` from the goal, and estimates that it is `off` from it. What is true ends no drive for it."""
     monitor, (x, y) = Watcher(), TASK.goal
     robot = driver(turtlebot, monitor)
@@ -351,7 +351,7 @@ def test_a_robot_looks_for_a_new_route_to_a_goal_that_it_believes_it_missed(turt
     assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
 
 
-def test_progress_is_told_ten_times_a_second(turtlebot):
+def test_progress_is_reported_ten_times_a_second(turtlebot):
     told = []
     with Engine(TASK.world, turtlebot) as engine:
         tracked = driver(turtlebot).path

@@ -1,4 +1,4 @@
-"""Drives among movers that the robot finds with its lidar: told nothing of them, it avoids what no map explains."""
+"""Drives among movers tracked by lidar, without ground truth."""
 
 import math
 from dataclasses import replace
@@ -112,7 +112,7 @@ def test_the_map_reaches_farther_among_movers(jackal):
     assert [compose(s).guide.survey.map.horizon for s in (told, tracks_movers)] == [10.0, 16.0]
 
 
-def test_an_empty_world_is_watched_as_well(turtlebot):
+def test_movers_are_tracked_in_an_empty_world(turtlebot):
     empty = Task(World("empty", (0.0, 0.0, 4.0, 3.0)), (0.8, 1.5, 0.0), (3.2, 1.5), cell=0.1)
     done = run(scenario(turtlebot, empty, unseen=()))
     assert done.succeeded
@@ -142,7 +142,7 @@ def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal):
     assert math.hypot(2.0, 2.0) - 0.2 > 2.3
 
 
-def test_a_robot_without_a_map_is_told_of_movers_only_by_name(jackal):
+def test_a_robot_without_a_map_gets_ground_truth_only_on_request(jackal):
     nobody = changed(TASK, "world", movers=())
     given, alone, still = (
         scenario(jackal, task, map=map, perception=None, unseen=())
@@ -160,7 +160,7 @@ def test_a_robot_without_a_map_is_told_of_movers_only_by_name(jackal):
 
 
 def test_without_a_map_a_mover_that_no_beam_meets_changes_nothing(jackal):
-    """It is behind posts beside the robot, and comes towards it: a robot that is told of it evades."""
+    """The mover approaches from behind posts; with ground truth the robot evades."""
     closet = tuple(Disc(0.1 + 0.14 * k, 1.4, 0.075) for k in range(22)) + tuple(
         Disc(3.1, 1.4 - 0.14 * k, 0.075) for k in range(11)
     )

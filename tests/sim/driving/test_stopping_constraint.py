@@ -1,4 +1,4 @@
-"""A robot that never outruns its sight touches nothing that stands, whatever is commanded: exact kinematics, exact scans."""
+"""Under the stopping constraint a robot touches no standing obstacle, whatever the command: exact kinematics and scans."""
 
 import math
 from dataclasses import replace
@@ -38,7 +38,7 @@ def after(pose, twist, period):
 
 
 def driven(robot, world, start, wanted, hz, held, *, told=None):
-    """Poses of a robot that is commanded each twist for some periods, as far as it accelerates, and limited by its sight.
+    """Poses of a robot that is commanded each twist for some periods, within its acceleration and the stopping constraint.
 
     `told` is the world of which it is told what stands around its start, by default the true one.
     """
@@ -101,8 +101,8 @@ def beside(robot, pose, away, angle, size):
 
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])
-def test_a_robot_is_told_what_stands_in_the_circle_of_its_first_turn(turn):
-    """A post behind a rectangle, where its lidar does not look."""
+def test_obstacles_in_the_circle_of_the_first_turn_are_given(turn):
+    """A post behind a rectangle, in the blind sector."""
     robot, start = robot_of("a rectangle", FORWARD), (2.0, 2.0, 0.0)
     world = World("post", (0.0, 0.0, 4.0, 4.0), (Disc(1.7, 2.0, 0.02),))
     wanted = [Twist(0.0, turn)]
@@ -123,7 +123,7 @@ def test_a_robot_is_told_what_stands_in_the_circle_of_its_first_turn(turn):
     st.sampled_from([(10, 8), (20, 16), (60, 40), (240, 120)]),
 )
 def test_nothing_that_stands_is_touched_whatever_is_commanded(shape, lidar, posts, yaw, wanted, rate):
-    """Posts stand anywhere, also beside the robot where its lidar does not look, in a room whose walls are near."""
+    """Posts stand anywhere, including the blind sector, in a narrow room."""
     robot, (hz, held), start = robot_of(shape, lidar), rate, (1.8, 1.8, yaw)
     discs = tuple(beside(robot, start, *post) for post in posts)
     world = World("any", (0.0, 0.0, 3.6, 3.6), discs)
@@ -132,7 +132,7 @@ def test_nothing_that_stands_is_touched_whatever_is_commanded(shape, lidar, post
 
 
 @pytest.mark.parametrize("beside", [0.275, None])
-def test_a_robot_that_forgets_its_map_turns_over_no_post_that_it_has_seen(beside):
+def test_a_robot_that_resets_its_map_turns_over_no_known_post(beside):
     """Posts within the circle of the turn, beside a rectangle whose lidar looks ahead only and last saw them long ago."""
     jackal = load_robot("jackal")
     robot = changed(jackal, "lidar", field_of_view=math.pi)

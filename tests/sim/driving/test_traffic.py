@@ -1,4 +1,4 @@
-"""Routes round the ground that movers roam, told of them or seen by lidar."""
+"""Routes around zones of movers, by ground truth or by lidar."""
 
 import math
 from dataclasses import replace
@@ -204,7 +204,7 @@ anywhere = st.floats(-20, 20)
 
 
 class Seen:
-    """A watch that has seen what it is told."""
+    """Stub of mover tracking with given tracks."""
 
     def __init__(self):
         self.tick, self.sight, self.reach = 0, 50.0, 7.5
@@ -298,7 +298,7 @@ def test_a_mover_on_its_way_onto_the_route_makes_a_new_one_due(jackal):
         assert movers.trigger(tracking.tick, POSE, straight(jackal), 0.0) == trigger, start
 
 
-def test_a_robot_that_waits_for_long_looks_for_another_way(jackal):
+def test_a_long_wait_triggers_a_replan(jackal):
     movers, _ = ahead(jackal, max_wait=2.0)
     due = []
     for tick in range(200):

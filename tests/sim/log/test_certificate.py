@@ -139,7 +139,7 @@ def test_a_robot_that_stays_where_it_is_gets_a_verdict_of_its_own(log):
 
 @given(st.integers(0, 2**32 - 1), st.floats(0, 3), st.integers(1, 60), st.floats(0.01, 10))
 def test_no_disc_that_is_left_out_is_the_nearest_to_a_footprint(seed, step, count, size):
-    """Whatever the path: the nearest of all discs, by plain distances of points, is among those looked at."""
+    """Whatever the path: the nearest of all discs, by plain distances of points, is among those checked."""
     rng = np.random.default_rng(seed)
     discs = np.column_stack([rng.uniform(-size, size, (count, 2)), rng.uniform(0, size / 2, count)])
     x, y = np.cumsum(rng.normal(0, step, (2, 12)), axis=1)
@@ -187,7 +187,7 @@ LOGS = (
     st.lists(st.sampled_from(ARRAYS), min_size=1, max_size=3, unique=True),
     st.data(),
 )
-def test_a_forged_array_gets_a_verdict(log, outcome, names, data):
+def test_a_forged_array_gets_a_certificate(log, outcome, names, data):
     forged = {}
     for name in names:
         values = getattr(log, name)

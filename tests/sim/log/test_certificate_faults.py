@@ -84,7 +84,7 @@ def says(log, text):
 
 
 def only_beyond(limit, make, text, share=0.01):
-    """Nothing is said of a log just within a limit, and the text of one just beyond it."""
+    """Require no problem just within a limit, and the given one just beyond it."""
     assert not says(make(limit * (1 - share)), text), (
         f"{limit} - {share:.0%}: {certify(make(limit * (1 - share))).problems}"
     )
@@ -559,7 +559,7 @@ def test_physics_reports_no_gap_without_a_force_and_no_pull():
         assert told is not possible
 
 
-def test_a_contact_is_looked_for_one_row_before_and_after():
+def test_a_contact_is_searched_one_row_before_and_after():
     for at, near in ((398, False), (399, True), (400, True), (401, True), (402, False)):
         log = touched(0.001, at=at)
         log.contacts[:, 1] = 4  # of one disc and four walls the last, y = 4
@@ -600,7 +600,7 @@ def test_a_contact_with_a_wall_is_where_a_corner_is_near_it(wall, yaw):
 
 
 def off_target(column, speed, seconds):
-    """A robot that is told to stand, drives for so long, and then back until the end."""
+    """A robot with zero commands that drives for some time, and then back until the end."""
     rows, twist = round(seconds * HZ), np.zeros((ROWS, 2))
     twist[1:, column] = -speed
     twist[1 : rows + 1, column] = speed
@@ -668,7 +668,7 @@ def test_rates_that_contradict_each_other_are_a_problem_and_no_error():
 
 
 @pytest.mark.parametrize("rows", [2, 5, 12, 13, 14])
-def test_logs_that_are_shorter_than_the_motors_delay_are_judged(rows):
+def test_logs_that_are_shorter_than_the_motors_delay_are_checked(rows):
     names = ("t", "pose", "twist", "command", "clearance", "limiter", "movers", "estimate", "actuated")
     short = replace(noisy(), **{name: getattr(noisy(), name)[:rows] for name in names})
     assert not says(short, "actuated")

@@ -125,7 +125,7 @@ def test_a_teleport_is_over_when_the_robot_could_have_stopped():
     assert after_jump(23, 0.0, twist=moving(0.0)) is Outcome.HIT_WHILE_STANDING
 
 
-def test_a_teleport_is_judged_by_the_row_before_it_and_the_row_after_it():
+def test_a_teleport_is_attributed_by_the_row_before_it_and_the_row_after_it():
     faster, slower = moving(0.5), moving(0.0)
     faster[20:], slower[20:] = 0.9, 0.5
     assert after_jump(60, 0.2601, twist=faster) is Outcome.COLLIDED

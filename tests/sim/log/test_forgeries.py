@@ -1,4 +1,4 @@
-"""Every kind of forged or broken log is found by the check that must find it, although its digest is right."""
+"""Each kind of forged or broken log with a valid digest fails the check meant for it."""
 
 import pytest
 
@@ -61,7 +61,7 @@ def test_genuine_drives_pass_every_check_and_have_the_digest_that_a_forger_compu
 
 @pytest.mark.parametrize("turn", range(len(KINDS)), ids=list(KINDS))
 def test_each_kind_is_found_in_one_of_the_drives(turn, drives, tmp_path):
-    """The drives take turns; `slow` tests look at all of them."""
+    """The drives take turns; `slow` tests check all of them."""
     kind = list(KINDS.values())[turn]
     names = ["turtlebot"] if kind.breaks else [*list(drives)[turn % len(drives) :], *drives]
     path = tmp_path / "forged.npz"
@@ -77,7 +77,7 @@ def test_each_kind_is_found_in_every_drive(drives):
 
 
 @pytest.mark.parametrize("kind", SENTENCES)
-def test_the_check_that_a_kind_is_there_for_says_so(kind, drives, tmp_path):
+def test_each_kind_fails_the_check_meant_for_it(kind, drives, tmp_path):
     name, words = SENTENCES[kind]
     path = tmp_path / "forged.npz"
     assert forged(KINDS[kind], drives[name], path)
@@ -95,7 +95,7 @@ def test_noise_that_the_seed_does_not_give_is_found_by_the_replay(kind, drives, 
 
 
 def test_a_noisy_collision_has_the_noise_of_its_seed(drives):
-    """After the contact the robot is no longer controlled, and no noise is drawn."""
+    """Control and noise end with the contact."""
     from antdrive.sim import Scenario, run
     from antdrive.worlds import Disc
 

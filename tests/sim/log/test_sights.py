@@ -1,4 +1,4 @@
-"""What scans say about ground and obstacles, against plain numpy and by hand; and the frames and ranges of a log."""
+"""Observed ground and sightings against plain numpy and by hand; frames and ranges of a log."""
 
 import math
 from dataclasses import replace
@@ -25,7 +25,7 @@ def log(made_up_drive):
 
 
 def visible(log, k, points, *others):
-    """Whether the lidar sees places from where scan k was taken: nothing stands on the line, and it is in the field of view."""
+    """Return whether the lidar sees points from scan k: in its field of view, with a clear line of sight."""
     lidar, discs = log.record.robot.lidar, (*log.record.world.discs, *others)
     x, y, yaw = lidar.pose_on(tuple(log.pose[log.scan_rows[k]]))
     to = points - (x, y)
@@ -109,7 +109,7 @@ def test_passed_is_what_came_within_half_a_metre(log, made_up_drive):
     assert passed(made_up_drive()) == []
 
 
-def test_movers_are_first_seen_where_they_come_into_sight_and_passed_where_they_are_nearest(made_up_drive):
+def test_movers_are_first_seen_when_visible_and_passed_when_nearest(made_up_drive):
     drive = made_up_drive(size=(6.0, 4.0), obstacles=40, movers=2)
     to = drive.pose[:, :2] - (4.5, 2.0)
     nearer = drive.movers[:, 1] - to / 6 - (0.0, 0.3)
@@ -135,7 +135,7 @@ def test_movers_are_first_seen_where_they_come_into_sight_and_passed_where_they_
     assert [sight.tracked_at for sight in found] == [math.inf, math.inf]
 
 
-def test_a_mover_is_followed_from_its_first_track_on(made_up_drive):
+def test_a_mover_is_tracked_from_its_first_track_on(made_up_drive):
     """The estimate is 0.4 m and a quarter turn off, so that tracks lie elsewhere than movers."""
     log = scanned(made_up_drive(size=(6.0, 4.0), movers=2))
     x, y, yaw = log.pose.T

@@ -145,8 +145,8 @@ def test_a_placed_robot_meets_the_cylinders_there(few):
         assert near in {contact.obstacle for contact in touched}
 
 
-def test_bodies_are_looked_for_before_the_robot_can_get_to_the_edge():
-    """The reach holds what the fastest robot drives between two looks, after the last of which it may be HOLD away."""
+def test_bodies_are_updated_before_the_robot_reaches_the_edge():
+    """The reach holds what the fastest robot drives between two updates, after the last of which it may be HOLD away."""
     with Engine(street().world, ROBOT) as engine:
         bodies = engine._near_bodies()
     least = HOLD + ROBOT.radius + 1.5 * ROBOT.max_speed * engines.CHECK_EVERY / 240

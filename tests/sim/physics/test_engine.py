@@ -214,7 +214,7 @@ def test_a_client_whose_world_failed_is_not_kept(turtlebot):
 
 
 @pytest.mark.parametrize("clearance", [-0.005, 0.002, 0.02])
-def test_a_pass_is_judged_by_where_the_robot_drove(clearance):
+def test_a_pass_is_evaluated_by_where_the_robot_drove(clearance):
     """At 60 Hz the turtlebot leaves its line by 9 mm on the way to the cylinder, so that 2 mm of clearance are an overlap."""
     robot = load_robot("turtlebot")
     radius, speed = robot.footprint.bounds[3], robot.max_speed / 2

@@ -86,7 +86,7 @@ def test_a_pose_that_has_drifted_is_corrected(off, jackal):
     assert abs(yaw - POSE[2]) < 0.002
 
 
-def test_walls_that_are_far_away_hold_a_pose_where_that_is_asked_for(jackal):
+def test_distant_walls_constrain_a_pose_on_request(jackal):
     """In the middle of a hall of 24 m nothing is nearer than 11 m."""
     hall, here = World("hall", (-12.0, -12.0, 12.0, 12.0)), (0.5, -0.4, 0.3)
     scanner, rng = Scanner.of(jackal.lidar, hall), np.random.default_rng(0)
@@ -113,7 +113,7 @@ def test_a_correction_that_is_too_large_is_not_believed(jackal):
     assert ScanMatcher(jackal.lidar).corrected(seen, far, ranges) == far
 
 
-def test_a_shift_along_the_only_wall_in_sight_is_left_out():
+def test_a_shift_along_the_only_wall_in_sight_is_dropped():
     before, after = (0.0, 0.0, 0.0), (0.01, 0.02, 0.003)
     wall = np.column_stack([np.full(60, 2.0), np.linspace(-1, 1, 60)])
     assert without_sliding(before, after, wall) == pytest.approx((0.01, 0.0, 0.003))

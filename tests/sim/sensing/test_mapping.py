@@ -112,7 +112,7 @@ def test_something_too_near_to_be_measured_leaves_its_beam_unknown():
     assert len(grid.insert((0, 0, 0), np.full(EYE.beams, -np.inf))) == 0
 
 
-def test_changes_are_told_cell_by_cell():
+def test_changes_are_returned_cell_by_cell():
     scanner, grid, rng = Scanner(EYE, POSTS), OccupancyMap(EYE), np.random.default_rng(1)
     free, occupied = grid.seen_free.copy(), grid.occupied.copy()
     for k in range(30):
@@ -210,7 +210,7 @@ def test_ground_on_which_something_stands_is_not_taken_as_free():
 
 
 @pytest.mark.parametrize("place", [(0.31, -0.77), (9.2, -1.03), (40.0, 0.0)])
-def test_a_renewed_map_knows_the_free_ground_around_a_place_and_nothing_else(place):
+def test_a_reset_map_keeps_the_free_ground_around_a_place_and_nothing_else(place):
     old, radius = OccupancyMap(EYE), 0.6
     for x in (0.0, 8.0):
         old.insert((x, 0.0, 0.1), Scanner(EYE, POSTS).scan((x, 0.0, 0.1)))
@@ -233,7 +233,7 @@ def test_a_renewed_map_knows_the_free_ground_around_a_place_and_nothing_else(pla
     assert np.array_equal(new.arrays.unseen, squares)
 
 
-def test_a_mover_can_be_forgotten_and_its_beams_left_out():
+def test_hits_of_a_mover_can_be_cleared_and_its_beams_omitted():
     scanner, grid = Scanner(EYE, np.empty((0, 3))), OccupancyMap(EYE)
     where, radii = np.array([[1.5, 0.0]]), np.array([0.3])
     ranges = scanner.scan((0, 0, 0), where, radii)

@@ -166,7 +166,7 @@ def test_a_post_on_the_map_is_a_mark_even_if_it_seems_to_creep(jackal):
 
 
 def test_a_pillar_that_is_passed_does_not_move(jackal):
-    """Its far side comes into sight, on ground that beams have grazed."""
+    """Its far side becomes visible, on ground that beams have grazed."""
     pillars = np.array([[2.0, 1.0, 0.35], [2.0, -1.2, 0.35]])
     scanner, grid = Scanner(jackal.lidar, pillars, bounds=BOUNDS), OccupancyMap(jackal.lidar)
     tracker = MoverTracker(jackal.lidar)

@@ -61,17 +61,17 @@ def barn(
     with resumable(out), campaign_bar("driving") as progress:
         results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress)
     runs, fastest = challenge.by_map(results.table), challenge.reference_times(folder)
-    found = list(challenge.lines(runs[map], fastest))
+    rows = list(challenge.lines(runs[map], fastest))
     known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
     (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)
     if not json:
-        show(json, None, _lines(found, known, price))  # before filming, which is slow and may fail
+        show(json, None, _lines(rows, known, price))  # before filming, which is slow and may fail
     filmed = _films(results, out / "films") if films else {}
     facts = {
         "folder": str(results.folder),
         "note": challenge.OURS,
-        "worlds": [vars(line) for line in found[:-1]],
-        "all": vars(found[-1]),
+        "worlds": [vars(line) for line in rows[:-1]],
+        "all": vars(rows[-1]),
         "published": [vars(entry) for entry in challenge.PUBLISHED],
         "films": [str(path) for path in filmed.values()],
         **({"with_map": vars(known), "price_of_not_knowing": price.as_dict()} if known and price else {}),
@@ -89,10 +89,10 @@ def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
         return film_failures(results.table.to_pylist(), results.folder, folder, progress=progress)
 
 
-def _lines(found: "Sequence[BarnLine]", known: "BarnLine | None", price: "Price | None") -> Iterator[str]:
+def _lines(rows: "Sequence[BarnLine]", known: "BarnLine | None", price: "Price | None") -> Iterator[str]:
     from antdrive.runs.barn_challenge import HEADS, OURS, PUBLISHED, PUBLISHED_HEADS
 
-    listed = [*found, *([dataclasses.replace(known, world="all, with the map")] if known else [])]
+    listed = [*rows, *([dataclasses.replace(known, world="all, with the map")] if known else [])]
     yield from table(HEADS, (line.cells for line in listed))
     yield ""
     if price:

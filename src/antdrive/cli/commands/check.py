@@ -43,12 +43,12 @@ def check(
     from antdrive.cli.testing.session_summary import add_to_page, drives_in, properties, save_junit
     from antdrive.cli.testing.unused import unused_beside
 
-    found = drive_suites(tests, only, jobs, "", results, film, json=json)
+    outcomes = drive_suites(tests, only, jobs, "", results, film, json=json)
     unused = unused_beside(tests)
     if junit is not None:
-        save_junit(found, junit)
-    add_to_page((drive for result in found for drive in drives_in(properties(result))), unused, print_error)
-    return _summarise(found, json, unused, strict=strict)
+        save_junit(outcomes, junit)
+    add_to_page((drive for result in outcomes for drive in drives_in(properties(result))), unused, print_error)
+    return _summarise(outcomes, json, unused, strict=strict)
 
 
 def accept(
@@ -66,8 +66,8 @@ def accept(
     """
     from antdrive.cli.testing.unused import unused_beside
 
-    found = drive_suites(tests, only, jobs, "new" if new else "all", results, film, json=json)
-    return _summarise(found, json, unused_beside(tests))
+    outcomes = drive_suites(tests, only, jobs, "new" if new else "all", results, film, json=json)
+    return _summarise(outcomes, json, unused_beside(tests))
 
 
 def drive_suites(
@@ -99,14 +99,14 @@ def drive_suites(
             with suppress(InputError, FieldError):  # reported as the test's failure
                 scenario_of(case, with_chosen_margin)
     processes = min(jobs or cores(), len(cases))
-    found = []
+    outcomes = []
     with bar("driving") as progress:
         for result in check_cases(cases, jobs=processes, update=update, results=results):
-            found.append(result)
+            outcomes.append(result)
             if not json:
                 _print(result)
-            progress(len(found) / len(cases))
-    return found
+            progress(len(outcomes) / len(cases))
+    return outcomes
 
 
 def _print(result: "CheckResult") -> None:

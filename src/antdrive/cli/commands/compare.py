@@ -56,7 +56,7 @@ def compare(
     figures: options.Figures = True,
     film: Annotated[Path | None, option("FILE", "Film the first world side by side: .mp4, .gif or .webp.")] = None,
     speed: options.Speed = 1.0,
-    asked: CampaignQuery,
+    query: CampaignQuery,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
@@ -65,8 +65,8 @@ def compare(
     Worlds: pairs the planners by world and seed; figures and film show the first pair. Exit code 0: every run succeeded.
     Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
-    if campaigns := campaign_folders(worlds, context, asked):
-        compare_campaigns(campaigns, planner or (), asked, json)
+    if campaigns := campaign_folders(worlds, context, query):
+        compare_campaigns(campaigns, planner or (), query, json)
         return True
     check_worlds(worlds)
     entrants = entrants_of(planner, settings)

@@ -56,17 +56,17 @@ def falsify(
     scenario = setup.scenario("empty", given)
     mark = fingerprint(scenario, budget, seed, method, obstacles, seconds)
     usual = Path("out") / file_name(f"falsify-{setup.planner}-{scenario.robot.name}-{seed}")
-    asked: dict[str, Any] = {"budget": budget, "seed": seed, "method": method}
+    search: dict[str, Any] = {"budget": budget, "seed": seed, "method": method}
     with results_folder(out, usual, MARKER, mark) as (folder, _):
         with bar("searching for failures") as progress:
             hunt = find_failures(
-                scenario, obstacles=obstacles, progress=lambda runs, found: progress(runs / budget), **asked
+                scenario, obstacles=obstacles, progress=lambda runs, failures: progress(runs / budget), **search
             )
         reported = _report(hunt, folder, seconds, film)
     facts = {
         "planner": scenario.planner_label,
         "robot": scenario.robot.name,
-        **asked,
+        **search,
         "runs": hunt.runs,
         "driven": hunt.driven,
         "interrupted": hunt.interrupted,

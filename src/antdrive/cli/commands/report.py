@@ -20,7 +20,7 @@ def report(
     title: Annotated[str | None, option("TEXT", "Title.  [default: the folders' names]")] = None,
     embed_films: Annotated[bool, flag("Embed films instead of linking to them.", "--embed-films")] = False,
     planner: Annotated[list[str] | None, option("LABEL", "Campaign: report on this planner only. Repeatable.")] = None,
-    asked: CampaignQuery,
+    query: CampaignQuery,
     json: options.Json = False,
 ) -> None:
     """Write a report on many runs or on a campaign.
@@ -30,12 +30,12 @@ def report(
     """
     campaigns = [folder for folder in folders if is_campaign(folder)]
     if campaigns and len(campaigns) == len(folders):
-        report_campaigns(folders, out, json, title, planner or (), asked)
+        report_campaigns(folders, out, json, title, planner or (), query)
         return
     other = next(folder for folder in folders if folder not in campaigns)
     if campaigns:
         raise InputError(f"{other}: is not a campaign folder, but {campaigns[0]} is; write separate reports")
-    refuse_campaign_options([*(["planner"] if planner else []), *asked.given], other)
+    refuse_campaign_options([*(["planner"] if planner else []), *query.given], other)
     from antdrive.views.pages.run_report import write_report
 
     count = write_report(folders, out, title=title, embed_films=embed_films)

@@ -46,25 +46,30 @@ def reproduce(
         if few:
             print_error(few)
         with bar("planning") as progress:
-            found = repeat(papers, folder, seeds=seeds, jobs=jobs, quick=quick, progress=progress)
-            files = dict(found.files)
+            reproduction = repeat(papers, folder, seeds=seeds, jobs=jobs, quick=quick, progress=progress)
+            files = dict(reproduction.files)
             for one in papers:
-                files |= draw_figures(one, found.of(one), folder, 1 if quick else min(seeds, 10), suffixes(vector))
+                files |= draw_figures(
+                    one, reproduction.of(one), folder, 1 if quick else min(seeds, 10), suffixes(vector)
+                )
                 if films:
                     from antdrive.views.papers import film_paper
 
                     film = film_paper(one, folder)
                     files |= {} if film is None else {f"{one} film": str(film)}
         result = {
-            "rows": [vars(row) for row in found.rows],
-            "claims": [verdict_facts(verdict) for verdict in found.verdicts],
+            "rows": [vars(row) for row in reproduction.rows],
+            "claims": [verdict_facts(verdict) for verdict in reproduction.verdicts],
             "files": files,
-            "kept": found.kept,
+            "kept": reproduction.kept,
         }
         write_json(folder / MARKER, {**facts, **result})
-    lines = [*table(HEADS, map(row_cells, found.rows)), *table(VERDICT_HEADS, map(verdict_cells, found.verdicts))]
+    lines = [
+        *table(HEADS, map(row_cells, reproduction.rows)),
+        *table(VERDICT_HEADS, map(verdict_cells, reproduction.verdicts)),
+    ]
     lines += file_lines(files)
-    if found.kept:
-        count = f"{found.kept} of {len(found.rows)}"
+    if reproduction.kept:
+        count = f"{reproduction.kept} of {len(reproduction.rows)}"
         lines.append(f"{count} experiments reused from {folder / RUNS_FOLDER}")
     show(json, result, lines)

@@ -105,7 +105,7 @@ def import_robot(
         values[key] = read[0]
     usual = Path(f"{path.name.removesuffix('.xacro').removesuffix('.urdf')}.yaml")
     target = import_target(path, out, usual, "robot")
-    found = import_urdf(
+    imported = import_urdf(
         path,
         left=left,
         right=right,
@@ -121,8 +121,8 @@ def import_robot(
     if figure is not None:
         from antdrive.views.figures.robot_figure import robot_figure
 
-        robot_figure(found.spec, figure, pieces=found.pieces, above=found.above)
+        robot_figure(imported.spec, figure, pieces=imported.pieces, above=imported.above)
         files["figure"] = str(figure)
-    write_text(target, found.text)
-    facts = {**robot_to_dict(found.spec), "files": files, "left_out": list(found.missing_meshes)}
-    show(json, facts, [found.text.rstrip(), *file_lines(files)])
+    write_text(target, imported.text)
+    facts = {**robot_to_dict(imported.spec), "files": files, "left_out": list(imported.missing_meshes)}
+    show(json, facts, [imported.text.rstrip(), *file_lines(files)])

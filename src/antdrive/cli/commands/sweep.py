@@ -87,11 +87,11 @@ def sweep(
     if out is None and not dry_run:
         raise InputError("--out: missing; name the output folder")
     _check(keep, dask, jobs, report, dry_run)
-    asked = campaign_from(
+    requested = campaign_from(
         campaign, given, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, tasks=tasks,
         run_limit=run_limit,
     )  # fmt: skip
-    expansion = expand(asked)
+    expansion = expand(requested)
     rest: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
     if dry_run or out is None:
         size = len(expansion.jobs)
@@ -102,7 +102,7 @@ def sweep(
     compile_once()
     with resumable(out), campaign_bar("driving") as progress:
         rest |= {"jobs": jobs, "dask": dask, "keep": cast("Keep | None", keep)}
-        results = make_runs(asked, out, expansion=expansion, progress=progress, **rest)
+        results = make_runs(requested, out, expansion=expansion, progress=progress, **rest)
     for note in results.notes:
         print_error(note)
     files: list[str] = []

@@ -36,17 +36,17 @@ def verify(
         try:
             path = str(log_at(given))
             result = given / "result.json" if given.is_dir() else None
-            found = checked[path] = verify_log(Path(path), task, spec, result, replay=replay)
+            report = checked[path] = verify_log(Path(path), task, spec, result, replay=replay)
         except InputError as error:
             print_error(str(error))
             checked[path] = {"certified": False, "problems": [str(error)], "readable": False}
             continue
         if not json:
-            print_line(f"{path}: {found['sentence']}{f'; about {about}' if about and found['certified'] else ''}")
-            for problem in found["problems"]:
+            print_line(f"{path}: {report['sentence']}{f'; about {about}' if about and report['certified'] else ''}")
+            for problem in report["problems"]:
                 print_line(f"  {problem}")
-    all_certified = all(found["certified"] for found in checked.values())
-    readable = all(found["readable"] for found in checked.values())
+    all_certified = all(report["certified"] for report in checked.values())
+    readable = all(report["readable"] for report in checked.values())
     if json and (readable or len(checked) > 1):
         print_json({"certified": all_certified, "rollouts": checked})
     return all_certified if readable else INVALID_INPUT

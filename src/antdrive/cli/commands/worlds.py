@@ -31,9 +31,9 @@ def list_worlds(json: options.Json = False) -> None:
     from antdrive.worlds import list_worlds as catalogue
     from antdrive.worlds import load_task
 
-    found = {name: _facts(load_task(name)) for name in catalogue()}
+    known = {name: _facts(load_task(name)) for name in catalogue()}
     heads = ("world", "size m", "obstacles", "movers", "cell m", "about")
-    show(json, found, table(heads, (_row(name, facts) for name, facts in found.items())))
+    show(json, known, table(heads, (_row(name, facts) for name, facts in known.items())))
 
 
 def _row(name: str, facts: Mapping[str, Any]) -> tuple[str, ...]:
@@ -66,7 +66,7 @@ def show_world(
     ends: Ends,
     out: Annotated[Path | None, option("FILE", "Drawing: .png, .svg or .pdf.")] = None,
     json: options.Json = False,
-    **asked: Any,
+    **settings: Any,
 ) -> None:
     """Describe a world and check whether a robot can cross it."""
     from antdrive.base.plane import world_to_map
@@ -74,7 +74,7 @@ def show_world(
     from antdrive.robots import list_robots, load_robot, overlap_at
     from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
 
-    margin = asked["margin"]
+    margin = settings["margin"]
     if margin == "auto":
         raise InputError("--margin auto: applies to drives only; give a number of metres")
     given, spec = ends.of(world), load_robot(robot)
@@ -204,7 +204,7 @@ def import_world(
     for task, file in zip(tasks, files, strict=True):
         # A map written by antdrive holds the other tasks in its file.
         save_task(task, file, kept_tasks(path, task) if file_format is IMPORTS["map_server"] else {})
-    found = [{**_facts(task), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
+    imported = [{**_facts(task), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
     lines = []
     if len(tasks) == 1:
         world = tasks[0].world
@@ -212,7 +212,7 @@ def import_world(
         if file_format.is_map and len(world.obstacles) > MANY:
             lines.append(f"  planning takes seconds beyond {MANY} obstacles; a larger --overhang needs fewer")
     lines += [line for file in files for line in file_lines({"world": file})]
-    show(json, {"worlds": found} if is_set else found[0], lines)
+    show(json, {"worlds": imported} if is_set else imported[0], lines)
 
 
 def _targets(path: Path, folder: Path, tasks: "Sequence[Task]") -> list[Path]:

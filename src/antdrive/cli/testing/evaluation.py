@@ -244,7 +244,7 @@ def check_cases(
 ) -> Iterator[CheckResult]:
     """Drive and evaluate many tests. Yield the results in the order of the tests; they do not depend on `jobs`.
 
-    A test that cannot be judged, because its suite, a file or its baseline is wrong, fails with that as its fault.
+    A test with an invalid suite, file or baseline fails with that error as its fault.
 
     Args:
         cases: the tests

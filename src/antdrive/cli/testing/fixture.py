@@ -200,10 +200,10 @@ def assert_collision_free(run: Run | Rollout, clearance: float = 0.0) -> None:
     if not certificate.certified:
         raise AssertionError(f"not certified collision-free: {'; '.join(certificate.problems)}")
     if certificate.bound < clearance:
-        found = nearest_of(rollout)
+        nearest = nearest_of(rollout)
         raise AssertionError(
-            f"clearance: {in_metres(certificate.bound)} is proved, expected {clearance:g} m; nearest to {found.thing}, "
-            f"{found.place}"
+            f"clearance: {in_metres(certificate.bound)} is proved, expected {clearance:g} m; nearest to {nearest.thing}, "
+            f"{nearest.place}"
         )
 
 

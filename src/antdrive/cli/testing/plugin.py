@@ -237,14 +237,14 @@ def _add_extras(report: Any, results: list[CheckResult]) -> None:
         return
     import base64
 
-    found = list(getattr(report, "extras", []))
+    attached = list(getattr(report, "extras", []))
     for result in results:
         for name, path in result.files.items():
             if path.endswith(".png"):
-                found.append(extras.png(base64.b64encode(Path(path).read_bytes()).decode(), name=name))
+                attached.append(extras.png(base64.b64encode(Path(path).read_bytes()).decode(), name=name))
             else:
-                found.append(extras.url(Path(path).as_uri(), name=name))
-    report.extras = found
+                attached.append(extras.url(Path(path).as_uri(), name=name))
+    report.extras = attached
 
 
 class _Listener:

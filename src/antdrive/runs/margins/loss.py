@@ -80,15 +80,15 @@ def _beside(cells: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
 
 def _pillars(line: Floats, free: Floats, radius: float, distance: float, rng: np.random.Generator) -> tuple[Disc, ...]:
     """Draw cylinders at a distance from a line (N, 2), and no nearer to the points `free` (M, 2)."""
-    left_out, found = rng.uniform(*LEFT_OUT), []
+    left_out, pillars = rng.uniform(*LEFT_OUT), []
     smallest, largest = (math.log(radius * share) for share in PILLARS)
     for at, away, factor in _places(line, radius, rng):
         size = math.exp(rng.uniform(smallest, largest))
         centre = at + (distance + size) * factor * np.array([math.cos(away), math.sin(away)])
         room = min(_distance(centre, line), float(np.hypot(*(free - centre).T).min(initial=math.inf)))
         if rng.random() >= left_out and room >= distance + size - ROUNDING / 2:
-            found.append(Disc(float(centre[0]), float(centre[1]), size))
-    return tuple(found)
+            pillars.append(Disc(float(centre[0]), float(centre[1]), size))
+    return tuple(pillars)
 
 
 def _places(line: Floats, radius: float, rng: np.random.Generator) -> Iterator[tuple[Floats, float, float]]:

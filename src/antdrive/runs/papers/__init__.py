@@ -1,1 +1,1 @@
-"""The papers' experiments, measured again: `reproduce` is the way in."""
+"""Reproduction of the papers' experiments; start with `reproduce`."""

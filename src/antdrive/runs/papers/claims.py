@@ -1,4 +1,4 @@
-"""The papers' claims, each a row of `claims.csv`, and whether they hold: a claim's test on the runs of its experiments.
+"""Claims of the papers, one row of `claims.csv` each, and their verdicts from the runs of the experiments.
 
 A claim is one sentence that an experiment can refute, and the test that decides it.
 """
@@ -21,12 +21,12 @@ from antdrive.runs.papers.paper_runs import PaperRun
 from antdrive.runs.statistics.intervals import Interval, means_by_world, medians_by_world, resampled, wilson
 from antdrive.runs.statistics.significance import wilcoxon
 
-#: The margin of "no longer than" [points]: A = 0.56, where a small effect begins (Vargha & Delaney 2000), is 56 : 44.
+#: The margin of "no longer than" [points]: a small effect, A = 0.56 (Vargha & Delaney 2000), is 56 : 44.
 SMALL_EFFECT = 12.0
 
 
 class Arm(NamedTuple):
-    """One experiment of a paper: a map's name, and the planner's with its setting."""
+    """One experiment of a paper: the names of the map and of the planner with its setting."""
 
     map: str
     name: str
@@ -36,21 +36,21 @@ class Arm(NamedTuple):
 class Claim:
     """A claim of a paper, and the test that decides it: `statistic` `relation` `bound`.
 
-    The statistics of `antdrive.runs.papers.claims` are of three kinds. One bounds a single planner, one compares two planners
-    seed by seed, and one counts the maps on which the first planner is below the second. Some take more than one quantity.
+    There are three kinds of statistics: bounds on one planner, comparisons of two planners seed by seed, and counts of maps on
+    which the first planner is below the second. Some take several quantities.
     """
 
     paper: str
     source: str  # section, table or figure
     sentence: str
-    reading: str = "ours"  # how the planner is read where that is not our default
-    printed: str  # the paper's figures
+    reading: str = "ours"  # interpretation of the planner, if not our default
+    printed: str  # the paper's values
     statistic: str  # a key of `STATISTICS`
-    quantity: tuple[str, ...] = ("gap",)  # properties of `PaperRun`; a second one is that of the second planner
+    quantity: tuple[str, ...] = ("gap",)  # properties of `PaperRun`; a second one belongs to the second planner
     relation: str  # a key of `RELATIONS`
     bound: float
-    cases: tuple[tuple[Arm, ...], ...]  # on each map the planners that are measured together
-    remark: str = ""  # what the figures do not say, and which margins and thresholds are ours, as the paper prints none
+    cases: tuple[tuple[Arm, ...], ...]  # for each map, the planners measured together
+    remark: str = ""  # limits of the values, and margins and thresholds that are ours because the paper prints none
 
     @property
     def arms(self) -> frozenset[Arm]:
@@ -82,17 +82,17 @@ Floats = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]
 RunsByArm = Mapping[Arm, Sequence[PaperRun]]
 NO_PATH = 1e9  # replaces infinity in differences, so that "no path" minus "no path" is 0
-FEWEST = 6  # with fewer runs no interval says anything
-MANY = 1000  # times as many maps and seeds: a factor above this is not written
-EQUAL = 1e-6  # a value is at most a bound that it exceeds by less
-ABOUT = 0.05  # the share of a printed mean by which ours may differ
+FEWEST = 6  # with fewer runs intervals are meaningless
+MANY = 1000  # larger factors of maps and seeds are not reported
+EQUAL = 1e-6  # tolerance of bounds
+ABOUT = 0.05  # allowed relative deviation from a printed mean
 ENDLESS_TEXT = "∞"
-TIMED = "cpu_ms"  # the quantity that is measured by the clock
-NEVER = "neither ever gets there"
+TIMED = "cpu_ms"  # quantity measured by the clock
+NEVER = "neither ever reaches it"
 
 
 class Decision(enum.Enum):
-    """What became of a claim. The value is the sentence shown to people."""
+    """The verdict on a claim; the value is shown to users."""
 
     HOLDS = "holds"
     REFUTED = "does not hold"
@@ -101,32 +101,32 @@ class Decision(enum.Enum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a claim."""
+    """The verdict on a claim, with its evidence."""
 
     claim: Claim
     decision: Decision
-    ours: str  # our figure with its interval, in words
+    ours: str  # our value with its interval, in words
     why: str
     value: float
-    low: float  # the ends of the value's interval
+    low: float  # ends of the value's interval
     high: float
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What a statistic gives on a claim's runs."""
+    """The result of a statistic on a claim's runs."""
 
     value: float
     interval: Interval
-    runs: int  # runs, or pairs of them, that count
+    runs: int  # counted runs, or pairs of them
     ours: str  # the value with its interval, in words
-    why: str = ""  # further figures, in words
-    unknown: str = ""  # why no decision is possible whatever the interval
-    few: str = ""  # what is said of fewer runs than the test needs, where it is not that no interval says anything
-    exact: bool = False  # the interval is right for any number of runs, so that even few can refute
+    why: str = ""  # further values, in words
+    unknown: str = ""  # reason why no decision is possible, whatever the interval
+    few: str = ""  # message for too few runs, if not the default
+    exact: bool = False  # the interval is valid for any number of runs, so that even few can refute
 
 
-#: By relation, whether an interval bears it out, and whether it refutes it.
+#: By relation, whether an interval confirms it, and whether it refutes it.
 RELATIONS: Mapping[str, Callable[[Interval, float], tuple[bool, bool]]] = MappingProxyType(
     {
         "<": lambda interval, bound: (interval.high < bound, interval.low >= bound),
@@ -142,14 +142,14 @@ RELATIONS: Mapping[str, Callable[[Interval, float], tuple[bool, bool]]] = Mappin
 
 
 def evaluate(claim: Claim, runs: RunsByArm) -> Verdict:
-    """Test a claim."""
+    """Evaluate a claim."""
     measured = STATISTICS[claim.statistic](claim, runs)
     holds, fails = RELATIONS[claim.relation](measured.interval, claim.bound)
     decision, reason = Decision.OPEN, ""
     if measured.unknown:
         reason = measured.unknown
     elif measured.runs < runs_needed(claim) and not (measured.exact and fails):
-        reason = measured.few or f"{measured.runs} runs, and with fewer than {FEWEST} no interval says anything"
+        reason = measured.few or f"{measured.runs} runs, but an interval needs at least {FEWEST}"
     elif holds or fails:
         decision = Decision.HOLDS if holds else Decision.REFUTED
     else:
@@ -159,7 +159,7 @@ def evaluate(claim: Claim, runs: RunsByArm) -> Verdict:
 
 
 def runs_needed(claim: Claim) -> int:
-    """How many runs a claim's test needs at least to bear it out."""
+    """Return the least number of runs that can confirm a claim."""
     if claim.statistic in ("arrived", "failed"):
         above = claim.relation in (">", ">=")
         return next(
@@ -169,15 +169,15 @@ def runs_needed(claim: Claim) -> int:
 
 
 def runs_available(claim: Claim, sizes: Mapping[Arm, int]) -> int:
-    """How many runs, or pairs of them, a claim's test counts."""
+    """Return the number of runs, or pairs of them, that a claim's test counts."""
     counts = [min(sizes[arm] for arm in case) for case in claim.cases]
     return min(counts) if "wins" in claim.statistic else sum(counts)
 
 
 def _difference(claim: Claim, runs: RunsByArm) -> Measured:
-    """The median of the differences, pair by pair."""
+    """Return the median of the paired differences."""
     first, second, world = _paired(claim, runs)
-    difference = np.round(first - second, 9)  # rounding errors become 0
+    difference = np.round(first - second, 9)  # removes rounding errors
     value, interval = _median(difference, world)
     why = f"{_counts(difference)}; Wilcoxon's p {wilcoxon(difference):.2g}"
     if claim.quantity == ("work",):
@@ -187,7 +187,7 @@ def _difference(claim: Claim, runs: RunsByArm) -> Measured:
 
 
 def _gain(claim: Claim, runs: RunsByArm) -> Measured:
-    """The median of the differences of two gains: from the first planner to the second, and from the third to the fourth."""
+    """Return the median difference of two gains: from the first planner to the second, from the third to the fourth."""
     (case,) = claim.cases
     before, after, world = _paired(claim, runs, [case[:2]])
     earlier, later, _ = _paired(claim, runs, [case[2:]])
@@ -198,11 +198,10 @@ def _gain(claim: Claim, runs: RunsByArm) -> Measured:
 
 
 def _balance(claim: Claim, runs: RunsByArm) -> Measured:
-    """The share of the pairs in which the first value is above the second, less the share in which it is below [points].
+    """Return the fraction of pairs with the first value above the second, minus that below [points].
 
-    For values of which many are equal, as lengths on small maps: their median difference is 0 whatever the others are. Two
-    planners that are alike have a balance of 0, of which an interval never says that it is 0 or less; so "no worse" lets a
-    small effect pass.
+    For values with many ties, such as lengths on small maps, whose median difference is always 0. Equivalent planners have a
+    balance of 0, whose interval never lies at or below 0; so "no worse" tolerates a small effect.
     """
     first, second, world = _paired(claim, runs)
     difference = np.round(first - second, 9)
@@ -216,9 +215,9 @@ def _balance(claim: Claim, runs: RunsByArm) -> Measured:
 
 
 def _scatter(claim: Claim, runs: RunsByArm) -> Measured:
-    """The difference of the two ranges between quartiles; maps, and runs within each, are resampled for its interval.
+    """Return the difference of the interquartile ranges; its interval resamples maps, then runs.
 
-    A quartile that no path reaches is infinite, and so is the range.
+    A quartile without a path is infinite, and so is the range.
     """
     first, second, world = _paired(claim, runs)
 
@@ -227,7 +226,7 @@ def _scatter(claim: Claim, runs: RunsByArm) -> Measured:
 
     rows = np.vstack(list(resampled(_alone(world))))
     ends = np.quantile([wider(row) for row in rows], [0.025, 0.975])
-    # Differences of equal ranges are not quite 0.
+    # Differences of equal ranges are not exactly 0.
     value, low, high = (round(float(one), 9) for one in (wider(np.ones(len(first), dtype=np.int64)), *ends))
     interval = Interval(low, high)
     ours = f"ranges differ by {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
@@ -235,7 +234,7 @@ def _scatter(claim: Claim, runs: RunsByArm) -> Measured:
 
 
 def _median_of_one(claim: Claim, runs: RunsByArm) -> Measured:
-    """The median of all values."""
+    """Return the median of all values."""
     values, world = _together(claim, runs)
     value, interval = _median(values, world)
     arrived, within = int((values < NO_PATH).sum()), int((values <= claim.bound + EQUAL).sum())
@@ -244,13 +243,13 @@ def _median_of_one(claim: Claim, runs: RunsByArm) -> Measured:
 
 
 def _mean_of_one(claim: Claim, runs: RunsByArm) -> Measured:
-    """The mean of all finite values, beside the printed one."""
+    """Return the mean of all finite values, beside the printed one."""
     values, _ = _together(claim, runs)
     known = values[values < NO_PATH]
     if not len(known):
         return Measured(math.nan, Interval(math.nan, math.nan), 0, "–", unknown="no path was found")
     value = float(known.mean())
-    # Runs are of one map, so each counts on its own.
+    # All runs are on one map, so each counts on its own.
     interval = means_by_world(known[:, None], np.arange(len(known)))[0]
     why = f"{100 * (value / claim.bound - 1):+.1f} % from the printed mean"
     if len(known) < len(values):
@@ -259,7 +258,7 @@ def _mean_of_one(claim: Claim, runs: RunsByArm) -> Measured:
 
 
 def _arrived(claim: Claim, runs: RunsByArm) -> Measured:
-    """The share of the runs in which a planner finds a path."""
+    """Return the fraction of runs in which a planner finds a path."""
     count, arrived, needed = *_solved(claim, runs), runs_needed(claim)
     interval = wilson(arrived, count)
     return Measured(
@@ -267,14 +266,14 @@ def _arrived(claim: Claim, runs: RunsByArm) -> Measured:
         interval=interval,
         runs=count,
         ours=f"{arrived}/{count} arrived [{interval.low:.0%}, {interval.high:.0%}]",
-        why=f"{'at least' if claim.relation == '>=' else 'at most'} {claim.bound:.0%} asked; Wilson's interval",
-        few=f"{count} runs, and the interval of fewer than {needed} is too wide whatever they give",
+        why=f"{'at least' if claim.relation == '>=' else 'at most'} {claim.bound:.0%} required; Wilson's interval",
+        few=f"{count} runs, but the interval needs at least {needed}",
         exact=True,
     )
 
 
 def _failed(claim: Claim, runs: RunsByArm) -> Measured:
-    """The share of the runs in which a planner finds no path. One such run shows that there are any; none refutes it."""
+    """Return the fraction of runs without a path. One such run confirms the claim; none does not refute it."""
     count, arrived = _solved(claim, runs)
     failed, interval = count - arrived, wilson(count - arrived, count)
     return Measured(
@@ -282,32 +281,32 @@ def _failed(claim: Claim, runs: RunsByArm) -> Measured:
         interval=interval,
         runs=count,
         ours=f"{failed}/{count} found no path [{interval.low:.0%}, {interval.high:.0%}]",
-        why="one run that fails bears it out" if failed else "",
-        unknown="" if failed else "no run failed, which does not say that none may",
+        why="one failed run confirms it" if failed else "",
+        unknown="" if failed else "no run failed, but others may",
     )
 
 
 def _wins(claim: Claim, runs: RunsByArm) -> Measured:
-    """In how many cases the first planner's median, or its best run as for times of equal work, is below the second's."""
+    """Count the cases in which the first planner's median, or best run, is below the second's."""
     stands = np.min if claim.statistic == "wins of best runs" else np.median
     pairs = [[float(stands([_value(t, claim.quantity[0]) for t in runs[arm]])) for arm in case] for case in claim.cases]
     less = sum(a < b - 1e-9 for a, b in pairs)
     digits = 2 if TIMED in claim.quantity else 0
     why = ", ".join(f"{a:.{digits}f} : {b:.{digits}f}" for a, b in pairs)
     count = min(len(runs[one]) for one, _ in claim.cases)
-    few = f"{count} runs tell no time, {FEWEST} do"
+    few = f"{count} runs, but times need at least {FEWEST}"
     return Measured(float(less), Interval(less, less), count, f"less in {less} of {len(pairs)}", why, few=few)
 
 
-#: By its name in the table of claims, what a statistic measures of a claim's runs.
+#: Statistics of a claim's runs, by name in the table of claims.
 STATISTICS: Mapping[str, Callable[[Claim, RunsByArm], Measured]] = MappingProxyType(
     {
-        # A single planner's runs, all together.
+        # A single planner, all runs together.
         "median": _median_of_one,
         "mean": _mean_of_one,
         "arrived": _arrived,
         "failed": _failed,
-        # Two planners, pair by pair of the same map and seed; `gain` compares two pairs.
+        # Two planners, paired by map and seed; `gain` compares two pairs.
         "difference": _difference,
         "balance": _balance,
         "scatter": _scatter,
@@ -320,16 +319,16 @@ STATISTICS: Mapping[str, Callable[[Claim, RunsByArm], Measured]] = MappingProxyT
 
 
 def _undecided(measured: Measured, claim: Claim) -> str:
-    """Why an interval decides nothing, and how much more it would take if the value stayed: intervals shrink with the root."""
+    """Explain an undecided interval, and estimate the runs needed: intervals shrink with the square root."""
     value, bound = measured.value, claim.bound
     if claim.relation == "about":
         bound = min(bound * (1 - ABOUT), bound * (1 + ABOUT), key=lambda end: abs(value - end))
-    words = f"the interval does not lie on one side of {bound:g}"
+    words = f"the interval contains {bound:g}"
     towards = measured.interval.high - value if bound > value else value - measured.interval.low
     if abs(bound - value) < 1e-9 or not abs(towards) < NO_PATH / 10:
         return words
     times = (towards / abs(bound - value)) ** 2
-    more = f"some {times:{'.0f' if times > 10 else '.1f'}} times as many maps and seeds would tell"
+    more = f"about {times:{'.0f' if times > 10 else '.1f'}} times as many maps and seeds would decide"
     return f"{words}; {more}" if 1.1 < times < MANY else words
 
 
@@ -343,7 +342,7 @@ def _never(first: Floats, second: Floats) -> str:
 
 
 def _slower(claim: Claim, runs: RunsByArm) -> float:
-    """By how much the first planner's median processor time is above the second's [%]; below 0 if it is faster."""
+    """Return how much slower the first planner is, by median processor time [%]; negative if faster."""
     first, second, _ = _paired(claim, runs, quantity=(TIMED,))
     return 100 * (float(np.median(first)) / max(float(np.median(second)), 1e-9) - 1)
 
@@ -354,13 +353,13 @@ def _value(run: PaperRun, quantity: str) -> float:
 
 
 def _solved(claim: Claim, runs: RunsByArm) -> tuple[int, int]:
-    """The number of all runs, and of those that found a path."""
+    """Return the number of all runs, and of those that found a path."""
     solved = [run.result.solved for (arm,) in claim.cases for run in runs[arm]]
     return len(solved), sum(solved)
 
 
 def _together(claim: Claim, runs: RunsByArm) -> tuple[Floats, Numbers]:
-    """The values of all runs, (N,), and the number of each one's map, (N,)."""
+    """Return the values of all runs, (N,), and the index of each one's map, (N,)."""
     (quantity,) = claim.quantity
     rows = [(_value(run, quantity), (arm.map, run.world)) for (arm,) in claim.cases for run in runs[arm]]
     return np.array([value for value, _ in rows]), _numbered([place for _, place in rows])
@@ -372,7 +371,7 @@ def _paired(
     cases: Sequence[tuple[Arm, ...]] | None = None,
     quantity: tuple[str, ...] | None = None,
 ) -> tuple[Floats, Floats, Numbers]:
-    """The values of first and second planners with the same map and seed, (N,) each, and the number of their map, (N,)."""
+    """Return the paired values of both planners with the same map and seed, (N,) each, and the index of the map, (N,)."""
     quantity = quantity or claim.quantity
     rows = []
     for one, other in claim.cases if cases is None else cases:
@@ -388,12 +387,12 @@ def _numbered(places: Sequence[tuple[str, int]]) -> Numbers:
 
 
 def _median(values: Floats, world: Numbers) -> tuple[float, Interval]:
-    """The median and its interval; where all runs are of one map, each counts on its own."""
+    """Return the median and its interval; on a single map each run counts on its own."""
     return float(np.median(values)), medians_by_world(values[:, None], _alone(world))[0]
 
 
 def _alone(world: Numbers) -> Numbers:
-    """What is resampled: maps or, where there is only one, single runs."""
+    """Return the units of resampling: maps, or runs if there is only one map."""
     return np.arange(len(world)) if len(set(world.tolist())) == 1 else world
 
 
@@ -402,7 +401,7 @@ def _quartile_range(values: Floats, counts: Numbers) -> float:
     return float(high - low)
 
 
-#: How a quantity is written: digits and unit.
+#: Digits and unit of a quantity.
 UNITS: Mapping[str, tuple[int, str]] = {
     "gap": (1, " %"),
     "length": (2, ""),
@@ -430,16 +429,16 @@ def _with_interval(value: float, interval: Interval, claim: Claim, endless: str 
 
 
 def _written(value: float, digits: int) -> str:
-    """A number without a sign where it is rounded to 0."""
+    """Format a number, without a sign if it rounds to 0."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-#: The headings of the table of claims; the verdict comes first, as a terminal may cut the lines.
+#: Headings of the table of claims; the verdict is first, as a terminal may cut the lines.
 VERDICT_HEADS = ("verdict", "paper", "claim", "reading", "printed", "ours", "why", "source")
 
 
 def verdict_cells(verdict: Verdict) -> list[str]:
-    """A row of the table as text, under `VERDICT_HEADS`."""
+    """Return a row of the table, under `VERDICT_HEADS`."""
     claim = verdict.claim
     return [
         verdict.decision.value,
@@ -454,7 +453,7 @@ def verdict_cells(verdict: Verdict) -> list[str]:
 
 
 def verdict_facts(verdict: Verdict) -> dict[str, Any]:
-    """A verdict as plain data, for files and `--json`."""
+    """Return a verdict as plain data, for files and `--json`."""
     cells = dict(zip(VERDICT_HEADS, verdict_cells(verdict), strict=True))
     numbers = {"value": verdict.value, "low": verdict.low, "high": verdict.high}
     known: Callable[[float], float | None] = lambda number: number if math.isfinite(number) else None  # noqa: E731

@@ -1,4 +1,4 @@
-"""The experiments of each paper with the values that it prints, one experiment per map and planner."""
+"""Experiments of the papers with their printed values, one per map and planner."""
 
 from __future__ import annotations
 
@@ -18,29 +18,25 @@ from antdrive.runs.papers.paper_runs import FirstTouchDStar
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """One planner on one map, to be run with several seeds, and the value that the paper prints."""
+    """One planner on one map, run with several seeds, and the paper's printed value."""
 
     paper: str
     map: str
     planner: str
-    query: Callable[[int], Query]  # gives the map with start and goal for a number
-    printed: float | None  # lengths in cells; None: the paper prints none
+    query: Callable[[int], Query]  # returns the map with start and goal for an index
+    printed: float | None  # length in cells; None if the paper prints none
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # the planner's parameters
-    recreated: bool = (
-        True  # the paper shows its map as a picture only; random maps of the same size and kind replace it
-    )
-    comparable: bool = (
-        False  # the shortest path of the recreated maps is as long as the paper says, so that lengths compare
-    )
-    quantity: str = "length"  # the value that is printed and measured: a property of `PaperRun`
-    label: str = ""  # the planner with its setting, unique among the experiments of a map
-    worlds: int = 1  # how many different maps there are; 0: one for each seed
-    work: float = math.inf  # where it is finite, planning ends after so many ant steps
-    most_seeds: int = 10_000  # more seeds than this would tell nothing new
-    rounds: int = 1  # how many times as many seeds as asked for are run, where single runs differ widely
-    slow: bool = False  # takes seconds, its map or its plans, and is left out of a quick look
-    made: Planner | None = None  # the planner itself, where it is not one of the registry
-    movers: int = 0  # how many obstacles move while the robot decides cell by cell; 0: the planner plans at once
+    recreated: bool = True  # the paper only pictures its map; random maps of the same size and kind replace it
+    comparable: bool = False  # the shortest path on recreated maps has the paper's length, so lengths are comparable
+    quantity: str = "length"  # the printed and measured value: a property of `PaperRun`
+    label: str = ""  # the planner with its setting, unique on a map
+    worlds: int = 1  # number of maps; 0: one for each seed
+    work: float = math.inf  # if finite, planning ends after this number of ant steps
+    most_seeds: int = 10_000  # more seeds add nothing
+    rounds: int = 1  # multiplies the number of seeds if runs vary widely
+    slow: bool = False  # takes seconds; omitted from a quick run
+    made: Planner | None = None  # the planner itself, if it is not registered
+    movers: int = 0  # number of moving obstacles while the robot decides cell by cell; 0: plan once
 
     @property
     def name(self) -> str:
@@ -48,19 +44,19 @@ class Experiment:
         return self.label or self.planner
 
     def world(self, seed: int) -> int:
-        """The number of the map that a seed gets."""
+        """Return the map index of a seed."""
         return seed % self.worlds if self.worlds else seed
 
     def seeds(self, asked: int) -> range:
-        """The seeds to run where so many were asked for."""
+        """Return the seeds to run for a requested number."""
         return range(min(asked * self.rounds, self.most_seeds))
 
 
-#: How many candidates take the place of a picture: as many as there are seeds, and where making or planning one takes long.
+#: Number of recreated maps: one per seed, or fewer if making or planning one is slow.
 MANY_CANDIDATES, CANDIDATES = 50, 10
 
 
-#: Nothing is random in hasan's environments but the moving obstacle; the seeds repeat the timing.
+#: Only the moving obstacle is random in hasan's environments; the seeds repeat the timing.
 HASAN_SEEDS = 20
 
 
@@ -69,7 +65,7 @@ def _for_every_seed(query: Query) -> Callable[[int], Query]:
 
 
 def _candidates(size: int, first: int, moves: tuple[int, int], **kind: Any) -> Callable[[int], Query]:
-    """Candidates for a square map from corner to corner, with `moves` = (straight, diagonal) of the shortest path."""
+    """Return candidates for a square map from corner to corner, with `moves` = (straight, diagonal) on the shortest path."""
     return lambda seed: _candidate((size, size), (0, 0), (size - 1, size - 1), moves, first + seed, *kind.items())
 
 
@@ -85,12 +81,12 @@ def _candidate(
     return candidate(shape, start, goal, MoveCount(*moves), seed, **dict(kind))
 
 
-#: A setting of a planner: its name, the printed value and the options.
+#: A planner's setting: name, printed value and options.
 Setting: TypeAlias = tuple[str, float | None, dict[str, Any]]
 
 
 def han2007() -> list[Experiment]:
-    """Experiment 6 with ants, elites on the thesis' simple maps, and the genetic algorithm around one large obstacle."""
+    """Return experiment 6 with ants, elites on simple maps, and the genetic algorithm around one large obstacle."""
     printed = ((10, 45.357), (100, 38.6223), (500, 36.237))
     table: list[Setting] = [(f"{n} ants", mean, {"ants": n}) for n, mean in printed]
     # Section 5.2 prints no means for these; its program runs 500 ants.
@@ -114,7 +110,7 @@ def han2007() -> list[Experiment]:
 
 
 def _han_via_points() -> Iterator[Setting]:
-    """Experiments 4 and 5; figure 5.1.9 varies Pc without mutation, figure 5.1.10 varies Pm without crossover."""
+    """Yield experiments 4 and 5; figure 5.1.9 varies Pc without mutation, figure 5.1.10 Pm without crossover."""
     yield "3 via points", 33.1798, {"via_points": 3}
     yield "2 via points", None, {"via_points": 2}
     yield "1 via point", None, {"via_points": 1}
@@ -143,10 +139,10 @@ def _han_experiments(where: str, query: Query, planner: str, settings: Sequence[
 
 
 def suganthi2019() -> list[Experiment]:
-    """Table 2: four sizes, three planners, and the readings of what the paper leaves open.
+    """Return table 2: four sizes, three planners, and interpretations of what the paper leaves open.
 
-    It does not say what an ant in a dead end does, whether loops are cut, or whether the elite's factor in eq. 7 is
-    the alpha of eq. 5. The constants of `pfaco` are those of Table 1, whose first value the text does not show.
+    It omits what an ant does in a dead end, whether loops are cut, and whether the elite's factor in eq. 7 is the alpha of
+    eq. 5. The constants of `pfaco` are those of Table 1, whose first value is missing in the text.
     """
     common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
     freed, letter = {"backtrack": True, "shortcut": True}, {"backtrack": False, "shortcut": False}
@@ -195,7 +191,7 @@ def suganthi2019() -> list[Experiment]:
 
 
 def ibraheem2016() -> list[Experiment]:
-    """Table 2: four sizes, ant system and ageing ants."""
+    """Return table 2: four sizes, ant system and ageing ants."""
     printed = {
         10: (5, 15.07, 15.07, (8, 5)),
         20: (10, 28.6274, 28.6274, (6, 16)),
@@ -235,9 +231,9 @@ def ibraheem2016() -> list[Experiment]:
 
 
 def lee2008() -> list[Experiment]:
-    """Tables I and II: five maps, ant system and ants on a potential field, with equal numbers of ant steps.
+    """Return tables I and II: five maps, ant system and potential-field ants, with equal numbers of ant steps.
 
-    Ant steps are in proportion to the printed search times, 3 million on map 3: the mean of both planners' shares.
+    Ant steps are proportional to the printed search times, averaged over both planners, with 3 million on map 3.
     """
     printed = {
         1: ((25, 25), None, 72.0833, 59.2548, (14, 32), (13326, 602)),
@@ -263,14 +259,14 @@ def lee2008() -> list[Experiment]:
         (planner, f"{label}, ten times", options, 10.0) for planner, label, options, _ in usual[:4] if planner == "as"
     ]
     others = {1: brief, 3: long}
-    found = []
+    experiments = []
     for number, (shape, goal, *values, moves, seconds) in printed.items():
         work = 3e6 * (seconds[0] / printed[3][5][0] + seconds[1] / printed[3][5][1]) / 2
-        if goal is None:  # no way so long is monotone on so small a map
+        if goal is None:  # no path of this length is monotone on so small a map
             query: Callable[[int], Query] = functools.partial(_lee_winding, shape, moves, number)
         else:
             query = functools.partial(_lee_candidate, shape, goal, moves, number)
-        found += [
+        experiments += [
             Experiment(
                 paper="lee2008",
                 map=f"{number}: {shape[0]}×{shape[1]}",
@@ -287,7 +283,7 @@ def lee2008() -> list[Experiment]:
             )
             for planner, label, options, share in (*usual, *others.get(number, ()))
         ]
-    return found
+    return experiments
 
 
 @functools.cache
@@ -298,7 +294,7 @@ def _lee_winding(shape: tuple[int, int], moves: tuple[int, int], number: int, se
 def _lee_candidate(
     shape: tuple[int, int], apart: tuple[int, int], moves: tuple[int, int], number: int, seed: int
 ) -> Query:
-    """A candidate whose start and goal are as far apart as the printed path says, on opposite edges."""
+    """Return a candidate with start and goal on opposite edges, as far apart as the printed path requires."""
     aside = (shape[1] - 1 - apart[1]) // 2
     start, goal = (0, aside), (apart[0], aside + apart[1])
     kind = (("blocks", 20), ("largest", max(shape) // 6))
@@ -306,9 +302,9 @@ def _lee_candidate(
 
 
 def hasan() -> list[Experiment]:
-    """Table 1: six environments with and without a moving obstacle, alpha and beta as the paper chose them for each.
+    """Return table 1: six environments with and without a moving obstacle, with the paper's alpha and beta for each.
 
-    The paper prints steps for its ants, total costs and times for both.
+    The paper prints steps for its ants, and total costs and times for both planners.
     """
     printed = {
         "1a curved walls": (65, 2491.8, 3318.4, (7.0, 1.0)),
@@ -319,19 +315,21 @@ def hasan() -> list[Experiment]:
         "5f the same, across the wall": (66, 2477.8, 3249.2, (1.0, 0.0)),
     }
     environments = maps.environments()
-    found = []
+    experiments = []
     for name, (steps, cost, rival, (alpha, beta)) in printed.items():
         query, chosen = _for_every_seed(environments[name]), {"alpha": alpha, "beta": beta}
         common: dict[str, Any] = {"paper": "hasan", "map": name, "query": query}
         ants: dict[str, Any] = {**common, "planner": "mmas-dstar", "options": chosen}
-        found.append(Experiment(**ants, label="steps", printed=float(steps), quantity="steps", most_seeds=HASAN_SEEDS))
+        experiments.append(
+            Experiment(**ants, label="steps", printed=float(steps), quantity="steps", most_seeds=HASAN_SEEDS)
+        )
         arms: list[tuple[dict[str, Any], str, float, Planner | None]] = [
             (ants, "mmas-dstar", cost, None),
             ({**common, "planner": "dstar"}, "dstar", rival, None),
             ({**common, "planner": "dstar"}, "D* that lowers no cost", rival, FirstTouchDStar()),
             ({**common, "planner": "mmas-dstar"}, "mmas-dstar, our rule", cost, None),
         ]
-        found += [
+        experiments += [
             Experiment(
                 **what,
                 label=label + (", moving" if movers else ""),
@@ -344,10 +342,10 @@ def hasan() -> list[Experiment]:
             for movers in (0, 1)
             for what, label, value, made in arms[: 3 if movers else 4]
         ]
-    return found
+    return experiments
 
 
-#: By the short name of each paper, a function that lists its experiments.
+#: Functions that list a paper's experiments, by its short name.
 PAPERS: Mapping[str, Callable[[], list[Experiment]]] = MappingProxyType(
     {f.__name__: f for f in (han2007, suganthi2019, ibraheem2016, lee2008, hasan)}
 )

@@ -1,10 +1,9 @@
-"""The papers' maps. Where a paper only shows a picture, random maps take its place: of its size and kind, or candidates.
+"""Maps of the papers. Random maps replace pictured ones: of the same size and kind, or candidates.
 
-A path over square cells with eight moves measures a + b sqrt(2): a straight moves and b diagonal ones. A printed length of
-three or four digits has one such pair or very few, so it tells how many moves of each kind the path has, whether it can be
-monotone, and how far apart start and goal can be. A candidate is a random map of the paper's size on which the shortest
-path has exactly the length that the paper's best planner printed. That length bounds the optimum of the paper's own map
-from above; a candidate takes it as the optimum.
+A path over square cells with eight moves measures a + b sqrt(2), with a straight and b diagonal moves. A printed length of
+three or four digits has one such pair or very few. It determines the number of moves of each kind, whether the path can
+be monotone, and how far apart start and goal can be. A candidate is a random map of the paper's size whose shortest path
+is exactly as long as the paper's best. That length is an upper bound of the optimum on the paper's own map.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ HAN_ANTS = (
     *((4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)),
     *((8, 14), (13, 14), (4, 10), (16, 14), (10, 16), (17, 10), (19, 18)),
 )
-#: Two walls of obstacles of radius 1 in the genetic algorithm's map, one from each side: no line with a single bend passes.
+#: Two walls of obstacles of radius 1 for the genetic algorithm, one from each side; one bend does not suffice.
 TWO_WALLS = tuple(
     [(6.0, y, 1.0) for y in (0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0)]
     + [(14.0, y, 1.0) for y in (6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0)]
@@ -35,31 +34,31 @@ HAN_GENES = ((3, 3), (10, 10), (14, 10), (14, 4), (8, 14), (6, 18))
 
 
 def optimum(query: Query) -> float:
-    """The length of the shortest path with the same moves; inf if there is none."""
+    """Return the length of the shortest path with the same moves; inf if there is none."""
     return PLANNERS["astar"].plan(query, np.random.default_rng(0)).cost
 
 
 def han_ants(*discs: tuple[float, float, float] | None) -> Query:
-    """han2007's map for ants, in the thesis' units, for a point robot: with the listing's obstacles, or with others."""
+    """Return han2007's map for ants and a point robot, in the thesis' units, with its obstacles or with `discs`."""
     listed = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_ANTS)
-    found = tuple(Disc(*disc) for disc in listed if disc is not None)
-    return Query(rasterise(World("han2007-aco", (0.5, 0.5, 20.5, 20.5), found), 1.0), (0, 0), (19, 19))
+    obstacles = tuple(Disc(*disc) for disc in listed if disc is not None)
+    return Query(rasterise(World("han2007-aco", (0.5, 0.5, 20.5, 20.5), obstacles), 1.0), (0, 0), (19, 19))
 
 
 def han_genes(*discs: tuple[float, float, float]) -> Query:
-    """han2007's map for the genetic algorithm, with the listing's obstacles or with `discs` (x, y, radius)."""
-    found = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_GENES)
-    world = World("han2007-ga", (-0.5, -0.5, 20.5, 20.5), tuple(Disc(*disc) for disc in found))
+    """Return han2007's map for the genetic algorithm, with its obstacles or with `discs` (x, y, radius)."""
+    obstacles = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_GENES)
+    world = World("han2007-ga", (-0.5, -0.5, 20.5, 20.5), tuple(Disc(*disc) for disc in obstacles))
     return Query(rasterise(world, 1.0), (0, 0), (20, 20))
 
 
 def scattered(size: int, blocked: float, seed: int) -> Query:
-    """A recreated map of size x size cells, each blocked with probability `blocked`, from corner to corner."""
+    """Recreate a map of size x size cells, each blocked with probability `blocked`, from corner to corner."""
     return _crossable(lambda rng: rng.random((size, size)) >= blocked, seed)
 
 
 def blocks(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
-    """A recreated map with `count` upright rectangles, each side 1 to `largest` cells, from corner to corner.
+    """Recreate a map with `count` upright rectangles, each side 1 to `largest` cells, from corner to corner.
 
     The 3 x 3 cells at both corners are free.
     """
@@ -77,7 +76,7 @@ def blocks(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
 
 
 def environments() -> dict[str, Query]:
-    """hasan's six environments of 50 x 50 cells, recreated from the paper's text, with its starts and goals."""
+    """Recreate hasan's six environments of 50 x 50 cells from the paper's text, with its starts and goals."""
     row, col = np.mgrid[:50, :50]
 
     def arc(r: float, c: float, radius: float, opening: float, wide: float) -> Picture:
@@ -115,7 +114,7 @@ def environments() -> dict[str, Query]:
 
 
 def _crossable(draw: Callable[[np.random.Generator], Picture], seed: int) -> Query:
-    """From corner to corner over the first map that `draw` gives on which there is a path."""
+    """Return a query from corner to corner on the first map drawn that has a path."""
     rng = np.random.default_rng(seed)
     while True:
         free = draw(rng)
@@ -127,20 +126,20 @@ def _crossable(draw: Callable[[np.random.Generator], Picture], seed: int) -> Que
 
 Picture = npt.NDArray[np.bool_]
 SQRT2 = math.sqrt(2.0)
-EQUAL = 1e-6  # lengths that differ by less are the same: two sums of moves differ by more for all lengths here
-TRIES = 300  # obstacles tried before a map is begun anew
-MAPS = 1000  # maps begun before a candidate is given up
-MEANDERS = 200_000  # paths drawn before a winding candidate is given up
+EQUAL = 1e-6  # tolerance of lengths; distinct sums of moves differ by more for all lengths here
+TRIES = 300  # obstacles tried per map
+MAPS = 1000  # maps tried per candidate
+MEANDERS = 200_000  # paths drawn per winding candidate
 LEGS = (
     (1, 5),
     (3, 10),
-)  # how many moves a winding path goes on in one direction, along an axis and aslant: at least, below
-APART, LATER = 3, 6  # cells of a winding path that are `LATER` moves or more apart lie `APART` cells apart or more
+)  # legs of a winding path in moves, straight and diagonal: at least, below
+APART, LATER = 3, 6  # cells of a winding path at least `LATER` moves apart are at least `APART` cells apart
 
 
 @dataclass(frozen=True)
 class MoveCount:
-    """How many moves of each kind a path has."""
+    """Number of moves of each kind in a path."""
 
     straight: int  # of length 1
     diagonal: int  # of length sqrt(2)
@@ -151,18 +150,18 @@ class MoveCount:
         return self.straight + SQRT2 * self.diagonal
 
     def monotone(self, rows: int, cols: int) -> bool:
-        """Whether these moves can lead from start to goal without a move back, `rows` and `cols` cells apart."""
+        """Return whether a monotone path over `rows` and `cols` can have these moves."""
         return self.straight + 2 * self.diagonal == rows + cols and self.diagonal <= min(rows, cols)
 
 
 def move_counts(printed: float, digits: int = 3) -> list[MoveCount]:
-    """The moves that a printed length can stand for."""
-    found = []
+    """Return the moves that give a printed length."""
+    counts = []
     for diagonal in range(int(printed / SQRT2) + 1):
         straight = round(printed - SQRT2 * diagonal)
         if abs(straight + SQRT2 * diagonal - printed) < 10.0**-digits:
-            found.append(MoveCount(straight, diagonal))
-    return found
+            counts.append(MoveCount(straight, diagonal))
+    return counts
 
 
 def candidate(
@@ -178,10 +177,10 @@ def candidate(
     thin: bool = False,
     walls: int = 0,
 ) -> Query:
-    """A random map on which the shortest path has as many straight and diagonal moves as `moves` says.
+    """Return a random map whose shortest path has the given straight and diagonal moves.
 
-    It begins with random obstacles; then further ones are put onto the shortest path, as long as it does not become longer
-    than wanted, until it is as long as wanted.
+    It begins with random obstacles. Further ones are put onto the shortest path until it has the wanted length, and never
+    exceed it.
     """
     rng = np.random.default_rng(seed)
     for _ in range(MAPS):
@@ -193,17 +192,17 @@ def candidate(
         for _ in range(blocks):
             _put(rng, free, rng.integers(0, shape), largest, thin)
         _clear_ends(free, start, goal)
-        found = _lengthened(rng, free, start, goal, moves.length, largest, thin)
-        if found is not None:
-            return found
-    raise FieldError("moves", f"no map of {shape[0]} x {shape[1]} cells was found whose shortest path has {moves}")
+        query = _lengthened(rng, free, start, goal, moves.length, largest, thin)
+        if query is not None:
+            return query
+    raise FieldError("moves", f"no map of {shape[0]} x {shape[1]} cells found whose shortest path has {moves}")
 
 
 def winding_candidate(shape: tuple[int, int], moves: MoveCount, seed: int, *, largest: int) -> Query:
-    """A random map whose shortest path has these moves and winds: a length for which no way can be monotone.
+    """Return a random map whose shortest path has these moves and winds, as it is too long for a monotone one.
 
-    A path of the wanted moves is drawn first, and start and goal are its ends. Walls are then put across every way that
-    is shorter, and never onto the path, until none is left.
+    A path with these moves is drawn first, and its ends are start and goal. Walls then close every shorter path, without
+    touching the drawn one.
     """
     rng = np.random.default_rng(seed)
     for _ in range(MEANDERS):
@@ -212,13 +211,11 @@ def winding_candidate(shape: tuple[int, int], moves: MoveCount, seed: int, *, la
             query = _walled(rng, shape, cells, moves.length, largest)
             if query is not None:
                 return query
-    raise FieldError(
-        "moves", f"no map of {shape[0]} x {shape[1]} cells was found whose shortest path winds with {moves}"
-    )
+    raise FieldError("moves", f"no map of {shape[0]} x {shape[1]} cells found whose shortest path winds with {moves}")
 
 
 def _meander(rng: np.random.Generator, shape: tuple[int, int], moves: MoveCount) -> npt.NDArray[np.int64] | None:
-    """The cells (N, 2) of a random path over these moves; None if it does not fit or comes near itself."""
+    """Draw the cells (N, 2) of a random path with these moves; None if it does not fit or comes near itself."""
     left, way = [moves.straight, moves.diagonal], int(rng.integers(8))
     steps: list[tuple[int, int]] = []
     while any(left):
@@ -228,7 +225,7 @@ def _meander(rng: np.random.Generator, shape: tuple[int, int], moves: MoveCount)
             return None
         steps += [DIRECTIONS[way]] * count
         left[aslant] -= count
-        # Where two diagonal moves meet at a right angle, two straight ones lead past the cell between them.
+        # Where two diagonal moves meet at a right angle, two straight ones would pass the cell between them.
         way = (way + int(rng.choice((-1, 1) if aslant else (-2, -1, 1, 2)))) % 8
     cells = np.vstack([(0, 0), steps]).cumsum(axis=0)
     cells -= cells.min(axis=0)
@@ -243,7 +240,7 @@ def _meander(rng: np.random.Generator, shape: tuple[int, int], moves: MoveCount)
 def _walled(
     rng: np.random.Generator, shape: tuple[int, int], cells: npt.NDArray[np.int64], length: float, largest: int
 ) -> Query | None:
-    """Walls across all ways that are shorter than a path; None if some cannot be closed."""
+    """Put walls across all paths shorter than a given one; None if some cannot be closed."""
     kept = np.zeros(shape, dtype=np.bool_)
     kept[tuple(cells.T)] = True
     kept[cells[:-1, 0], cells[1:, 1]] = kept[cells[1:, 0], cells[:-1, 1]] = True  # a diagonal move needs both corners
@@ -269,7 +266,7 @@ def _lengthened(
     largest: int,
     thin: bool,
 ) -> Query | None:
-    """The map with more obstacles, such that the shortest path has this length; None if that was not achieved."""
+    """Add obstacles until the shortest path has this length; None if that fails."""
     query, cells, shortest = _solved(free, start, goal)
     for _ in range(TRIES):
         if shortest > length + EQUAL:
@@ -287,7 +284,7 @@ def _lengthened(
 
 
 def _solved(free: Picture, start: tuple[int, int], goal: tuple[int, int]) -> tuple[Query, npt.NDArray[np.int32], float]:
-    """The query of a map, a shortest path and its length, inf if there is none."""
+    """Return the query of a map, a shortest path and its length; inf if there is none."""
     query = Query(Grid.from_free(free), start, goal)
     plan = PLANNERS["astar"].plan(query, np.random.default_rng(0))
     return query, plan.cells, plan.cost

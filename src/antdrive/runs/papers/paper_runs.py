@@ -1,7 +1,7 @@
-"""Runs of the papers' experiments: a planner's path on one map with one seed, planned at once or decided cell by cell.
+"""Runs of the papers' experiments: one planner on one map with one seed, planned at once or decided cell by cell.
 
-As in hasan, obstacles of one cell may move to a random free neighbouring cell at every decision. His baseline must have been
-a D* that is not optimal: its printed costs are far above those of shortest paths.
+As in hasan, obstacles of one cell may move to a random free neighbouring cell at every decision. The paper's baseline was
+probably a suboptimal D*: its printed costs are far above those of shortest paths.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from antdrive.worlds import DIRECTIONS, Grid
 
 @dataclass(frozen=True, kw_only=True)
 class FirstTouchDStar(GridPlanner):
-    """Spreads costs from the goal, nearest to the start first, and never lowers a cost once it is given.
+    """Spreads costs from the goal, nearest to the start first, and never lowers a cost.
 
-    Both liberties are those of hasan's own listing: a cell gets its cost when it is new, and no order of the
-    open list is stated. Paths around concave obstacles are longer than the shortest.
+    Both follow hasan's listing: a cell gets its cost when it is new, and the order of the open list is not given. Paths
+    around concave obstacles are longer than the shortest.
     """
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs."""
+        """What this planner can do and needs."""
         return Capabilities()
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -68,15 +68,15 @@ class FirstTouchDStar(GridPlanner):
 
 
 def neighbours(query: Query, cell: Cell) -> list[Cell]:
-    """The cells to which a move is allowed; all moves of a grid are allowed both ways."""
+    """Return the cells reachable in one move; all moves of a grid are allowed both ways."""
     moves = int(query.grid.moves[cell])
     return [(cell[0] + dr, cell[1] + dc) for k, (dr, dc) in enumerate(DIRECTIONS) if moves >> k & 1]
 
 
 def total_cost(query: Query, result: PlanResult) -> float:
-    """hasan's total path cost: over all cells that are entered, the sum of what is left to the goal; inf without a path.
+    """Return hasan's total path cost: the sum over all entered cells of the remaining cost; inf without a path.
 
-    A straight move costs 1 and a diagonal one 1.4, as in the paper; what is left is counted along the path.
+    A straight move costs 1 and a diagonal one 1.4, as in the paper; the remaining cost is along the path.
     """
     if not result.solved:
         return math.inf
@@ -85,89 +85,87 @@ def total_cost(query: Query, result: PlanResult) -> float:
     return float(np.cumsum(steps[::-1]).sum())
 
 
-ENDLESS = 1_000_000  # iterations; the ant steps end such a plan much earlier
-CLOSE = 0.25  # a path is close to the shortest when it is at most this share longer
-NEAR = 0.05  # and near to it at this share
+ENDLESS = 1_000_000  # iterations; the limit of ant steps ends a plan much earlier
+CLOSE = 0.25  # relative excess length of a path close to the shortest
+NEAR = 0.05  # relative excess length of a path near the shortest
 LAST = 10  # iterations over which `unrest` is measured
 
 
 @dataclass(frozen=True)
 class PaperRun:
-    """What one plan of an experiment gave. Lengths are in cells."""
+    """The result of one plan of an experiment. Lengths are in cells."""
 
     seed: int  # of map and planner
-    world: int  # which of the experiment's maps it was
+    world: int  # index of the map in the experiment
     result: PlanResult
-    optimum: float  # the length of the shortest path with the same moves
+    optimum: float  # length of the shortest path with the same moves
     cpu_s: float  # processor time of the plan [s]
-    total: float  # hasan's total cost of the path; inf if there is none
-    concentration: float = (
-        math.nan
-    )  # the share of the planner's field that lies on the path; nan without a path or a field
+    total: float  # hasan's total cost of the path; inf without a path
+    concentration: float = math.nan  # fraction of the planner's field on the path; nan without a path or a field
 
     @property
     def length(self) -> float:
-        """The length of the path; inf if there is none."""
+        """The length of the path; inf without a path."""
         return self.result.line_length if self.result.solved else math.inf
 
     @property
     def gap(self) -> float:
-        """How much longer than the shortest path the path is [%]; inf if there is none."""
+        """The relative excess of the path over the shortest [%]; inf without a path."""
         return 100.0 * (self.length / self.optimum - 1.0)
 
     @property
     def steps(self) -> float:
-        """How many moves the path has; inf if there is none."""
+        """The number of moves of the path; inf without a path."""
         return float(len(self.result.cells) - 1) if self.result.solved else math.inf
 
     @property
     def last(self) -> float:
-        """The best path of the last iteration that any ant finished; inf if none did."""
+        """The best path of the last iteration in which an ant arrived; inf if none did."""
         known = self.result.history.iteration_best
         return float(known[-1]) if len(known) else math.inf
 
     @property
     def settled(self) -> float:
-        """The iteration, from 1, that found the path; inf if there is none."""
+        """The iteration, from 1, that found the path; inf without a path."""
         best = self.result.history.best
         return float(np.argmax(best <= best[-1] * (1 + 1e-9)) + 1) if self.result.solved and len(best) else math.inf
 
     @property
     def near(self) -> float:
-        """The iteration, from 1, with which the path was within `NEAR` of the shortest; inf if it never was."""
+        """The iteration, from 1, when the path came within `NEAR` of the shortest; inf if never."""
         near = np.flatnonzero(self.result.history.best <= (1 + NEAR) * self.optimum + 1e-9)
         return float(near[0] + 1) if len(near) else math.inf
 
     @property
     def effort(self) -> float:
-        """How much work it took until the path was within `CLOSE` of the shortest; inf if it never was.
+        """The work until the path was within `CLOSE` of the shortest; inf if never.
 
-        Every iteration counts as the same share of the work.
+        Every iteration counts as an equal fraction of the work.
         """
         near = np.flatnonzero(self.result.history.best <= (1 + CLOSE) * self.optimum + 1e-9)
         return self.result.work * (near[0] + 1) / len(self.result.history) if len(near) else math.inf
 
     @property
     def unrest(self) -> float:
-        """The standard deviation of the best paths of the last `LAST` iterations; inf where some had none."""
+        """The standard deviation of the best paths of the last `LAST` iterations; inf if any lacks a path."""
         known = self.result.history.iteration_best[-LAST:]
         return float(known.std()) if len(known) and np.isfinite(known).all() else math.inf
 
     @property
     def early_unrest(self) -> float:
-        """The same of the first `LAST` iterations in which an ant arrived; inf if none did."""
+        """The same over the first `LAST` iterations in which an ant arrived; inf without any."""
         known = self.result.history.iteration_best
         known = known[np.isfinite(known)][:LAST]
         return float(known.std()) if len(known) else math.inf
 
     @property
     def cpu_ms(self) -> float:
-        """Processor time of the plan, or of all decisions on the way [ms]."""
+        """The processor time of the plan, or of all decisions [ms]."""
         return 1000.0 * self.cpu_s
 
     @property
     def work(self) -> float:
-        """What the planner counts as its work: ant steps, cells propagated, chromosomes."""
+        """The planner's measure of work: ant steps, propagated cells, chromosomes."""
         return float(self.result.work)
 
 
@@ -191,7 +189,7 @@ def solve(
 
 
 def concentration(result: PlanResult) -> float:
-    """The share of a plan's field that lies on the cells of its path; nan without a path or a field."""
+    """Return the fraction of a plan's field on the cells of its path; nan without a path or a field."""
     if not result.solved or result.field is None:
         return math.nan
     on_path = np.zeros(result.field.shape, dtype=np.bool_)
@@ -200,7 +198,7 @@ def concentration(result: PlanResult) -> float:
 
 
 def _until(states: Iterator[Iteration], work: float) -> Iterator[Iteration]:
-    """The iterations up to that in which the work adds up to `work`."""
+    """Yield iterations until their work adds up to `work`."""
     done = 0
     for state in states:
         yield state
@@ -209,14 +207,14 @@ def _until(states: Iterator[Iteration], work: float) -> Iterator[Iteration]:
             return
 
 
-DECISIONS = 5000  # after so many a drive has failed
+DECISIONS = 5000  # limit of a drive
 
 
 class Strollers:
-    """Movers of one cell each that go to a random free neighbouring cell in every step."""
+    """Movers of one cell that move to a random free neighbouring cell in every step."""
 
     def __init__(self, grid: Grid, count: int, rng: np.random.Generator, away: tuple[Cell, ...]) -> None:
-        """Put movers on random free cells."""
+        """Place movers on random free cells."""
         self._grid, self._rng = grid, rng
         free = [tuple(map(int, cell)) for cell in np.argwhere(grid.free)]
         chosen = rng.permutation(len(free))
@@ -224,7 +222,7 @@ class Strollers:
 
     @property
     def cells(self) -> npt.NDArray[np.int64]:
-        """The cells that movers are in (N, 2)."""
+        """The movers' cells (N, 2)."""
         return np.array(self._cells, dtype=np.int64).reshape(-1, 2)
 
     def step(self, robot: Cell) -> None:
@@ -232,7 +230,7 @@ class Strollers:
         for n, (r, c) in enumerate(self._cells):
             moves = int(self._grid.moves[r, c])
             near = [(r + dr, c + dc) for k, (dr, dc) in enumerate(DIRECTIONS) if moves >> k & 1]
-            draw = self._rng.random()  # one number per step, whatever the robot does
+            draw = self._rng.random()  # one number per step, independent of the robot
             near = [cell for cell in near if cell != robot and cell not in self._cells]
             if near:
                 self._cells[n] = near[int(draw * len(near))]
@@ -246,9 +244,9 @@ def drive(
     limit: int = DECISIONS,
     spent: Callable[[float], None] = lambda seconds: None,
 ) -> list[Cell]:
-    """The cells that a robot goes through, start included; the last is the goal if it arrives within the decisions.
+    """Return the cells of a drive, including the start; the last is the goal if the robot arrives within the limit.
 
-    `spent` is told the processor time of each decision, the movers' steps left out [s].
+    `spent` receives the processor time of each decision, without the movers' steps [s].
     """
     cells, name = [robot.cell], name or type(robot).__name__
     for _ in range(limit):
@@ -262,7 +260,7 @@ def drive(
             continue
         step = DIRECTIONS.index((to[0] - before[0], to[1] - before[1]))
         if not int(query.grid.moves[before]) >> step & 1:
-            raise PlannerError(name, f"went from {before} to {to}, a move that is not allowed")
+            raise PlannerError(name, f"went from {before} to {to}, a forbidden move")
         if list(to) in movers.cells.tolist():
             raise PlannerError(name, f"went from {before} to {to}, into a mover")
         cells.append(to)
@@ -270,7 +268,7 @@ def drive(
 
 
 def drive_among(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, count: int) -> PaperRun:
-    """Drive once, cell by cell, among movers; the run's path is the one that was driven."""
+    """Drive once, cell by cell, among movers; the run's path is the driven one."""
     chosen = load_planner(planner, **options) if isinstance(planner, str) else planner
     movers = Strollers(query.grid, count, np.random.default_rng([seed, count]), (query.start, query.goal))
     started = time.process_time()

@@ -1,6 +1,6 @@
-"""The papers' experiments repeated: printed and measured values, and the claims with their verdicts.
+"""Reproduction of the papers' experiments: printed and measured values, and the claims with their verdicts.
 
-Runs are kept in files, so that an interrupted reproduction goes on where it stopped.
+Runs are kept in files, so an interrupted reproduction can resume.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ from antdrive.runs.statistics.intervals import medians_by_world
 
 HISTORY = ("best", "iteration_best", "iteration_mean", "arrived")
 NUMBERS = ("optimum", "cpu_s", "total", "concentration")  # in the order of `PaperRun`
-NONE = -1  # the size of waypoints that a plan does not have
+NONE = -1  # size of missing waypoints
 
 
 def runs_key(experiment: Experiment, seeds: int) -> str:
-    """What the runs of an experiment depend on, the source code included: a file with another key is not used."""
+    """Return the key of an experiment's runs, including the source code; files with another key are ignored."""
     facts = {
         "map": experiment.map,
         "name": experiment.name,
@@ -70,12 +70,12 @@ def runs_key(experiment: Experiment, seeds: int) -> str:
 
 @functools.cache
 def code_hash() -> str:
-    """The hash of the source files of worlds, planners and papers' experiments, but for those that only evaluate and draw."""
+    """Return the hash of the source files of worlds, planners and experiments, except those that only evaluate."""
     digest = hashlib.sha256()
     for package in (antdrive.worlds, antdrive.planners, antdrive.runs.papers):
         for folder in package.__path__:
             for path in sorted(Path(folder).rglob("*.py")):
-                if package is antdrive.runs.papers and path.stem == "claims":  # no run depends on it
+                if package is antdrive.runs.papers and path.stem == "claims":  # runs do not depend on it
                     continue
                 digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -106,7 +106,7 @@ def save_runs(runs: Sequence[PaperRun], path: Path, key: str) -> None:
 
 
 def load_runs(path: Path, key: str) -> list[PaperRun] | None:
-    """The runs of a file; None if there is no such file, or it has another key or cannot be read."""
+    """Load the runs of a file; None if it is missing, unreadable or has another key."""
     try:
         with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             if str(file["key"]) != key:
@@ -142,8 +142,8 @@ def _parts(joined: npt.NDArray[Any], sizes: npt.NDArray[np.int64]) -> list[npt.N
 
 
 T = TypeVar("T")
-MOST_SEEDS = 1000  # every claim can be decided with fewer
-RUNS_FOLDER = "trials"  # the folder of the runs within that of the results
+MOST_SEEDS = 1000  # enough to decide every claim
+RUNS_FOLDER = "trials"  # subfolder of the runs in the results
 
 
 Measurements = list[tuple[Experiment, list[PaperRun]]]
@@ -151,38 +151,38 @@ Measurements = list[tuple[Experiment, list[PaperRun]]]
 
 @dataclass(frozen=True)
 class ResultRow:
-    """An experiment's result over its seeds. Lengths are in cells."""
+    """Result of an experiment over its seeds. Lengths are in cells."""
 
     paper: str
     map: str
-    recreated: bool  # the map is not the paper's own
-    comparable: bool  # the shortest path is as long as the paper says, so that lengths compare with the printed one
+    recreated: bool  # whether a random map replaces the paper's
+    comparable: bool  # whether the shortest path has the paper's length, so lengths are comparable with the printed one
     planner: str  # with its setting
-    quantity: str  # the value that is printed and measured: `length`, `steps` or `total`
-    printed: float | None  # the paper's value; None: it prints none
-    mean: float  # of the seeds that found a path; nan if none did
+    quantity: str  # the printed and measured value: `length`, `steps` or `total`
+    printed: float | None  # the paper's value; None if it prints none
+    mean: float  # over the seeds with a path; nan without any
     best: float
-    arrived: int  # how many seeds found a path
+    arrived: int  # number of seeds with a path
     seeds: int
     optimum: float  # length of the shortest path with the same moves, mean over the seeds' maps
-    gap: float  # median of length / shortest - 1 of the seeds that found a path
-    gap_low: float  # the ends of its interval, bootstrapped over maps
+    gap: float  # median of length / shortest - 1 over the seeds with a path
+    gap_low: float  # ends of its interval, bootstrapped over maps
     gap_high: float
     plan_s: float  # median processor time of planning [s]
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What `reproduce` found."""
+    """The result of `reproduce`."""
 
     measured: Measurements
     rows: list[ResultRow]  # one for each experiment
     verdicts: list[Verdict]  # one for each claim whose experiments were run
     files: dict[str, str]  # by name
-    kept: int  # how many experiments were taken from the files of an earlier, interrupted command
+    kept: int  # number of experiments loaded from an earlier, interrupted command
 
     def of(self, paper: str) -> Measurements:
-        """The experiments of one paper with their runs."""
+        """Return the experiments of one paper with their runs."""
         return [(experiment, runs) for experiment, runs in self.measured if experiment.paper == paper]
 
 
@@ -195,10 +195,10 @@ def reproduce(
     quick: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Reproduction:
-    """Run the experiments of papers again, evaluate the papers' claims, and write tables and CSV files.
+    """Reproduce the experiments of papers, evaluate their claims, and write tables and CSV files.
 
-    The runs of an experiment are written as soon as it is done. A second call with the same folder and seeds takes them
-    from there, unless the source code has changed in between.
+    The runs of each experiment are written as soon as it is done. A second call with the same folder and seeds loads them,
+    unless the source code has changed.
     """
     experiments = _experiments(papers, quick)
     measured, kept = _all_runs(experiments, folder / RUNS_FOLDER, seeds, jobs, progress)
@@ -215,7 +215,7 @@ def reproduce(
 
 
 def _experiments(papers: Sequence[str], quick: bool) -> list[Experiment]:
-    """The experiments of these papers; for a quick look without the slow ones, and with fewer ant steps and maps."""
+    """Return the experiments of papers; a quick run omits slow ones and uses fewer ant steps and maps."""
     for paper in papers:
         if paper not in PAPERS:
             raise InputError(f"reproduce: unknown paper {paper!r}; choose from {', '.join([*PAPERS, 'all'])}")
@@ -234,7 +234,7 @@ def _all_runs(
     jobs: int | None,
     progress: Callable[[float], None] | None,
 ) -> tuple[Measurements, int]:
-    """The experiments with their runs, and for how many these were in the folder already."""
+    """Run or load all experiments; return their runs, and the number of experiments loaded."""
     total, done, kept = sum(len(experiment.seeds(seeds)) for experiment in experiments), 0, 0
     measured: Measurements = []
     with Pool(processes_for(jobs)) as pool:
@@ -259,7 +259,7 @@ def _all_runs(
 
 
 def _planned(experiment: Experiment, seeds: int) -> Iterator[Callable[[], PaperRun]]:
-    """The calls that plan an experiment."""
+    """Yield the calls that plan an experiment."""
     planner = experiment.made or experiment.planner
     for seed in experiment.seeds(seeds):
         query = experiment.query(experiment.world(seed))
@@ -270,7 +270,7 @@ def _planned(experiment: Experiment, seeds: int) -> Iterator[Callable[[], PaperR
 
 
 def _measured_claims(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[Claim, dict[Arm, T]]]:
-    """The claims all of whose experiments are among these (paper, map, name), with what is known of them."""
+    """Yield the claims whose experiments are all known, with their data."""
     for claim in CLAIMS:
         places = {arm: (claim.paper, *arm) for arm in claim.arms}
         if known.keys() >= set(places.values()):
@@ -278,7 +278,7 @@ def _measured_claims(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[
 
 
 def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> str:
-    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all."""
+    """Return a warning with the number of claims that these seeds cannot decide; empty if they can decide all."""
     experiments = _experiments(papers, quick)
 
     def undecided(count: int) -> tuple[int, int]:
@@ -289,7 +289,7 @@ def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> 
     if not few:
         return ""
     enough = next(count for count in range(seeds, MOST_SEEDS) if not undecided(count)[0])
-    return f"seeds: {seeds} are too few to decide {few} of {total} claims, whatever they give; {enough} suffice"
+    return f"seeds: {seeds} are too few to decide {few} of {total} claims; use {enough}"
 
 
 def _row(experiment: Experiment, runs: Sequence[PaperRun]) -> ResultRow:
@@ -320,7 +320,7 @@ def _row(experiment: Experiment, runs: Sequence[PaperRun]) -> ResultRow:
     )
 
 
-#: The headings of the table; lengths are in cells.
+#: Headings of the table; lengths are in cells.
 HEADS = (
     *("paper", "map", "planner", "quantity"),
     *("printed", "mean", "best", "solved", "shortest", "gap", "planning"),
@@ -328,7 +328,7 @@ HEADS = (
 
 
 def row_cells(row: ResultRow) -> list[str]:
-    """A row of the table as text, under `HEADS`."""
+    """Return a row of the table, under `HEADS`."""
 
     def number(value: float) -> str:
         return f"{value:.{3 if row.quantity == 'length' else 0}f}" if math.isfinite(value) else "–"
@@ -349,9 +349,9 @@ def row_cells(row: ResultRow) -> list[str]:
 
 
 NOTE = (
-    "Some papers show their maps as pictures only. Recreated maps are random maps of the same size on which the shortest\n"
-    "path is as long as the best that the paper prints; on another map only the gap to the shortest path (`shortest`)\n"
-    "means anything. All lengths are in cells; a gap is a median with its 95 % interval over maps.\n\n"
+    "Some papers only picture their maps. Recreated maps are random maps of the same size whose shortest path is as long\n"
+    "as the paper's best; on another map only the gap to the shortest path (`shortest`) is comparable.\n"
+    "All lengths are in cells; a gap is a median with its 95 % interval over maps.\n\n"
 )
 
 

@@ -1,7 +1,4 @@
-"""Each pair of planners on the runs that they share: success, and any metric.
-
-Likewise whether planners are not worse than a reference by more than a stated difference.
-"""
+"""Paired comparison of planners: success and any metric, and non-inferiority to a reference."""
 
 from __future__ import annotations
 
@@ -54,21 +51,21 @@ class PairedComparison:
     first: str  # label of the first planner
     second: str  # label of the second planner
     direction: Direction  # whether lower or higher values are better, or neither
-    pairs: int  # number of pairs that the numbers rest on
-    worlds: int  # number of worlds that these pairs are in
-    dropped: int  # pairs left out because not both succeeded; 0 for success
+    pairs: int  # number of pairs
+    worlds: int  # number of worlds of these pairs
+    dropped: int  # pairs omitted because not both succeeded; 0 for success
     unpaired: int  # runs of either planner without a partner
-    # pairs in which the first planner's value is better; where no direction is, those in which it is lower
+    # pairs in which the first planner's value is better, or lower if no direction is better
     first_wins: int
     second_wins: int  # pairs in which the second planner's value is better, or lower
     ties: int  # pairs with equal values
-    difference: float  # first minus second: of success shares, or the median of the paired differences
+    difference: float  # first minus second: of success rates, or the median of the paired differences
     interval: Interval  # 95 % interval of the difference
-    # matched-pairs rank biserial correlation, -1 to 1; above 0 if the first planner wins, or has less where no
-    # direction is better
+    # matched-pairs rank biserial correlation, -1 to 1; positive if the first planner wins, or is lower if no direction is
+    # better
     effect: float
     p: float  # exact McNemar or Wilcoxon signed rank, over pairs; nan without pairs
-    p_worlds: float  # signs flipped by world; nan where no world has two pairs, or there is one world
+    p_worlds: float  # sign flips by world; nan if no world has two pairs, or there is one world
     p_holm: float = math.nan  # `p` with Holm's correction over all comparisons of this measure
     p_worlds_holm: float = math.nan  # `p_worlds` with Holm's correction
 
@@ -79,34 +76,32 @@ class PairedComparison:
 
     @property
     def decided(self) -> str:
-        """The planner that `effect` favours, if both corrected p-values are below 0.05; else empty."""
+        """The planner favoured by `effect`, if both corrected p-values are below 0.05; else empty."""
         if not self.decisive_p < ALPHA or self.effect == 0:
             return ""
         return self.first if self.effect > 0 else self.second
 
     @property
     def better(self) -> str:
-        """The planner that is better, if that is decided and one direction is better; else empty."""
+        """The better planner, if that is decided and one direction is better; else empty."""
         return "" if self.direction == "neither" else self.decided
 
     @property
     def lower(self) -> str:
-        """The planner with less, if that is decided and no direction is better; else empty."""
+        """The planner with the lower value, if that is decided and no direction is better; else empty."""
         return self.decided if self.direction == "neither" else ""
 
     def as_dict(self) -> dict[str, Any]:
-        """All fields as plain values, and which planner is better, or has less."""
+        """Return all fields as plain values, and the planner that is better or lower."""
         fields = {**dataclasses.asdict(self), "interval": list(self.interval)}
         return {**fields, "better": self.better, "lower": self.lower}
 
 
 def pairs_of(paired: PairedRuns, against: str | None = None) -> list[tuple[int, int]]:
-    """The pairs of planners to compare, as indices."""
+    """Return the pairs of planners to compare, as indices."""
     labels = paired.planners
     if len(labels) < 2:
-        raise FieldError(
-            "planners", f"{labels[0]} alone; two are needed for a comparison, antdrive report is about one, too"
-        )
+        raise FieldError("planners", f"only {labels[0]}; a comparison needs two, antdrive report takes one")
     if against is not None and against not in labels:
         raise FieldError("against", f"unknown planner {against!r}; choose from {', '.join(labels)}")
     chosen = [
@@ -115,9 +110,7 @@ def pairs_of(paired: PairedRuns, against: str | None = None) -> list[tuple[int, 
         if against is None or against in (labels[i], labels[j])
     ]
     if not any((paired.present[:, i] & paired.present[:, j]).any() for i, j in chosen):
-        raise FieldError(
-            "planners", "no two have a run in the same world, task, settings and seed; only paired runs are compared"
-        )
+        raise FieldError("planners", "no two share a run: same world, task, settings and seed")
     return chosen
 
 
@@ -143,13 +136,13 @@ def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
 def success_interval(
     paired: PairedRuns, mask: Flags, i: int, j: int, resampled: Interval, confidence: float = CONFIDENCE
 ) -> Interval:
-    """An interval for the difference of two planners' success that holds over runs and over worlds."""
+    """Return an interval for the difference of two planners' success, valid over runs and over worlds."""
     first, second = paired.success[mask, i], paired.success[mask, j]
-    both, one, other = (int(found.sum()) for found in (first & second, first & ~second, ~first & second))
+    both, one, other = (int(mask.sum()) for mask in (first & second, first & ~second, ~first & second))
     interval = paired_difference(both, one, other, len(first) - both - one - other, confidence)
     if not paired.several_in_worlds(mask):
         return interval
-    if len(np.unique(first.astype(int) - second)) == 1:  # no resample differs: a world counts as one pair
+    if len(np.unique(first.astype(int) - second)) == 1:  # resamples do not vary: a world counts as one pair
         worlds = paired.worlds_in(mask)
         both, one, other = (round(worlds * count / len(first)) for count in (both, one, other))
         resampled = paired_difference(both, one, other, worlds - both - one - other, confidence)
@@ -157,10 +150,10 @@ def success_interval(
 
 
 def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direction) -> list[PairedComparison]:
-    """Compare a metric on the pairs in which both planners succeeded: Wilcoxon, median difference, rank biserial."""
+    """Compare a metric on the pairs in which both succeeded: Wilcoxon, median difference, rank biserial."""
     values = paired.values(metric)
     if not np.isfinite(values).any():
-        raise FieldError("metric", f"{metric}: no successful run has a value of it")
+        raise FieldError("metric", f"{metric}: no successful run has a value")
     masks, gaps, ranks, shared = [], [], [], []
     for i, j in pairs:
         shared.append(paired.counted(i, j))
@@ -196,7 +189,7 @@ def _row(
     effect: float,
     p: float,
 ) -> PairedComparison:
-    """A comparison on the instances of a mask, without the test over worlds."""
+    """Return a comparison on the instances of a mask, without the test over worlds."""
     i, j = planners
     pairs = int(mask.sum())
     return PairedComparison(
@@ -222,7 +215,7 @@ def _row(
 def _corrected(
     paired: PairedRuns, rows: list[PairedComparison], masks: Sequence[Flags], scores: Floats
 ) -> list[PairedComparison]:
-    """The rows with the test over worlds and with Holm's correction; scores (N, K) are nan outside the masks."""
+    """Return the rows with the test over worlds and Holm's correction; scores (N, K) are nan outside the masks."""
     sums = np.stack(
         [sums_by_world(np.nan_to_num(column), paired.world, len(paired.worlds)) for column in scores.T], axis=1
     )
@@ -235,25 +228,24 @@ def _corrected(
     ]
 
 
-POWER = 0.8  # the chance with which the needed worlds show it, if the two are equally good
-TAIL_RESAMPLES = 20  # resamples beyond each end of an interval, at least
+POWER = 0.8  # of the test with the needed worlds, if the two are equally good
+TAIL_RESAMPLES = 20  # least number of resamples beyond each end of an interval
 FEWEST_WORLDS = 6
 
 
 @dataclass(frozen=True)
 class NonInferiority:
-    """A planner against the reference."""
+    """A planner compared with the reference."""
 
     measure: str  # "success" or the name of a metric
     planner: str  # its label
-    reference: str  # label of the planner that it is compared with
-    allowed: float  # by how much the planner may be worse: a share of successes, or in the metric's unit
-    # by how much it is better: difference of shares, or median of the paired differences; below 0 if worse
+    reference: str  # label of the reference planner
+    allowed: float  # how much worse the planner may be: difference of success rates, or in the metric's unit
+    # how much better it is: difference of success rates, or median of the paired differences; negative if worse
     advantage: float
-    interval: Interval  # of the advantage, such that all intervals of the table hold at once with 95 %
-    worlds: int  # number of worlds that the pairs are in
-    # worlds that show it with a chance of 80 % if the two are equally good, from the spread between these
-    # worlds
+    interval: Interval  # of the advantage; all intervals of the table hold jointly with 95 %
+    worlds: int  # number of worlds of the pairs
+    # worlds needed to show it with a power of 80 % if the two are equally good, from the spread between these worlds
     needed: int
 
     @property
@@ -262,14 +254,14 @@ class NonInferiority:
         return self.interval.low > -self.allowed
 
     def as_dict(self) -> dict[str, Any]:
-        """All fields as plain values, and whether the planner is not worse."""
+        """Return all fields as plain values, and whether the planner is not worse."""
         return {**dataclasses.asdict(self), "interval": list(self.interval), "not_worse": self.not_worse}
 
 
 def not_worse(
     paired: PairedRuns, reference: str, measure: str, allowed: float, better: Direction
 ) -> list[NonInferiority]:
-    """A row for each planner but the reference."""
+    """Return a row for each planner except the reference."""
     if not (math.isfinite(allowed) and allowed > 0):
         raise FieldError("allowed", f"must be above 0; got {allowed:g}")
     if better == "neither":
@@ -314,10 +306,10 @@ def _world_means(gap: Floats, world: npt.NDArray[np.int64]) -> Floats:
 
 
 def _needed(means: Sequence[float] | Floats, allowed: float, alpha: float, success: bool) -> int:
-    """Worlds after which the interval's lower end is above `-allowed`; at least as many as a run without disagreement takes."""
+    """Return the number of worlds after which the interval lies above `-allowed`; at least that without disagreement."""
     z = statistics_library("scipy.stats").norm.ppf([1 - alpha / 2, POWER])
     spread = float(np.std(means, ddof=1)) if len(means) > 1 else math.nan
     normal = 0 if math.isnan(spread) else math.ceil((z.sum() * spread / allowed) ** 2)
-    # Where nothing fails, Wilson's interval over n worlds is as wide as z² / (n + z²).
+    # Without failures, Wilson's interval over n worlds has a width of z² / (n + z²).
     alike = math.ceil(z[0] ** 2 * (1 - allowed) / allowed) if success and allowed < 1 else 0
     return max(normal, alike, FEWEST_WORLDS)

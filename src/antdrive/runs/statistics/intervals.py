@@ -1,9 +1,8 @@
-"""Confidence intervals: for proportions, for paired differences of them, and over worlds by bootstrap.
+"""Confidence intervals for proportions and their paired differences, and over worlds by bootstrap.
 
-Bootstraps resample worlds and then the runs within each world.
-Runs in one world resemble each other, so that resampling single runs gives intervals that are too narrow for statements
-about other worlds (Field and Welsh 2007). Samples are drawn among the runs that count: a repetition that is no evidence has
-no part in them, so that an interval is the same however often a drive was repeated.
+The bootstrap resamples worlds, then the runs within each world. Runs in one world are similar, so resampling single runs
+gives too narrow intervals for statements about other worlds (Field and Welsh 2007). Only counted runs are resampled:
+repetitions are no evidence and do not change an interval.
 """
 
 from __future__ import annotations
@@ -24,27 +23,27 @@ CONFIDENCE = 0.95
 class Interval(NamedTuple):
     """A confidence interval."""
 
-    low: float  # its lower end
-    high: float  # its upper end
+    low: float  # lower end
+    high: float  # upper end
 
 
 NOWHERE = Interval(math.nan, math.nan)
 
 
 def wilson(successes: int, total: int, confidence: float = CONFIDENCE) -> Interval:
-    """Wilson's score interval for a proportion (Wilson 1927)."""
+    """Return Wilson's score interval for a proportion (Wilson 1927)."""
     if not 0 <= successes <= total or total < 1:
         raise FieldError("successes", f"must be 0 to total, and total at least 1; got {successes} of {total}")
     proportion = statistics_library("statsmodels.stats.proportion")
     low, high = proportion.proportion_confint(successes, total, alpha=1 - confidence, method="wilson")
-    # At 0 and at `total` the interval ends exactly there; rounding may leave it 1e-17 off.
+    # At 0 and at `total` the interval ends exactly there; rounding may leave 1e-17.
     return Interval(0.0 if successes == 0 else float(low), 1.0 if successes == total else float(high))
 
 
 def paired_difference(both: int, first: int, second: int, neither: int, confidence: float = CONFIDENCE) -> Interval:
-    """An interval for the difference of two paired proportions (Newcombe 1998, method 10).
+    """Return an interval for the difference of two paired proportions (Newcombe 1998, method 10).
 
-    It combines the Wilson intervals of the two proportions and takes their correlation into account.
+    It combines the Wilson intervals of both proportions and includes their correlation.
     """
     n = both + first + second + neither
     p1, p2 = (both + first) / n, (both + second) / n
@@ -69,7 +68,7 @@ BLOCK = 4_000_000  # numbers held at once
 
 
 def resampled(world: Ints, resamples: int = RESAMPLES, seed: int = SEED) -> Iterator[Ints]:
-    """Blocks of rows (b, N) that say how often each run is drawn, `resamples` rows in total."""
+    """Yield blocks (b, N) with the number of draws of each run, `resamples` rows in total."""
     rng = np.random.default_rng(seed)
     names, inverse, sizes = np.unique(world, return_inverse=True, return_counts=True)
     members = np.split(np.argsort(inverse, kind="stable"), np.cumsum(sizes)[:-1])
@@ -91,16 +90,16 @@ def medians_by_world(
     counted: Flags | None = None,
     confidence: float = CONFIDENCE,
 ) -> list[Interval]:
-    """Percentile intervals for the median of each column of values (N, K), nan left out."""
-    found = np.full((resamples, values.shape[1]), np.nan)
+    """Return percentile intervals for the median of each column of values (N, K), ignoring nan."""
+    statistics = np.full((resamples, values.shape[1]), np.nan)
     for rows, columns in _columns_alike(values, counted):
         chosen = [_Sorted.of(values[rows, k]) for k in columns]
         first = 0
         for weights in resampled(world[rows], resamples):
             for k, column in zip(columns, chosen, strict=True):
-                found[first : first + len(weights), k] = column.medians(weights)
+                statistics[first : first + len(weights), k] = column.medians(weights)
             first += len(weights)
-    return [_percentiles(found[:, k], confidence) for k in range(values.shape[1])]
+    return [_percentiles(statistics[:, k], confidence) for k in range(values.shape[1])]
 
 
 def means_by_world(
@@ -111,8 +110,8 @@ def means_by_world(
     counted: Flags | None = None,
     confidence: float = CONFIDENCE,
 ) -> list[Interval]:
-    """Percentile intervals for the mean of each column of values (N, K), nan left out."""
-    found = np.full((resamples, values.shape[1]), np.nan)
+    """Return percentile intervals for the mean of each column of values (N, K), ignoring nan."""
+    statistics = np.full((resamples, values.shape[1]), np.nan)
     for rows, columns in _columns_alike(values, counted):
         known = ~np.isnan(values[rows][:, columns])
         filled = np.where(known, values[rows][:, columns], 0.0)
@@ -120,13 +119,15 @@ def means_by_world(
         for weights in resampled(world[rows], resamples):
             totals = weights @ known.astype(float)
             with np.errstate(invalid="ignore"):
-                found[first : first + len(weights), columns] = (weights @ filled) / np.where(totals > 0, totals, np.nan)
+                statistics[first : first + len(weights), columns] = (weights @ filled) / np.where(
+                    totals > 0, totals, np.nan
+                )
             first += len(weights)
-    return [_percentiles(found[:, k], confidence) for k in range(values.shape[1])]
+    return [_percentiles(statistics[:, k], confidence) for k in range(values.shape[1])]
 
 
 def _columns_alike(values: Floats, counted: Flags | None) -> Iterator[tuple[Ints, Ints]]:
-    """Rows that are counted, and the columns for which they are: these see the same samples."""
+    """Yield counted rows and the columns that share them, so that these get the same resamples."""
     if counted is None:
         yield np.arange(len(values)), np.arange(values.shape[1])
         return
@@ -137,7 +138,7 @@ def _columns_alike(values: Floats, counted: Flags | None) -> Iterator[tuple[Ints
 
 
 class _Sorted:
-    """A column's values in order, so that the median of every resample is a place in a running sum of weights."""
+    """A column's sorted values: the median of every resample is a position in a cumulative sum of weights."""
 
     def __init__(self, values: Floats, order: Ints) -> None:
         self.values = values
@@ -149,7 +150,7 @@ class _Sorted:
         return cls(column[order], order)
 
     def medians(self, weights: Ints) -> Floats:
-        """The median of each resample, nan where it holds no value."""
+        """Return the median of each resample; nan without values."""
         if not len(self.values):
             return np.full(len(weights), np.nan)
         running = np.cumsum(weights[:, self.order], axis=1)

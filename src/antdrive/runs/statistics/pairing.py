@@ -1,4 +1,4 @@
-"""Runs arranged so that planners are compared in the same world, task, settings and seed, and nowhere else."""
+"""Runs paired by world, task, settings and seed, to compare planners."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from antdrive.sim.log.metrics import WALL_CLOCK
 
 @dataclass(frozen=True, eq=False)
 class PairedRuns:
-    """Runs by instance and planner. An instance is a world, a task, the settings that `RunTable.settings` lists, and a seed.
+    """Runs by instance and planner. An instance is a world, a task, the settings of `RunTable.settings`, and a seed.
 
     Attributes:
         table: the runs
-        planners: their labels, P of them, in the order of the table
+        planners: labels of the P planners, in the order of the table
         worlds: names of the W worlds
-        world: the index of each instance's world, (N,)
-        setting_group: a number for each instance that is the same where only the seed differs, (N,)
-        row: the row of each instance and planner in the table, (N, P); -1 where there is none
-        success: whether that run succeeded, (N, P)
-        seeded: whether the seed changes any drive of each planner under the settings of each instance, (N, P)
+        world: index of each instance's world, (N,)
+        setting_group: equal numbers for instances that differ only in the seed, (N,)
+        row: row of each instance and planner in the table, (N, P); -1 if missing
+        success: whether the run succeeded, (N, P)
+        seeded: whether the seed changes any drive of the planner under the instance's settings, (N, P)
     """
 
     table: RunTable
@@ -39,10 +39,10 @@ class PairedRuns:
 
     @classmethod
     def of(cls, table: RunTable, planners: Sequence[str] = ()) -> PairedRuns:
-        """Arrange the runs of a table, or of some planners in this order."""
+        """Arrange the runs of a table, or of some planners in the given order."""
         table = table.of_planners(planners) if planners else table
         if not len(table):
-            raise FieldError("runs", "none; the campaign has no finished run")
+            raise FieldError("runs", "none; the campaign has no finished runs")
         labels = table.texts("planner")
         planners = tuple(dict.fromkeys(planners or labels))
         column = np.array([planners.index(label) for label in labels])
@@ -56,8 +56,8 @@ class PairedRuns:
         names, world = _worlds(table)
         success = (row >= 0) & table.success[row]
         group = _joint(table, described)[first]
-        judged = _joint(table, [name for name in table.settings if name not in OF_WORLDS])[first]
-        seeded = _seeded(table, row, group, judged)
+        setting = _joint(table, [name for name in table.settings if name not in OF_WORLDS])[first]
+        seeded = _seeded(table, row, group, setting)
         return cls(table, planners, names, world[first], group, row, success, seeded)
 
     @property
@@ -71,38 +71,38 @@ class PairedRuns:
         return np.asarray(self.present.all(axis=1))
 
     def values(self, name: str) -> Floats:
-        """A column of the table by instance and planner, (N, P); nan without success.
+        """Return a column of the table by instance and planner, (N, P); nan without success.
 
-        Wall-clock times of a drive that repeats with every seed are the median over its repetitions.
+        Wall-clock times of a drive that repeats with every seed are the median of its repetitions.
         """
         values = np.where(self.success, self.table.numbers(name)[self.row], np.nan)
         return self._over_repetitions(values) if name in WALL_CLOCK else values
 
     def _over_repetitions(self, values: Floats) -> Floats:
-        """Values (N, P) in which those of repeated drives are replaced by their median."""
-        found = values.copy()
+        """Replace the values (N, P) of repeated drives by their median."""
+        medians = values.copy()
         for k in range(len(self.planners)):
             places = np.flatnonzero(~self.seeded[:, k] & np.isfinite(values[:, k]))
             if not len(places):
                 continue
             order = places[np.argsort(self.setting_group[places], kind="stable")]
             for same in np.split(order, np.flatnonzero(np.diff(self.setting_group[order])) + 1):
-                found[same, k] = np.median(values[same, k])
-        return found
+                medians[same, k] = np.median(values[same, k])
+        return medians
 
     def worlds_in(self, mask: Flags) -> int:
-        """The number of worlds among some instances."""
+        """Return the number of worlds among some instances."""
         return len(np.unique(self.world[mask]))
 
     def several_in_worlds(self, mask: Flags) -> bool:
-        """Whether there are several worlds among some instances, and several instances in one of them."""
+        """Return whether some instances cover several worlds, one of them with several instances."""
         sizes = np.bincount(self.world[mask])
         return bool((sizes > 0).sum() > 1 and sizes.max() > 1)
 
     def counted(self, *planners: int, within: Flags | None = None) -> Flags:
-        """The instances that all of these planners ran, each different drive once, (N,).
+        """Return the instances that all of these planners ran, each distinct drive once, (N,).
 
-        Under settings where the seed changes no drive of any of them, the first seed stands for all: repetitions are no
+        Under settings in which the seed changes no drive of these planners, only the first seed counts: repetitions are no
         evidence.
         """
         chosen = list(planners)
@@ -117,16 +117,16 @@ class PairedRuns:
 
 
 def _twice(table: RunTable, label: str) -> str:
-    """What is wrong with a table in which a planner has two runs of one instance."""
+    """Explain why a planner has two runs of one instance."""
     lacks = [name for name in ("robot_hash", "margin_asked") if name not in table]
     why = "one is needed to pair them"
     if lacks:
-        why = f"the table lacks {' and '.join(lacks)}, which may tell them apart; antdrive sweep of the same campaign adds them"
+        why = f"the table lacks {' and '.join(lacks)}, which may distinguish them; repeat antdrive sweep to add them"
     return f"{label} has two runs of one world, task, settings and seed; {why}"
 
 
 def _joint(table: RunTable, names: Sequence[str]) -> Ints:
-    """Equal numbers for runs that agree in all of these columns, ascending in the order of the columns."""
+    """Return equal numbers for runs that agree in all these columns, in the order of the columns."""
     joint = np.zeros(len(table), dtype=np.int64)
     for name in names:
         codes = _seeds(table) if name == "seed" else table.codes(name)
@@ -135,18 +135,18 @@ def _joint(table: RunTable, names: Sequence[str]) -> Ints:
 
 
 def _seeds(table: RunTable) -> Ints:
-    """Codes of the seeds in the order of numbers, so that the first seed is the smallest."""
+    """Return codes of the seeds in numerical order, so the smallest is the first."""
     return np.unique(table.numbers("seed"), return_inverse=True)[1].astype(np.int64)
 
 
 def _worlds(table: RunTable) -> tuple[tuple[str, ...], Ints]:
-    """Names of the worlds, and the index of each run's. Several tasks in one world are no other worlds."""
+    """Return the names of the worlds, and the index of each run's. Tasks in one world share it."""
     names, codes = np.unique(np.array(table.texts("world"), dtype=object), return_inverse=True)
     return tuple(names), codes.astype(np.int64)
 
 
 def _seeded(table: RunTable, row: Ints, group: Ints, setting: Ints) -> Flags:
-    """Whether runs of a planner under one setting that differ in the seed alone differ in their drives, (N, P)."""
+    """Return whether a planner's drives under one setting change with the seed, (N, P)."""
     seeded = np.ones(row.shape, dtype=np.bool_)
     if "drive_digest" not in table:
         return seeded

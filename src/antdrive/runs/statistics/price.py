@@ -1,4 +1,4 @@
-"""The price of not knowing: how much longer drives without a map take than the same drives with it."""
+"""Cost of driving without a map: extra time and length compared with the same drives with it."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ TIME, LENGTH = "arrival_s", "driven_length_m"
 
 
 class Ratio(NamedTuple):
-    """How a number without the map compares with the same number with it, over all pairs."""
+    """Ratio of a quantity without the map to that with it, over all pairs."""
 
-    mean: float  # geometric mean of the pairs' ratios
-    low: float  # lower end of its 95 % interval, from a bootstrap that draws worlds and then pairs within
+    mean: float  # geometric mean over the pairs
+    low: float  # lower end of its 95 % interval, from a bootstrap over worlds, then pairs
     high: float  # upper end
-    most: float  # the largest ratio of a pair
+    most: float  # largest ratio of a pair
 
 
 @dataclass(frozen=True)
 class Price:
-    """What drives without a map cost, beside the same drives with it: same world, task, robot, settings, planner and seed.
+    """Drives without a map compared with the same drives with it: same world, task, robot, settings, planner and seed.
 
     Attributes:
-        planner: their planner, as tables call it
-        robot: their robot, as tables call it
-        localisation: how the robot without the map knew its pose
-        odometry: the factor on the errors of its odometry
-        drives: drives without a map
-        pairs: pairs in which both drives succeeded
-        worlds: worlds that these are of
-        lost: pairs in which only the drive with the map succeeded
-        won: pairs in which only the drive without it succeeded
-        unpaired: drives without a map of which there is none with it
-        time: ratio of the times of arrival
+        planner: the planner's name in tables
+        robot: the robot's name in tables
+        localisation: localisation of the robot without the map
+        odometry: factor on the errors of its odometry
+        drives: number of drives without a map
+        pairs: number of pairs in which both drives succeeded
+        worlds: number of worlds of these pairs
+        lost: number of pairs in which only the drive with the map succeeded
+        won: number of pairs in which only the drive without it succeeded
+        unpaired: number of drives without a map that lack one with it
+        time: ratio of the arrival times
         length: ratio of the driven lengths
     """
 
@@ -59,21 +59,21 @@ class Price:
 
     @property
     def sentence(self) -> str:
-        """The price in words."""
+        """The comparison in words."""
         who = f"{self.planner}, {self.robot}, {self.localisation} with errors x {self.odometry:g}"
         if not self.pairs:
-            return f"Price of not knowing the map, {who}: no pair of drives of which both arrived."
+            return f"Cost of driving without the map, {who}: no pair in which both drives arrived."
         parts = (
             f"{name} x {ratio.mean:.3f} ({ratio.low:.3f} to {ratio.high:.3f}; at most {ratio.most:.2f})"
             for name, ratio in (("time", self.time), ("length", self.length))
         )
         return (
-            f"Price of not knowing the map, {who}: {', '.join(parts)}; geometric means of {self.pairs} pairs in "
+            f"Cost of driving without the map, {who}: {', '.join(parts)}; geometric means of {self.pairs} pairs in "
             f"{self.worlds} worlds, 95 % intervals over worlds; arrived only with the map: {self.lost}, only without: {self.won}."
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """All fields as plain values; numbers of no pairs are null."""
+        """Return all fields as plain values; numbers of no pairs are null."""
         fields = dataclasses.asdict(self)
         for name in ("time", "length"):
             ratio = getattr(self, name)._asdict()
@@ -82,7 +82,7 @@ class Price:
 
 
 def prices(table: RunTable, *, any_robot: bool = False) -> list[Price]:
-    """The price for each planner, robot, localisation and factor of odometry that a table has drives without a map of."""
+    """Return the cost for each planner, robot, localisation and odometry factor with drives without a map."""
     if "map" not in table:
         return []
     left_out = {*SENSING, DRIVEN, *(("robot", "robot_hash") if any_robot else ())}
@@ -99,7 +99,7 @@ def prices(table: RunTable, *, any_robot: bool = False) -> list[Price]:
 
 
 def _price(table: RunTable, rows: list[int], partners: list[int]) -> Price:
-    """The price of some drives without a map; a drive's partner is -1 where it has none."""
+    """Compare some drives without a map with their partners; -1 means none."""
     there = [k for k, partner in enumerate(partners) if partner >= 0]
     without, with_map = np.array([rows[k] for k in there], int), np.array([partners[k] for k in there], int)
     arrived, known = table.success[without], table.success[with_map]
@@ -129,7 +129,7 @@ def _price(table: RunTable, rows: list[int], partners: list[int]) -> Price:
 
 
 def _ratios(table: RunTable, without: np.ndarray[Any, Any], with_map: np.ndarray[Any, Any]) -> Iterator[Any]:
-    """The logarithms of the ratios of times, and of lengths, one for each pair."""
+    """Yield the logarithms of the ratios of times and of lengths, one for each pair."""
     for name in (TIME, LENGTH):
         values = table.numbers(name)
         yield np.log(values[without] / values[with_map])

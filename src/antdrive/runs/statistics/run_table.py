@@ -1,4 +1,4 @@
-"""The runs of campaigns as columns, however they were stored: chosen as `--where COLUMN=VALUE` says it, or merged."""
+"""Table of campaigns' runs as columns: selection by `--where COLUMN=VALUE`, and merging."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from antdrive.base.types import Flags, Floats
 from antdrive.sim.settings import SETTING_COLUMNS
 from antdrive.sim.settings import SETTINGS as DECLARED
 
-LISTED = 20  # values that an error names
-NONE = "none"  # stands for a run without a value
+LISTED = 20  # most values listed in an error
+NONE = "none"  # represents a missing value
 
 
 def column_named(names: Iterable[str], column: str) -> str:
-    """The full name of a column."""
+    """Return the full name of a column."""
     known = list(names)
     for name in (column, f"option.{column}"):
         if name in known:
@@ -30,24 +30,24 @@ def column_named(names: Iterable[str], column: str) -> str:
 
 
 def places_of(column: str, values: Sequence[Any], wanted: str) -> list[int]:
-    """The rows whose value is wanted, at least one."""
-    found = matching(values, wanted)
-    if not found:
+    """Return the rows that match a selection, at least one."""
+    rows = matching(values, wanted)
+    if not rows:
         raise FieldError(column, f"no run with {wanted!r}; the campaign has {described(values)}")
-    return found
+    return rows
 
 
 def matching(values: Sequence[Any], wanted: str) -> list[int]:
-    """The rows whose value is wanted."""
+    """Return the rows that match a selection."""
     whole = [k for k, value in enumerate(values) if _text(value) == wanted]
-    if whole:  # a name may hold a comma
+    if whole:  # a name may contain a comma
         return whole
     tests = [_range(part) or part for part in wanted.split(",")]
     return [k for k, value in enumerate(values) if any(_fits(value, test) for test in tests)]
 
 
 def described(values: Sequence[Any]) -> str:
-    """The values of a column in a few words."""
+    """Summarise the values of a column."""
     different = list(dict.fromkeys(values))
     numbers = [value for value in different if isinstance(value, int | float) and not isinstance(value, bool)]
     if len(numbers) > LISTED:
@@ -61,12 +61,12 @@ def _text(value: Any) -> str:
 
 
 def _range(text: str) -> tuple[float, float] | None:
-    """The ends of a range such as "10..20"."""
-    found = re.fullmatch(r"(.*?)\.\.(.*)", text)
-    if found is None or not (found[1] or found[2]):
+    """Return the ends of a range such as "10..20", or None."""
+    match = re.fullmatch(r"(.*?)\.\.(.*)", text)
+    if match is None or not (match[1] or match[2]):
         return None
     try:
-        return float(found[1] or -math.inf), float(found[2] or math.inf)
+        return float(match[1] or -math.inf), float(match[2] or math.inf)
     except ValueError:
         return None
 
@@ -83,17 +83,17 @@ def _fits(value: Any, test: str | tuple[float, float]) -> bool:
         return False
 
 
-#: Where a run took place.
+#: Columns of the place of a run.
 PLACE = ("world", "world_hash", "task")
-#: The rest of what a run is, besides planner and seed. A table may lack some of them.
+#: Columns of a run's configuration besides planner and place. A table may lack some.
 SETTINGS = ("robot", "robot_hash", *(name for name in SETTING_COLUMNS if name != "seed"))
-#: What a robot knows of the world and of its pose.
+#: Columns of the robot's knowledge of the world and of its pose.
 SENSING = tuple(one.column for one in DECLARED.values() if one.setting.group == "Sensing")
-#: The margin as the campaign asks for it, such as "auto", and the one that was driven with: runs are paired by the first.
+#: The margin as requested, such as "auto", and the one used: runs are paired by the first.
 ASKED, DRIVEN = "margin_asked", "margin"
-#: A world's own cell size is no setting of the campaign, so that seeds are not judged apart for each size.
+#: A world's own cell size is not a setting of the campaign, so seeds are not separated by it.
 OF_WORLDS = ("cell",)
-#: Hashes tell what equal names hide; pages show the names.
+#: Hashes distinguish equal names; pages show the names.
 HASHES = ("world_hash", "robot_hash")
 
 
@@ -104,7 +104,7 @@ REQUIRED = ("world", "planner", "seed", "outcome", "succeeded")
 class RunTable:
     """The runs of a campaign, a row each."""
 
-    # by name the value of each run, None where it has none; `REQUIRED` names those that must be there
+    # each column's values by run, None if missing; `REQUIRED` columns must exist
     columns: Mapping[str, Sequence[Any]]
 
     def __post_init__(self) -> None:
@@ -122,34 +122,34 @@ class RunTable:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """The columns that say what a run is, besides place, planner and seed: of two margins the one that was asked for."""
+        """The columns of a run's settings; of the two margins only the requested one."""
         return tuple(
             name for name in SETTINGS if name in self.columns and not (name == DRIVEN and ASKED in self.columns)
         )
 
     def texts(self, name: str) -> list[str]:
-        """A column as text; empty where there is no value."""
+        """Return a column as text; empty for missing values."""
         return ["" if value is None else str(value) for value in self.columns.get(name, [None] * len(self))]
 
     def numbers(self, name: str) -> Floats:
-        """A column as numbers, (N,); nan where there is none."""
+        """Return a column as numbers, (N,); nan for missing values."""
         values = self.columns.get(name, [None] * len(self))
         return np.array([value if isinstance(value, int | float) else np.nan for value in values], dtype=float)
 
     @property
     def success(self) -> Flags:
-        """Whether each run reached the goal and is certified, (N,). A run that crashed did not."""
+        """Whether each run reached the goal and is certified, (N,); false for a crashed run."""
         done = np.array([value is True for value in self.columns["succeeded"]])
         if "certified" in self.columns:
             done &= np.array([value is not False for value in self.columns["certified"]])
         return done
 
     def where(self, column: str, value: str) -> RunTable:
-        """The runs with some values in a column."""
+        """Return the runs that match a selection in a column."""
         return self.take(places_of(column, self.columns[column_named(self.columns, column)], value))
 
     def of_planners(self, labels: Sequence[str]) -> RunTable:
-        """The runs of some planners."""
+        """Return the runs of some planners."""
         mine = self.texts("planner")
         for label in labels:
             if label not in mine:
@@ -157,21 +157,21 @@ class RunTable:
         return self.take([k for k, label in enumerate(mine) if label in labels])
 
     def take(self, rows: Sequence[int]) -> RunTable:
-        """Some of the runs."""
+        """Return some of the runs."""
         return RunTable({name: [values[k] for k in rows] for name, values in self.columns.items()})
 
     def codes(self, name: str) -> npt.NDArray[np.int64]:
-        """Equal numbers for runs with equal texts in a column, (N,)."""
+        """Return equal numbers for runs with equal texts in a column, (N,)."""
         return np.unique(np.array(self.texts(name), dtype=object), return_inverse=True)[1].astype(np.int64)
 
 
-FOLDER = "folder"  # the column that names the campaign
+FOLDER = "folder"  # column with the campaign's name
 
 
 def merged(tables: Mapping[str, RunTable]) -> RunTable:
-    """The runs of several campaigns in one table, with the column `folder`.
+    """Merge the runs of several campaigns into one table, with the column `folder`.
 
-    A planner of which two campaigns have a run of the same instance is a planner of its own in each: "astar @today".
+    If two campaigns have a run of the same planner and instance, they become separate planners: "astar @today".
     """
     if len(tables) == 1:
         return next(iter(tables.values()))
@@ -198,12 +198,12 @@ def _check(tables: Mapping[str, RunTable]) -> None:
         if lacks:
             raise FieldError(
                 folder,
-                f"its table lacks {', '.join(lacks)}, which the others have; antdrive sweep of its campaign adds them",
+                f"its table lacks {', '.join(lacks)}, which the others have; repeat its antdrive sweep to add them",
             )
 
 
 def _in_several(table: RunTable, folders: list[str]) -> set[str]:
-    """Labels of planners of which two folders have a run of one instance."""
+    """Return the planners with runs of one instance in two folders."""
     described = [name for name in (*PLACE, *SETTINGS, "seed", "planner") if name in table]
     if ASKED in described:
         described.remove(DRIVEN)

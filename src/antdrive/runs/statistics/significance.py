@@ -1,4 +1,4 @@
-"""Tests of paired differences: McNemar, Wilcoxon, signs flipped by world; Holm's correction for many of them."""
+"""Tests of paired differences: McNemar, Wilcoxon, sign flips by world, and Holm's correction."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from antdrive.base.optional import statistics_library
 from antdrive.base.types import Floats, Ints
 
-EXACT_WORLDS = 16  # up to so many worlds, all 2^W flips are tried
-FLIPS = 99_999  # random flips above
-SEED = 20_060_301  # of the random flips; the same table gives the same p-values
+EXACT_WORLDS = 16  # up to this number of worlds, all 2^W flips are enumerated
+FLIPS = 99_999  # random flips above that
+SEED = 20_060_301  # of the random flips; a table always gives the same p-values
 BLOCK = 4_000_000  # numbers held at once
-TIE = 1e-9  # differences that are smaller than this, relative to the values, are rounding
+TIE = 1e-9  # smaller differences, relative to the values, are rounding errors
 
 
 def mcnemar(first: int, second: int) -> float:
-    """The exact p-value of McNemar's test (McNemar 1947): a two-sided binomial test of the pairs that disagree."""
+    """Return the exact p-value of McNemar's test (McNemar 1947): a two-sided binomial test of the discordant pairs."""
     if first + second == 0:
         return 1.0
     tables = statistics_library("statsmodels.stats.contingency_tables")
@@ -25,13 +25,13 @@ def mcnemar(first: int, second: int) -> float:
 
 
 def differences(first: Floats, second: Floats) -> Floats:
-    """First minus second, (N,); what is only rounding becomes 0, so that ties are seen as ties."""
+    """Return first minus second, (N,), with rounding errors set to 0 so that ties are ties."""
     raw = first - second
     return np.where(np.abs(raw) <= TIE * np.maximum(np.abs(first), np.abs(second)), 0.0, raw)
 
 
 def signed_ranks(difference: Floats) -> Floats:
-    """The rank of each difference's size among those that are not 0, with its sign, (N,); 0 stays 0."""
+    """Return the signed rank of each difference's size among the nonzero ones, (N,); 0 stays 0."""
     ranks = np.zeros(len(difference))
     other = difference != 0
     ranks[other] = statistics_library("scipy.stats").rankdata(_levelled(np.abs(difference[other])))
@@ -39,15 +39,15 @@ def signed_ranks(difference: Floats) -> Floats:
 
 
 def _levelled(sizes: Floats) -> Floats:
-    """Sizes, such that those which differ by rounding alone share a rank."""
+    """Level sizes that differ only by rounding, so that they share a rank."""
     largest = float(sizes.max(initial=0.0))
     return np.maximum(np.round(sizes / largest / TIE), 1.0) if largest > 0 else sizes
 
 
 def wilcoxon(difference: Floats) -> float:
-    """The two-sided p-value of Wilcoxon's signed rank test (Wilcoxon 1945); zeros are left out.
+    """Return the two-sided p-value of Wilcoxon's signed rank test (Wilcoxon 1945), ignoring zeros.
 
-    It is exact for up to 50 differences without ties and up to 13 with; beyond, the normal approximation.
+    It is exact for up to 50 differences without ties and up to 13 with ties; beyond, the normal approximation.
     """
     other = difference[difference != 0]
     if not len(other):
@@ -57,9 +57,9 @@ def wilcoxon(difference: Floats) -> float:
 
 
 def rank_biserial(difference: Floats) -> float:
-    """The matched-pairs rank biserial correlation (Kerby 2014), -1 to 1.
+    """Return the matched-pairs rank biserial correlation (Kerby 2014), -1 to 1.
 
-    It is the share of rank sum in favour of positive differences minus the share in favour of negative ones.
+    It is the fraction of the rank sum from positive differences minus the fraction from negative ones.
     """
     ranks = signed_ranks(difference)
     total = float(np.abs(ranks).sum())
@@ -67,10 +67,10 @@ def rank_biserial(difference: Floats) -> float:
 
 
 def flips_by_world(sums: Floats) -> Floats:
-    """Two-sided p-values (K,) of tests that flip the signs of all of a world's differences together.
+    """Return two-sided p-values (K,) of tests that flip the signs of all differences in a world together.
 
-    If two planners are alike, exchanging their names in a world changes nothing, however much the runs in that world
-    depend on each other. With signed ranks this is the test of Rosner, Glynn and Lee (2006).
+    If two planners are equivalent, swapping their names in a world changes nothing, however correlated its runs are. With
+    signed ranks this is the test of Rosner, Glynn and Lee (2006).
     """
     worlds, comparisons = sums.shape
     exact = worlds <= EXACT_WORLDS
@@ -97,12 +97,12 @@ def _random_signs(worlds: int) -> Iterator[Floats]:
 
 
 def sums_by_world(values: Floats, world: Ints, worlds: int) -> Floats:
-    """The sum of the values (N,) of each world, (W,)."""
+    """Return the sum of the values (N,) in each world, (W,)."""
     return np.bincount(world, weights=values, minlength=worlds).astype(float)
 
 
 def holm(p_values: Floats) -> Floats:
-    """Holm's adjusted p-values (Holm 1979), (K,); nan stays nan and does not count.
+    """Return Holm's adjusted p-values (Holm 1979), (K,); nan stays nan and does not count.
 
     The k-th smallest of m is multiplied by m + 1 - k, and none is below a smaller one's.
     """

@@ -1,4 +1,4 @@
-"""How often each planner succeeds, and its medians: both on instances that all of the planners share.
+"""Success rates and medians of planners, on instances that all of them ran.
 
 Performance profiles and empirical distributions are over all instances; failures count in the denominator.
 """
@@ -22,17 +22,17 @@ from antdrive.runs.statistics.pairing import PairedRuns
 
 @dataclass(frozen=True)
 class PlannerSuccess:
-    """How often a planner succeeds, on the instances that every planner ran."""
+    """Success of a planner on the instances that every planner ran."""
 
     planner: str  # its label
     runs: int  # number of all its runs
-    elsewhere: int  # how many of them are left out, because some other planner lacks a run of their instance
-    # number of different runs among the rest: where the seed changes no drive, one run stands for all seeds
+    elsewhere: int  # runs omitted because another planner lacks their instance
+    # distinct runs among the rest: if the seed changes no drive, one run represents all seeds
     counted: int
-    successes: int  # how many of the counted runs succeeded
-    interval: Interval  # Wilson's 95 % interval for the share
-    # 95 % interval over worlds: by bootstrap, or Wilson's for whole worlds if all runs ended alike; nan where
-    # no world has two counted runs, or there is one world
+    successes: int  # number of counted runs that succeeded
+    interval: Interval  # Wilson's 95 % interval of the fraction
+    # 95 % interval over worlds: by bootstrap, or Wilson's for whole worlds if all runs ended alike; nan if no world
+    # has two counted runs, or there is one world
     over_worlds: Interval
     outcomes: Mapping[str, int]  # number of all runs by outcome
 
@@ -43,11 +43,11 @@ class PlannerSuccess:
 
     @property
     def across_worlds(self) -> Interval:
-        """The interval over worlds, or the one over runs where each world has one."""
+        """The interval over worlds, or over runs if each world has one."""
         return self.interval if math.isnan(self.over_worlds.low) else self.over_worlds
 
     def as_dict(self) -> dict[str, Any]:
-        """All fields as plain values, and the share."""
+        """Return all fields and the fraction (`share`) as plain values."""
         fields = dataclasses.asdict(self)
         return {
             **fields,
@@ -58,9 +58,9 @@ class PlannerSuccess:
 
 
 def success_table(paired: PairedRuns) -> list[PlannerSuccess]:
-    """A row for each planner, in the order of the runs.
+    """Return a row for each planner, in the order of the runs.
 
-    Shares are over the instances that every planner ran; where there is none, over each planner's own.
+    Fractions are over the instances that every planner ran; without any, over each planner's own.
     """
     outcomes = paired.table.texts("outcome")
     shared = paired.shared if paired.shared.any() else np.ones(len(paired.row), dtype=np.bool_)
@@ -86,7 +86,7 @@ def success_table(paired: PairedRuns) -> list[PlannerSuccess]:
 
 
 def _over_worlds(paired: PairedRuns, mask: Flags, successes: int, resampled: Interval) -> Interval:
-    """The interval of a share over worlds. Where all runs ended alike, no resample differs; whole worlds are counted then."""
+    """Return the interval of a fraction over worlds. If all runs ended alike, resamples do not vary: count whole worlds."""
     if not paired.several_in_worlds(mask):
         return NOWHERE
     if successes in (0, int(mask.sum())):
@@ -96,41 +96,41 @@ def _over_worlds(paired: PairedRuns, mask: Flags, successes: int, resampled: Int
 
 
 def common_medians(paired: PairedRuns, metrics: Sequence[str]) -> tuple[int, dict[str, list[tuple[float, Interval]]]]:
-    """The median of each metric and planner over the instances in which every planner succeeded.
+    """Return the median of each metric and planner over the instances in which every planner succeeded.
 
     Returns:
-        The number of those instances, and for each metric the medians of the planners with 95 % bootstrap intervals.
+        The number of those instances, and for each metric the planners' medians with 95 % bootstrap intervals.
     """
     common = paired.success.all(axis=1) & paired.counted(*range(len(paired.planners)))
-    found = {}
+    medians = {}
     for metric in metrics:
         values = paired.values(metric)[common]
         if len(values) and np.isfinite(values).all():
             intervals = medians_by_world(values, paired.world[common])
-            found[metric] = list(zip(np.median(values, axis=0).tolist(), intervals, strict=True))
-    return int(common.sum()), found
+            medians[metric] = list(zip(np.median(values, axis=0).tolist(), intervals, strict=True))
+    return int(common.sum()), medians
 
 
 class StepCurve(NamedTuple):
-    """A curve that rises in steps."""
+    """A step function that rises."""
 
-    x: Floats  # where it rises, ascending, (M,)
-    fraction: Floats  # its value from there on, 0 to 1, (M,)
+    x: Floats  # positions of the steps, ascending, (M,)
+    fraction: Floats  # value from there on, 0 to 1, (M,)
 
     def at(self, x: float) -> float:
-        """The curve's value."""
+        """Return the curve's value."""
         place = int(np.searchsorted(self.x, x, side="right"))
         return float(self.fraction[place - 1]) if place else 0.0
 
 
 def performance_profiles(cost: Floats) -> list[StepCurve]:
-    """For each planner the share of instances that it solves at no more than x times the best cost.
+    """Return for each planner the fraction of instances solved at no more than x times the best cost.
 
-    Performance profiles after Dolan and Moré (2002). An instance that nobody solves counts as unsolved by all.
+    Performance profiles after Dolan and Moré (2002). An instance that no planner solves counts as unsolved by all.
     """
     _check(cost)
     if np.nanmin(cost, initial=0.0) < 0:
-        raise FieldError("cost", "must not be negative; a ratio to the best is not defined")
+        raise FieldError("cost", "must not be negative: ratios to the best would be undefined")
     best = np.where(np.isnan(cost), np.inf, cost).min(axis=1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(cost == best, 1.0, cost / best)
@@ -139,7 +139,7 @@ def performance_profiles(cost: Floats) -> list[StepCurve]:
 
 
 def distributions(values: Floats) -> list[StepCurve]:
-    """For each planner the share of instances that it solves with a value of at most x."""
+    """Return for each planner the fraction of instances solved with a value of at most x."""
     _check(values)
     curves = []
     for column in values.T:

@@ -1,4 +1,4 @@
-"""Compiled queries about what a lidar has hit: arrays in, arrays out, nothing validated."""
+"""Compiled route checks against lidar hits: arrays in, arrays out, no validation."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 from antdrive.worlds._kernels import ROUNDING, Array, kernel
 
-BLOCK = 8  # points of a route that are looked at together
+BLOCK = 8  # points of a route that share one rectangle
 
 
 @kernel
 def near_polyline(xy: Array, discs: Array, distance: float) -> Array:
-    """The discs whose surface is within a distance of a polyline, in their order."""
+    """Return the discs whose surface is within a distance of a polyline, in their order."""
     out = np.empty_like(discs)
     count = 0
     links = xy.shape[0] - 1
-    blocks = np.empty(((links + BLOCK - 1) // BLOCK, 4))  # rectangles around so many links each
+    blocks = np.empty(((links + BLOCK - 1) // BLOCK, 4))  # rectangles around BLOCK links each
     for b in range(blocks.shape[0]):
         some = xy[BLOCK * b : min(BLOCK * (b + 1), links) + 1]
         blocks[b, 0], blocks[b, 1] = some[:, 0].min() - ROUNDING, some[:, 0].max() + ROUNDING
@@ -51,7 +51,7 @@ def near_polyline(xy: Array, discs: Array, distance: float) -> Array:
 
 @kernel
 def beside(discs: Array, points: Array, distance: float) -> Array:
-    """The discs whose surface is farther than a distance from all points, in their order."""
+    """Return the discs whose surface is farther than a distance from all points, in their order."""
     out = np.empty_like(discs)
     count = 0
     for j in range(discs.shape[0]):
@@ -70,7 +70,7 @@ def hit_within(
     points: Array, needed: Array, ahead: Array, tolerance: float, blur: float, x0: float, y0: float, yaw: float,
     beams: Array, ranges: Array,
 ) -> bool:  # fmt: skip
-    """Whether a beam from (x0, y0) ends nearer to point i than needed[i], less `tolerance` and `blur` * ahead[i]."""
+    """Return whether a beam from (x0, y0) ends within needed[i] of point i, less `tolerance` and `blur` * ahead[i]."""
     distances = needed - (tolerance + blur * ahead)
     x_min, x_max, y_min, y_max, most = math.inf, -math.inf, math.inf, -math.inf, 0.0
     for i in range(points.shape[0]):
@@ -98,7 +98,7 @@ def hit_within(
 
 @kernel
 def surrounding(points: Array, distances: Array) -> Array:
-    """Rectangles around BLOCK points each and what lies within their distances: x_min, x_max, y_min, y_max (K, 4)."""
+    """Return rectangles around BLOCK points each with their distances: x_min, x_max, y_min, y_max (K, 4)."""
     out = np.empty(((points.shape[0] + BLOCK - 1) // BLOCK, 4))
     for k in range(out.shape[0]):
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = math.inf, -math.inf, math.inf, -math.inf
@@ -111,7 +111,7 @@ def surrounding(points: Array, distances: Array) -> Array:
 
 @kernel
 def point_at(xy: Array, arc: Array, at: float) -> tuple[float, float]:
-    """The point of a polyline at a distance from its start; `arc` holds those of its points."""
+    """Return the point of a polyline at a distance from its start; `arc` holds the arc lengths of its points."""
     k = min(max(int(np.searchsorted(arc, at)), 1), arc.shape[0] - 1)
     share = min(max((at - arc[k - 1]) / (arc[k] - arc[k - 1]), 0.0), 1.0)
     return xy[k - 1, 0] + share * (xy[k, 0] - xy[k - 1, 0]), xy[k - 1, 1] + share * (xy[k, 1] - xy[k - 1, 1])

@@ -1,4 +1,4 @@
-"""Compiled distances from the robot to movers: arrays in, arrays out, nothing validated."""
+"""Compiled distances from the robot to movers: arrays in, arrays out, no validation."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def lower_by_movers(
 ) -> None:
     """Lower clearance[i] to the distance from the footprint at poses[i] to the nearest of movers[i] (M, 2).
 
-    `footprint` holds half length, half width and rounding of a rounded rectangle; where there are `corners` (K, 2), they are
-    those of the polygon in its place.
+    `footprint` holds half length, half width and rounding of a rounded rectangle; `corners` (K, 2), if any, replace it by a
+    polygon.
     """
     for i in range(poses.shape[0]):
         x, y, cos, sin = poses[i, 0], poses[i, 1], math.cos(poses[i, 2]), math.sin(poses[i, 2])

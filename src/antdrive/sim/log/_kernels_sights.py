@@ -1,7 +1,7 @@
-"""Compiled: when a lidar met what, which ground it saw, and how near the robot came. Arrays in, arrays out, nothing validated.
+"""Compiled visibility: first hits, observed ground and nearest approaches. Arrays in, arrays out, no validation.
 
-`eye` is the lidar's true x, y and yaw, `reaches` (B,) how far each beam got [m]; beam k points `first` + k `spacing` to the left
-of the lidar's heading, and where the circle is `closed` the first beam follows the last.
+`eye` is the lidar's true x, y and yaw, `reaches` (B,) the length of each beam [m]. Beam k points `first` + k `spacing` to the
+left of the lidar's heading; on a `closed` circle the first beam follows the last.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ def first_meetings(
     eye: Array, first: float, spacing: float, closed: bool, reaches: Array, discs: Array, slack: float, now: float,
     met: Array,
 ) -> None:  # fmt: skip
-    """Set met[j] = now for every disc (N, 3) not met before on whose surface a beam ended, give or take `slack` [m].
+    """Set met[j] = now for every disc (N, 3) whose surface a beam hits for the first time, within `slack` [m].
 
     `met` (N,) is infinite before.
     """
@@ -47,7 +47,7 @@ def first_meetings(
 def mark_seen(
     eye: Array, first: float, spacing: float, closed: bool, reaches: Array, grid: Array, seen: Array
 ) -> None:  # fmt: skip
-    """Mark the cells of `seen` (rows, cols) whose middle is nearer than the beam that is nearest in direction has got.
+    """Mark the cells of `seen` (rows, cols) whose centre is nearer than the end of the beam closest in direction.
 
     `grid` (3,): the lower left corner of the first cell, and the side of a cell [m].
     """
@@ -79,9 +79,9 @@ def mark_seen(
 
 @kernel
 def nearest_approaches(poses: Array, shape: Array, corners: Array, discs: Array, rows: Array, away: Array) -> None:
-    """rows[j] = the pose at which the footprint was nearest to the surface of disc j, away[j] = how near that was.
+    """Set rows[j] to the pose at which the footprint was nearest to the surface of disc j, and away[j] to the distance.
 
-    `shape` and `corners` are those of `footprint_clearances`. Over a disc's middle, minus its radius is the distance.
+    `shape` and `corners` are those of `footprint_clearances`. Over a disc's centre, the distance is minus its radius.
     """
     hx, hy, rounding = shape[0], shape[1], shape[2]
     radius = math.hypot(hx, hy) + rounding

@@ -1,8 +1,8 @@
-"""Compiled occupancy map: scans go in, discs come out. Arrays in, arrays out, nothing validated.
+"""Compiled occupancy map: scans in, discs out. Arrays in, arrays out, no validation.
 
-Ground is seen free in cells. Hits are kept finer, in grains (GRAINS by GRAINS to a cell), each with its log-odds and with the
-box around the points that were measured in it. Grains are kept in a list of the occupied cells, those of a cell side by side: so
-all hits of a map lie in a few hundred kilobytes, however large the map is, and stay in the processor's cache.
+Cells hold free ground. Finer grains (GRAINS by GRAINS to a cell) hold hits, each with its log-odds and the bounding box of its
+points. A list of the occupied cells holds the grains of a cell side by side, so all hits of a map take a few hundred kilobytes,
+however large the map is, and stay in the processor's cache.
 
 Kernels that Python calls get a map as the plain tuple of its arrays: a call with a named tuple takes 1 to 4 us longer.
 """
@@ -17,29 +17,29 @@ import numpy as np
 from antdrive.worlds._kernels import Array, inline, kernel
 
 GRAINS = 2
-SQUARE, SHIFT = 8, 3  # cells along the side of a square of cells, and its logarithm to base 2
+SQUARE, SHIFT = 8, 3  # cells along the side of a square, and its binary logarithm
 HIT, MISS, MOST = 0.85, 0.4, 3.5  # steps of the log-odds and their upper limit (Hornung et al. 2013, section 4)
 SLACK = 1e-4  # added to the radius of discs; boxes are kept in single precision [m]
-EDGE = 1e-6  # beams end so far inside of the map's edge [cells]
-THINNEST = 0.005  # the least radius of a disc [m]
+EDGE = 1e-6  # beams end this far inside the map's edge [cells]
+THINNEST = 0.005  # least radius of a disc [m]
 
 
 class MapArrays(NamedTuple):
-    """The state of a map with R rows and C columns of cells, K of them occupied at most.
+    """State of a map with R rows and C columns of cells, at most K of them occupied.
 
-    The last four are lists of the occupied cells, without order; the first `count[0]` rows count.
+    The last four are unordered lists of the occupied cells; the first `count[0]` rows count.
 
     Attributes:
-        free: which cells were seen free (R, C)
-        unseen: how many cells of each square of SQUARE x SQUARE are not free (R / SQUARE, C / SQUARE, rounded up)
-        occupied: which cells hold hits (R, C); no cell is both
+        free: whether cells were observed as free (R, C)
+        unseen: number of cells in each square of SQUARE x SQUARE that are not free (R / SQUARE, C / SQUARE, rounded up)
+        occupied: whether cells hold hits (R, C); no cell is free and occupied
         slot: the row of an occupied cell in the lists (R, C)
         count: the number of occupied cells (1,)
         frame: x and y of the lower left corner, and a cell's side (3,) [m]
-        cells: row and column of an occupied cell, the scan in which it became occupied, 0: it had not been seen before, and the
-            scan in which a beam last crossed it (K, 4)
-        odds: log-odds of its grains, row by row (K, GRAINS * GRAINS); 0: nothing was hit there
-        stamp: the scan that a grain was last hit in, or looked at: whether it is seen through (K, GRAINS * GRAINS)
+        cells: row and column of an occupied cell, the scan in which it became occupied (0: from unknown), and the scan in which
+            a beam last crossed it (K, 4)
+        odds: log-odds of its grains, row by row (K, GRAINS * GRAINS); 0: no hits
+        stamp: the scan that last hit a grain, or checked whether beams pass it (K, GRAINS * GRAINS)
         box: the least x and y and the largest x and y of a grain's hits (K, GRAINS * GRAINS, 4) [m]
     """
 
@@ -56,12 +56,12 @@ class MapArrays(NamedTuple):
 
 
 class Fan(NamedTuple):
-    """A scan as it lies in the map.
+    """Scan in the frame of the map.
 
     Attributes:
-        eye: where the lidar is: x, y, and the cosine and sine of its yaw
-        beams: directions of the beams, seen from the lidar (B, 2)
-        ranges: what they measured (B,) [m]
+        eye: pose of the lidar: x, y, and the cosine and sine of its yaw
+        beams: directions of the beams in the lidar's frame (B, 2)
+        ranges: their ranges (B,) [m]
         closed: whether the first beam is beside the last
     """
 
@@ -73,9 +73,9 @@ class Fan(NamedTuple):
 
 @kernel
 def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
-    """out[i] = the distance from which on beam i is needed to leave no cell out [m], when all have had their turns.
+    """Set out[i] to the distance from which beam i is needed to omit no cell [m], once all beams have had their turns.
 
-    Near the lidar every second, fourth, ... beam crosses all cells that others cross.
+    Near the lidar every second, fourth, ... beam crosses all cells that the others cross.
     """
     for i in range(beams):
         step, number = 2, i
@@ -98,12 +98,12 @@ def insert(
     x: float, y: float, cos: float, sin: float, beams: Array, ranges: Array, closed: bool, begin: Array, turn: int,
     turns: int, left_out: Array, horizon: float, trust: float, scan: int, arrays: tuple[Array, ...], changed: Array,
 ) -> int:  # fmt: skip
-    """Enter a scan from (x, y) and the cosine and sine of a yaw; the number of rows written to `changed`.
+    """Enter a scan from (x, y) and the cosine and sine of a yaw; return the number of rows written to `changed`.
 
-    As a whole, with the free ways of every `turns`-th beam from beam `turn` on; or, where `turn` is less than 0, only where its
-    hits lie.
+    A whole scan enters the free paths of every `turns`-th beam from beam `turn` on; for `turn` below 0, only the hits are
+    entered.
 
-    Hits farther than `horizon` are not entered, nor those of beams in `omitted`; ground is seen free up to `trust`.
+    Hits farther than `horizon` are omitted, as are those of beams in `omitted`; ground is observed as free up to `trust`.
     """
     fan, m = Fan((x, y, cos, sin), beams, ranges, closed), MapArrays(*arrays)
     count = enter_hits(fan, turn >= 0, left_out, horizon, scan, m, changed)
@@ -112,9 +112,9 @@ def insert(
 
 @kernel
 def enter_hits(fan: Fan, whole: bool, left_out: Array, horizon: float, scan: int, m: MapArrays, changed: Array) -> int:
-    """Enter the measured points: all of them in the boxes of their grains, those of whole scans in the log-odds.
+    """Enter the hits: all of them in the boxes of their grains, those of whole scans in the log-odds.
 
-    What was hit may come nearer to the robot between two whole scans by as much as a cell: the robot must know at once.
+    A hit may come nearer by as much as a cell between two whole scans, which the robot must know at once.
     """
     size = m.odds.size
     odds, stamp, box = m.odds.reshape(size), m.stamp.reshape(size), m.box.reshape(size, 4)
@@ -147,9 +147,9 @@ def enter_hits(fan: Fan, whole: bool, left_out: Array, horizon: float, scan: int
 
 @inline
 def locate(fan: Fan, left_out: Array, horizon: float, m: MapArrays, found: Array, at: Array) -> None:
-    """Where the beams end: x, y [m], column and row [cells] (4, B), and the number of the cell (B,), -1 for none.
+    """Write the ends of the beams: x, y [m], column and row [cells] (4, B), and the number of the cell (B,), -1 for none.
 
-    Without branches, so that several beams are taken at once.
+    Branch-free for vectorisation.
     """
     ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
     left, low, cell = m.frame[0], m.frame[1], m.frame[2]
@@ -166,7 +166,7 @@ def locate(fan: Fan, left_out: Array, horizon: float, m: MapArrays, found: Array
 
 @kernel
 def occupy(row: int, col: int, scan: int, m: MapArrays) -> None:
-    """Put a cell without hits on the list of occupied ones."""
+    """Add a cell without hits to the list of occupied ones."""
     at = m.count[0]
     m.count[0] = at + 1
     m.cells[at, 0], m.cells[at, 1], m.cells[at, 2], m.cells[at, 3] = row, col, scan if m.free[row, col] else 0, 0
@@ -182,22 +182,21 @@ def occupy(row: int, col: int, scan: int, m: MapArrays) -> None:
 def enter_ways(
     fan: Fan, begin: Array, turn: int, turns: int, trust: float, scan: int, m: MapArrays, changed: Array, count: int
 ) -> int:
-    """Enter the free ways of every `turns`-th beam, each from its `begin` on.
+    """Enter the free paths of every `turns`-th beam, each from its `begin` on.
 
-    A beam goes through columns of cells or, if it is steep, through rows: *lanes*. The *place* within a lane where it goes on to
-    the next follows from the lane's number, so that no step waits for the one before (as in J. Bresenham, IBM Systems Journal
-    4, 1965, but for all cells that a beam meets). Both are counted in the beam's direction. Squares of cells that are free
-    already are passed in one step.
+    A beam passes columns of cells or, if steep, rows: *lanes*. The *place* where it enters the next lane follows from the
+    lane's number, so that no step depends on the previous one (as in J. Bresenham, IBM Systems Journal 4, 1965, but for all cells
+    that a beam meets). Both are counted in the beam's direction. Squares of free cells are passed in one step.
     """
     ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
     left, low, cell = m.frame[0], m.frame[1], m.frame[2]
     rows, cols = m.free.shape
-    # Arrays of a record are taken out of it once: each time costs as much as several cells.
+    # Hoisted: each access to an array of a record costs as much as several cells.
     occupied, free, unseen = m.occupied.reshape(rows * cols), m.free.reshape(rows * cols), m.unseen
     cells, slot = m.cells, m.slot.reshape(rows * cols)
     crossed, crossings = np.empty((m.count[0], 3), dtype=np.int32), 0
     for i in range(turn, beams.shape[0], turns):
-        rest = min(ranges[i], trust) - begin[i]  # inf: nothing there; -inf: something too near to be measured
+        rest = min(ranges[i], trust) - begin[i]  # inf: no hit; -inf: a hit too near to measure
         if not rest > 0.0:
             continue
         ux, uy = cos * beams[i, 0] - sin * beams[i, 1], sin * beams[i, 0] + cos * beams[i, 1]
@@ -211,7 +210,7 @@ def enter_ways(
         along, beside, lane, place = (px, py, c, r) if flat else (py, px, r, c)
         to_lane, to_place, lanes, places = (to_c, to_r, cols, rows) if flat else (to_r, to_c, rows, cols)
         large, small = max(abs(ux), abs(uy)) / cell, min(abs(ux), abs(uy)) / cell
-        # What lies beyond the map is left out.
+        # Ground beyond the map is omitted.
         end = min(rest, (lanes - EDGE - along) / large)
         if end * small > places - EDGE - beside:
             end = (places - EDGE - beside) / small
@@ -265,16 +264,16 @@ def enter_ways(
 
 @inline
 def all_free(lane: int, first: int, last: int, flat: bool, unseen: Array) -> bool:
-    """Whether the squares `first` to `last`, at most three, of a lane of squares are free."""
+    """Return whether the squares `first` to `last`, at most three, of a lane of squares are free."""
     squares = unseen[:, lane] if flat else unseen[lane]
     return bool(squares[first] | squares[(first + last) >> 1] | squares[last] == 0)
 
 
 @kernel
 def see_through(crossed: Array, scan: int, fan: Fan, m: MapArrays, changed: Array, count: int) -> int:
-    """Lower the log-odds of those grains of occupied cells whose hits the scan has passed by on both sides.
+    """Lower the log-odds of the grains of occupied cells whose hits the scan has passed on both sides.
 
-    A grain that the scan has met is left alone. `crossed` has the row and the column of each cell, and a beam that crosses it.
+    Grains that the scan has hit are unchanged. `crossed` has the row and column of each cell, and a beam that crosses it.
     """
     slot, odds, stamp, box = m.slot, m.odds, m.stamp, m.box
     eye, beams, ranges, closed, behind = fan.eye, fan.beams, fan.ranges, fan.closed, m.frame[2]
@@ -306,10 +305,10 @@ def see_through(crossed: Array, scan: int, fan: Fan, m: MapArrays, changed: Arra
 def seen_beyond(
     dx: float, dy: float, behind: float, beam: int, eye: Array, beams: Array, ranges: Array, closed: bool
 ) -> bool:
-    """Whether both beams beside the middle of a grain's hits, at (dx, dy) from the lidar, end at least `behind` farther away.
+    """Return whether both beams beside the middle of a grain's hits, at (dx, dy) from the lidar, end at least `behind` farther.
 
-    A beam that passes beside an obstacle says nothing about it: its neighbour on the other side has met the obstacle.
-    `beam` is one that passes close by, from which the two are looked for.
+    A beam beside an obstacle says nothing about it: its neighbour on the other side has hit the obstacle. `beam` passes close by
+    and starts the search for the two.
     """
     ahead, left = eye[2] * dx + eye[3] * dy, eye[2] * dy - eye[3] * dx
     count = ranges.shape[0]
@@ -317,7 +316,7 @@ def seen_beyond(
     side = beams[beam, 0] * left - beams[beam, 1] * ahead
     step = 1 if side >= 0.0 else -1
     last = beam
-    while True:  # beams on the way to the middle; all beams lie within half a turn of it
+    while True:  # all beams lie within half a turn of the middle
         other = last + step
         if closed:
             other %= count
@@ -334,7 +333,7 @@ def seen_beyond(
 
 @kernel
 def vacate(row: int, col: int, m: MapArrays) -> None:
-    """Take an occupied cell off the list; it is then free ground."""
+    """Remove an occupied cell from the list; it becomes free ground."""
     m.occupied[row, col], m.free[row, col] = False, True
     m.unseen[row >> SHIFT, col >> SHIFT] -= 1
     m.count[0] -= 1
@@ -352,7 +351,7 @@ def vacate(row: int, col: int, m: MapArrays) -> None:
 
 @kernel
 def forget(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed: Array) -> int:
-    """Make the occupied cells whose hits all lie within `radius` of (x, y) free again; the rows written to `changed`."""
+    """Free the occupied cells whose hits all lie within `radius` of (x, y); return the number of rows written to `changed`."""
     m = MapArrays(*arrays)
     count = 0
     i = 0
@@ -377,9 +376,9 @@ def forget(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed
 def take_as_free(
     x: float, y: float, radius: float, discs: Array, walls: Array, arrays: tuple[Array, ...], changed: Array
 ) -> int:
-    """Make the unknown cells that meet a disc free, but for those that meet one of `discs` (N, 3) or reach beyond `walls`.
+    """Free the unknown cells that meet a disc, except those that meet one of `discs` (N, 3) or reach beyond `walls`.
 
-    `walls` are x_min, y_min, x_max, y_max. The number of rows written to `changed` is returned.
+    `walls` are x_min, y_min, x_max, y_max. Return the number of rows written to `changed`.
     """
     m = MapArrays(*arrays)
     cell = m.frame[2]
@@ -407,7 +406,7 @@ def take_as_free(
 
 @kernel
 def square_meets(west: float, south: float, side: float, x: float, y: float, radius: float) -> bool:
-    """Whether a square, given by its lower left corner, meets a disc."""
+    """Return whether a square, given by its lower left corner, meets a disc."""
     dx = max(max(west - x, x - west - side), 0.0)
     dy = max(max(south - y, y - south - side), 0.0)
     return bool(dx * dx + dy * dy <= radius * radius)
@@ -415,7 +414,7 @@ def square_meets(west: float, south: float, side: float, x: float, y: float, rad
 
 @kernel
 def discs_within(x_min: float, y_min: float, x_max: float, y_max: float, arrays: tuple[Array, ...]) -> Array:
-    """A disc (x, y, radius) around the hits of every grain whose cell meets a rectangle (D, 3) [m]."""
+    """Return a disc (x, y, radius) around the hits of every grain whose cell meets a rectangle (D, 3) [m]."""
     m = MapArrays(*arrays)
     cells, odds, box, cell = m.cells, m.odds, m.box, m.frame[2]
     rows, cols = m.free.shape
@@ -443,7 +442,7 @@ def discs_within(x_min: float, y_min: float, x_max: float, y_max: float, arrays:
 
 @kernel
 def meeting(low: float, high: float, begin: float, cell: float, count: int) -> tuple[int, int]:
-    """The first and the last of `count` cells in a row from `begin` on that meet an interval."""
+    """Return the first and the last of `count` cells in a row from `begin` on that meet an interval."""
     last = int(min(max((high - begin) / cell, -1.0), count * 1.0))
     while last < count - 1 and begin + (last + 1) * cell <= high:
         last += 1
@@ -459,7 +458,7 @@ def meeting(low: float, high: float, begin: float, cell: float, count: int) -> t
 
 @kernel
 def grain_disc(box: Array, at: int, k: int) -> tuple[float, float, float]:
-    """The disc around the hits of a grain: x, y, radius [m]."""
+    """Return the disc around the hits of a grain: x, y, radius [m]."""
     x_min, y_min = np.float64(box[at, k, 0]), np.float64(box[at, k, 1])
     x_max, y_max = np.float64(box[at, k, 2]), np.float64(box[at, k, 3])
     wide, high = x_max - x_min, y_max - y_min
@@ -469,9 +468,9 @@ def grain_disc(box: Array, at: int, k: int) -> tuple[float, float, float]:
 
 @kernel
 def explained(points: Array, scan: int, settle: int, arrays: tuple[Array, ...], out: Array) -> None:
-    """out[i] = whether point i lies in or beside a cell that has been occupied for `settle` scans, or was never seen free.
+    """Set out[i] to whether point i lies in or beside a cell that is occupied for `settle` scans, or was never free.
 
-    A point outside the map is explained; so is one in ground that was never seen.
+    Points outside the map and on unknown ground count as explained.
     """
     m = MapArrays(*arrays)
     cell = m.frame[2]

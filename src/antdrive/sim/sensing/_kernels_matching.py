@@ -1,4 +1,4 @@
-"""Compiled scan matching: the small motion that lays a scan on a map. Arrays in, arrays out, nothing validated."""
+"""Compiled scan matching: the small motion that aligns a scan with a map. Arrays in, arrays out, no validation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays
 from antdrive.worlds._kernels import Array, kernel
 
 ROUNDS = 4  # pairings of hits with the map
-SETTLED = 1.0  # log-odds from which on a place of the map is matched with: two hits
+SETTLED = 1.0  # least log-odds of a grain that is matched: two hits
 
 
 @kernel
@@ -18,10 +18,10 @@ def match(
     x: float, y: float, yaw: float, beams: Array, ranges: Array, every: int, first: int, far: float, near: int,
     fewest: int, arrays: tuple[Array, ...],
 ) -> tuple[float, float, float, int]:  # fmt: skip
-    """The lidar's pose (x, y, yaw), moved so that hits lie on the nearest hits of the map: x, y, yaw, and the number of pairs.
+    """Return the lidar's pose x, y, yaw, moved to align hits with the nearest hits of the map, and the number of pairs.
 
-    Every `every`-th beam from beam `first` counts if its range is at most `far`; partners are looked for within `near` grains.
-    With fewer pairs than `fewest` the pose stays. In each round the best rigid motion for the pairs has a closed form (K. S.
+    Every `every`-th beam from beam `first` counts if its range is at most `far`; partners lie within `near` grains. With fewer
+    pairs than `fewest` the pose stays. In each round the best rigid motion for the pairs has a closed form (K. S.
     Arun, T. S. Huang and S. D. Blostein, *Least-squares fitting of two 3-D point sets*, IEEE PAMI 9, 1987); the whole is the
     iterative closest point of P. J. Besl and N. D. McKay, IEEE PAMI 14, 1992.
     """
@@ -58,7 +58,7 @@ def match(
 
 @kernel
 def partner(x: float, y: float, near: int, m: MapArrays) -> tuple[bool, float, float]:
-    """The settled hit of the map that is nearest to a point, within `near` grains."""
+    """Return the settled hit of the map nearest to a point, within `near` grains."""
     cell = m.frame[2]
     reach = near * cell / GRAINS
     rows, cols = m.free.shape

@@ -1,4 +1,4 @@
-"""Compiled rays of a lidar against discs and walls: arrays in, arrays out, nothing validated."""
+"""Compiled ray casting of a lidar against discs and walls: arrays in, arrays out, no validation."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from antdrive.worlds._kernels import Array, inline, kernel
 
-SURE = 0.05  # so many beams are looked at beyond those that a disc's angle holds, whatever the rounding
-ANGLE_ERROR = 2e-5  # more than the largest error of `angle_of` [rad]
+SURE = 0.05  # beams checked beyond a disc's angle, against rounding
+ANGLE_ERROR = 2e-5  # upper bound of the error of `angle_of` [rad]
 
 
 @kernel
@@ -17,7 +17,7 @@ def scan(
     x: float, y: float, yaw: float, beams: Array, spacing: float, first: float, limits: Array, discs: Array,
     movers: Array, bounds: Array, noise: Array, out: Array,
 ) -> None:  # fmt: skip
-    """Write what a lidar at (x, y) with a yaw measures into out (B,).
+    """Write the ranges of a lidar at (x, y) with a yaw into out (B,).
 
     `limits` are its shortest and longest range, resolution and the standard deviation of ranges; `noise` (B,) is in units of
     that. `bounds` without numbers are no walls. `beams` (2, B), `discs` (3, N) and `movers` (3, M) have a row for each
@@ -36,7 +36,7 @@ def scan(
 
 @inline
 def angle_of(y: float, x: float) -> float:
-    """The direction of (x, y), to 1e-5 rad (C. Hastings, *Approximations for digital computers*, 1955, sheet 11)."""
+    """Return the direction of (x, y), to 1e-5 rad (C. Hastings, *Approximations for digital computers*, 1955, sheet 11)."""
     small, large = min(abs(x), abs(y)), max(abs(x), abs(y))
     t = small / large if large > 0.0 else 0.0
     u = t * t
@@ -53,10 +53,9 @@ def cast(
 ) -> None:  # fmt: skip
     """Lower out[i] to the distance at which beam i meets the first disc.
 
-    The lidar is at (x, y), with the cosine and sine of its yaw; `beams` (2, B) are the beams' directions seen from the lidar,
-    beam i at the angle `first` + i `spacing`. Discs are taken one by one: a disc is met by the beams within its angle alone. A
-    beam that starts in a disc has the distance 0. Discs farther than `most` are not met. It is quickest when near discs come
-    first.
+    The lidar is at (x, y), with the cosine and sine of its yaw; `beams` (2, B) are the beams' directions in its frame, beam i
+    at the angle `first` + i `spacing`. A disc is tested against the beams within its angle only. A beam that starts in a
+    disc has the distance 0. Discs farther than `most` are omitted. Sorting near discs first is fastest.
     """
     turn = 2.0 * math.pi / spacing  # a full turn in beams
     last = beams.shape[1] - 1
@@ -77,10 +76,9 @@ def cast(
 def look(
     x: float, y: float, cos: float, sin: float, spacing: float, first: float, most: float, discs: Array, seen: Array
 ) -> bool:
-    """Where discs lie, seen from a lidar (5, N): ahead, to the left, the distance [m], and the first and last beam.
+    """Write the positions of discs relative to a lidar (5, N): ahead, left, distance [m], first and last beam.
 
-    Whether the lidar is in one of them. Beams are inf for a disc that is farther than `most`. Without branches, so that several
-    discs are taken at once.
+    Return whether the lidar is in one of them. Beams are inf for a disc farther than `most`. Branch-free for vectorisation.
     """
     per = 1.0 / spacing
     inside = 0
@@ -105,7 +103,7 @@ def look(
 def cast_at(
     low: float, high: float, ahead: float, left: float, radius: float, nearest: float, beams: Array, out: Array
 ) -> None:
-    """Lower the distances of the beams `low` to `high`, as far as they meet a disc."""
+    """Lower the distances of the beams `low` to `high` that hit a disc."""
     for i in range(max(0, int(math.ceil(low))), min(beams.shape[1] - 1, int(math.floor(high))) + 1):
         if nearest >= out[i]:
             continue
@@ -117,13 +115,13 @@ def cast_at(
 
 @kernel
 def cast_walls(x: float, y: float, cos: float, sin: float, beams: Array, bounds: Array, out: Array) -> None:
-    """Lower out[i] to the distance at which beam i meets a wall; 0 for a lidar that is not between the walls."""
+    """Lower out[i] to the distance at which beam i meets a wall; 0 for a lidar outside the walls."""
     if not (bounds[0] < x < bounds[2] and bounds[1] < y < bounds[3]):
         out[:] = 0.0
         return
     east, west, north, south = bounds[2] - x, bounds[0] - x, bounds[3] - y, bounds[1] - y
     nearest = min(min(east, -west), min(north, -south))
-    for i in range(out.shape[0]):  # without branches, so that several are taken at once
+    for i in range(out.shape[0]):  # branch-free for vectorisation
         ux, uy = cos * beams[0, i] - sin * beams[1, i], sin * beams[0, i] + cos * beams[1, i]
         along_x, along_y = (east if ux > 0.0 else -west) / abs(ux), (north if uy > 0.0 else -south) / abs(uy)
         wall = along_x if along_x < along_y else along_y
@@ -132,9 +130,9 @@ def cast_walls(x: float, y: float, cos: float, sin: float, beams: Array, bounds:
 
 @kernel
 def measure(ranges: Array, noise: Array, limits: Array) -> None:
-    """Turn true distances into what a lidar says, in place; see `scan` for the `limits`.
+    """Convert true distances to lidar ranges, in place; see `scan` for the `limits`.
 
-    Farther than the longest range is inf, nearer than the shortest is -inf. The others get their `noise`, are rounded to
+    Distances beyond the longest range become inf, below the shortest -inf. The others get their `noise`, are rounded to
     multiples of the resolution and stay within the lidar's limits.
     """
     least, most, resolution, sigma = limits[0], limits[1], limits[2], limits[3]

@@ -1,4 +1,4 @@
-"""Compiled: how far a robot may go before its footprint meets ground that was not seen, or a hit."""
+"""Compiled free-path queries: how far a robot can move before its footprint meets unknown ground or a hit."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from antdrive.robots._kernels_footprint import polygon_distance
 from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays, grain_disc
 from antdrive.worlds._kernels import Array, kernel
 
-TOUCHING = 1e-3  # where the footprint counts as having met a disc [m]
-SAMPLES = 8  # of the way, for the part of the map that it lies in
-GIVE = 2e-3  # a disc that the footprint overlaps already is shrunk to this distance from it [m]
+TOUCHING = 1e-3  # distance at which the footprint meets a disc [m]
+SAMPLES = 8  # samples of the path, for its part of the map
+GIVE = 2e-3  # discs that overlap the footprint shrink to this distance from it [m]
 
 
 @kernel
@@ -18,9 +18,9 @@ def clear_way(
     x0: float, y0: float, yaw: float, speed: float, yaw_rate: float, half_length: float, half_width: float,
     rounding: float, corners: Array, limit: float, arrays: tuple[Array, ...],
 ) -> float:  # fmt: skip
-    """How far a footprint gets on the arc of a twist from a pose [m], at most `limit`; for a turn on the spot [rad].
+    """Return how far a footprint gets on a twist's arc from a pose [m], at most `limit`; for a turn on the spot [rad].
 
-    It is a rounded rectangle; where there are `corners` (K, 2), they are those of the polygon in its place.
+    The footprint is a rounded rectangle; `corners` (K, 2), if any, replace it by a polygon.
     """
     pose, shape, m = (x0, y0, yaw), (half_length, half_width, rounding), MapArrays(*arrays)
     radius = math.hypot(shape[0], shape[1]) + shape[2]
@@ -30,7 +30,7 @@ def clear_way(
     turns = speed == 0.0
     if turns and yaw_rate == 0.0:
         return limit
-    # The robot's velocity for each metre of the way, or each radian of the turn.
+    # The robot's velocity per metre of the path, or per radian of the turn.
     forward = 0.0 if turns else math.copysign(1.0, speed)
     bend = math.copysign(1.0, yaw_rate) if turns else yaw_rate / abs(speed)
     best = within_map(pose, forward, bend, radius, limit, m)
@@ -75,7 +75,7 @@ def clear_way(
 def within_map(
     pose: tuple[float, float, float], forward: float, bend: float, radius: float, limit: float, m: MapArrays
 ) -> float:
-    """How far the disc around the robot stays on the map; what lies beyond was not seen."""
+    """Return how far the disc around the robot stays on the map; ground beyond is unknown."""
     cell = m.frame[2]
     rows, cols = m.free.shape
     done = 0.0
@@ -93,7 +93,7 @@ def within_map(
 
 @kernel
 def on_arc(forward: float, bend: float, done: float) -> tuple[float, float]:
-    """Where the robot is after a way, seen from where it was: ahead and to the left."""
+    """Return the robot's position after a path, relative to its start: ahead and to the left."""
     turn = bend * done
     if forward == 0.0:
         return 0.0, 0.0
@@ -112,7 +112,7 @@ def on_the_way(ahead: float, left: float, forward: float, bend: float, reach: fl
         return False
     if abs(bend) < 1e-6:
         return bool(abs(left) <= reach + 1e-3 and forward * ahead > 0.0)
-    # The way lies on a circle around the centre of the turn, at (0, forward / bend).
+    # The path lies on a circle around the centre of the turn, at (0, forward / bend).
     beside = left - forward / bend
     return bool(abs(math.sqrt(ahead * ahead + beside * beside) - 1.0 / abs(bend)) <= reach)
 
@@ -122,10 +122,10 @@ def contact(
     ahead: float, left: float, size: float, forward: float, bend: float, shape: tuple[float, float, float], corners: Array,
     limit: float,
 ) -> float:  # fmt: skip
-    """How far the robot gets before it meets a disc at (ahead, left), at most `limit`.
+    """Return how far the robot gets before it meets a disc at (ahead, left), at most `limit`.
 
-    Steps are as long as the distance allows (conservative advancement). A disc that the robot overlaps at first is taken for
-    smaller: it may leave the disc or drive along it, but not come nearer.
+    Steps are as long as the distance allows (conservative advancement). A disc that overlaps the robot at first shrinks: the
+    robot may leave it or drive along it, but not come nearer.
     """
     done = 0.0
     while done < limit:

@@ -1,6 +1,6 @@
-"""Compiled search for movers in a scan: clusters of points, the circle of each, and the tracks that they belong to.
+"""Compiled mover tracking: clusters of points, their circles, and the tracks that they belong to.
 
-Arrays in, arrays out, nothing validated. Tracks are the rows of a table that has room for those that a scan begins.
+Arrays in, arrays out, no validation. Tracks are rows of a table with room for those that a scan begins.
 """
 
 from __future__ import annotations
@@ -12,70 +12,70 @@ import numpy as np
 
 from antdrive.worlds._kernels import Array, kernel
 
-ROUNDS = 12  # of the fit of a circle's centre
+ROUNDS = 12  # iterations of the fit of a circle's centre
 
-SKIN = 0.06  # points so near to a mover's surface are its own, whatever else may explain them [m]
-CLAIM = 0.1  # a track expects its points within this of its surface, and the error of its position [m]
-CLAIM_MOST = 0.4  # but no farther away than this [m]
-MATURE = 5  # a radius that was seen so often is known: what else is in a cluster belongs to something else
-ROUND = 0.03  # a cluster is round if it lies so near to a circle [m]
-CROOKED = 0.15  # and it is no part of a mover if it is farther off any [m]
-FRESH = 1 / 3  # this share of a mover lies on ground that was seen free, before it counts on a map of the robot's own
-ALL_FRESH = 0.9  # and this share of it, all the way, where only a part of it is seen
-FARTHER = 3.0  # such a part has to have come so many times as far
-FASTER = 0.3  # and to be faster than this [m/s]
-OFTEN = 0.25  # and to have been seen in this share of the scans
-ALIKE = 0.2  # and its radius, unless it was seen from edge to edge, to differ from the usual one by this share at most
-THROUGH = 3  # a track through which the beams have passed in so many scans is gone
-SURE = 0.4  # a track counts once its velocity is known so well, as a standard deviation [m/s]
-SLOW = 0.1  # what is slower has stopped [m/s]
+SKIN = 0.06  # points this near to a mover's surface belong to it [m]
+CLAIM = 0.1  # a track expects its points within this of its surface, plus the error of its position [m]
+CLAIM_MOST = 0.4  # largest such distance [m]
+MATURE = 5  # views after which a radius is known: other points of a cluster belong to another object
+ROUND = 0.03  # a cluster is round if it lies within this of a circle [m]
+CROOKED = 0.15  # a cluster farther off any circle is no part of a mover [m]
+FRESH = 1 / 3  # fraction of a mover on observed free ground before it counts on the robot's own map
+ALL_FRESH = 0.9  # the same for a partly visible mover, along its whole path
+FARTHER = 3.0  # factor on the distance that a partly visible mover must cover
+FASTER = 0.3  # least speed of a partly visible mover [m/s]
+OFTEN = 0.25  # least fraction of scans that hit a partly visible mover
+ALIKE = 0.2  # largest relative difference of its radius from the usual one, without a full view
+THROUGH = 3  # a track that beams pass in this many scans is lost
+SURE = 0.4  # a track counts once its velocity has this standard deviation [m/s]
+SLOW = 0.1  # slower objects have stopped [m/s]
 
-#: A track. Both coordinates have the same variances, so there is one 2x2 covariance of a place and its speed.
+#: Track. Both coordinates have the same variances, so one 2x2 covariance of position and speed serves both.
 TRACK = np.dtype(
     [
         ("number", np.int64),
         ("x", np.float64),
         ("y", np.float64),
         ("radius", np.float64),
-        ("begun", np.float64),  # when it was first seen [s]
-        ("last", np.float64),  # when it was last measured [s]
+        ("begun", np.float64),  # time of the first hit [s]
+        ("last", np.float64),  # time of the last measurement [s]
         ("variance", np.float64),  # of a coordinate [m^2]
         ("vx", np.float64),
         ("vy", np.float64),
         ("mixed", np.float64),  # covariance of a coordinate and its velocity [m^2/s]
         ("spread", np.float64),  # variance of a velocity [m^2/s^2]
-        ("seen", np.int64),  # in how many scans
-        ("views", np.int64),  # how often it was seen from edge to edge
-        ("weight", np.float64),  # of the views of its radius
-        ("through", np.int64),  # in how many scans in a row beams have passed where it should be
-        ("sure", np.bool_),  # whether it was seen so often, and its velocity was known so well, that it counts
-        ("moves", np.bool_),  # whether it has come far enough to be a mover
-        ("rested", np.float64),  # since when it has been where it stands [s]
-        ("anchor_x", np.float64),  # where that is, or where it was first seen [m]
+        ("seen", np.int64),  # number of scans that hit it
+        ("views", np.int64),  # number of full views
+        ("weight", np.float64),  # weight of the views of its radius
+        ("through", np.int64),  # consecutive scans whose beams passed its expected position
+        ("sure", np.bool_),  # whether it has enough hits and a known velocity
+        ("moves", np.bool_),  # whether it has moved far enough to be a mover
+        ("rested", np.float64),  # time since which it stands [s]
+        ("anchor_x", np.float64),  # where it stands, or its first position [m]
         ("anchor_y", np.float64),
-        ("free_x", np.float64),  # since when all of it stands on ground that was free [m]
+        ("free_x", np.float64),  # time since which all of it stands on once free ground [m]
         ("free_y", np.float64),
     ]
 )
 
 
 class TrackingRules(NamedTuple):
-    """How movers are found and followed: the numbers of a `TrackingPolicy`, and what follows from them and from the lidar.
+    """Tracking rules: the numbers of a `TrackingPolicy`, with those derived from them and from the lidar.
 
     Attributes:
         gap, least, settle, smallest, largest, gate, speed, confirmed, way, patience, doubt: as in the policy
-        whole: variance of the centre of a mover that is seen from edge to edge, without that of the pose (,) [m^2]
-        part: the same for one that is partly hidden [m^2]
+        whole: variance of the centre of a fully visible mover, without that of the pose (,) [m^2]
+        part: the same for a partly hidden one [m^2]
         pose_xy: variance of the robot's position [m^2]
         pose_yaw: standard deviation of its heading [rad]
-        power: 2.0. Python's `x ** 2` rounds otherwise than `x * x` in one of a thousand cases; with a number that the compiler
-            does not know it is done here as there, and results stay what they were
+        power: 2.0. Python's `x ** 2` rounds differently from `x * x` in one of a thousand cases; a number unknown to the compiler
+            makes both agree
         spacing: angle between two beams [rad]
-        first: angle of the first beam, seen from the lidar [rad]
+        first: angle of the first beam in the lidar's frame [rad]
         reach: the lidar's longest range [m]
-        rate: scans in a second [Hz]
+        rate: scans per second [Hz]
         closed: whether the first beam is beside the last
-        complete: whether all that stands is known; else the map is being made
+        complete: whether the map is complete; else the robot is making it
     """
 
     gap: float
@@ -103,16 +103,16 @@ class TrackingRules(NamedTuple):
 
 
 class View(NamedTuple):
-    """A scan that is being read.
+    """Scan under processing.
 
     Attributes:
-        points: where beams ended (N, 2) [m]
+        points: ends of beams (N, 2) [m]
         beams: the beams' numbers (N,)
-        explained: whether what stands explains the points (N,)
-        owner: the track, by its row, that expects each point; -1 where none does (N,)
+        explained: whether standing obstacles explain the points (N,)
+        owner: row of the track that expects each point; -1 for none (N,)
         ranges: the scan (B,) [m]
-        eye: where the lidar is: x, y, yaw (3,)
-        time: when it was taken [s]
+        eye: pose of the lidar: x, y, yaw (3,)
+        time: time of the scan [s]
     """
 
     points: Array
@@ -126,7 +126,7 @@ class View(NamedTuple):
 
 @kernel
 def predict(tracks: Array, count: int, dt: float, acceleration2: float, variance: float, mixed: float) -> None:
-    """Go on at constant velocity for a time; what the unknown acceleration adds is given, but for that of the velocity."""
+    """Predict at constant velocity; the variances by the unknown acceleration are given, except that of the velocity."""
     for k in range(count):
         track = tracks[k]
         track["x"] += dt * track["vx"]
@@ -138,13 +138,13 @@ def predict(tracks: Array, count: int, dt: float, acceleration2: float, variance
 
 @kernel
 def own(tracks: Array, count: int, points: Array, explained: Array, owner: Array) -> None:
-    """owner[i] = the track that expects point i on its surface, the nearest first; -1 where none does."""
+    """Set owner[i] to the nearest track that expects point i on its surface; -1 for none."""
     for i in range(points.shape[0]):
         best = math.inf
         owner[i] = -1
         for k in range(count):
             track = tracks[k]
-            # What stands still explains other points too well to give them to a track that only passes.
+            # Standing obstacles explain other points too well to give them to a passing track.
             if explained[i]:
                 allowed = SKIN if track["moves"] and track["sure"] else -1.0
             else:
@@ -160,7 +160,7 @@ def own(tracks: Array, count: int, points: Array, explained: Array, owner: Array
 
 @kernel
 def read(view: View, rules: TrackingRules, tracks: Array, count: int, found: int, usual: Array) -> tuple[int, int]:
-    """Correct and begin tracks by a scan, and drop those that are over; how many there are now, and were found so far.
+    """Correct, begin and end tracks by a scan; return the number of tracks and the total begun so far.
 
     `usual` (2,) is the radius of the movers so far and its weight.
     """
@@ -191,7 +191,7 @@ def read(view: View, rules: TrackingRules, tracks: Array, count: int, found: int
 
 @kernel
 def clustered(view: View, rules: TrackingRules, used: Array) -> tuple[Array, Array]:
-    """The points that are used, cluster by cluster (N,), and where each cluster begins (K + 1,)."""
+    """Return the used points, cluster by cluster (N,), and where each cluster begins (K + 1,)."""
     n = used.shape[0]
     points, beams, label = np.empty((n, 2)), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     for i in range(n):
@@ -211,7 +211,7 @@ def clustered(view: View, rules: TrackingRules, used: Array) -> tuple[Array, Arr
 
 @kernel
 def share_out(cluster: Array, view: View, rules: TrackingRules, tracks: Array, usual: Array) -> Array:
-    """Correct the tracks that expect points in a cluster; the points that may be another mover's."""
+    """Correct the tracks that expect points in a cluster; return the points that may belong to another mover."""
     nothing = cluster[:0]
     owners, last = 0, -1
     while True:  # the owners in the order of their rows
@@ -243,7 +243,7 @@ def match(
 ) -> int:
     """Match clusters in which no track expects points with tracks that were not measured, nearest first, and begin new tracks.
 
-    Returns how many tracks there are now.
+    Return the number of tracks.
     """
     n = begins.shape[0] - 1
     circles = np.empty((n, 4))
@@ -255,7 +255,7 @@ def match(
         for k in range(count):
             if not tracks[k]["last"] < view.time:
                 continue
-            # A track that was seen once has no velocity yet.
+            # A track with a single hit has no velocity yet.
             since = view.time - tracks[k]["last"]
             gate = rules.gate + (rules.speed * since if tracks[k]["seen"] == 1 else 0.0)
             distance = math.hypot(circles[i, 0] - tracks[k]["x"], circles[i, 1] - tracks[k]["y"])
@@ -279,7 +279,7 @@ def match(
 
 @kernel
 def may_begin(cluster: Array, off: float, view: View, rules: TrackingRules) -> bool:
-    """Whether a cluster may be a mover, or a part of one, where the ground is not known."""
+    """Return whether a cluster may be a mover, or a part of one, on ground that the map does not explain."""
     x, y = view.points[cluster, 0], view.points[cluster, 1]
     size = max(x.max() - x.min(), y.max() - y.min())
     return bool(size <= 2 * rules.largest and off <= CROOKED)
@@ -292,7 +292,7 @@ def begin(
     """Begin a track."""
     x, y, radius = circle[0], circle[1], circle[2]
     whole = is_whole(cluster, view, rules)
-    if not whole and usual[0] > radius:  # as large as the others, as long as only a part of it is seen
+    if not whole and usual[0] > radius:  # as large as the others while only partly visible
         radius = usual[0]
         x, y = centre(cluster, view, radius)
     track["number"], track["x"], track["y"], track["radius"] = number, x, y, radius
@@ -306,7 +306,7 @@ def begin(
 
 @kernel
 def points_of(cluster: Array, view: View) -> Array:
-    """The points of a cluster (N, 2)."""
+    """Return the points of a cluster (N, 2)."""
     out = np.empty((cluster.shape[0], 2))
     for i in range(cluster.shape[0]):
         out[i, 0], out[i, 1] = view.points[cluster[i], 0], view.points[cluster[i], 1]
@@ -315,7 +315,7 @@ def points_of(cluster: Array, view: View) -> Array:
 
 @kernel
 def circle_of(cluster: Array, view: View, rules: TrackingRules) -> tuple[float, float, float, float]:
-    """The circle through a cluster: x, y, radius, and how far its points lie off it [m]."""
+    """Fit a circle to a cluster: x, y, radius, and the deviation of its points [m]."""
     points, place = points_of(cluster, view), np.empty(2)
     seen = visible_radius(points, view.eye[0], view.eye[1], rules.spacing)
     radius = min(max(seen, rules.smallest), rules.largest)
@@ -329,7 +329,7 @@ def circle_of(cluster: Array, view: View, rules: TrackingRules) -> tuple[float, 
 
 @kernel
 def centre(cluster: Array, view: View, radius: float) -> tuple[float, float]:
-    """The centre of the circle of a given radius through a cluster."""
+    """Fit the centre of a circle of given radius to a cluster."""
     place = np.empty(2)
     centre_of(points_of(cluster, view), view.eye[0], view.eye[1], radius, place)
     return place[0], place[1]
@@ -337,7 +337,7 @@ def centre(cluster: Array, view: View, radius: float) -> tuple[float, float]:
 
 @kernel
 def is_whole(cluster: Array, view: View, rules: TrackingRules) -> bool:
-    """Whether a cluster is seen from edge to edge: the beams beside it got clearly farther, so nothing goes on there."""
+    """Return whether a cluster is fully visible: the beams beside it end clearly farther away."""
     beams = view.ranges.shape[0]
     for end in range(2):
         edge = view.beams[cluster[0 if end == 0 else cluster.shape[0] - 1]]
@@ -353,7 +353,7 @@ def is_whole(cluster: Array, view: View, rules: TrackingRules) -> bool:
 
 @kernel
 def distance_between(dx: float, dy: float) -> float:
-    """The length of (dx, dy), rounded as Python's `math.hypot` does it: the root is corrected by what it leaves over."""
+    """Return the length of (dx, dy), rounded as Python's `math.hypot`: the root is corrected by its residual."""
     size = max(abs(dx), abs(dy))
     if size == 0.0:
         return 0.0
@@ -377,7 +377,7 @@ def distance_between(dx: float, dy: float) -> float:
 
 @kernel
 def variance_of(x: float, y: float, view: View, rules: TrackingRules, whole: bool) -> float:
-    """The variance of a measured centre [m^2]."""
+    """Return the variance of a measured centre [m^2]."""
     away = distance_between(x - view.eye[0], y - view.eye[1])
     turned = math.pow(away * rules.pose_yaw, rules.power)
     error = math.sqrt((rules.whole if whole else rules.part) + rules.pose_xy + turned)
@@ -386,7 +386,7 @@ def variance_of(x: float, y: float, view: View, rules: TrackingRules, whole: boo
 
 @kernel
 def correct(track: Array, cluster: Array, view: View, rules: TrackingRules, usual: Array) -> None:
-    """Take a cluster for the track's mover: its radius as the mean so far, its centre with that radius."""
+    """Correct a track by a cluster: its radius as the running mean, its centre with that radius."""
     if cluster.shape[0] < 2:
         return
     whole = cluster.shape[0] >= rules.least and is_whole(cluster, view, rules)
@@ -415,7 +415,7 @@ def correct(track: Array, cluster: Array, view: View, rules: TrackingRules, usua
 
 @kernel
 def filter_in(track: Array, x: float, y: float, variance: float) -> None:
-    """Take a measured centre into account."""
+    """Update a track with a measured centre."""
     total = track["variance"] + variance
     gain, speeds = track["variance"] / total, track["mixed"] / total
     dx, dy = x - track["x"], y - track["y"]
@@ -430,14 +430,14 @@ def filter_in(track: Array, x: float, y: float, variance: float) -> None:
 
 @kernel
 def judge(track: Array, cluster: Array, view: View, rules: TrackingRules, round_: bool, usual: float) -> None:
-    """Whether a track moves, on a map that is being made: what stood at first, or has stood for long, is part of it."""
+    """Update whether a track moves, on the robot's own map: lasting objects are part of that map."""
     count = 0
     for i in cluster:
         count += 0 if view.explained[i] else 1
     fresh = count / cluster.shape[0]
     if fresh < ALL_FRESH or not track["sure"]:
         track["free_x"], track["free_y"] = track["x"], track["y"]
-    if track["views"] < rules.confirmed:  # a part of something seems to move as more of it comes into sight
+    if track["views"] < rules.confirmed:  # a partly visible object seems to move as more of it comes into view
         track["rested"], track["anchor_x"], track["anchor_y"] = view.time, track["x"], track["y"]
     away = math.hypot(track["x"] - track["anchor_x"], track["y"] - track["anchor_y"])
     if not track["moves"]:
@@ -452,10 +452,10 @@ def judge(track: Array, cluster: Array, view: View, rules: TrackingRules, round_
 
 @kernel
 def crosses_free_ground(track: Array, cluster: Array, view: View, rules: TrackingRules, usual: float) -> bool:
-    """Whether a track of which perhaps only a part is seen has gone a long way over ground that was seen free.
+    """Return whether a partly visible track has moved far over observed free ground.
 
-    Things that stand, seen through gaps between others, seem to move. So what is seen has to be a good part of a circle
-    of the track's size, and that size to be known: from views from edge to edge of it, or of other movers like it.
+    Standing objects seem to move if seen through gaps. The visible part must therefore be a good part of a circle of the track's
+    size, and that size known from full views of it or of similar movers.
     """
     came = math.hypot(track["x"] - track["free_x"], track["y"] - track["free_y"])
     due = (view.time - track["begun"]) * rules.rate
@@ -478,7 +478,7 @@ def crosses_free_ground(track: Array, cluster: Array, view: View, rules: Trackin
 
 @kernel
 def goes_on(track: Array, view: View, rules: TrackingRules) -> bool:
-    """Whether a track is not over: not hidden for too long, and no beams have passed where it should be."""
+    """Return whether a track continues: not hidden for too long, and not passed by beams."""
     if track["last"] == view.time:
         return True
     if view.time - track["last"] > (rules.patience if track["sure"] else rules.doubt):
@@ -489,7 +489,7 @@ def goes_on(track: Array, view: View, rules: TrackingRules) -> bool:
 
 @kernel
 def seen_through(track: Array, view: View, rules: TrackingRules) -> bool:
-    """Whether beams have passed where a track should be."""
+    """Return whether beams have passed the expected position of a track."""
     dx, dy = track["x"] - view.eye[0], track["y"] - view.eye[1]
     away = math.hypot(dx, dy)
     if away <= track["radius"]:
@@ -510,10 +510,10 @@ def seen_through(track: Array, view: View, rules: TrackingRules) -> bool:
 def suspects(
     tracks: Array, count: int, dt: float, time: float, settle: float, points: Array, explained: Array, out: Array
 ) -> None:
-    """out[i] = whether point i may lie on something that moves, at `time`, `dt` after the last scan.
+    """Set out[i] to whether point i may lie on a mover at `time`, `dt` after the last scan.
 
-    An explained point does only on what is known to move or has only just come into sight: small posts that a robot drives past
-    seem to creep.
+    An explained point does so only on a known mover, or on an object that has just come into view: small posts seem to creep when
+    a robot drives past.
     """
     out[:] = False
     for k in range(count):
@@ -532,7 +532,7 @@ def suspects(
 
 @kernel
 def on_movers(points: Array, places: Array, radii: Array, out: Array) -> None:
-    """out[i] = whether point i lies on or in a mover."""
+    """Set out[i] to whether point i lies on or in a mover."""
     for i in range(points.shape[0]):
         out[i] = False
         for k in range(radii.shape[0]):
@@ -543,10 +543,10 @@ def on_movers(points: Array, places: Array, radii: Array, out: Array) -> None:
 
 @kernel
 def clusters(points: Array, beam: Array, beams: int, closed: bool, gap: float, label: Array) -> int:
-    """label[i] = the cluster of point i; the number of clusters.
+    """Set label[i] to the cluster of point i; return the number of clusters.
 
-    Points come in the order of their beams. Two in a row belong together if they are at most `gap` apart; on a lidar that
-    sees all around so do the last and the first.
+    Points are in the order of their beams. Neighbours belong together if they are at most `gap` apart; on a full circle, so
+    do the last and the first.
     """
     n = points.shape[0]
     count = 0
@@ -565,7 +565,7 @@ def clusters(points: Array, beam: Array, beams: int, closed: bool, gap: float, l
 
 @kernel
 def visible_radius(points: Array, eye_x: float, eye_y: float, spacing: float) -> float:
-    """The radius of a circle from the angle under which it is seen and its nearest point.
+    """Return the radius of a circle from its visual angle and its nearest point.
 
     With the centre at distance d, the nearest point is at d - r, and half of the angle has the sine r / d. The edges lie,
     on average, half a beam beyond the outermost hits.
@@ -589,7 +589,7 @@ def visible_radius(points: Array, eye_x: float, eye_y: float, spacing: float) ->
 
 @kernel
 def centre_of(points: Array, eye_x: float, eye_y: float, radius: float, out: Array) -> None:
-    """The centre of the circle of a given radius nearest to points on its near side, by Gauss-Newton steps."""
+    """Fit the centre of a circle of given radius to points on its near side, by Gauss-Newton steps."""
     n = points.shape[0]
     x, y = 0.0, 0.0
     for i in range(n):
@@ -598,7 +598,8 @@ def centre_of(points: Array, eye_x: float, eye_y: float, radius: float, out: Arr
     ux, uy = (x - eye_x) / away, (y - eye_y) / away
     x, y = x + radius * ux, y + radius * uy
     for _ in range(ROUNDS):
-        a, b, c, p, q = 1e-3, 0.0, 1e-3, 0.0, 0.0  # a little damping, for points on one line of sight
+        a, b, c, p, q = 1e-3, 0.0, 1e-3, 0.0, 0.0  # slight damping, for points on one line of sight
+
         for i in range(n):
             dx, dy = x - points[i, 0], y - points[i, 1]
             d = max(math.hypot(dx, dy), 1e-9)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.base import reuse
+from antdrive.base import caches
 from antdrive.base.caches import bits, cached, clear_caches
 from antdrive.planners import PLANNERS, Query
 from antdrive.sim import Engine, Scenario, run
@@ -105,12 +105,12 @@ def test_only_so_much_is_kept():
     square(2)
     assert calls[-1] == 2
     assert len(calls) == 7
-    reuse._kept.pop()
+    caches._caches.pop()
 
 
 def test_every_cache_is_bounded():
-    assert all(0 < cached.cache_parameters()["maxsize"] <= 64 for cached in reuse._kept)
-    assert len(reuse._kept) >= 5
+    assert all(0 < cached.cache_parameters()["maxsize"] <= 64 for cached in caches._caches)
+    assert len(caches._caches) >= 5
 
 
 @given(st.floats(), st.floats())
