@@ -212,7 +212,9 @@ def worlds() -> list[str]:
         world = load_task(name).world
         size = "\u00a0×\u00a0".join(f"{side:g}" for side in world.size) + "\u00a0m"
         counts = str(len(world.obstacles)), str(len(world.movers))
-        return code(name), _picture("worlds", name), size, *counts, cell(world.source or "")
+        source = (world.source or "").removeprefix("made for antdrive; ").partition("; ")[0]
+        source = re.sub(r"(?<=worlds\.forest)\(.*\)", "", source)
+        return code(name), _picture("worlds", name), size, *counts, cell(source)
 
     return table("world, picture, size, cylinders, movers, source", map(row, list_worlds()))
 
