@@ -1,4 +1,4 @@
-"""What is said of wrong input, gathered in one snapshot a room; `pytest --force-regen` writes it anew."""
+"""Error messages on invalid input, one snapshot per room; `pytest --force-regen` rewrites it."""
 
 import re
 

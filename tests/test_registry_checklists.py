@@ -1,4 +1,4 @@
-"""Checklists of `docs/explanation/extending.md`: each step has a test."""
+"""Registry entries are complete: every step of CONTRIBUTING's checklists that could be missed has a test."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Files that are written whole, what killed processes leave, and folders that one process claims."""
+"""Atomic writes, leftovers of killed processes, and folder locks."""
 
 import os
 import signal

@@ -32,12 +32,12 @@ def test_a_field_error_reads_as_key_and_problem():
         ("", "radius", "radius"),
     ],
 )
-def test_a_key_can_be_seen_from_outside(parent, key, whole):
+def test_a_key_takes_its_parents_prefix(parent, key, whole):
     error = FieldError(key, "is wrong").under(parent)
     assert (error.key, error.problem) == (whole, "is wrong")
 
 
-def test_a_field_error_survives_its_way_from_a_worker_process():
+def test_a_field_error_survives_pickling():
     error = pickle.loads(pickle.dumps(FieldError("radius", "is wrong")))
     assert (error.key, error.problem, str(error)) == ("radius", "is wrong", "radius: is wrong")
 

@@ -20,7 +20,7 @@ PIECES = (
 
 
 def read(text):
-    """The data and the lines of a text, or the sentence about its fault."""
+    """Return the data and the lines of a text, or the error's message."""
     try:
         found = parse_document(text, "file")
     except InputError as error:

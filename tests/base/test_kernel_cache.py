@@ -1,4 +1,4 @@
-"""Machine code of kernels is kept where it can be, and damaged entries are compiled again."""
+"""The kernel cache: its folder, its validity and damaged entries."""
 
 import contextlib
 import itertools
@@ -29,7 +29,7 @@ def measure(**environment):
 
 @pytest.fixture(scope="module")
 def filled(tmp_path_factory):
-    """A cache with the kernels that one measurement needs, and what it printed."""
+    """Return a cache with the kernels of one measurement, and its output."""
     folder = tmp_path_factory.mktemp("cache")
     done = measure(NUMBA_CACHE_DIR=str(folder))
     assert (done.returncode, done.stderr) == (0, "")
@@ -61,7 +61,7 @@ def entries(folder, stamp):
 
 
 def test_an_entry_is_that_of_its_types_and_sources_whatever_is_interrupted(tmp_path, monkeypatch):
-    """Two processes write, and each of them is killed before each of its renames in turn: no entry stands for another one."""
+    """Two processes write, each killed before each of its renames in turn: no entry has another one's key."""
     replace = os.replace
     written = [("old", "int", 1), ("new", "float", 2), ("new", "int", 3), ("newer", "int", 4)]
     for killed in range(len(written) + 1):
@@ -89,7 +89,7 @@ def test_an_entry_is_that_of_its_types_and_sources_whatever_is_interrupted(tmp_p
 
 @pytest.mark.parametrize("order", sorted(set(itertools.permutations(["int", "int", "float", "float"]))))
 def test_two_processes_that_compile_at_once_keep_both_entries(tmp_path, monkeypatch, order):
-    """Both have looked into the folder before either writes; then they rename their files in every order.
+    """Both processes list the folder before either writes; then they rename their files in every order.
 
     Threads stand for the processes.
     """

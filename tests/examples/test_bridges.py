@@ -1,6 +1,7 @@
 """The example that leads from a URDF file to a bag: every command of its page works."""
 
 import csv
+import re
 import shlex
 import shutil
 from pathlib import Path
@@ -11,7 +12,8 @@ from antdrive.robots import load_robot
 from tests.cli.conftest import antdrive as antdrive  # a fixture
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "bridges"
-COMMANDS = [line for line in (EXAMPLE / "README.md").read_text().splitlines() if line.startswith("antdrive ")]
+TEXT = re.sub(r" \\\n +", " ", (EXAMPLE / "README.md").read_text())
+COMMANDS = [line for line in TEXT.splitlines() if line.startswith("antdrive ")]
 
 
 def test_every_command_works_and_the_bag_lies_in_the_map(antdrive, tmp_path):

@@ -1,4 +1,4 @@
-"""The lidar in robot files, and what a robot without one keeps: its record and its hash."""
+"""Lidars in robot files; robots without one keep record and hash."""
 
 import math
 from pathlib import Path
@@ -30,7 +30,7 @@ def test_jackal_carries_the_challenges_sensor(jackal):
     assert lidar.angles[0] == -lidar.angles[-1]
 
 
-def test_turtlebot_sees_all_around(turtlebot):
+def test_turtlebots_lidar_covers_a_full_circle(turtlebot):
     lidar = turtlebot.lidar
     assert lidar.full_circle
     assert math.degrees(lidar.spacing) == pytest.approx(1.0, abs=1e-6)

@@ -1,4 +1,4 @@
-"""What is said of wrong robots, in files, in URDF and in Python: all of it is in `messages.yml`."""
+"""Messages for invalid robots in files, URDF and Python; the snapshot is `messages.yml`."""
 
 import dataclasses
 import math
@@ -18,7 +18,7 @@ TRUCK = {
 }  # fmt: skip
 
 
-def test_wrong_robots_are_refused_in_one_line(tmp_path, jackal, data_regression):
+def test_invalid_robots_are_refused_in_one_line(tmp_path, jackal, data_regression):
     def robot(old, new):
         assert old in test_robot_file.GOOD
         (tmp_path / "mine.yaml").write_text(test_robot_file.GOOD.replace(old, new))

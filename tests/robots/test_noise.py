@@ -1,4 +1,4 @@
-"""Noise models, whether a robot fits where it stands, and what notebooks show of a robot."""
+"""Noise models, footprint clearances and robot cards."""
 
 import dataclasses
 import math

@@ -98,7 +98,7 @@ WRONG = (
 
 
 def test_the_promised_accelerations_are_reached_in_physics(tmp_path):
-    """A robot whose motors can just do what it promises does so in physics; closed form and PyBullet agree."""
+    """A robot whose motors just reach its limits reaches them in physics; closed form and PyBullet agree."""
     path = tmp_path / "mine.yaml"
     path.write_text(
         GOOD.replace("wheel_torque: 2.0", "wheel_torque: 0.1001").replace(

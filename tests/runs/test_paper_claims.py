@@ -1,4 +1,4 @@
-"""Claims and their verdicts, on runs made up so that the answer is known."""
+"""Claims and their verdicts, on synthetic runs with a known answer."""
 
 import dataclasses
 import itertools

@@ -1,4 +1,4 @@
-"""World files that are wrong in one way each; `test_messages.yml` beside has what is said of each."""
+"""World files with one error each; the snapshot of `test_messages.py` has the messages."""
 
 _START = """\
 schema: 1

@@ -1,4 +1,4 @@
-"""The catalogue: its worlds are free of mistakes, and robots get through where they should."""
+"""The catalogue of worlds: validity and passability."""
 
 import dataclasses
 import itertools
@@ -106,7 +106,7 @@ def test_hasans_worlds_are_recreated_in_fifty_by_fifty_cells(case):
     assert (len(task.world.movers), len(moving.world.movers)) == (0, 1)
 
 
-def test_hasans_last_two_cases_share_their_environment():
+def test_hasans_last_two_cases_have_one_environment():
     assert load_task("hasan-5e").world.obstacles == load_task("hasan-5f").world.obstacles
 
 

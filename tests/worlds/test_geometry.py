@@ -44,8 +44,8 @@ def test_segment_clearance_is_the_least_along_the_segment(world, a, b):
 
 @settings(max_examples=50)
 @given(worlds(), st.lists(st.tuples(points, points), min_size=2, max_size=6))
-def test_clearances_asked_for_together_are_those_asked_for_one_by_one(world, ends):
-    """Bit for bit: each is looked for from that of the one before."""
+def test_clearances_in_a_batch_equal_single_ones(world, ends):
+    """Bit for bit: each search starts from the previous result."""
     starts, stops = (np.array(side, dtype=float) for side in zip(*ends, strict=True))
     one_by_one = [point_clearance(world, [start])[0] for start in starts]
     assert point_clearance(world, starts).tolist() == one_by_one

@@ -1,4 +1,4 @@
-"""Free cells and allowed moves, against their definitions, and the small kernels and conversions that they are made of."""
+"""Grids against the definitions of free cells and allowed moves, with their kernels."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What is said of wrong worlds, in files of every format and in Python: all of it is in `test_messages.yml`."""
+"""Messages for invalid worlds in files of every format and in Python; the snapshot is `messages.yml`."""
 
 import math
 
@@ -88,7 +88,7 @@ WANDERERS = {
 }
 
 
-def test_wrong_worlds_are_refused_in_one_line(tmp_path, monkeypatch, data_regression):
+def test_invalid_worlds_are_refused_in_one_line(tmp_path, monkeypatch, data_regression):
     monkeypatch.chdir(tmp_path)
 
     def served(text, image):

@@ -1,4 +1,4 @@
-"""Where movers are: against oracles that share no code, and against the files that declare them."""
+"""Positions of movers against independent oracles and their files."""
 
 import dataclasses
 import json
@@ -105,7 +105,7 @@ def test_before_the_first_keyframe_and_after_the_last_it_stands():
     np.testing.assert_allclose(velocity, [(0, 0), (2, 0), (0, 2), (0, 2), (0, 0)])
 
 
-def test_pingpong_comes_back_the_same_way():
+def test_pingpong_returns_along_the_same_path():
     mover = Keyframed(radius=0.3, keyframes=ELL)
     np.testing.assert_allclose(at(mover, [4.5, 5.0, 6.0, 7.0, 8.0]), [(6, 3), (6, 2), (4, 2), (2, 2), (4, 2)])
     np.testing.assert_allclose(
@@ -232,7 +232,7 @@ def test_wanderers_draw_from_the_runs_seed_unless_they_have_one_of_their_own():
     assert (one == trajectories(own, shared, shared, seed=0).positions(FINE)).all()
 
 
-def test_asking_for_more_of_a_walk_does_not_change_it():
+def test_extending_a_walk_does_not_change_it():
     mover = Wandering(radius=0.2, cell=0.5, period=0.4)
     whole, parts = trajectories(mover, obstacles=POSTS), trajectories(mover, obstacles=POSTS)
     asked = [parts.positions(t)[0] for t in FINE]
@@ -267,7 +267,7 @@ def test_velocity_is_the_change_of_place_and_travel_is_never_less(mover):
     assert jumped.sum() == len(moving.jump_times(20)[0])
 
 
-def test_a_time_has_the_same_bits_whichever_other_times_are_asked_for():
+def test_a_time_has_the_same_bits_whatever_other_times_are_requested():
     moving = trajectories(*KINDS)
     whole = moving.positions(FINE)
     assert (whole[::7] == moving.positions(FINE[::7])).all()
@@ -365,7 +365,7 @@ WRONG = (
 
 @pytest.mark.parametrize(("movers", "discs"), [([(1.0, 0.0), (1.0, 2000.0)], 800), ([(0.05, 0.0)] * 1000, 20_000)])
 def test_wanderers_may_have_some_steps_behind_them(movers, discs):
-    """What is refused is in `test_messages.py`."""
+    """`test_messages.py` has the errors."""
     walking = tuple(Wandering(radius=0.1, cell=0.5, period=period, phase=phase) for period, phase in movers)
     assert len(World("w", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 0.5),) * discs, None, walking).movers) == len(movers)
 

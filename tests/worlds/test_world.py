@@ -1,4 +1,4 @@
-"""Discs, worlds, tasks and routes: what they compute."""
+"""Discs, worlds, tasks and routes."""
 
 import dataclasses
 

@@ -1,12 +1,12 @@
-"""How kernels are compiled and cached.
+"""Compilation and on-disk caching of kernels.
 
-An entry of the cache that cannot be read (cut short, damaged, or written for records that no longer exist) is dropped, and the
-kernel is compiled again. An entry is valid for one text of *all* kernel files; numba by itself would notice a change of the
-kernel's own file, but not of a kernel in another file that it calls.
+Unreadable cache entries (truncated, damaged, or for removed records) are dropped, and the kernel is compiled again. An entry
+is valid for one text of *all* kernel files; numba alone detects changes of a kernel's own file, but not of kernels that it
+calls in other files.
 
-Each entry is one file, which holds what it is for beside the machine code, and is written whole. numba keeps an index apart from
-numbered files of machine code: it enters a number before it writes that file, and two processes that compile at once take the
-same number. A process then runs code of older sources, or code for other types.
+Each entry is one file, written atomically, with its key beside the machine code. numba uses an index and numbered files: it
+reserves a number before writing the file, so two processes that compile at once take the same number, and a process may run
+code of older sources or for other types.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
 
-_settings: Any = config  # its names are set when it is imported
+_settings: Any = config  # its attributes are set on import
 F = TypeVar("F", bound=Callable[..., Any])
 
 # IEEE arithmetic (no fastmath), so that results repeat bit for bit.
@@ -33,17 +33,17 @@ _SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 
 
 def kernel(function: F) -> F:
-    """A function that is compiled at its first call and cached on disk."""
+    """Compile a function on its first call and cache it on disk."""
     return _cached(numba.njit(**_SETTINGS)(function), function)
 
 
 def inline(function: F) -> F:
-    """A kernel that is always inlined into the kernels that call it."""
+    """Return a kernel that is always inlined into its callers."""
     return _cached(numba.njit(inline="always", **_SETTINGS)(function), function)
 
 
 class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
-    """The machine code of one kernel: a file for each combination of argument types, without an index."""
+    """The machine code of one kernel: one file for each combination of argument types, without an index."""
 
     def save(self, key: Any, data: Any) -> None:
         path = self._path(key)
@@ -56,7 +56,7 @@ class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
 
     def load(self, key: Any) -> Any:
         try:
-            found = pickle.loads(self._path(key).read_bytes())  # noqa: S301 - as executable as the code it holds
+            found = pickle.loads(self._path(key).read_bytes())  # noqa: S301 - no less safe than the code in it
         except FileNotFoundError:
             return None
         *is_for, data = found
@@ -67,7 +67,7 @@ class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
             path.unlink(missing_ok=True)
 
     def _path(self, key: Any) -> Path:
-        # Types that stand for functions have their addresses in their names; the file itself says what it is for.
+        # Function types have addresses in their names; the entry contains the full key.
         text = re.sub(r"0x[0-9a-f]+", "", repr(key))
         return Path(self._cache_path) / f"{self._begin()}{hashlib.sha256(text.encode()).hexdigest()[:16]}.nbc"
 
@@ -92,21 +92,21 @@ class _Cache(FunctionCache):  # type: ignore[misc]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # unpickling damaged bytes can raise nearly anything; compiling again mends all of it
+        except Exception:  # unpickling damaged bytes can raise almost anything; compile again
             with contextlib.suppress(OSError):
                 self.flush()
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        with contextlib.suppress(OSError):  # a full disk costs time at the next start, not this run
+        with contextlib.suppress(OSError):  # a full disk costs time at the next start only
             super().save_overload(sig, data)
 
 
 def _cached(dispatcher: Any, function: F) -> F:
-    if hasattr(dispatcher, "enable_caching"):  # with NUMBA_DISABLE_JIT the dispatcher is the plain function
-        with contextlib.suppress(RuntimeError):  # no folder can be written: every process compiles anew
+    if hasattr(dispatcher, "enable_caching"):  # with NUMBA_DISABLE_JIT it is the plain function
+        with contextlib.suppress(RuntimeError):  # no writable folder: every process compiles
             dispatcher._cache = _Cache(function)
-    return dispatcher  # type: ignore[no-any-return]  # stands for the function
+    return dispatcher  # type: ignore[no-any-return]  # has the function's signature
 
 
 def _choose_folder() -> None:

@@ -1,4 +1,4 @@
-"""Where the machine code of kernels is kept between runs, and for which sources it is valid. Loads no compiler."""
+"""Location and validity of the kernels' machine-code cache, without loading the compiler."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ PACKAGES = ("base", "worlds", "planners", "robots", "sim", "views")
 
 
 def sources_stamp() -> str:
-    """A SHA-256 of the text of every kernel file of antdrive, as this process has imported them.
+    """Return the SHA-256 of all kernel files' texts as imported by this process.
 
-    Modules are imported when they are needed, so files that are edited meanwhile are of two versions in one process. What is
-    compiled then must not be taken for either version's, by this or any later process: the stamp is that of both texts.
+    Modules are imported lazily, so editing files meanwhile mixes two versions in one process. Code compiled then belongs to
+    neither version: its stamp covers both texts.
     """
     first, then, stamp = _first_state()
     if _state(first) == then:
@@ -29,15 +29,15 @@ def sources_stamp() -> str:
 
 @functools.cache
 def _first_state() -> tuple[dict[Path, bytes], list[tuple[int, int]], str]:
-    """The texts of all kernel files when this is first called, what `_state` says of them, and their stamp."""
+    """Return the texts, `_state` and stamp of all kernel files at the first call."""
     paths = [path for package in PACKAGES for path in sorted((_ROOT / package).rglob("_kernels*.py"))]
-    state = _state(paths)  # before they are read, so that an edit in between shows
+    state = _state(paths)  # before reading, to detect edits in between
     texts = {path: path.read_bytes() for path in paths}
     return texts, state, _sha(texts.values())
 
 
 def _state(paths: Iterable[Path]) -> list[tuple[int, int]]:
-    """When files were last written, and their sizes; zeros for those that are gone."""
+    """Return modification times and sizes of files; zeros for missing ones."""
     found = []
     for path in paths:
         try:
@@ -56,10 +56,10 @@ def _sha(texts: Iterable[bytes]) -> str:
 
 
 def cache_folder() -> Path | None:
-    """The folder for machine code; None where no folder at all can be written.
+    """Return the folder for machine code; None without a writable folder.
 
-    The first that can be written of: what `NUMBA_CACHE_DIR` names, the package's own `__pycache__`, the user's cache folder,
-    and a private folder among the temporary files.
+    The first writable one of: `NUMBA_CACHE_DIR`, the package's `__pycache__`, the user's cache folder, and a private folder
+    among the temporary files.
     """
     given = os.environ.get("NUMBA_CACHE_DIR")
     for folder in (*([Path(given)] if given else []), *default_folders()):
@@ -69,7 +69,7 @@ def cache_folder() -> Path | None:
 
 
 def default_folders() -> tuple[Path, Path]:
-    """The folders that numba tries by itself, as far as antdrive's kernels are concerned."""
+    """Return the folders that numba itself tries for antdrive's kernels."""
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
     return _ROOT / "base" / "__pycache__", user / "numba"
 
@@ -84,9 +84,9 @@ def _writable(folder: Path) -> bool:
 
 
 def _private_folder() -> Path | None:
-    """A folder that nobody else can write, the same one in every process of this user if possible.
+    """Return a folder writable only by this user, the same one in every process if possible.
 
-    Cached code is executed, so a folder that somebody else has made is never used.
+    Cached code is executed, so another user's folder is never used.
     """
     user = os.getuid() if hasattr(os, "getuid") else None
     try:
@@ -97,5 +97,5 @@ def _private_folder() -> Path | None:
         if stat.S_ISDIR(found.st_mode) and private and _writable(folder):
             return folder
         return Path(tempfile.mkdtemp(prefix="antdrive-cache-"))
-    except OSError:  # also where no folder for temporary files exists
+    except OSError:  # includes a missing folder for temporary files
         return None

@@ -8,16 +8,16 @@ import numpy as np
 
 from antdrive.worlds._kernels import Array, kernel
 
-# A list of nearby discs is used again while the robot stays within this distance of where it was made [m].
+# Distance from its origin within which a list of nearby discs stays valid [m].
 NEAR = 0.25
 
 
 @kernel
 def footprint_clearances(poses: Array, shape: Array, corners: Array, discs: Array, bounds: Array, out: Array) -> None:
-    """out[i] = distance from the footprint at poses[i] to the nearest disc surface or wall.
+    """Fill out[i] with the distance from the footprint at poses[i] to the nearest disc surface or wall.
 
-    `shape` holds half length, half width and rounding of a rounded rectangle; where there are `corners` (K, 2), they are
-    those of the polygon in its place.
+    `shape` is half length, half width and rounding of a rounded rectangle; `corners` (K, 2), if any, replace the rectangle by
+    a polygon.
     """
     hx, hy, rounding = shape[0], shape[1], shape[2]
     radius = math.hypot(hx, hy) + rounding
@@ -57,7 +57,7 @@ def footprint_clearances(poses: Array, shape: Array, corners: Array, discs: Arra
 
 @kernel
 def polygon_distance(x: float, y: float, corners: Array) -> float:
-    """The distance from a convex polygon (K, 2), counter-clockwise, to a point; within it minus that to the nearest edge.
+    """Return the signed distance from a convex polygon (K, 2), counter-clockwise, to a point, negative inside.
 
     A polygon of one corner is a point.
     """
@@ -80,7 +80,7 @@ def polygon_distance(x: float, y: float, corners: Array) -> float:
 
 @kernel
 def polygon_wall_distance(x: float, y: float, cos: float, sin: float, corners: Array, bounds: Array) -> float:
-    """The distance from a polygon (K, 2) at (x, y), turned by an angle with this cosine and sine, to the nearest wall."""
+    """Return the distance from a polygon (K, 2) at (x, y), rotated by cosine and sine, to the nearest wall."""
     best = math.inf
     for k in range(corners.shape[0]):
         cx = x + cos * corners[k, 0] - sin * corners[k, 1]
@@ -93,7 +93,7 @@ def polygon_wall_distance(x: float, y: float, cos: float, sin: float, corners: A
 def discs_near(x: float, y: float, slack: float, discs: Array, out: Array) -> int:
     """Write the discs at most `slack` farther from (x, y) than the closest one to `out`; return their number.
 
-    While the robot is within NEAR of (x, y), only these can be the disc closest to its footprint.
+    While the robot is within NEAR of (x, y), no other disc can be the closest to its footprint.
     """
     closest = math.inf
     for j in range(discs.shape[0]):

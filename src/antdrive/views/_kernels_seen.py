@@ -1,6 +1,6 @@
-"""Compiled painting of what a lidar has seen: arrays in, arrays out, nothing validated.
+"""Compiled painting of lidar beams, unknown ground and undetected obstacles: arrays in, arrays out, no validation.
 
-`inv` (3, 3) takes pixels to the ground, `fwd` (3, 3) the ground to pixels.
+`inv` (3, 3) maps pixels to the ground, `fwd` (3, 3) the ground to pixels.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from antdrive.worlds._kernels import Array, inline, kernel
 
 @inline
 def _unknown(free: Array, occupied: Array, u: float, v: float) -> float:
-    """How much of the ground at a place is not on the map, 0 to 1; u, v are in cells from the first cell's centre.
+    """Return the unknown fraction of the ground at a point, 0 to 1; u, v are in cells from the first cell's centre.
 
-    Cells are interpolated, so that the edge of what was seen is a line and no staircase.
+    Interpolation between cells smooths the edge of known ground.
     """
     c, r = math.floor(u), math.floor(v)
     if r < 0 or c < 0 or r + 1 >= free.shape[0] or c + 1 >= free.shape[1]:
@@ -38,9 +38,9 @@ def veil(
 ) -> None:  # fmt: skip
     """Hatch the ground of `frame` (H, W, 3) within bounds that is neither free nor occupied on a map.
 
-    `shift` (4,) takes the ground to the map: cosine and sine of a turn, then x and y [m]; `corner` (3,) is the lower left
-    corner of the map and the side of its cells [m]. `style` (4,): how much the ground and the lines are covered, the distance
-    between lines and a pixel's width [m]; `tints` (2, 3) are the colours of both. The map is looked at once for 2 x 2 pixels.
+    `shift` (4,) transforms the ground to the map: cosine and sine of a rotation, then x and y [m]; `corner` (3,) is the lower
+    left corner of the map and the side of its cells [m]. `style` (4,): opacity of the veil and of the lines, spacing of the
+    lines and width of a pixel [m]; `tints` (2, 3) are the colours of both. The map is sampled once for 2 x 2 pixels.
     """
     height, width = visible.shape
     for row in range(0, height, 2):
@@ -56,7 +56,7 @@ def veil(
             unknown = _unknown(free, occupied, u, v)
             if unknown <= 0.0:
                 continue
-            # From one pixel to the next, x + y grows by these; within 2 x 2 pixels it is as good as linear.
+            # Increments of x + y per pixel, linear within 2 x 2 pixels.
             right = (inv[0, 0] + inv[1, 0] - (x + y) * inv[2, 0]) / w
             down = (inv[0, 1] + inv[1, 1] - (x + y) * inv[2, 1]) / w
             for i in range(min(2, height - row)):
@@ -78,7 +78,7 @@ def veil(
 def pale_bodies(
     frame: Array, visible: Array, seg: Array, fine: int, unmet: Array, colour: Array, strength: float
 ) -> None:
-    """Blend a colour into the bodies of `frame` (H, W, 3) whose number in `seg` is below len(unmet) and unmet."""
+    """Blend a colour into the bodies of `frame` (H, W, 3) whose index in `seg` is below len(unmet) and unmet."""
     height, width = visible.shape
     for row in range(height):
         for col in range(width):
@@ -99,7 +99,7 @@ def pale_bodies(
 
 @inline
 def _direction(dx: float, dy: float) -> float:
-    """The direction of a vector, -pi to pi, to 0.00001 rad (M. Abramowitz, I. Stegun, 1964, 4.4.49)."""
+    """Return the direction of a vector, -pi to pi, to 0.00001 rad (M. Abramowitz, I. Stegun, 1964, 4.4.49)."""
     ax, ay = abs(dx), abs(dy)
     t = min(ax, ay) / max(max(ax, ay), 1e-12)
     s = t * t
@@ -116,10 +116,10 @@ def lay_fan(
     frame: Array, visible: Array, fwd: Array, inv: Array, eye: Array, first: float, spacing: float, closed: bool,
     reaches: Array, every: int, style: Array, colour: Array,
 ) -> None:  # fmt: skip
-    """Lay the beams of a scan on the ground of `frame` (H, W, 3): a tint as far as they got, and every `every`-th as a line.
+    """Draw the beams of a scan on the ground of `frame` (H, W, 3): a tint over their area and every `every`-th as a line.
 
-    `eye` is the lidar's x, y and yaw, `reaches` (B,) how far each beam got [m]. `style` (3,): the strength of tint and
-    lines, and a pixel's width [m].
+    `eye` is the lidar's x, y and yaw, `reaches` (B,) the length of each beam [m]. `style` (3,): opacity of tint and lines,
+    and width of a pixel [m].
     """
     height, width = visible.shape
     beams, pixel = reaches.shape[0], style[2]
@@ -152,7 +152,7 @@ def lay_fan(
             weight = style[0] * min(1.0, max(0.0, 0.5 + (reaches[nearest] - away) / pixel))
             drawn = math.floor(k / every + 0.5) * every
             if drawn < beams and away < reaches[drawn]:
-                apart = every * spacing * away / pixel  # of two lines [px]
+                apart = every * spacing * away / pixel  # spacing of lines [px]
                 aside = abs(k - drawn) * spacing * away / pixel
                 weight += style[1] * min(1.0, max(0.0, 1.0 - aside)) * min(1.0, apart / 6.0)
             weight *= visible[row, col]

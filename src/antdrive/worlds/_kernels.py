@@ -1,4 +1,4 @@
-"""Compiled geometry: arrays in, arrays out, nothing validated."""
+"""Compiled geometry: arrays in, arrays out, without validation."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ Array = Any
 ONE, ALL = np.uint64(1), np.uint64(2**64 - 1)
 
 SQRT2 = math.sqrt(2.0)
-GRAZE = 1e-12  # how far off a distance may be by rounding, as a share of the coordinates; a thousand times what it is
-TOGETHER = 8  # discs in one rectangle
-APART = 8  # of so many discs in a row one comes first
-SPARE = 1e-6  # so many cells are added to a range of cells, whatever the rounding
-ROUNDING = 1e-6  # a disc is left out only if it is this much too far away to matter, so that no result changes [m]
+GRAZE = 1e-12  # bound on the rounding error of distances, as a fraction of the coordinates; 1000 times the actual error
+TOGETHER = 8  # discs in one box
+APART = 8  # every so many discs, one is processed first
+SPARE = 1e-6  # slack of cell ranges for rounding [cells]
+ROUNDING = 1e-6  # discs are skipped only with this slack, so that no result changes [m]
 # Directions by bit: E, NE, N, NW, W, SW, S, SE as (row, column) steps; row grows with y.
 DROW = np.array([0, 1, 1, 1, 0, -1, -1, -1], dtype=np.int64)
 DCOL = np.array([1, 1, 0, -1, -1, -1, 0, 1], dtype=np.int64)
@@ -26,7 +26,7 @@ DCOL = np.array([1, 1, 0, -1, -1, -1, 0, 1], dtype=np.int64)
 
 @kernel
 def doubled(array: Array) -> Array:
-    """A copy of a vector with twice its length; the second half is undefined."""
+    """Return a copy of a vector with twice its length; the second half is undefined."""
     out = np.empty(2 * len(array), dtype=array.dtype)
     for i in range(len(array)):
         out[i] = array[i]
@@ -35,7 +35,7 @@ def doubled(array: Array) -> Array:
 
 @kernel
 def doubled_rows(array: Array) -> Array:
-    """A copy of a table (N, M) with twice its rows; the second half is undefined."""
+    """Return a copy of a table (N, M) with twice its rows; the second half is undefined."""
     out = np.empty((2 * len(array), array.shape[1]), dtype=array.dtype)
     for i in range(len(array)):
         for j in range(array.shape[1]):
@@ -45,7 +45,7 @@ def doubled_rows(array: Array) -> Array:
 
 @kernel
 def segment_distance2(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Squared distance from a point to the closed segment ab."""
+    """Return the squared distance from a point to the closed segment ab."""
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
     t = 0.0
@@ -58,15 +58,15 @@ def segment_distance2(px: float, py: float, ax: float, ay: float, bx: float, by:
 
 @kernel
 def wall_distance(x: float, y: float, bounds: Array) -> float:
-    """Distance to the nearest wall, negative outside."""
+    """Return the distance to the nearest wall, negative outside."""
     return float(min(min(x - bounds[0], bounds[2] - x), min(y - bounds[1], bounds[3] - y)))
 
 
 @kernel
 def boxes_around(discs: Array) -> Array:
-    """The rectangles around each TOGETHER discs in a row: x_min, y_min, x_max, y_max (B, 4).
+    """Return the bounding boxes of each TOGETHER consecutive discs: x_min, y_min, x_max, y_max (B, 4).
 
-    Discs of one list often lie side by side; where those of a rectangle are too far away to matter, none is looked at.
+    Consecutive discs are often neighbours; all discs of a box that is too far away are skipped.
     """
     count = discs.shape[0]
     out = np.empty(((count + TOGETHER - 1) // TOGETHER, 4))
@@ -82,7 +82,7 @@ def boxes_around(discs: Array) -> Array:
 
 @inline
 def is_beyond(reach: float, x: float, y: float, box: Array) -> bool:
-    """Whether a rectangle is farther from (x, y) than a reach; never if that is negative."""
+    """Return whether a box is farther from (x, y) than a reach; False for a negative reach."""
     dx = max(max(box[0] - x, x - box[2]), 0.0)
     dy = max(max(box[1] - y, y - box[3]), 0.0)
     return bool(reach >= 0.0 and dx * dx + dy * dy > reach * reach)
@@ -90,12 +90,12 @@ def is_beyond(reach: float, x: float, y: float, box: Array) -> bool:
 
 @kernel
 def point_clearances(points: Array, discs: Array, bounds: Array, out: Array) -> None:
-    """out[i] = distance from point i to the nearest disc surface or wall."""
+    """Fill out[i] with the distance from point i to the nearest disc surface or wall."""
     boxes = boxes_around(discs)
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         best = wall_distance(x, y, bounds)
-        if i > 0:  # from the point before, clearance cannot have grown by more than the way
+        if i > 0:  # clearance grows at most by the distance from the previous point
             best = min(best, out[i - 1] + math.hypot(x - points[i - 1, 0], y - points[i - 1, 1]) + ROUNDING)
         for b in range(boxes.shape[0]):
             if is_beyond(best + ROUNDING, x, y, boxes[b]):
@@ -110,7 +110,7 @@ def point_clearances(points: Array, discs: Array, bounds: Array, out: Array) -> 
 
 @kernel
 def segment_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, bounds: Array) -> float:
-    """Distance from a segment to the nearest disc surface or wall."""
+    """Return the distance from a segment to the nearest disc surface or wall."""
     # Inside the box the distance to the nearest wall is concave along a segment, so its minimum is at an end.
     best = min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds))
     mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay) + ROUNDING
@@ -126,9 +126,9 @@ def segment_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, 
 def clearance_up_to(
     most: float, ax: float, ay: float, bx: float, by: float, discs: Array, boxes: Array, bounds: Array
 ) -> float:
-    """`segment_clearance` of a segment among discs with the rectangles around them, or `most` if that is less.
+    """Return the lesser of `segment_clearance` and `most`, for discs with their boxes.
 
-    What is farther away than `most` is hardly looked at.
+    Most discs farther away than `most` are skipped.
     """
     best = min(most, min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds)))
     x_min, x_max, y_min, y_max = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
@@ -149,7 +149,7 @@ def clearance_up_to(
 
 @kernel
 def polyline_clearance(xy: Array, discs: Array, bounds: Array) -> float:
-    """The least clearance of the segments of a polyline (N, 2), N >= 2."""
+    """Return the least clearance of the segments of a polyline (N, 2), N >= 2."""
     boxes = boxes_around(discs)
     best = math.inf
     for i in range(xy.shape[0] - 1):
@@ -159,12 +159,12 @@ def polyline_clearance(xy: Array, discs: Array, bounds: Array) -> float:
 
 @kernel
 def segment_clearances(starts: Array, ends: Array, discs: Array, bounds: Array, out: Array) -> None:
-    """out[i] = clearance of the segment starts[i]..ends[i]."""
+    """Fill out[i] with the clearance of the segment starts[i]..ends[i]."""
     boxes = boxes_around(discs)
     for i in range(starts.shape[0]):
         ax, ay, bx, by = starts[i, 0], starts[i, 1], ends[i, 0], ends[i, 1]
         most = math.inf
-        if i > 0:  # from the segment before, clearance cannot have grown by more than the ends have moved
+        if i > 0:  # clearance grows at most by the ends' distances from the previous segment
             begun = math.hypot(ax - starts[i - 1, 0], ay - starts[i - 1, 1])
             ended = math.hypot(bx - ends[i - 1, 0], by - ends[i - 1, 1])
             most = out[i - 1] + max(begun, ended) + ROUNDING
@@ -175,7 +175,7 @@ def segment_clearances(starts: Array, ends: Array, discs: Array, bounds: Array, 
 def rasterise(
     discs: Array, bounds: Array, x0: float, y0: float, cell: float, inflate: float, free: Array, closed: Array
 ) -> None:
-    """Fill `free` with the free cells, and mark in `closed` the moves between free cells that a disc blocks.
+    """Fill `free` with the free cells, and mark in `closed` the moves between free cells blocked by discs.
 
     A cell is blocked when its centre is no farther than `inflate` from a disc or a wall.
     `closed` has the bits of E, NE, N and NW only, so that each pair of opposite moves is stored once.
@@ -187,7 +187,7 @@ def rasterise(
         within[c] = min(x - bounds[0], bounds[2] - x) > inflate
     grazes = np.empty(discs.shape[0], dtype=np.bool_)
     blocked = np.zeros((rows, cols // 64 + 1), dtype=np.uint64)  # a bit for each cell
-    # Neighbours in the list often are neighbours in the world: between two that have come first, others add little.
+    # Neighbours in the list are often neighbours in the world: after every APART-th disc, the others add little.
     for first in range(APART):
         for j in range(first, discs.shape[0], APART):
             grazes[j] = block_cells(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, cols, blocked)
@@ -207,7 +207,7 @@ def rasterise(
 
 @inline
 def cells_of(word: int, first: int, last: int) -> Array:
-    """The bits of the cells `first` to `last` of a row that lie in one of its words."""
+    """Return the bits of the cells `first` to `last` of a row within one of its words."""
     low, high = max(first - 64 * word, 0), min(last - 64 * word, 63)
     return (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high))
 
@@ -218,7 +218,7 @@ def block_cells(
 ) -> bool:
     """Set the bits of the cells whose centres lie in a disc.
 
-    Whether other centres lie on its rim, as far as rounding can tell, and are not blocked by discs before it.
+    Return whether other centres, not blocked by earlier discs, lie on its rim within rounding.
     """
     radius2, per = radius * radius, 1.0 / cell
     rim2 = radius2 + GRAZE * radius * (abs(cx) + abs(cy) + abs(x0) + abs(y0) + radius + cell)
@@ -233,7 +233,7 @@ def block_cells(
     grazes = False
     for r in range(r_lo, r_hi + 1):
         if w_hi <= w_lo + 1 and blocked[r, w_lo] & mask_lo == mask_lo and blocked[r, w_hi] & mask_hi == mask_hi:
-            continue  # all of them are
+            continue  # all are set
         dy = y0 + r * cell - cy
         if abs(dy) > radius:
             grazes = grazes or dy * dy <= rim2
@@ -267,10 +267,10 @@ def block_cells(
 def close_moves(
     cx: float, cy: float, radius: float, x0: float, y0: float, cell: float, free: Array, closed: Array
 ) -> None:
-    """Mark the moves between free cells that a disc blocks, on whose rim no centre lies.
+    """Mark the moves between free cells that a disc blocks, if no cell centre lies on its rim.
 
-    Such a move has the disc's centre beside it, and is no farther from it than the radius, which both of its ends are. In
-    units of cells, with the disc's centre at (p, q): `lo` to `hi` is the range of its distances, times its length.
+    Such a move passes the disc's centre at no more than the radius, while both of its ends are farther. In units of cells,
+    with the disc's centre at (p, q), `lo` to `hi` is the range of its distances times its length.
     """
     p, q, size2 = (cx - x0) / cell, (cy - y0) / cell, (radius / cell) * (radius / cell)
     for side in range(2):
@@ -312,7 +312,7 @@ def close_move(
 def close_rim(
     cx: float, cy: float, radius: float, x0: float, y0: float, cell: float, free: Array, closed: Array
 ) -> None:
-    """Mark the moves between free cells that a disc blocks, whatever lies on its rim: look at all cells along it."""
+    """Mark the moves between free cells that a disc blocks, checking all cells along its rim."""
     rows, cols = free.shape
     reach = radius + SQRT2 * cell
     r_lo = max(0, int(math.floor((cy - reach - y0) / cell)))
@@ -342,10 +342,10 @@ def close_rim(
 def allowed_moves(free: Array, closed: Array, moves: Array) -> None:
     """Fill `moves` with the masks of allowed moves; a diagonal needs both orthogonal neighbours free.
 
-    Without branches, so that many cells are taken at once.
+    Branch-free, so that the loop is vectorised.
     """
     rows, cols = free.shape
-    wide = np.zeros((rows + 1, cols + 2), dtype=np.uint8)  # the free cells, with others around them
+    wide = np.zeros((rows + 1, cols + 2), dtype=np.uint8)  # the free cells, padded
     first = np.zeros((rows + 1, cols + 2), dtype=np.uint8)  # their moves E, NE, N and NW, with a row below
     for r in range(rows):
         for c in range(cols):

@@ -1,4 +1,4 @@
-"""The search for the best candidate leaves out most of them: it must find what judging each of them in turn finds."""
+"""The search for the best candidate agrees with an exhaustive evaluation."""
 
 import math
 
@@ -26,7 +26,7 @@ def tracked():
 
 
 def in_turn(situation, contact_distances, near):
-    """The choice and its contact: each candidate followed and judged, in their order."""
+    """Return the choice and its contact from evaluating each candidate in order."""
     x, y, yaw, v, w, s, _, candidates, path, obstacles, limits, tuning, weights, places, radii = situation
     steps = len(places) - 1
     everyone = kernels.Reachable(np.tile(near, (steps, 1)), np.full(steps, len(near)))
@@ -62,7 +62,7 @@ def in_turn(situation, contact_distances, near):
     w=st.floats(-1.5, 1.5),
     movers=st.lists(st.tuples(near, near, speed, speed, st.floats(0.1, 0.5)), min_size=1, max_size=8),
 )
-def test_no_candidate_that_is_left_out_is_better(tracked, yaw, aside, v, w, movers):
+def test_no_skipped_candidate_is_better(tracked, yaw, aside, v, w, movers):
     table = np.array(movers)
     table[:, :2] += np.where(np.hypot(*table[:, :2].T) < 0.6, 1.0, 0.0)[:, None]
     places = table[:, :2] + AVOIDANCE.prediction_times[:, None, None] * table[:, 2:4]

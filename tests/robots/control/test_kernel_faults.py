@@ -1,4 +1,4 @@
-"""The controller's kernels where a plausible mistake would go unnoticed on the road."""
+"""Properties of the controller's kernels that drives do not test."""
 
 import math
 

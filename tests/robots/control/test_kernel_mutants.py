@@ -1,4 +1,4 @@
-"""Parts of the controller that no drive shows by itself: each small fault that was put there once is noticed here."""
+"""Mutation tests of the controller's kernels."""
 
 import math
 
@@ -81,7 +81,7 @@ def test_a_route_is_as_long_as_its_segments(turtlebot):
     assert tracked.length == pytest.approx(3.0)
 
 
-def test_lookaheads_and_braking_keep_their_shares_of_the_margin(turtlebot):
+def test_lookaheads_and_braking_keep_their_fractions_of_the_margin(turtlebot):
     world = World("open", (-5.0, -5.0, 5.0, 5.0))
     controller = PurePursuit(lookahead_margin=0.7, stopping_margin=0.4)
     tuning = controller.prepare(Route(STRAIGHT), world, turtlebot, 0.1, 1 / 60).tuning
@@ -109,7 +109,7 @@ def test_a_candidate_is_worth_less_the_nearer_it_comes_to_movers():
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.9, math.pi / 2, 2.5, -2.0])
-def test_progress_is_at_most_the_way_in_the_routes_direction(turn):
+def test_progress_is_at_most_the_travel_in_the_routes_direction(turn):
     """On a straight route in any direction, for a robot a metre from its start and one that is behind."""
     cos, sin = math.cos(turn), math.sin(turn)
     path = samples(STRAIGHT @ np.array([[cos, sin], [-sin, cos]]))

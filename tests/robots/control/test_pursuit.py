@@ -135,7 +135,7 @@ def cross_track(poses, route):
 
 @pytest.mark.parametrize(("radius", "speed"), [(0.5, 1.0), (2.0, 2.0)])
 def test_bends_of_known_curvature_are_followed_and_not_cut(radius, speed, jackal):
-    """Their speed is what the lateral acceleration allows. Steering for the carrot alone cuts them."""
+    """Their speed is the limit of the lateral acceleration. Steering for the carrot alone cuts them."""
     route = bends(radius)
     poses, commands, _ = follow(jackal, route, (0, 0, 0))
     fast = commands[:, 0] > 0.7 * speed
@@ -230,7 +230,7 @@ def test_obstacles_that_are_not_sorted_by_place_prepare_the_same_path(turtlebot,
 
 
 @given(st.integers(0, 10_000))
-def test_discs_that_are_left_out_change_no_clearance(seed):
+def test_skipped_discs_change_no_clearance(seed):
     """The oracle samples the segment, and is too large by half the distance between samples at most."""
     rng = np.random.default_rng(seed)
     discs, bounds = (
@@ -248,7 +248,7 @@ def test_discs_that_are_left_out_change_no_clearance(seed):
         assert below == found if found < most else below >= most
 
 
-def test_driving_backwards_is_driving_forwards_seen_from_behind(turtlebot):
+def test_driving_backwards_mirrors_driving_forwards(turtlebot):
     controller = PurePursuit()
     tracked = controller.prepare(STAIRCASE, OPEN, turtlebot, 0.05, DT)
     ahead, _ = controller.step(tracked, (0.2, 0.1, 0.4), Twist(0.1, 0.2), PursuitState())

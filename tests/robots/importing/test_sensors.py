@@ -1,4 +1,4 @@
-"""The lidar of a robot out of URDF: what its Gazebo sensor says, where it is, and why one cannot be used."""
+"""Import of lidars from URDF files."""
 
 import math
 from pathlib import Path
@@ -55,7 +55,7 @@ def test_a_lidar_is_read_where_it_is(tmp_path, kind, tag):
         ("0 0 1.5707963", "<pose>0.05 0.02 0.03 0 0 -1.5707963</pose>", math.pi / 4),
     ],
 )
-def test_a_lidar_looks_where_the_middle_of_its_view_is(tmp_path, joint, pose, heading):
+def test_a_lidars_yaw_is_the_middle_of_its_field_of_view(tmp_path, joint, pose, heading):
     found = imported(
         tmp_path, sensor(high="1.5707963", pose=pose), joint=f'xyz="0 0.01 0.167" rpy="{joint}"'
     ).spec.lidar
@@ -81,7 +81,7 @@ def test_a_lidar_looks_where_the_middle_of_its_view_is(tmp_path, joint, pose, he
         ({"tag": "beam"}, "scan: has no horizontal samples"),
     ],
 )
-def test_a_lidar_that_cannot_be_used_is_left_out_with_the_reason(tmp_path, changes, says):
+def test_an_unusable_lidar_is_omitted_with_the_reason(tmp_path, changes, says):
     found = imported(tmp_path, sensor(**changes))
     assert found.spec.lidar is None
     assert f"# no lidar: sensor lds of link scan is not used: {says}" in found.text.splitlines()

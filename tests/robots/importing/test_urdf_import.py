@@ -1,4 +1,4 @@
-"""Robots out of URDF: what public dimensions say is what is imported, and what is no differential drive is refused."""
+"""Import of robots from URDF: published dimensions are reproduced, and other drives are refused."""
 
 import itertools
 import math
@@ -38,7 +38,7 @@ def imported(name, **settings):
 
 
 def comments(found):
-    """What the file says of each value, beside it or above it."""
+    """Return the file's comment on each value."""
     lines = found.text.splitlines()
     beside = {line.split(":")[0]: line.partition("  # ")[2] for line in lines if "  # " in line}
     above = {line.split(":")[0]: last[2:] for last, line in itertools.pairwise(lines) if last.startswith("# ")}
@@ -147,7 +147,7 @@ def limited(tmp_path, words):
         ('effort="0.01"', "max_acceleration", 0.545455, "computed: 0.9 times the limit of motors and grip"),
     ],
 )  # fmt: skip
-def test_no_limit_of_a_joint_is_left_out_without_a_word(tmp_path, words, key, value, says):
+def test_every_unused_limit_of_a_joint_is_named(tmp_path, words, key, value, says):
     found = limited(tmp_path, words)
     assert getattr(found.spec, key) == pytest.approx(value, rel=1e-4)
     assert comments(found)[key].startswith(says)
@@ -167,7 +167,7 @@ def test_no_limit_of_a_joint_is_left_out_without_a_word(tmp_path, words, key, va
          "is above the 50 rad/s limit of robot files, not used"),
     ],
 )  # fmt: skip
-def test_a_speed_that_stands_for_no_limit_is_not_used_but_named(tmp_path, tag, told, velocity, key, value, says):
+def test_a_speed_that_means_no_limit_is_named_and_not_used(tmp_path, tag, told, velocity, key, value, says):
     plugin = (
         "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
         f"<{tag}>{told}</{tag}></plugin></gazebo></robot>"
@@ -296,7 +296,7 @@ def test_links_without_a_mass_are_named(tmp_path):
     assert comments(found)["mass"] == "computed: sum of the masses of base_link; left, right have none"
 
 
-def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle():
+def test_a_skid_steer_robot_needs_its_axle():
     with pytest.raises(
         InputError, match=r"2 axles with pairs of wheels \(front_left_wheel and front_right_wheel; rear_left"
     ):
@@ -367,7 +367,7 @@ def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path):
     body = '<collision><origin xyz="-0.064 0 0.0815"/><geometry><box size="0.281 0.306 0.119"/></geometry></collision>'
     with pytest.raises(InputError, match="has no collision geometry other than its wheels, so no footprint"):
         import_urdf(changed(tmp_path, "waffle.urdf", (body, "")))
-    with pytest.raises(InputError, match=r"has no collision geometry below 0\.005 m beside its wheels"):
+    with pytest.raises(InputError, match=r"has no collision geometry below 0\.005 m other than its wheels"):
         imported("burger.urdf", below=0.005)
 
 
@@ -387,7 +387,7 @@ def test_long_numbers_stand_apart_from_their_comments(key, value):
     assert getattr(found.spec, key) == pytest.approx(value)
 
 
-def test_wheels_can_be_told_by_joint_or_link():
+def test_wheels_are_given_by_joint_or_link():
     there = imported("burger.urdf").spec
     assert imported("burger.urdf", left="wheel_left_link", right="wheel_right_joint").spec == there
     back = imported("burger.urdf", left="wheel_right_link", right="wheel_left_link").spec  # it drives backwards
@@ -402,7 +402,7 @@ def test_wheels_can_be_told_by_joint_or_link():
         imported("burger.urdf", left="wheel")
 
 
-def test_what_lies_higher_is_left_out_and_meshes_too_where_asked(tmp_path):
+def test_higher_pieces_and_missing_meshes_are_omitted_on_request(tmp_path):
     wide = changed(tmp_path, "turtlebot4.urdf", ('size="0.1 0.1 0.246"', 'size="0.9 0.1 0.246"'))
     assert import_urdf(wide).spec.radius > 0.45
     low = import_urdf(wide, below=0.1)
@@ -629,7 +629,7 @@ def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path):
         imported("burger.urdf", arguments={"name": "two"})
 
 
-def test_meshes_of_a_package_are_found_where_it_is_said_to_be(tmp_path):
+def test_meshes_of_a_package_are_in_its_given_folder(tmp_path):
     pytest.importorskip("trimesh")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "body.obj").write_text(

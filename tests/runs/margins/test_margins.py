@@ -1,4 +1,4 @@
-"""The choice of a margin: courses, trials, the prediction of losses, the search, and scenarios whose margin is chosen."""
+"""Choice of a margin: courses, losses, their prediction, the search, and scenarios with a chosen margin."""
 
 import dataclasses
 import itertools

@@ -1,4 +1,4 @@
-"""Baselines, and what is judged against them; each verdict by changing one thing in a baseline or a log."""
+"""Evaluation against baselines: each fault arises from one change in a baseline or a log."""
 
 import dataclasses
 import json

@@ -123,7 +123,7 @@ def test_a_forged_estimate_that_scans_corrected_is_refused(log):
     shifted = log.estimate.copy()
     shifted[row:, 1] += 0.002
     (problem,) = replay(replace(log, estimate=shifted)).problems
-    assert problem.startswith("replay: estimate is not what")
+    assert problem.startswith("replay: estimate differs")
     assert f"t = {log.t[row]:.3f} s" in problem
 
 

@@ -1,4 +1,4 @@
-"""World files: which are read, which are refused, and how they are written."""
+"""World files: reading, validation and writing."""
 
 import json
 import math
@@ -122,7 +122,7 @@ def test_whole_numbers_are_numbers(tmp_path):
     assert task.cell == 1.0
 
 
-def test_keys_left_out_get_their_defaults(tmp_path):
+def test_omitted_keys_get_their_defaults(tmp_path):
     text = "schema: 1\nbounds: [0, 0, 9, 9]\nstart: [1, 1, 0]\ngoal: [8, 8]\nmovers: []\n"
     task = load_task(write(tmp_path, text, "my world.yaml"))
     assert task.world == World("my world", (0.0, 0.0, 9.0, 9.0))
@@ -274,7 +274,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
     assert path.read_bytes() == b"the old one"
 
 
-def test_a_place_that_cannot_be_written_is_wrong_input(tmp_path):
+def test_an_unwritable_path_is_invalid_input(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
         save_task(TASK, tmp_path / "file" / "w.yaml")

@@ -105,8 +105,8 @@ def test_solid_ground_takes_fewer_discs_than_cells_and_a_larger_overhang_fewer_s
 
 @given(maps(), st.data())
 @settings(max_examples=60)
-def test_planners_see_the_very_cells_of_the_map(cells, data):
-    """The robot fits through what the discs leave of a passage one cell wide."""
+def test_planners_use_the_exact_cells_of_the_map(cells, data):
+    """The robot fits through a passage one cell wide between discs."""
     spots = [tuple(spot) for spot in np.argwhere(cells.free).tolist()]
     assume(spots)
     start, goal = data.draw(st.sampled_from(spots)), data.draw(st.sampled_from(spots))

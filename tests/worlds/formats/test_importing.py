@@ -1,4 +1,4 @@
-"""The one function that imports any file: it chooses the format and refuses options of other formats."""
+"""`import_file` chooses the format and refuses options of other formats."""
 
 import json
 

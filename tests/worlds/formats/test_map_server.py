@@ -1,4 +1,4 @@
-"""Maps of ROS's map_server: what a pixel means, the order of rows, and which files are refused."""
+"""Maps of ROS's map_server: pixels, order of rows and invalid files."""
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def test_raw_shades_are_percent_and_never_negated(tmp_path):
         assert read_map(path).unknown == 4
 
 
-def test_what_is_not_opaque_is_unknown_in_scale_and_averaged_in_trinary(tmp_path):
+def test_transparent_pixels_are_unknown_in_scale_and_averaged_in_trinary(tmp_path):
     pixels = np.array([[[255, 255], [255, 254], [0, 255], [0, 0]]], dtype=np.uint8)
     Image.fromarray(pixels).save(tmp_path / "made.png")
     text = GOOD.replace("made.pgm", "made.png")
@@ -159,8 +159,8 @@ BAD = {
 }
 
 
-def test_a_turned_map_becomes_an_upright_world_that_knows_how_it_lies(tmp_path):
-    """The same picture, upright and turned: same world, and the ends go the way that complex numbers turn."""
+def test_a_rotated_map_becomes_an_upright_world_with_a_frame(tmp_path):
+    """The same picture, upright and rotated: same world, with start and goal rotated by complex numbers."""
     turn, corner = 0.4, complex(2.0, -3.0)
     for name, origin in (("upright", "[0.0, 0.0, 0.0]"), ("turned", "[2.0, -3.0, 0.4]")):
         Image.fromarray(np.full((8, 8), 254, dtype=np.uint8)).save(tmp_path / f"{name}.png")
@@ -188,7 +188,7 @@ def test_a_turned_map_becomes_an_upright_world_that_knows_how_it_lies(tmp_path):
 
 
 @pytest.mark.parametrize("there", ["w.yaml", "w.pgm"])
-def test_an_export_replaces_no_file_unless_it_is_told_to(tmp_path, there):
+def test_an_export_replaces_files_only_on_request(tmp_path, there):
     (tmp_path / there).write_text("mine")
     with pytest.raises(InputError, match=rf"{there}: exists; choose another file, or replace it with --force"):
         export_map_server(load_task("empty"), tmp_path / "w.yaml")

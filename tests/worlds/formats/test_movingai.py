@@ -146,7 +146,7 @@ def test_every_printed_length_is_matched(folder, name, search):
 
 @pytest.mark.parametrize("name", ["Paris_1_256", "AR0011SR"])
 def test_worlds_of_discs_have_the_printed_lengths_too(folder, name):
-    """What discs reach beyond blocked cells leaves a robot of a quarter cell every move of the map."""
+    """The overhang of discs leaves a robot of a quarter cell every move of the map."""
     problems = loaded(folder, name)[1]
     for number in range(50, len(problems), len(problems) // 4):
         task = import_movingai_task(folder / f"{name}.map", problem=number)

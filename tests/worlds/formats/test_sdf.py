@@ -1,4 +1,4 @@
-"""Gazebo worlds: which models become cylinders, and which files are refused."""
+"""Gazebo worlds: supported models and invalid files."""
 
 import math
 

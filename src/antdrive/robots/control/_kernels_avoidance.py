@@ -14,7 +14,7 @@ from antdrive.worlds._kernels import Array, kernel, segment_clearance
 
 # The columns of a table of candidates.
 KIND = 0  # FOLLOW_ROUTE or TWO_TWISTS
-SPEED = 1  # the highest speed on the route, or the speed of the first twist [m/s]
+SPEED = 1  # speed limit on the route, or speed of the first twist [m/s]
 YAW_RATE = 2  # of the first twist [rad/s]
 DURATION = 3  # of the first twist [s]
 NEXT_SPEED, NEXT_YAW_RATE = 4, 5  # of the second twist
@@ -22,30 +22,30 @@ NEXT_SPEED, NEXT_YAW_RATE = 4, 5  # of the second twist
 # The kinds of candidates: pure pursuit along the route up to a speed, or one constant twist and then another.
 FOLLOW_ROUTE, TWO_TWISTS = 0.0, 1.0
 
-CONTACT_MARGIN = 0.005  # a mover that is already closer than the minimum counts as met at this clearance [m]
-START_TIME = 0.25  # the time a standing robot needs to start moving [s]
-ESCAPE_TIME = 1.2  # an escape from a mover that cannot be kept clear of is judged for this long [s]
-ROUNDING = 1e-6  # movers are left out only if they are this much farther away than matters [m]
-LEVELS = 64  # of distance, for which the progress is tabulated
-ROUTE_END = 0.1  # closer to the route's end than this, the heading no longer counts [m]
+CONTACT_MARGIN = 0.005  # contact clearance of movers already closer than the minimum [m]
+START_TIME = 0.25  # for a robot at rest to start moving [s]
+ESCAPE_TIME = 1.2  # horizon of an escape when no candidate keeps its clearance [s]
+ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
+LEVELS = 64  # tabulated distances for progress
+ROUTE_END = 0.1  # distance from the route's end below which the heading is ignored [m]
 
 
 class AvoidanceWeights(NamedTuple):
-    """The settings of `Avoidance` as they apply to one robot.
+    """The settings of `Avoidance` for one robot.
 
     Attributes:
         step: time between two predicted instants [s]
-        min_distance: what a candidate keeps between the robot's centre and a mover's surface [m]
-        preferred_clearance: clearance beyond `min_distance` from which more makes no difference [m]
-        clearance_weight: metres of the route that a metre of missing clearance costs
-        cross_track_weight: metres of the route that a metre off the route costs
-        heading_weight: metres of the route that a radian off its direction costs [m/rad]
-        speed_weight: metres of the route that 1 m/s of final speed along the route is worth [s]
-        persistence: metres of the route that keeping to the last decision is worth
-        reversal_time: how far ahead a sudden reversal of a mover is considered [s]
-        reversal_distance: what the robot's centre keeps to the surface of a mover that reverses [m]
-        reversal_weight: metres of the route that each metre closer than that costs
-        narrowest: distance from the robot's centre to its outline where that is nearest [m]
+        min_distance: least distance from the robot's centre to a mover's surface [m]
+        preferred_clearance: clearance beyond `min_distance` above which the cost is zero [m]
+        clearance_weight: cost of each metre below the preferred clearance [m/m]
+        cross_track_weight: cost of each metre off the route [m/m]
+        heading_weight: cost of each radian off the route's direction [m/rad]
+        speed_weight: worth of 1 m/s of final speed along the route [s]
+        persistence: worth of keeping the last decision [m]
+        reversal_time: horizon for a sudden reversal of a mover [s]
+        reversal_distance: least distance from the robot's centre to a reversing mover's surface [m]
+        reversal_weight: cost of each metre below that [m/m]
+        narrowest: least distance from the robot's centre to its outline [m]
     """
 
     step: float
@@ -63,11 +63,11 @@ class AvoidanceWeights(NamedTuple):
 
 
 class Trail(NamedTuple):
-    """How far following a candidate leads, whatever movers do.
+    """Result of following a candidate, regardless of movers.
 
     Attributes:
-        steps: how many steps it takes
-        blocked: whether it comes too close to an obstacle, in the last of these steps
+        steps: number of steps
+        blocked: whether the last step comes too close to an obstacle
     """
 
     steps: int
@@ -75,12 +75,12 @@ class Trail(NamedTuple):
 
 
 class Encounter(NamedTuple):
-    """How a candidate gets on with movers.
+    """Interaction of a candidate with movers.
 
     Attributes:
-        contact: when it first meets a mover or an obstacle [s], inf if never
+        contact: time of the first contact with a mover or an obstacle [s], inf if never
         clearance: least clearance to movers before that, beyond the minimum [m]; exact below the `cap` of `encounter`
-        intrusion: how far it intrudes on movers that reverse [m]
+        intrusion: depth of intrusion on reversing movers [m]
     """
 
     contact: float
@@ -89,11 +89,11 @@ class Encounter(NamedTuple):
 
 
 class Reachable(NamedTuple):
-    """The movers that matter in each step, for all candidates alike.
+    """The relevant movers in each step, for all candidates.
 
     Attributes:
         near: their indices, step by step (K, M); a row is filled up to its count
-        counts: how many matter in each step (K,)
+        counts: number of relevant movers in each step (K,)
     """
 
     near: Array
@@ -105,11 +105,11 @@ def first_contact(
     x0: float, y0: float, x1: float, y1: float, places: Array, k: int, radii: Array, near: Array,
     contact_distances: Array, min_distance: float, cap: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """The share of a step after which a mover is at its contact distance, 2 if none is, and the clearance.
+    """Return the fraction of a step until a mover is at its contact distance, 2 if none is, and the clearance.
 
-    The robot moves straight from (x0, y0) to (x1, y1), and each mover straight from its place k to the next.
-    The clearance is the least to a mover's surface, beyond `min_distance`; movers without contact that are no closer
-    than `cap` may be left out.
+    The robot moves straight from (x0, y0) to (x1, y1), and each mover straight from its position k to the next. The
+    clearance is the least to a mover's surface, beyond `min_distance`; movers without contact farther than `cap` may be
+    omitted.
     """
     share, clearance = 2.0, math.inf
     for m in near:
@@ -134,7 +134,7 @@ def first_contact(
 
 @kernel
 def intrusion(x: float, y: float, places: Array, k: int, radii: Array, near: Array, distance: float) -> float:
-    """How much closer than `distance` a point is to a mover at instant k, if movers reversed at instant 0."""
+    """Return how much closer than `distance` a point is to a mover at instant k, if movers reverse at instant 0."""
     most = 0.0
     for m in near:
         dx = x - (2.0 * places[0, m, 0] - places[k, m, 0])
@@ -147,19 +147,19 @@ def intrusion(x: float, y: float, places: Array, k: int, radii: Array, near: Arr
 
 @kernel
 def least_clearance(trail: Array, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
-    """What the robot's centre keeps to obstacles along a trail: less than usual where it is nearer at its start [m]."""
+    """Return the required clearance of the robot's centre along a trail, reduced if its start is closer [m]."""
     return min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
 
 
 @kernel
 def passes_within(x: float, y: float, x1: float, y1: float, required: float, obstacles: ObstacleIndex) -> bool:
-    """Whether a straight step comes closer to an obstacle than required."""
+    """Return whether a straight step comes closer to an obstacle than required."""
     return bool(segment_clearance(x, y, x1, y1, nearby(x, y, obstacles), obstacles.bounds) < required)
 
 
 @kernel
 def meets_obstacle(trail: Array, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float) -> bool:
-    """Whether a trail that was followed without looking comes too close to an obstacle."""
+    """Return whether a trail that was followed without obstacle checks comes too close to an obstacle."""
     required = least_clearance(trail, obstacles, tuning)
     for k in range(trail.shape[0] - 1):
         length = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step
@@ -176,11 +176,11 @@ def follow(
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
     step: float, first: int, looks: bool, trail: Array,
 ) -> Trail:  # fmt: skip
-    """A candidate followed from step `first` on, for as many steps as `trail` (K + 1, 5) has rows after its first.
+    """Follow a candidate from step `first` to the last row of `trail` (K + 1, 5).
 
-    A row of `trail` is a place [m, m], a heading [rad], a speed [m/s] and a yaw rate [rad/s]. Row 0 is the start, from
-    which all obstacles are judged; row `first` is (x, y, yaw, v, w), and the rows after it are filled.
-    Without `looks` obstacles are left to `meets_obstacle`, and the trail does not end at one.
+    A row of `trail` is position [m, m], heading [rad], speed [m/s] and yaw rate [rad/s]. Row 0 is the start, which
+    determines the required clearance; row `first` is (x, y, yaw, v, w), and the rows after it are filled. Without `looks`,
+    `meets_obstacle` checks obstacles later, and the trail does not end at one.
     """
     capped = MotionLimits(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
@@ -251,7 +251,7 @@ def encounter(
     trail: Array, end: Trail, places: Array, radii: Array, near: Array, by_step: Reachable, contact_distances: Array,
     weights: AvoidanceWeights, cap: float,
 ) -> Encounter:  # fmt: skip
-    """How a candidate that follows a trail gets on with the movers `near`, those of `by_step` in particular."""
+    """Return the interaction of a candidate's trail with the movers `near`, step by step those of `by_step`."""
     least, risk, now = math.inf, 0.0, 0.0
     for k in range(end.steps):
         x1, y1 = trail[k + 1, 0], trail[k + 1, 1]
@@ -275,10 +275,10 @@ def relevant_movers(
     x: float, y: float, limits: MotionLimits, tuning: PursuitTuning, weights: AvoidanceWeights, places: Array,
     radii: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """The movers that the robot can get near to (N,), and the distance that counts as contact (M,) [m].
+    """Return the movers within the robot's reach (N,), and their contact distances (M,) [m].
 
-    A mover that is already closer than the minimum may come closer still while the robot starts moving:
-    otherwise every candidate would begin with a contact, and there would be nothing to choose.
+    A mover already closer than the minimum may come closer while the robot starts moving: otherwise every candidate would
+    begin with a contact.
     """
     near, contact_distances = np.empty(radii.shape[0], np.int64), np.empty(radii.shape[0])
     count = 0
@@ -312,7 +312,7 @@ def relevant_movers(
 def reachable_by_step(
     x: float, y: float, speed: float, weights: AvoidanceWeights, places: Array, radii: Array, near: Array, cap: float
 ) -> Reachable:
-    """Which of the movers `near` a robot no faster than `speed` can get closer to than `cap`, in each step."""
+    """Return the movers among `near` that a robot up to `speed` can get closer to than `cap`, in each step."""
     rows, counts = np.empty((places.shape[0] - 1, near.shape[0]), np.int64), np.zeros(places.shape[0] - 1, np.int64)
     for k in range(places.shape[0] - 1):
         for m in near:
@@ -328,7 +328,7 @@ def reachable_by_step(
 
 @kernel
 def fastest(v: float, candidates: Array, limits: MotionLimits) -> float:
-    """A speed that no candidate exceeds [m/s]."""
+    """Return an upper bound of the candidates' speeds [m/s]."""
     most = max(abs(v), limits.speed)
     for n in range(candidates.shape[0]):
         most = max(most, max(abs(candidates[n, SPEED]), abs(candidates[n, NEXT_SPEED])))
@@ -339,10 +339,9 @@ def fastest(v: float, candidates: Array, limits: MotionLimits) -> float:
 def worth(
     end: Array, s: float, window: float, path: PathSamples, tuning: PursuitTuning, weights: AvoidanceWeights
 ) -> float:
-    """What a candidate is worth that ends at `end`, a row of its trail, among movers that are far away [m].
+    """Return the worth of a candidate that ends at `end`, a row of its trail, without movers nearby [m].
 
-    That is its progress, less what its shortcomings cost. `s` is the progress now [m], `window` how much farther the
-    candidate can get at most [m].
+    It is the progress minus the costs. `s` is the current progress [m], `window` the largest further progress [m].
     """
     x, y, yaw, v = end[0], end[1], end[2], end[3]
     xy, arc = path.xy, path.arc
@@ -361,7 +360,7 @@ def worth(
 
 @kernel
 def among_movers(alone: float, met: Encounter, weights: AvoidanceWeights) -> float:
-    """What a candidate is worth that is worth `alone` among movers that are far away [m]."""
+    """Return the worth of a candidate among movers, from its worth `alone` without movers nearby [m]."""
     value = alone - weights.reversal_weight * met.intrusion
     return value - weights.clearance_weight * max(weights.preferred_clearance - met.clearance, 0.0)
 
@@ -370,10 +369,10 @@ def among_movers(alone: float, met: Encounter, weights: AvoidanceWeights) -> flo
 def progress_by_distance(
     x: float, y: float, yaw: float, s: float, window: float, path: PathSamples, farthest: float, out: Array
 ) -> float:
-    """Fill `out` (N,): the progress of a robot that ends no farther from (x, y) than 0 to `farthest` [m].
+    """Fill `out` (N,) with the largest progress within distances of 0 to `farthest` from (x, y) [m].
 
-    The nearest point of a route is no farther along a segment than the robot's own place along its direction. Returns
-    the largest angle between the robot's heading and a segment that it may get to [rad].
+    The nearest point on a segment is no farther along it than the robot's projection. Return the largest angle between the
+    robot's heading and a segment within reach [rad].
     """
     xy, arc = path.xy, path.arc
     k, aligned = 0, 1.0
@@ -397,10 +396,10 @@ def progress_by_distance(
 def travel(
     candidate: Array, v: float, w: float, span: float, step: float, off: float, limits: MotionLimits
 ) -> tuple[float, float]:
-    """How far a candidate gets at most in the route's direction [m], and how fast it is at the end at most [m/s].
+    """Return upper bounds of a candidate's progress along the route [m] and its final speed [m/s].
 
-    `off` is the largest angle between the robot's heading and the route: a robot that drives backwards and turns less
-    than what is left to a right angle gets no farther.
+    `off` is the largest angle between the robot's heading and the route. A robot that drives backwards makes no progress
+    unless it turns by more than a right angle minus `off`.
     """
     brake, first, second = 0.5 / limits.acceleration, candidate[SPEED], candidate[NEXT_SPEED]
     until = min(candidate[DURATION] + step, span)
@@ -425,7 +424,7 @@ def limit_worths(
     x: float, y: float, yaw: float, v: float, w: float, s: float, candidates: Array, path: PathSamples,
     limits: MotionLimits, tuning: PursuitTuning, weights: AvoidanceWeights, span: float, window: float,
 ) -> Array:  # fmt: skip
-    """More than each candidate (N, 6) can be worth, without following it (N,) [m]."""
+    """Return upper bounds of the candidates' (N, 6) worths without following them (N,) [m]."""
     most = fastest(v, candidates, limits)
     brake, step = 0.5 / limits.acceleration, weights.step
     farthest = most * span + (v * v + most * most) * brake + limits.acceleration * step * step + 2.0 * ROUNDING
@@ -447,15 +446,14 @@ def choose(
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
     weights: AvoidanceWeights, places: Array, radii: Array,
 ) -> tuple[int, float]:  # fmt: skip
-    """Which of the candidates (N, 6) to take, and when that meets something [s], inf if never.
+    """Return the index of the chosen candidate (N, 6), and the time of its first contact [s], inf if never.
 
-    Row 0 is the controller's own motion, row 1 the last decision. Row 0 is taken if it has the preferred
-    clearance and no risk; otherwise the candidate without contact that scores best; if each has a contact,
-    the one whose comes last.
+    Row 0 is the controller's motion, row 1 the last decision. Row 0 is chosen if it has the preferred clearance and no
+    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact.
 
-    Obstacles only exclude and movers only lower a score. So the candidate with the highest limit is followed next, which
-    lowers its limit to what it is worth without either, and judged among them once it comes first again, until none can
-    beat the best.
+    Obstacles only exclude candidates, and movers only lower their worth. So the search is best-first: the candidate with the
+    highest bound is followed, which lowers its bound to its worth without movers. When it is first again, it is evaluated
+    among obstacles and movers. The search ends when no bound exceeds the best worth.
     """
     near, contact_distances = relevant_movers(x, y, limits, tuning, weights, places, radii)
     if near.shape[0] == 0:
@@ -476,7 +474,7 @@ def choose(
     limit = limit_worths(x, y, yaw, v, w, s, candidates, path, limits, tuning, weights, span, window)
     if (candidates[1] == candidates[0]).all():
         limit[1] = -math.inf  # never better than row 0
-    limit[0] = -math.inf  # judged below
+    limit[0] = -math.inf  # evaluated below
     followed = np.zeros(count, np.bool_)
     best, best_score = -1, -math.inf
     if met.contact == math.inf:
@@ -528,10 +526,10 @@ def best_escape(
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
     weights: AvoidanceWeights, places: Array, radii: Array,
 ) -> int:  # fmt: skip
-    """The candidate that stays farthest from movers in the near future; -1 if each meets an obstacle or a mover.
+    """Return the candidate that stays farthest from movers in the near future; -1 if all have contact.
 
-    A mover that has turned towards the robot may leave no candidate that keeps the minimum. The minimum holds a
-    margin, and the robot is narrower than its circumscribed circle, so a robot that dodges is often missed.
+    A mover that has turned towards the robot may leave no candidate with the least clearance. That clearance includes a
+    margin, and the robot is narrower than its circumscribed circle, so dodging often avoids the contact.
     """
     near, _ = relevant_movers(x, y, limits, tuning, weights, places, radii)
     soon = places[: min(places.shape[0], int(ESCAPE_TIME / weights.step) + 2)]

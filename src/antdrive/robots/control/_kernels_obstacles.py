@@ -1,4 +1,4 @@
-"""Compiled queries about obstacles: which are near a place, and how near an arc passes them."""
+"""Compiled obstacle queries: obstacles near a point, and clearances of arcs and turns."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from antdrive.worlds._kernels import ROUNDING, Array, kernel, segment_clearance,
 
 
 class ObstacleIndex(NamedTuple):
-    """The obstacles that the controller knows, sorted into the squares of a coarse grid.
+    """The obstacles known to the controller, indexed by the squares of a coarse grid.
 
     Attributes:
         discs: x, y and radius of the discs near each square, square by square (K, 3) [m]
@@ -29,14 +29,14 @@ class ObstacleIndex(NamedTuple):
 
 @kernel
 def index_discs(discs: Array, bounds: Array, side: float, distance: float) -> tuple[Array, Array]:
-    """The discs that come within `distance` of each square, as `discs` and `starts` of an ObstacleIndex."""
+    """Return the discs within `distance` of each square, as `discs` and `starts` of an ObstacleIndex."""
     cols = int((bounds[2] - bounds[0]) / side) + 1
     rows = int((bounds[3] - bounds[1]) / side) + 1
     starts = np.zeros(rows * cols + 1, np.int64)
     found, fill = np.empty((0, 3)), starts
-    for filling in range(2):  # first the discs of each square are counted, then entered where its count says
+    for filling in range(2):  # first count the discs of each square, then fill them in
         for j in range(discs.shape[0]):
-            reach = distance + discs[j, 2] + 0.01 * side  # the squares beyond are farther away, whatever the rounding
+            reach = distance + discs[j, 2] + 0.01 * side  # with slack for rounding
             c_low = max(0, int(math.floor((discs[j, 0] - reach - bounds[0]) / side)))
             c_high = min(cols - 1, int(math.floor((discs[j, 0] + reach - bounds[0]) / side)))
             r_low = max(0, int(math.floor((discs[j, 1] - reach - bounds[1]) / side)))
@@ -62,7 +62,7 @@ def index_discs(discs: Array, bounds: Array, side: float, distance: float) -> tu
 
 @kernel
 def nearby(x: float, y: float, obstacles: ObstacleIndex) -> Array:
-    """The discs (N, 3) that matter near (x, y)."""
+    """Return the indexed discs (N, 3) near (x, y)."""
     bounds, side = obstacles.bounds, obstacles.side
     cols = int((bounds[2] - bounds[0]) / side) + 1
     rows = int((bounds[3] - bounds[1]) / side) + 1
@@ -73,7 +73,7 @@ def nearby(x: float, y: float, obstacles: ObstacleIndex) -> Array:
 
 @kernel
 def clearance_at(x: float, y: float, obstacles: ObstacleIndex) -> float:
-    """Distance from a point to the nearest disc surface or wall."""
+    """Return the distance from a point to the nearest disc surface or wall."""
     return segment_clearance(x, y, x, y, nearby(x, y, obstacles), obstacles.bounds)
 
 
@@ -89,7 +89,7 @@ def arc_clearance(
     discs: Array,
     bounds: Array,
 ) -> float:
-    """Distance from a circular arc to the nearest disc surface or wall.
+    """Return the distance from a circular arc to the nearest disc surface or wall.
 
     The arc leaves (x, y) along `yaw`, turns by `sweep` and ends at (ex, ey).
     """
@@ -123,10 +123,10 @@ def turn_clearance(
     x: float, y: float, yaw: float, turn: float, half_length: float, half_width: float, rounding: float, corners: Array,
     discs: Array, bounds: Array,
 ) -> float:  # fmt: skip
-    """Distance from a rounded rectangle that turns about its centre by `turn` to the nearest disc surface or wall.
+    """Return the distance from a rounded rectangle rotating about its centre by `turn` to the nearest disc or wall.
 
-    Seen from the rectangle, a disc moves on a circle, and is nearest at one of its ends or in line with a corner.
-    Where there are `corners` (K, 2), they are those of the polygon in the rectangle's place.
+    In the rectangle's frame a disc moves on an arc, and is nearest at an end or in line with a corner. `corners` (K, 2), if
+    any, replace the rectangle by a polygon.
     """
     if corners.shape[0] > 0:
         return polygon_turn_clearance(x, y, yaw, turn, corners, discs, bounds) - rounding
@@ -161,7 +161,7 @@ def turn_clearance(
 def polygon_turn_clearance(
     x: float, y: float, yaw: float, turn: float, corners: Array, discs: Array, bounds: Array
 ) -> float:
-    """The same for a convex polygon (K, 2) around (x, y), in the frame that is turned by `yaw`."""
+    """Return the same for a convex polygon (K, 2) around (x, y), in the frame rotated by `yaw`."""
     best = math.inf
     for j in range(discs.shape[0]):
         dx, dy = discs[j, 0] - x, discs[j, 1] - y
@@ -171,7 +171,7 @@ def polygon_turn_clearance(
         for k in range(corners.shape[0]):
             if on_arc(math.atan2(corners[k, 1], corners[k, 0]), angle, -turn):
                 best = min(best, away - math.hypot(corners[k, 0], corners[k, 1]) - discs[j, 2])
-    for end in (yaw + 0.0, yaw + turn):  # of one type, also where the yaw is an integer
+    for end in (yaw + 0.0, yaw + turn):  # always float, even for an integer yaw
         best = min(best, polygon_wall_distance(x, y, math.cos(end), math.sin(end), corners, bounds))
     for q in range(4):  # the walls, by the direction in which they are
         room = abs(bounds[q] - (x if q % 2 == 0 else y))
@@ -184,7 +184,7 @@ def polygon_turn_clearance(
 
 @kernel
 def on_arc(angle: float, first: float, sweep: float) -> bool:
-    """Whether an angle lies on the arc that starts at `first` and turns by `sweep`."""
+    """Return whether an angle lies on the arc from `first` by `sweep`."""
     turn = (angle - first) % (2.0 * math.pi)
     if sweep < 0:
         turn = (2.0 * math.pi - turn) % (2.0 * math.pi)

@@ -1,4 +1,4 @@
-"""Compiled queries about the tracked path: the nearest point, the carrot, clear lookaheads, braking."""
+"""Compiled path queries: nearest point, carrot, clear lookaheads, braking."""
 
 from __future__ import annotations
 
@@ -20,15 +20,14 @@ from antdrive.worlds._kernels import (
 
 
 class PathSamples(NamedTuple):
-    """The route, and what holds at samples along it, which are a constant spacing apart.
+    """A route and quantities at samples along it, at constant spacing.
 
     Attributes:
         xy: the route's points (N, 2) [m]
         arc: length along the route at each point (N,) [m]
         lookahead: the longest lookahead with a clear line to the carrot (S,) [m]
         speed: the speed limit (S,) [m/s]
-        curvature: the route's curvature (S,) [1/m], NaN for a route with corners, which only the carrot
-            rounds
+        curvature: the route's curvature (S,) [1/m], NaN for a route with corners
         heading: the route's heading (S,) [rad]
     """
 
@@ -42,7 +41,7 @@ class PathSamples(NamedTuple):
 
 @kernel
 def point_at(s: float, k: int, xy: Array, arc: Array) -> tuple[float, float, int]:
-    """The point at arc length s and its segment, from segment k on; the last one extends past the end."""
+    """Return the point at arc length s and its segment, from segment k on; the last one extends past the end."""
     n = xy.shape[0]
     while k < n - 2 and arc[k + 1] < s:
         k += 1
@@ -52,7 +51,7 @@ def point_at(s: float, k: int, xy: Array, arc: Array) -> tuple[float, float, int
 
 @kernel
 def project(x: float, y: float, progress: float, window: float, xy: Array, arc: Array) -> tuple[float, int]:
-    """Arc length and segment of the point nearest to (x, y), between `progress` and `window` beyond it."""
+    """Return arc length and segment of the point nearest to (x, y), between `progress` and `window` beyond it."""
     n = xy.shape[0]
     k = 0
     while k < n - 2 and arc[k + 1] < progress:
@@ -74,13 +73,13 @@ def project(x: float, y: float, progress: float, window: float, xy: Array, arc: 
 
 @kernel
 def carrot_at(x: float, y: float, lookahead: float, s: float, k: int, xy: Array, arc: Array) -> tuple[float, float]:
-    """The first route point beyond arc length s at distance `lookahead` from the robot at (x, y).
+    """Return the first route point beyond arc length s at distance `lookahead` from the robot at (x, y).
 
-    Past the route's end it lies on the extension of the last segment.
+    Past the route's end it is on the extension of the last segment.
     """
     n = xy.shape[0]
     ax, ay, k = point_at(s, k, xy, arc)
-    if math.hypot(ax - x, ay - y) >= lookahead:  # too far from the route: go straight back to it
+    if math.hypot(ax - x, ay - y) >= lookahead:  # too far from the route: return straight to it
         return ax, ay
     while True:
         bx, by = xy[k + 1, 0], xy[k + 1, 1]
@@ -98,7 +97,7 @@ def carrot_at(x: float, y: float, lookahead: float, s: float, k: int, xy: Array,
 
 @kernel
 def clearance_below(most: float, ax: float, ay: float, bx: float, by: float, discs: Array, bounds: Array) -> float:
-    """The clearance of a segment if it is less than `most`, else a value that is not less."""
+    """Return the clearance of a segment if it is less than `most`, otherwise a value of at least `most`."""
     best = min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds))
     mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay) + ROUNDING
     for j in range(discs.shape[0]):
@@ -111,7 +110,7 @@ def clearance_below(most: float, ax: float, ay: float, bx: float, by: float, dis
 
 @inline
 def within_reach(x: float, y: float, reach: float, discs: Array, out: Array) -> Array:
-    """The discs (N, 3) whose surfaces are within reach of a point, in their order; `out` has room for all."""
+    """Return the discs (N, 3) whose surfaces are within reach of a point, in order; `out` has room for all."""
     count = 0
     for j in range(discs.shape[0]):
         dx, dy, far = discs[j, 0] - x, discs[j, 1] - y, reach + discs[j, 2]
@@ -125,9 +124,9 @@ def within_reach(x: float, y: float, reach: float, discs: Array, out: Array) -> 
 def beside_route(
     ax: float, ay: float, end: float, k: int, distance: float, xy: Array, arc: Array, discs: Array
 ) -> Array:
-    """Those discs, moved to the front, whose surfaces may be within a distance of a line from one place of the route to another.
+    """Return the discs, moved to the front, that may be within a distance of a line between two points of the route.
 
-    The places lie between (ax, ay) on segment k and arc length `end`; the rectangle around them holds all such lines.
+    The points are between (ax, ay) on segment k and arc length `end`; their bounding box contains all such lines.
     """
     bx, by, last = point_at(end, k, xy, arc)
     x_min, x_max, y_min, y_max = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
@@ -148,10 +147,9 @@ def clear_lookaheads(
     xy: Array, arc: Array, obstacles: ObstacleIndex, clearance: float, spacing: float, low: float, high: float,
     out: Array,
 ) -> None:  # fmt: skip
-    """out[i] = the longest lookahead at i * spacing whose straight line to the carrot keeps `clearance`.
+    """Fill out[i] with the longest lookahead at i * spacing whose straight line to the carrot keeps `clearance`.
 
-    At least `low`, at most `high`. Where the route itself comes closer, the line may come as close as the
-    route.
+    At least `low`, at most `high`. Where the route is closer to obstacles, the line may be as close as the route.
     """
     bounds = obstacles.bounds
     step = 0.5 * low
@@ -180,6 +178,6 @@ def clear_lookaheads(
 
 @kernel
 def brake_backwards(limit: Array, spacing: float, deceleration: float) -> None:
-    """Lower each speed until braking reaches the next: v_i^2 <= v_{i+1}^2 + 2 a ds."""
+    """Lower each speed so that braking reaches the next: v_i^2 <= v_{i+1}^2 + 2 a ds."""
     for i in range(limit.shape[0] - 2, -1, -1):
         limit[i] = min(limit[i], math.sqrt(limit[i + 1] * limit[i + 1] + 2.0 * deceleration * spacing))

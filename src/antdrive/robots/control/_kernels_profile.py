@@ -9,7 +9,7 @@ from antdrive.worlds._kernels import Array, inline, kernel
 
 @inline
 def allowed_gain(v2: float, curvature: float, change: float, acceleration: float, yaw_acceleration: float) -> float:
-    """The acceleration a at speed v that also keeps the yaw acceleration, `change v^2 + curvature a`."""
+    """Return the acceleration a at speed v that also keeps the yaw acceleration, `change v^2 + curvature a`."""
     k = abs(curvature)
     if k * acceleration <= 1e-12:
         return acceleration
@@ -21,7 +21,7 @@ def limit_speed(
     curvature: Array, change: Array, max_speed: float, lateral_acceleration: float, yaw_rate: float,
     yaw_acceleration: float, half_track: float, rim_speed: float, out: Array,
 ) -> None:  # fmt: skip
-    """out[i] = the highest speed at curvature[i], which grows by change[i] a metre, at constant speed."""
+    """Fill out[i] with the highest constant speed at curvature[i] with derivative change[i]."""
     for i in range(len(curvature)):
         k, dk = abs(curvature[i]), abs(change[i])
         v = min(max_speed, rim_speed / (1.0 + k * half_track))
@@ -36,7 +36,7 @@ def limit_speed(
 def limit_braking(
     arc: Array, curvature: Array, change: Array, deceleration: float, yaw_acceleration: float, speed: Array
 ) -> None:
-    """Lower each speed until braking reaches the next (backward pass)."""
+    """Lower each speed so that braking reaches the next (backward pass)."""
     for i in range(len(arc) - 2, -1, -1):
         v2 = speed[i + 1] * speed[i + 1]
         a = min(
@@ -50,7 +50,7 @@ def limit_braking(
 def limit_acceleration(
     arc: Array, curvature: Array, change: Array, acceleration: float, yaw_acceleration: float, speed: Array
 ) -> None:
-    """Lower each speed until accelerating from the previous reaches it (forward pass)."""
+    """Lower each speed so that acceleration from the previous reaches it (forward pass)."""
     for i in range(1, len(arc)):
         v2 = speed[i - 1] * speed[i - 1]
         a = min(

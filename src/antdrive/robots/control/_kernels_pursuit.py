@@ -1,4 +1,4 @@
-"""Compiled pure pursuit: the carrot, the speed rules, the robot's limits, the check that it can stop."""
+"""Compiled pure pursuit: carrot, speed rules, the robot's limits, and the stopping check."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from antdrive.worlds._kernels import Array, kernel, segment_clearance
 # The rules that can limit the speed, as indices into pursuit.LIMITERS.
 CRUISE, CURVATURE, ROUTE, YAW_RATE, GOAL, ROTATE, CREEP, BRAKING, DONE, CLEARANCE = range(10)
 
-HARDEST = 1.4  # times its acceleration: how hard a robot may slow down to turn at top speed; certificates allow 1.5
+HARDEST = 1.4  # largest deceleration to turn at top speed, times the limit; certificates allow 1.5
 YAW_RATE_TIME = 0.2  # the yaw rate of a curve must be reachable within this time [s]
-END_LOOKAHEAD = 0.35  # near the goal, the lookahead is at most this share of the remaining route
-TURN_CLEARANCE = 0.005  # a rectangle that turns on the spot keeps this, or nearly what it has [m]
-START_TOLERANCE = 5e-4  # an arc may come this much closer to obstacles than the robot is now [m]
+END_LOOKAHEAD = 0.35  # near the goal, the lookahead is at most this fraction of the remaining route
+TURN_CLEARANCE = 0.005  # least clearance of a rotation in place, or almost the current one [m]
+START_TOLERANCE = 5e-4  # arcs may be this much closer to obstacles than the robot is [m]
 
 
 class MotionLimits(NamedTuple):
-    """What the robot's drive can do.
+    """Limits of the robot's drive.
 
     Attributes:
         speed: forward speed [m/s]
@@ -42,31 +42,30 @@ class MotionLimits(NamedTuple):
 
 
 class PursuitTuning(NamedTuple):
-    """The controller's settings as they apply to one robot on one route.
+    """The controller's settings for one robot on one route.
 
     Attributes:
         period: control period [s]
         spacing: distance between the path's samples [m]
-        lookahead_clearance: what the arc to the carrot keeps between the robot's centre and obstacles [m]
-        stopping_clearance: what the arc on which the robot can stop keeps between its centre and obstacles
-            [m]
+        lookahead_clearance: of the robot's centre on the arc to the carrot [m]
+        stopping_clearance: of the robot's centre on the stopping arc [m]
         robot_radius: circumscribed radius of the robot [m]
-        half_length: of the footprint, without its rounding; 0 if no turn on the spot is to be checked [m]
+        half_length: of the footprint, without its rounding; 0 to skip checks of rotations in place [m]
         half_width: the same across [m]
         rounding: radius of the footprint's corners [m]
-        corners: of a footprint that is a polygon (K, 2) [m]; none if it is not, or no turn is to be checked
-        lookahead_time: the lookahead is the speed times this [s]
+        corners: of a polygonal footprint (K, 2) [m]; none for other footprints or to skip checks of rotations in place
+        lookahead_time: lookahead divided by speed [s]
         lookahead_min: shortest lookahead [m]
         lookahead_max: longest lookahead [m]
-        preferred_lookahead_min: shortest lookahead where there is room for a longer one [m]
-        rotate_above: bearing of the carrot above which a driving robot rotates in place [rad]
-        rotate_above_at_rest: the same for a robot that stands [rad]
-        rotate_until: bearing at which rotating in place ends [rad]
-        braking: share of the deceleration that planned braking uses
+        preferred_lookahead_min: shortest lookahead if it is clear [m]
+        rotate_above: bearing of the carrot above which a moving robot rotates in place [rad]
+        rotate_above_at_rest: the same for a robot at rest [rad]
+        rotate_until: bearing below which the rotation ends [rad]
+        braking: fraction of the deceleration for planned braking
         creep_speed: slowest forward speed [m/s]
-        goal_distance: the robot stops when this much of the route remains [m]
-        min_speed_near_obstacles: speed allowed without any clearance [m/s]
-        clearance_time: clearance divided by this is the speed allowed in addition [s]
+        goal_distance: remaining route length at which the robot stops [m]
+        min_speed_near_obstacles: speed limit at zero clearance [m/s]
+        clearance_time: clearance divided by this is added to that limit [s]
     """
 
     period: float
@@ -96,7 +95,7 @@ class Carrot(NamedTuple):
     """The route point that the robot steers for, relative to the robot.
 
     Attributes:
-        lookahead: lookahead distance that found it [m]
+        lookahead: its lookahead distance [m]
         left: its offset to the left of the robot's heading [m]
         distance: its distance [m]
         bearing: its direction relative to the heading [rad]
@@ -112,16 +111,16 @@ class Carrot(NamedTuple):
 
 @kernel
 def clip(value: float, low: float, high: float) -> float:
-    """The value, moved into [low, high]."""
+    """Return the value clipped to [low, high]."""
     return min(max(value, low), high)
 
 
 @kernel
 def keep_wheels_within(v: float, w: float, last: float, period: float, limits: MotionLimits) -> tuple[float, float]:
-    """Speed and yaw rate, scaled together so that no wheel's rim is faster than it may be.
+    """Scale speed and yaw rate together to keep both wheels within their speed limit.
 
-    Where that would be too hard a braking from the speed `last`, the turn gives way: a robot whose top speed is that of its
-    wheels cannot both turn in and keep to its acceleration.
+    If that brakes too hard from the speed `last`, the yaw rate is reduced instead: a robot at its wheels' top speed cannot
+    both turn in and keep its deceleration limit.
     """
     rim = abs(v) + abs(w) * limits.half_track
     if rim > limits.rim_speed:
@@ -134,7 +133,7 @@ def keep_wheels_within(v: float, w: float, last: float, period: float, limits: M
 
 @kernel
 def reachable_yaw_rate(wanted: float, w: float, period: float, limits: MotionLimits) -> float:
-    """The yaw rate closest to the wanted one that can be reached from `w` within a period."""
+    """Return the yaw rate closest to the wanted one that is reachable from `w` within a period."""
     change = limits.yaw_acceleration * period
     return clip(wanted, max(w - change, -limits.yaw_rate), min(w + change, limits.yaw_rate))
 
@@ -143,7 +142,7 @@ def reachable_yaw_rate(wanted: float, w: float, period: float, limits: MotionLim
 def reachable_twist(
     speed: float, yaw_rate: float, v: float, w: float, period: float, limits: MotionLimits
 ) -> tuple[float, float]:
-    """The speed and yaw rate closest to the wanted ones that can be reached from (v, w) within a period."""
+    """Return the speed and yaw rate closest to the wanted ones that are reachable from (v, w) within a period."""
     change = limits.acceleration * period
     new_v = clip(speed, v - change, v + change)
     new_w = reachable_yaw_rate(yaw_rate, w, period, limits)
@@ -152,7 +151,7 @@ def reachable_twist(
 
 @kernel
 def slow_for_curvature(curvature: float, lateral_acceleration: float, yaw_rate: float) -> float:
-    """The speed at which a curve needs no more than the given lateral acceleration and yaw rate.
+    """Return the highest speed in a curve for the given lateral acceleration and yaw rate.
 
     v^2 |k| <= a and v |k| <= w.
     """
@@ -164,7 +163,7 @@ def slow_for_curvature(curvature: float, lateral_acceleration: float, yaw_rate: 
 
 @kernel
 def slow_for_yaw_rate(curvature: float, yaw_rate: float, yaw_acceleration: float, time: float) -> float:
-    """The speed at which the yaw rate of a curve can be reached within `time` from the present one.
+    """Return the highest speed at which a curve's yaw rate is reachable within `time` from the current one.
 
     v |k| <= w + a t, with the yaw rate w counted in the direction of the curve.
     """
@@ -177,7 +176,7 @@ def slow_for_yaw_rate(curvature: float, yaw_rate: float, yaw_acceleration: float
 
 @kernel
 def slow_for_clearance(clearance: float, min_speed: float, time: float) -> float:
-    """The speed allowed near obstacles: `min_speed` without clearance, and clearance / time more with it.
+    """Return the speed limit near obstacles: `min_speed` plus clearance / time.
 
     After the proximity heuristic of S. Macenski et al., Regulated pure pursuit for robot path tracking,
     Autonomous Robots 47, 2023, with the clearance in place of the costmap's cost.
@@ -187,7 +186,7 @@ def slow_for_clearance(clearance: float, min_speed: float, time: float) -> float
 
 @kernel
 def brake_for_goal(remaining: float, deceleration: float) -> float:
-    """The speed from which the robot can still stop in `remaining` metres: v^2 = 2 a d."""
+    """Return the speed from which the robot can stop in `remaining` metres: v^2 = 2 a d."""
     return math.sqrt(2.0 * deceleration * max(remaining, 0.0))
 
 
@@ -203,7 +202,7 @@ def stopping_clearance(
     discs: Array,
     bounds: Array,
 ) -> float:
-    """The clearance of the arc that the robot still drives if it brakes after one more period.
+    """Return the clearance of the stopping arc: one more period, then braking.
 
     A velocity is admissible if the robot can stop before the next obstacle on its arc (D. Fox, W. Burgard and
     S. Thrun, The dynamic window approach to collision avoidance, IEEE Robotics & Automation Magazine 4, 1997).
@@ -220,10 +219,10 @@ def find_carrot(
     x: float, y: float, yaw: float, v: float, s: float, k: int, clearance: float, longest: float,
     discs: Array, bounds: Array, path: PathSamples, tuning: PursuitTuning,
 ) -> Carrot:  # fmt: skip
-    """The carrot at the longest lookahead, at most `longest`, whose arc keeps `clearance`.
+    """Return the carrot at the longest lookahead, at most `longest`, whose arc keeps `clearance`.
 
-    The lookahead shrinks until the arc is clear, so corners are cut only where there is room. If no arc is
-    clear, the carrot is that of the shortest lookahead.
+    The lookahead shrinks until the arc is clear, so corners are cut only where there is room. If no arc is clear, the
+    carrot is that of the shortest lookahead.
     """
     shortest = tuning.lookahead_min
     look = clip(max(tuning.lookahead_time * v, tuning.preferred_lookahead_min), shortest, longest)
@@ -245,7 +244,7 @@ def find_carrot(
 
 @kernel
 def should_rotate(rotating: bool, v: float, carrot: Carrot, tuning: PursuitTuning) -> bool:
-    """Whether to rotate in place: with hysteresis, and sooner where no arc is clear or the robot stands."""
+    """Return whether to rotate in place: with hysteresis, and sooner if no arc is clear or the robot is at rest."""
     limit = tuning.rotate_above if v > tuning.creep_speed else tuning.rotate_above_at_rest
     if rotating:
         limit = tuning.rotate_until
@@ -258,11 +257,11 @@ def should_rotate(rotating: bool, v: float, carrot: Carrot, tuning: PursuitTunin
 def curvature_to_drive(
     v: float, s: float, k: int, i: int, j: int, carrot: Carrot, path: PathSamples, tuning: PursuitTuning
 ) -> float:
-    """The curvature of the arc to the carrot (Coulter 1992), corrected where the route's own is known.
+    """Return the curvature of the arc to the carrot (Coulter 1992), corrected if the route's curvature is known.
 
-    The arc to a carrot on a bend cuts the bend. So the route's own curvature is driven, one period ahead, and
-    the carrot contributes only what is due to the robot being off the route: the difference between its arc
-    and the arc to the same carrot from the route itself.
+    The arc to a carrot on a bend cuts the bend. So the command follows the route's curvature, one period ahead, and the
+    carrot corrects only the cross-track error: the difference between its arc and the arc to the same carrot from the
+    route.
     """
     curvature = 2.0 * carrot.left / (carrot.distance * carrot.distance)
     if math.isnan(path.curvature[i]):
@@ -284,7 +283,7 @@ def speed_limit(
     w: float, curvature: float, route_speed: float, clearance: float, remaining: float, clear: bool,
     limits: MotionLimits, tuning: PursuitTuning,
 ) -> tuple[float, int]:  # fmt: skip
-    """The lowest speed that a rule allows, and which rule that is."""
+    """Return the lowest speed limit of all rules, and its rule."""
     target, limiter = limits.speed, CRUISE
     bound = slow_for_curvature(curvature, limits.lateral_acceleration, limits.yaw_rate)
     if bound < target:
@@ -309,11 +308,11 @@ def speed_limit(
 def clear_turn(
     x: float, y: float, yaw: float, bearing: float, distance: float, discs: Array, bounds: Array, tuning: PursuitTuning
 ) -> float:
-    """By how much to turn on the spot towards a bearing; 0 where the footprint would touch something either way round.
+    """Return the angle to rotate in place towards a bearing; 0 if the footprint has contact in both directions.
 
-    `distance` is that from the centre to the nearest obstacle: one that is farther than the circumscribed radius is in no
-    turn's way, and one that is nearer is in the way of a centred rectangle's longer turn, too, which leads two corners past
-    it. A polygon with one far corner may still get by the longer way round.
+    `distance` is from the centre to the nearest obstacle. An obstacle beyond the circumscribed radius blocks no turn. A
+    nearer one also blocks a centred rectangle's longer turn, which leads two corners past it; a polygon with one far corner
+    may still pass it.
     """
     hx, hy, rounding, corners = tuning.half_length, tuning.half_width, tuning.rounding, tuning.corners
     if distance > tuning.robot_radius or (hx == 0.0 and hy == 0.0 and corners.shape[0] == 0):
@@ -334,11 +333,10 @@ def speed_off_route(
     route_speed: float, x: float, y: float, s: float, k: int, path: PathSamples, limits: MotionLimits,
     tuning: PursuitTuning,
 ) -> float:  # fmt: skip
-    """The route's speed limit for a robot at (x, y) whose nearest point of the route, at arc length s, is far away.
+    """Return the route's speed limit for a robot at (x, y) off the route, whose nearest point is at arc length s.
 
-    The limit holds on the route, and the robot can brake on its way there; without this, a robot that avoided something
-    beside a sharp corner, where the limit is 0, would creep all the way back. Within the shortest lookahead the robot
-    counts as on the route.
+    The limit holds on the route, and the robot can brake on its path there. Otherwise a robot that left the route at a sharp
+    corner, where the limit is 0, would creep back. Within the shortest lookahead the robot counts as on the route.
     """
     px, py, _ = point_at(s, k, path.xy, path.arc)
     spare = math.hypot(px - x, py - y) - tuning.lookahead_min
@@ -349,10 +347,10 @@ def speed_off_route(
 
 @kernel
 def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLimits, tuning: PursuitTuning) -> float:
-    """The yaw rate of a robot that is to rotate in place.
+    """Return the yaw rate for a rotation in place.
 
-    It brakes on its present curve first and rotates once it (nearly) stands, so that the footprint stays
-    where it was checked. The yaw rate falls to 0 together with the bearing.
+    The robot first brakes on its current curve and rotates once it is almost at rest, so that the footprint stays where it
+    was checked. The yaw rate falls to 0 together with the bearing.
     """
     if abs(new_v) < tuning.creep_speed:
         return math.copysign(min(limits.yaw_rate, math.sqrt(limits.yaw_acceleration * abs(bearing))), bearing)
@@ -364,11 +362,11 @@ def full_braking(
     x: float, y: float, yaw: float, v: float, w: float, curvature: float, required: float,
     discs: Array, bounds: Array, limits: MotionLimits, tuning: PursuitTuning,
 ) -> tuple[float, float]:  # fmt: skip
-    """Speed and yaw rate of a robot that brakes as hard as it can: on its present curve as long as that is clear.
+    """Return speed and yaw rate of full braking, on the current curve as long as it is clear.
 
-    The last command passed the check of the arc on which the robot can stop, so its curve is clear if the robot
-    drives as commanded. Where slip or a corrected estimate has brought that arc closer to obstacles than `required`,
-    the robot steers towards `curvature` while it brakes, if it then stops farther from them.
+    The last command passed the check of its stopping arc, so its curve is clear if the robot drives as commanded. If slip or
+    a corrected estimate has moved that arc closer to obstacles than `required`, the robot steers towards `curvature` while
+    braking, if it then stops farther from them.
     """
     period, deceleration = tuning.period, limits.acceleration
     new_v = max(v - deceleration * period, 0.0)
@@ -389,7 +387,7 @@ def pursue(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, rotating: bool,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
 ) -> tuple[float, float, float, bool, int]:  # fmt: skip
-    """One control period: the next speed and yaw rate, the progress, whether to rotate, the limiter."""
+    """Compute one control period: next speed and yaw rate, progress, whether to rotate, and the limiter."""
     bounds, period = obstacles.bounds, tuning.period
     discs = nearby(x, y, obstacles)
     s, k = project(x, y, progress, tuning.lookahead_max, path.xy, path.arc)
@@ -399,7 +397,7 @@ def pursue(
 
     distance = segment_clearance(x, y, x, y, discs, bounds)
     clearance = min(tuning.lookahead_clearance, distance - START_TOLERANCE)
-    # Near the end a shorter lookahead makes the robot stop at the route's end and not beside it.
+    # Near the end a shorter lookahead makes the robot stop at the route's end, not beside it.
     near_end = max(END_LOOKAHEAD * remaining, tuning.lookahead_min)
     longest = min(min(path.lookahead[i], path.lookahead[j]), near_end)
     carrot = find_carrot(x, y, yaw, v, s, k, clearance, longest, discs, bounds, path, tuning)
@@ -427,7 +425,7 @@ def pursue(
     new_w = reachable_yaw_rate(wanted, w, period, limits)
     new_v, new_w = keep_wheels_within(new_v, new_w, v, period, limits)
 
-    # Whatever the rules above allow, the arc on which the robot can still stop must be clear.
+    # Overrides the rules above: the stopping arc must be clear.
     required = min(tuning.stopping_clearance, clearance)
     if (
         new_v > tuning.creep_speed

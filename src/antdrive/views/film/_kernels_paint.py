@@ -1,7 +1,7 @@
 """Compiled painting on the ground plane and blending of rendered crops: arrays in, arrays out, no validation.
 
-`inv` (3, 3) takes pixels to the ground, `fwd` (3, 3) the ground to pixels. Edges are anti-aliased by the exact
-distance to them, divided by the extent of one pixel across the edge.
+`inv` (3, 3) maps pixels to the ground, `fwd` (3, 3) the ground to pixels. Edges are anti-aliased by the exact distance
+to them, divided by the extent of one pixel across the edge.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Array = Any
 
 @inline
 def _ramp(value: float) -> float:
-    """0 below 0, 1 above 1, smooth in between."""
+    """Return a smooth step: 0 below 0, 1 above 1."""
     t = min(1.0, max(0.0, value))
     return t * t * (3.0 - 2.0 * t)
 
@@ -27,9 +27,9 @@ def _ramp(value: float) -> float:
 def pixel_box(
     fwd: Array, inv: Array, x0: float, y0: float, x1: float, y1: float, width: int, height: int
 ) -> tuple[int, int, int, int]:
-    """The pixels x0, y0, x1, y1 that a ground rectangle may cover; empty when it lies behind the camera."""
+    """Return the pixel bounds x0, y0, x1, y1 of a ground rectangle; empty behind the camera."""
     left, top, right, bottom = 1e30, 1e30, -1e30, -1e30
-    # Edges are cut where they are nearer than any ground in the picture: close to the camera, boxes would be huge.
+    # Edges nearer than any visible ground are cut: close to the camera, boxes would be huge.
     left_edge = max(inv[2, 2], inv[2, 1] * height + inv[2, 2])
     near = 0.5 / max(left_edge, left_edge + inv[2, 0] * width)
     for i in range(4):
@@ -62,7 +62,7 @@ def pixel_box(
 
 @inline
 def _at(inv: Array, px: float, py: float) -> tuple[float, float, float]:
-    """The ground point under a pixel's centre, and the homogeneous scale there."""
+    """Return the ground point at a pixel's centre and its homogeneous scale."""
     w = inv[2, 0] * px + inv[2, 1] * py + inv[2, 2]
     return (
         (inv[0, 0] * px + inv[0, 1] * py + inv[0, 2]) / w,
@@ -73,7 +73,7 @@ def _at(inv: Array, px: float, py: float) -> tuple[float, float, float]:
 
 @inline
 def _span(inv: Array, x: float, y: float, w: float, nx: float, ny: float) -> float:
-    """The extent of one pixel on the ground along the unit vector n [m]."""
+    """Return the extent of one pixel on the ground along the unit vector n [m]."""
     across = nx * (inv[0, 0] - x * inv[2, 0]) + ny * (inv[1, 0] - y * inv[2, 0])
     down = nx * (inv[0, 1] - x * inv[2, 1]) + ny * (inv[1, 1] - y * inv[2, 1])
     return math.sqrt(across * across + down * down) / abs(w) + 1e-12
@@ -92,7 +92,7 @@ def lay_floor(
 ) -> None:
     """Paint the floor (H, W, 3) where `ground` is true, and set `inside` to the ground within the bounds.
 
-    `colours` (3, 3) are those inside, outside and of grid lines, which are `weight` pixels wide.
+    `colours` (3, 3): inside, outside and grid lines, which are `weight` pixels wide.
     """
     height, width = rgb.shape[0], rgb.shape[1]
     for row in range(height):
@@ -177,7 +177,7 @@ def cover_capsules(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
 
 @kernel
 def capsule_cover(inv: Array, row: int, col: int, ax: float, ay: float, bx: float, by: float, half: float) -> float:
-    """The fraction of a pixel that a capsule covers."""
+    """Return the fraction of a pixel that a capsule covers."""
     x, y, w = _at(inv, col + 0.5, row + 0.5)
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
@@ -226,7 +226,7 @@ def blend_cover(rgb: Array, cover: Array, ground: Array, colour: Array, strength
 
 @kernel
 def multiply(rgb: Array, shade: Array) -> None:
-    """Darken `rgb` (H, W, 3) by `shade` (H, W), blue less than red, as outdoor shadows are a little blue."""
+    """Darken `rgb` (H, W, 3) by `shade` (H, W), blue less than red: outdoor shadows are slightly blue."""
     for row in range(rgb.shape[0]):
         for col in range(rgb.shape[1]):
             lit = shade[row, col]
@@ -252,7 +252,7 @@ def count_ground(seg: Array, factor: int, visible: Array, ground: Array) -> None
 
 @kernel
 def resolve(rgb: Array, image: Array, seg: Array, factor: int, visible: Array, out: Array) -> None:
-    """Join the painted ground (H, W, 3) and the bodies, rendered `factor` times as fine, to a picture `out`."""
+    """Combine the painted ground (H, W, 3) and the bodies, rendered `factor` times as fine, into `out`."""
     count = factor * factor
     for row in range(out.shape[0]):
         for col in range(out.shape[1]):
@@ -363,7 +363,7 @@ def shade_body(
     cx, cy, yaw = pose[0], pose[1], pose[2]
     cosine, sine = math.cos(yaw), math.sin(yaw)
     places = 5 if sun[0] != 0.0 or sun[1] != 0.0 else 1  # along the shadow
-    unlit2 = (shape[2] + 0.5 * soft) ** 2 * (1.0 + 1e-9)  # the squared distance from which nothing is darkened
+    unlit2 = (shape[2] + 0.5 * soft) ** 2 * (1.0 + 1e-9)  # squared distance of the shadow's end
     reach = math.hypot(shape[0], shape[1]) + shape[2] + soft
     left, top, right, bottom = pixel_box(
         fwd,

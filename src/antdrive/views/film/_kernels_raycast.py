@@ -1,7 +1,7 @@
-"""Compiled ray casting of standing bodies, for moving cameras: arrays in, arrays out, nothing validated.
+"""Compiled ray casting of static bodies: arrays in, arrays out, no validation.
 
-`rays` (3, 3) takes a pixel (x, y, 1) to the direction seen there, one metre deep: the distance of a hit along that
-direction is its depth. Light is computed as PyBullet's TinyRenderer does it.
+`rays` (3, 3) maps a pixel (x, y, 1) to its direction, one metre deep: the distance of a hit along that direction is its
+depth. Light follows PyBullet's TinyRenderer.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ def cast_cylinders(
     colours: Array,
     first: int,
 ) -> None:
-    """Draw cylinders (N, 4) x, y, radius, height that stand on the ground, each within its span of pixels.
+    """Draw cylinders (N, 4) x, y, radius, height on the ground, each within its span of pixels.
 
     `spans` (N, 4) are x0, y0, x1, y1. `image` (h, w, 4), `depth` and `seg` (h, w) have `fine` times as many rows and
     columns as the spans' pixels. `scale` holds the offset and the factor from 1 / depth to the projection's depth, then
-    the ambient and the diffuse light. Bodies are numbered from `first`.
+    the ambient and the diffuse light. The first body has the index `first`.
     """
     for n in range(cylinders.shape[0]):
         cx, cy, radius, tall = cylinders[n, 0], cylinders[n, 1], cylinders[n, 2], cylinders[n, 3]

@@ -1,7 +1,7 @@
-"""Compiled drawing of small meshes as PyBullet's TinyRenderer draws them, at a tenth of its cost: arrays in, arrays out.
+"""Compiled rasterisation of small meshes, equal to PyBullet's TinyRenderer at a tenth of its cost: arrays in, arrays out.
 
-A sample is where TinyRenderer takes it: at the lower left corner of its place in the picture. Depth and light follow the
-same formulas, so pictures agree apart from rounding.
+Samples are at lower left corners, as in TinyRenderer. Depth and light follow its formulas, so pictures agree up to
+rounding.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from antdrive.worlds._kernels import kernel
 
 Array = Any
 
-NEAREST = 1e-3  # parts of a mesh that are not this far ahead of the camera are cut off [m]
-EDGE = 1e-9  # weights that are negative by less count as 0, so that no sample falls between two triangles
+NEAREST = 1e-3  # near plane of the camera [m]
+EDGE = 1e-9  # tolerance of negative weights, so that no sample falls between two triangles
 
 
 @kernel
@@ -35,11 +35,11 @@ def draw_mesh(
 ) -> None:
     """Draw the outside of a mesh into `image` (h, w, 3) and `depth` (h, w) where it is nearest, and set `seg` to 0 there.
 
-    `place` (3, 4) turns and moves the mesh. `lens` (3, 4) takes the world to samples: column and row, both times the
+    `place` (3, 4) turns and moves the mesh. `lens` (3, 4) maps the world to samples: column and row, both times the
     distance ahead, and the distance ahead. `scale` holds the offset and the factor from 1 / distance to depth, then the
     ambient and the diffuse light.
     """
-    corners = np.empty((vertices.shape[0], 6))  # as `lens` gives them, and the normal
+    corners = np.empty((vertices.shape[0], 6))  # projected by `lens`, then the normal
     for i in range(vertices.shape[0]):
         point = (vertices[i, 0], vertices[i, 1], vertices[i, 2])
         out = (normals[i, 0], normals[i, 1], normals[i, 2])
@@ -70,7 +70,7 @@ def draw_mesh(
 def _fill(
     image: Array, depth: Array, seg: Array, scale: Array, light: Array, a: Array, b: Array, c: Array, colour: Array
 ) -> None:
-    """Draw one triangle, unless it is seen from inside."""
+    """Draw one triangle unless its inside faces the camera."""
     ax, ay, aw = a[0] / a[2], a[1] / a[2], 1.0 / a[2]
     bx, by, bw = b[0] / b[2], b[1] / b[2], 1.0 / b[2]
     cx, cy, cw = c[0] / c[2], c[1] / c[2], 1.0 / c[2]

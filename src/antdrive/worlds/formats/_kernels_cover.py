@@ -1,7 +1,7 @@
-"""Compiled work on maps of cells: which cells can be reached, and which discs cover the blocked ones.
+"""Compiled map operations: flood fill, distance transform and disc cover.
 
-Lengths are in half cells: the corners, edge middles and centres of cells are then points (i, j) of a lattice of whole
-numbers, cell (r, c) spans 2r..2r+2 by 2c..2c+2, and every distance from such a point to a cell is the root of a whole number.
+Lengths are in half cells: corners, edge midpoints and centres of cells are points (i, j) of an integer lattice, cell (r, c)
+spans 2r..2r+2 by 2c..2c+2, and squared distances from lattice points to cells are integers.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ DCOL4 = np.array([1, 0, -1, 0], dtype=np.int64)
 
 @kernel
 def flood(free: Array, row: int, col: int, reached: Array) -> None:
-    """Mark in `reached` the free cells that steps over shared sides join to a cell."""
+    """Mark in `reached` the free cells 4-connected to a cell."""
     rows, cols = free.shape
     if not free[row, col] or reached[row, col]:
         return
@@ -38,10 +38,10 @@ def flood(free: Array, row: int, col: int, reached: Array) -> None:
 
 @kernel
 def squared_distances(free: Array, cap: int, out: Array) -> None:
-    """out[i, j] = squared distance from a lattice point to the nearest free cell, at most cap squared.
+    """Fill out[i, j] with the squared distance from a lattice point to the nearest free cell, at most cap squared.
 
-    The point of a cell nearest to a lattice point is itself a lattice point, so whole numbers are exact. Distances are
-    found along columns first, then along rows.
+    The point of a cell nearest to a lattice point is itself a lattice point, so integers are exact. Distances are computed
+    along columns first, then along rows.
     """
     height, width = out.shape
     column = np.full((height, width), cap, dtype=np.int32)
@@ -70,7 +70,7 @@ def squared_distances(free: Array, cap: int, out: Array) -> None:
 
 @kernel
 def span(low: int, centre_i: int, centre_j: int, reach2: float, cols: int) -> tuple[int, int]:
-    """The columns of the cells in one row that lie fully in a disc: the first, and the one after the last.
+    """Return the half-open range of columns in a row whose cells lie fully in a disc.
 
     The row spans `low` to `low` + 2; the disc has the centre (`centre_i`, `centre_j`) and the squared radius `reach2`.
     """
@@ -86,11 +86,11 @@ def span(low: int, centre_i: int, centre_j: int, reach2: float, cols: int) -> tu
 
 @kernel
 def greedy_cover(needed: Array, distance2: Array, extra: float, chosen: Array) -> int:
-    """Choose discs until each needed cell lies fully in one of them, and return how many.
+    """Choose discs until each needed cell lies fully in one of them, and return their number.
 
-    Candidates are centred on lattice points and reach `extra` beyond the nearest free cell. In each step the candidate
-    with most of the cells not yet covered is chosen (Chvátal, *A greedy heuristic for the set-covering problem*, 1979)
-    and shrunk to those cells. A row of `chosen` is the centre i, j, the squared radius and the centre's squared
+    Candidates are centred on lattice points and reach `extra` beyond the nearest free cell. Each step chooses the candidate
+    with the most uncovered cells (Chvátal, *A greedy heuristic for the set-covering problem*, 1979)
+    and shrinks it to those cells. A row of `chosen` is the centre i, j, the squared radius and the centre's squared
     distance to free cells.
     """
     rows, cols = needed.shape
@@ -120,7 +120,7 @@ def greedy_cover(needed: Array, distance2: Array, extra: float, chosen: Array) -
                 for r in range(max(0, int((i - reach) / 2)), min(rows, int((i + reach) / 2) + 1)):
                     first, last = span(2 * r, i, j, reach2, cols)
                     gain[i * width + j] += before[r, last] - before[r, first]
-    # Candidates wait in stacks, one for each number of uncovered cells they held when last counted; it only shrinks.
+    # Candidates are in stacks by their last known number of uncovered cells, which can only decrease.
     best = gain.max() if count else 0
     head, below = np.full(best + 1, -1, dtype=np.int32), np.empty(height * width, dtype=np.int32)
     for candidate in range(height * width - 1, -1, -1):
