@@ -8,7 +8,9 @@ and `BY_HAND` are screenshots of other programs.
 from __future__ import annotations
 
 import argparse
+import functools
 import itertools
+import os
 import shutil
 import subprocess
 import sys
@@ -31,17 +33,21 @@ from antdrive.views.film.video import STILLS, film, still
 from antdrive.views.pages.run_report import write_report
 from antdrive.views.run_folder import caption
 from antdrive.worlds import list_worlds, load_task
+from antdrive.worlds.generators.generate import generated
 from antdrive.worlds.trajectories import Trajectories
-from antdrive.worlds.world import Disc
+from antdrive.worlds.world import Disc, Task
+from tools.pages import Page
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+TUTORIALS = PICTURES.parent / "tutorials"
 SIZE = (1120, 630)  # of most pictures [px]
+SMALL = (640, 360)  # of pictures in tutorials [px]
 FROM_PAPERS = ("hasan-maps.png", "ibraheem2016-history.png", "lee2008-maps.png")
 BY_HAND = ("foxglove.webp",)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
-def drive(world: str, planner: str, **settings: Any) -> Rollout:
+def drive(world: str | Task, planner: str, **settings: Any) -> Rollout:
     """Drive a scenario and return its log."""
     log = run(Scenario.of(world, planner, **settings)).rollout
     assert log is not None
@@ -120,6 +126,14 @@ def comparison(path: Path) -> None:
     saved(picture, path)
 
 
+def campaign(path: Path) -> None:
+    """Render both planners of the tutorial's campaign in its first world."""
+    task = generated("forest", 0, ())
+    planners: list[tuple[str, Mapping[str, Any]]] = [("astar", {}), ("aco-han", {"ants": 20})]
+    logs = [drive(task, name, options=options, smoothing="none") for name, options in planners]
+    saved(SplitScreen(logs, "oblique", SMALL).frame(8.0), path)
+
+
 def report(path: Path) -> None:
     """Take a browser's screenshot of the upper part of a report of six runs."""
     from PIL import Image
@@ -144,10 +158,53 @@ def report(path: Path) -> None:
             picture.convert("RGB").save(path, format="webp", **STILLS[".webp"])
 
 
+@functools.cache
+def lesson(page: str) -> Mapping[str, Rollout]:
+    """Run a tutorial. Return its logs by folder."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            Page(TUTORIALS / f"{page}.md").run()
+            logs = sorted(Path().rglob("rollout.npz"))
+            return {log.parent.relative_to("out").as_posix(): Rollout.load(log) for log in logs}
+        finally:
+            os.chdir(before)
+
+
+def tutorial(path: Path, page: str, logs: list[str], t: float, camera: str = "oblique") -> None:
+    """Render one log of a tutorial, or two side by side, at a time [s]."""
+    chosen = [lesson(page)[name] for name in logs]
+    if len(chosen) > 1:
+        saved(SplitScreen(chosen, camera, SMALL).frame(t), path)
+    else:
+        still(chosen[0], path, t, camera=camera, size=SMALL)
+
+
+#: Page, logs, time [s] and camera of each picture of a tutorial.
+LESSONS: Mapping[str, tuple[Any, ...]] = MappingProxyType({
+    "first-drive": ("first-drive", ["first"], 9.0),
+    "collision": ("first-drive", ["hit"], 3.9),
+    "two-posts": ("your-own-world", ["two-posts"], 3.5),
+    "long-robot": ("your-own-robot", ["long"], 8.0),
+    "own-planner": ("your-own-planner", ["wave", "straight"], 9.0),
+    "crossing": ("moving-world", ["crossing"], 6.0),
+    "crossing-blind": ("moving-world", ["blind"], 5.4),
+    "crossing-sipp": ("moving-world", ["sipp"], 6.0),
+    "without-a-map": ("without-a-map", ["unknown"], 5.0),
+    "drift": ("without-a-map", ["drift"], 12.0),
+    "why-slow": ("why-slow", ["slow"], 5.0),
+    "corners": ("why-slow", ["corners"], 5.0),
+    "slower": ("regression-test", ["my/slalom-0"], 12.0),
+    "slide": ("film-for-a-talk", ["ants"], 10.0),
+    "side-by-side": ("film-for-a-talk", ["compare-slalom/astar", "compare-slalom/aco-han"], 10.0),
+})  # fmt: skip
+DRAWN = (hero, worlds, robots, plaza, unknown, pheromone, comparison, campaign, report)
 #: Generator of each picture, by file name.
-MADE: Mapping[str, Callable[[Path], None]] = MappingProxyType(
-    {made.__name__: made for made in (hero, worlds, robots, plaza, unknown, pheromone, comparison, report)}
-)
+MADE: Mapping[str, Callable[[Path], None]] = MappingProxyType({
+    **{made.__name__: made for made in DRAWN},
+    **{name: functools.partial(tutorial, page=page, logs=logs, t=t) for name, (page, logs, t) in LESSONS.items()},
+})  # fmt: skip
 
 
 def main(words: list[str]) -> int:
