@@ -296,6 +296,19 @@ def metrics() -> list[str]:
     return table("metric, unit, better, definition", rows)
 
 
+def tolerances() -> list[str]:
+    """Return the default tolerance of every metric that regression tests compare."""
+    from antdrive.sim.log.metrics import METRICS
+
+    rows = []
+    for one in METRICS.values():
+        if one.tolerance is not None:
+            unit = "" if one.unit == "1" else f" {one.unit}"
+            fraction = f" + {100 * one.tolerance.relative:g} %" if one.tolerance.relative else ""
+            rows.append((code(one.name), one.better, f"{one.tolerance.absolute:g}{unit}{fraction}"))
+    return table("metric, better, tolerance", rows)
+
+
 def composition() -> list[str]:
     """Return the parts of drives of each kind, as `compose` chooses them."""
     from antdrive.sim.compose import compose
@@ -333,7 +346,7 @@ GENERATED: dict[str, Callable[..., list[str]]] = {
     "arrays": arrays, "commands": commands, "composition": composition, "controller": controller,
     "exit-codes": exit_codes, "keys": keys,
     "metrics": metrics, "outcomes": outcomes, "planner": planner, "planners": planners, "record": record,
-    "robots": robots, "worlds": worlds,
+    "robots": robots, "tolerances": tolerances, "worlds": worlds,
 }  # fmt: skip
 
 
