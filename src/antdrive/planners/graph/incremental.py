@@ -46,7 +46,7 @@ class Replanner(Protocol):
         ...
 
     def move(self, start: Cell) -> None:
-        """Set the robot's cell; it need not be on the path.
+        """Set the robot's cell `start`, which need not be on the path.
 
         Raises:
             ValueError: the cell lies outside the grid.
@@ -111,7 +111,7 @@ class CachedReplanner(abc.ABC):
         return self._query
 
     def move(self, start: Cell) -> None:
-        """Set the robot's cell; it need not be on the path."""
+        """Set the robot's cell `start`, which need not be on the path."""
         self._query = dataclasses.replace(self._query, start=start)
 
     def block(self, cells: npt.ArrayLike) -> int:
