@@ -71,7 +71,7 @@ class Result(NamedTuple):
         replans: attempts to find a new route
         certified: whether the robot reached the goal and its log proves that nothing was touched
         reason: what the outcome leaves open
-        proved: whether the planner in space and time found a path
+        proved: whether the space-time planner found a path
     """
 
     name: str

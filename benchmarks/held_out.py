@@ -2,7 +2,7 @@
 
 World, planner, robot, noise and smoothing of drive n follow from n and the seed. Planners alternate over every kind of
 world. Each drive is certified, and a second audit (`benchmarks.second_audit`), which shares no code with the certificate,
-recomputes the least clearance.
+recomputes the minimum clearance.
 
 Worlds: forests by han2007's rule; thickets of 20 to 60 thinner cylinders; fields by BARN's cellular automaton; halls with
 columns and 1 to 10 movers. Results are lines of a JSONL file, from which an interrupted run resumes. `--only N` repeats one
@@ -39,7 +39,7 @@ ROOT = Path(__file__).parent.parent
 RESULTS = Path("out/held_out")
 SMALLEST = ("--drives 2 --jobs 1 --margins fixed",)
 STREAM = 0x48454C44  # keeps these worlds apart from those of all other seeds
-SAME = 2e-4  # the certificate's and the second audit's least clearance at the rows agree to this [m]
+SAME = 2e-4  # the certificate's and the second audit's minimum clearance at the rows agree to this [m]
 # The share of worlds of each kind; drives among movers take several times as long.
 KINDS = ("forest", "thicket", "barn", "forest", "thicket", "barn", "forest", "thicket", "barn", "hall")
 SETTINGS = tuple(itertools.product(("turtlebot", "jackal"), (0.0, 1.0), ("none", "taut", "clearance")))
@@ -135,7 +135,7 @@ def contradictions(log: Rollout, world: dict[str, Any], certificate: Certificate
     """Return the second audit's objections to a certificate, one sentence each."""
     if abs(least.rows - certificate.min_clearance) > SAME:
         yield (
-            f"the least clearance at the rows is {certificate.min_clearance:.5f} m in the certificate, "
+            f"the minimum clearance at the rows is {certificate.min_clearance:.5f} m in the certificate, "
             f"{least.rows:.5f} m in the second audit"
         )
     if not certificate.certified:
@@ -196,7 +196,7 @@ def counted(keys: Sequence[str], results: Sequence[dict[str, Any]]) -> Iterator[
             f"{1000 * min((r['second'] for r in good), default=math.nan):.1f} mm",
             f"{1000 * min(apart, default=math.nan):.2f} mm",
         ])  # fmt: skip
-    yield from table([*keys, *COUNTS, "least clearance", "least above the bound"], lines)
+    yield from table([*keys, *COUNTS, "minimum clearance", "least above the bound"], lines)
 
 
 def failures(results: Sequence[dict[str, Any]]) -> Iterator[str]:

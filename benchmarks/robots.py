@@ -99,7 +99,7 @@ def main() -> None:
     if given.values:
         return
     reasons: dict[str, list[str]] = {}
-    heads = "robot | radius m | noise 0 | time s | least clearance m | noise 1 | time s | least clearance m"
+    heads = "robot | radius m | noise 0 | time s | minimum clearance m | noise 1 | time s | minimum clearance m"
     print_table(heads, drive_rows(barn_tasks(given.barn)["world_0"], names, reasons))
     for reason, names in reasons.items():
         print(f"- {' and '.join(names)}: {reason}")

@@ -1,4 +1,4 @@
-"""Independent computation of a drive's least clearance, without code of the certificate.
+"""Independent computation of a drive's minimum clearance, without code of the certificate.
 
 It reads the world's file and the robot's file as plain YAML, not through antdrive, and the log's poses and speeds. The
 footprint becomes a cloud of points: its outline every 5 mm and its inside. Between two rows the pose follows the arc of

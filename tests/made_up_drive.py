@@ -92,7 +92,7 @@ def _made_up_drive(
 
 
 def scanned(drive, **changes):
-    """The drive of a robot without a map and without noise; `changes` are of its lidar."""
+    """The drive of a mapless robot and without noise; `changes` are of its lidar."""
     lidar = drive.record.robot.lidar
     exact = replace(lidar, **{"sigma": 0.0, "resolution": 0.0, "rate": 10.0, **changes})
     rows = np.arange(0, len(drive.t), round(drive.record.physics_hz / exact.rate), dtype=np.int32)

@@ -212,7 +212,9 @@ def worlds() -> list[str]:
         world = load_task(name).world
         size = "\u00a0×\u00a0".join(f"{side:g}" for side in world.size) + "\u00a0m"
         counts = str(len(world.obstacles)), str(len(world.movers))
-        return code(name), _picture("worlds", name), size, *counts, cell(world.source or "")
+        source = (world.source or "").removeprefix("made for antdrive; ").partition("; ")[0]
+        source = re.sub(r"(?<=worlds\.forest)\(.*\)", "", source)
+        return code(name), _picture("worlds", name), size, *counts, cell(source)
 
     return table("world, picture, size, cylinders, movers, source", map(row, list_worlds()))
 
@@ -314,11 +316,11 @@ def composition() -> list[str]:
     from antdrive.sim.scenario import Scenario
 
     kinds: dict[str, tuple[str, str, dict[str, Any]]] = {
-        "mapped, nothing moves": ("forest", "astar", {}),
+        "mapped, no movers": ("forest", "astar", {}),
         "mapped, noise": ("forest", "astar", {"noise": 1.0}),
         "among movers": ("plaza-moving", "astar", {}),
         "movers by lidar": ("plaza-moving", "astar", {"perception": Perception(kind="lidar")}),
-        "planner in space and time": ("plaza-moving", "sipp", {}),
+        "space-time planner": ("plaza-moving", "sipp", {}),
         "cell by cell": ("plaza-moving", "mmas-dstar", {}),
         "mapless": ("forest", "astar", {"robot": "jackal", "map": "none"}),
         "mapless, odometry": ("forest", "astar", {"robot": "jackal", "map": "none", "localisation": "matching"}),
@@ -332,7 +334,7 @@ def composition() -> list[str]:
         rules = ", ".join(code(type(rule).__name__) for rule in parts.rules)
         return kind, *map(_class, (parts.localiser, scan, parts.guide)), rules
 
-    return table("drive, localiser, scans, guide, rules in their order", map(row, kinds))
+    return table("drive, localiser, scans, guide, rules in order", map(row, kinds))
 
 
 def _class(part: object) -> str:

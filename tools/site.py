@@ -29,10 +29,10 @@ WIDE, NARROW, HIGH = 1280, 390, 900  # [px]
 CONTRAST = 3.0  # least contrast of text and background; WCAG requires 4.5 for small and 3 for large text
 #: Searches, each with the page of the first result.
 ASKED = {
-    "replan": "how-to/movers",
+    "replan": "how-to/",
     "campaign": "how-to/campaigns",
     "pure pursuit": "explanation/following",
-    "certificate": "explanation/certificate",
+    "lidar": "explanation/unknown-worlds-sensing",
 }
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 CHECKED = (("light", WIDE), ("dark", NARROW))

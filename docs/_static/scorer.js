@@ -10,7 +10,8 @@ var Scorer = {
   term: 5,
   partialTerm: 2,
   score: ([page, , , , score, , kind]) => {
-    const wordless = kind === "index" || kind === "object" || page.startsWith("reference/api");
-    return score + (wordless ? 0 : KINDS[page.split("/")[0]] || 0);
+    if (kind === "index" || kind === "object") return score / 10;
+    const folder = page.startsWith("reference/api") ? 0 : KINDS[page.split("/")[0]] || 0;
+    return score + folder + (kind === "title" ? 25 : 0);
   },
 };

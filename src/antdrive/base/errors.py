@@ -14,7 +14,7 @@ class Terminated(SystemExit):
 
 
 class FieldError(ValueError):
-    """An invalid value of a record's field or a function's argument. As text: "key: problem".
+    """An invalid value of a record's field or a function's argument. `str()` gives "key: problem".
 
     Attributes:
         key: the field, such as "radius" or "movers[0].walk.start"; empty for the whole value

@@ -45,7 +45,7 @@ class Ends:
         str,
         option(
             "world|map",
-            "Frame of --start and --goal; map: that of the imported map.",
+            "Frame of --start and --goal: world, or map (the frame of the imported map).",
             panel="World",
         ),
     ] = WORLD_FRAME

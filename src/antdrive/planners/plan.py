@@ -28,7 +28,7 @@ Cell: TypeAlias = tuple[int, int]
 #: Cells of a grid, (N, 2): row and column of each.
 Cells: TypeAlias = npt.NDArray[np.int32]
 
-END_BATCH = 16  # candidate lines from an end to free cells checked per batch, shortest first
+END_BATCH = 16  # candidate lines per batch, from an end to free cells, shortest first
 
 
 class PlanStatus(enum.Enum):
@@ -50,7 +50,7 @@ class Query:
         goal: the goal cell (row, col)
         task: the task whose world was rasterised, for any-angle planners
         unreachable: why no free cell connects to the start or the goal; empty if both connect
-        motions: the motions of the movers, for planners in space and time
+        motions: the motions of the movers, for space-time planners
         start_time: departure time on the clock of the motions [s]
 
     Raises:
@@ -81,7 +81,7 @@ class Query:
 
         own, room = point_clearance(task.world, [task.start[:2], task.goal]).tolist()
         start, can_leave = _entrance(grid, task, task.start[:2], math.inf, own)
-        # A goal closer to an obstacle than the inflation: the robot stops at a free cell within the goal tolerance.
+        # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal tolerance.
         # The allowance covers the distance between the stopping point and the cell's centre.
         within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
         goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within, room)
@@ -103,9 +103,9 @@ class Query:
 
 
 def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -> tuple[Cell, bool]:
-    """Return the nearest free cell within `within` [m] that a clear straight line joins to the point, and True.
+    """Return (cell, True) for the nearest free cell within `within` [m] with a clear straight line to the point.
 
-    If there is none, return the cell of the point, and False. `own` is the point's clearance [m].
+    Return (cell of the point, False) if there is none. `own` is the point's clearance [m].
     """
     from antdrive.worlds.geometry import segment_clearance
 
@@ -359,7 +359,7 @@ class GridPlanner(abc.ABC):
         return dataclasses.replace(result, options=options, wall_s=spent)
 
     def for_warmup(self) -> GridPlanner:
-        """Return this planner with minimal work that calls the same kernels, to load them before timing."""
+        """Return a copy that does minimal work with the same kernels, for a warm-up before timing."""
         return self
 
     def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:

@@ -24,7 +24,7 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
     any-angle planners. Planners that need discs or motions have none.
 
     Raises:
-        ValueError: the planner needs more than cells.
+        ValueError: the planner needs discs or motions.
         PlannerError: the planner raised an exception.
     """
     can = capabilities_of(planner)
@@ -92,11 +92,11 @@ class OnlineAgent(Protocol):
 
     @property
     def note(self) -> str:
-        """A remark on what the agent changed to make progress; may be empty."""
+        """A note on the agent's measures to make progress; may be empty."""
         ...
 
     def move(self, cell: Cell) -> None:
-        """Report that the robot is in another cell than the one it chose.
+        """Set the robot's cell, if it is not the one that the agent chose.
 
         Raises:
             ValueError: the cell lies outside the grid.
@@ -125,7 +125,7 @@ def agent_for(planner: Planner, query: Query, rng: np.random.Generator) -> Onlin
     """Return the planner's own agent if it has one, else an agent that follows replanned paths.
 
     Raises:
-        ValueError: the planner needs more than cells.
+        ValueError: the planner needs discs or motions.
         PlannerError: the planner raised an exception.
     """
     if capabilities_of(planner).cell_by_cell:
@@ -154,11 +154,11 @@ class SteppingAgent(abc.ABC):
 
     @property
     def note(self) -> str:
-        """A remark on what the agent changed to make progress; may be empty."""
+        """A note on the agent's measures to make progress; may be empty."""
         return ""
 
     def move(self, cell: Cell) -> None:
-        """Report that the robot is in another cell than the one it chose."""
+        """Set the robot's cell, if it is not the one that the agent chose."""
         self._query = dataclasses.replace(self._query, start=cell)
         self._cell = self._query.start
 

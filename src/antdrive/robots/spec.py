@@ -220,7 +220,7 @@ def require_feasible(spec: RobotSpec) -> None:
     if 2 * spec.wheel_radius > spec.height:
         raise FieldError(
             "wheel_radius",
-            f"wheels of {spec.wheel_radius:g} m are higher than the body of {spec.height:g} m; "
+            f"wheels of {spec.wheel_radius:g} m are taller than the body of {spec.height:g} m; "
             f"the largest radius is {spec.height / 2:.3g} m",
         )
     if spec.lidar is not None:

@@ -16,7 +16,7 @@ COMPARED = {
     "path_length_m": "planned m",
     "driven_length_m": "driven m",
     "duration_s": "s",
-    "min_clearance_m": "least clearance m",
+    "min_clearance_m": "minimum clearance m",
 }
 
 

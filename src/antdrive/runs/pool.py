@@ -1,7 +1,7 @@
 """Pool of worker processes on this machine for many runs.
 
 If a worker dies, only its current run is lost, and that run is tried once more. A worker takes a chunk of runs and
-returns each result at once, so the current run is always known. Workers end when their parent does.
+returns each result as soon as it is ready, so the current run is always known. Workers end when their parent does.
 `antdrive.runs.cluster` is the same pool on a dask cluster.
 """
 
@@ -49,8 +49,8 @@ class Ticket(Generic[Item]):
 class Waiting(Generic[Item]):
     """Queue of runs, by group.
 
-    A process stays with the group of its last run, then takes an untouched one, then helps with the largest. Chunks take
-    about two seconds by the mean time of recent runs, and less near the end.
+    A process stays with the group of its last run, then takes an untouched one, then helps with the largest. Chunks
+    are sized for about two seconds, from the mean time of recent runs, and are shorter near the end.
 
     Attributes:
         processes: number of processes
@@ -122,7 +122,7 @@ class Waiting(Generic[Item]):
 
 
 class WorkerDied(RuntimeError):
-    """A run killed the process that made it."""
+    """A run killed the process that executed it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -378,7 +378,7 @@ def _undisturbed() -> Iterator[None]:
 
 
 def serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
-    """Make the runs received through a pipe until the parent closes it."""
+    """Execute the runs received through a pipe until the parent closes it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # in case it could not be blocked
     with contextlib.suppress(EOFError, OSError):  # the parent closed the pipe, or died
         pipe.send(None)
@@ -405,7 +405,7 @@ def _answer(work: Callable[[Any], Any], item: Any) -> bytes:
 
 
 def _packed(message: Any) -> bytes:
-    """Pickle a message; functions and classes of a script go by value."""
+    """Pickle a message; functions and classes of a script are pickled by value."""
     from joblib.externals.loky.backend.reduction import dumps
 
     return bytes(dumps(message))

@@ -1,12 +1,6 @@
-"""Composition of a scenario's drive: selects parts by map, localisation, perception and replanning.
+"""Composition of a drive. Only this module selects parts by map, localisation, perception and replanning.
 
-| run | localiser | scans | guide | others | rules, in order |
-|---|---|---|---|---|---|
-| given map, nothing moves | Exact, Fixes, TruePose, Reckoned | - | OneRoute | - | Pursuit |
-| among movers | the same | - or Lookout | Replanning or OneRoute | Told or Tracked | Pursuit, Avoid |
-| planner in space and time | the same | - | Replanning | Told | Pursuit, KeepToSchedule, Avoid |
-| cell by cell | the same | - or Lookout | CellByCell | Told or Tracked | Pursuit, Avoid |
-| no map | the same | Survey | Exploration | Told or Tracked | Pursuit, LookRound, Avoid, StayInSight |
+`docs/explanation/architecture.md` lists the parts of each kind of drive.
 """
 
 from __future__ import annotations
@@ -35,14 +29,14 @@ from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
 from antdrive.worlds import Cruising, Disc, Task, World
 
-DRIFTING_SHARE = 0.6  # `GOAL_SHARE` of a robot without a map that tracks movers by lidar
+DRIFTING_SHARE = 0.6  # `GOAL_SHARE` of a mapless robot that tracks movers by lidar
 BLIND_SHARE = 0.3  # such a robot backs into its blind sector at this fraction of its top speed, unless a mover is met
 
 _rehearsed: set[str] = set()  # keys of the replanning warm-ups in this process
 
 
 class Parts(NamedTuple):
-    """Parts of a drive, with what its record says of them; None: unused."""
+    """Parts of a drive, and their entries in its record; None: unused."""
 
     localiser: Localiser
     scan: Scanning
@@ -51,7 +45,7 @@ class Parts(NamedTuple):
     logs: tuple[Logs, ...]
     perception: Perception | None  # perception of movers
     avoidance: Avoidance | None  # avoidance of movers
-    replanning: ReplanPolicy | None  # when to re-plan
+    replanning: ReplanPolicy | None  # when to replan
     limiters: tuple[str, ...]  # names of the rules that limit the speed
     mapped: bool  # whether plans use the given map
 
@@ -125,14 +119,14 @@ def route_planner(s: Scenario) -> RoutePlanner:
 
 
 def mapless_task(task: Task) -> Task:
-    """Return the task as a robot without a map knows it: its first pose, the relative goal and the tolerance."""
+    """Return the task as known to a mapless robot: start pose, goal and tolerance."""
     (x0, y0), (x1, y1) = task.start[:2], task.goal
     empty = World("unknown", (min(x0, x1) - 1.0, min(y0, y1) - 1.0, max(x0, x1) + 1.0, max(y0, y1) + 1.0))
     return Task(empty, task.start, task.goal, task.goal_tolerance)
 
 
 def avoidance_of(s: Scenario) -> Avoidance | None:
-    """Return the avoidance settings, adapted to what the robot knows of movers.
+    """Return the avoidance settings, adapted to the perception of movers.
 
     Movers with known motions do not reverse unexpectedly, so reversals are ignored. Plans in space and time already avoid
     movers, so the horizon is short.
@@ -153,7 +147,7 @@ def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
 
 
 def _exploration(s: Scenario, survey: Survey) -> Exploration:
-    """Create the guide of a robot without a map, around tracked movers if the policy says so."""
+    """Create the guide of a mapless robot; it plans around tracked movers if the policy asks for it."""
     policy, ahead = s.replanning or ReplanPolicy(), None
     if survey.tracking is not None and s.replanning is not None and policy.around_movers:
         tracked = Tracked(survey.tracking, perception_of(s), s.control_hz)
@@ -162,7 +156,7 @@ def _exploration(s: Scenario, survey: Survey) -> Exploration:
 
 
 def _survey(s: Scenario, tracks_movers: bool) -> Survey:
-    """Create the mapping of a robot without a map."""
+    """Create the mapping of a mapless robot."""
     tracking = MoverTracking(_lidar(s), s.control_hz) if tracks_movers else None
     return Survey.of(s.robot, s.task, _sensor(s), matching=s.localisation == "matching", tracking=tracking)
 
@@ -176,7 +170,7 @@ def _mover_detector(s: Scenario) -> MoverDetector:
 
 
 def _lidar(s: Scenario) -> Lidar:
-    assert s.robot.lidar is not None  # a scenario in which a lidar sees has one
+    assert s.robot.lidar is not None  # `Scenario` checks that the robot has a lidar
     return s.robot.lidar
 
 
@@ -198,7 +192,7 @@ def warm_up_replanning(s: Scenario) -> None:
     mover = Cruising(radius=unit, position=(8 * unit, 11 * unit), velocity=(0.1 * unit, 0.0))
     world = World("tiny", (0.0, 0.0, 24 * unit, 24 * unit), (Disc(12 * unit, 12 * unit, 2 * unit),), movers=(mover,))
     task = Task(world, (4 * unit, 4 * unit, 0.0), (20 * unit, 20 * unit), goal_tolerance=unit, cell=unit)
-    with contextlib.suppress(Exception):  # a planner that fails here fails where it is timed
+    with contextlib.suppress(Exception):  # the same error recurs in the timed run
         guide = compose(dataclasses.replace(s, task=task, planner=planner, cell=None, unseen=())).guide
         grid, answer = guide.first()
         if answer.solved:

@@ -117,7 +117,7 @@ class Run:
         if self.rollout is not None:
             lines = [(self.rollout.route, ROUTE_COLOUR, True), (self.rollout.pose[::12, :2], LINE, False)]
             facts["time"] = f"{self.rollout.t[-1]:.1f} s"
-            facts["least clearance"] = f"{self.rollout.clearance.min():.3f} m"
+            facts["minimum clearance"] = f"{self.rollout.clearance.min():.3f} m"
             facts["certified"] = "yes" if self.certificate and self.certificate.certified else "no"
         if self.reason:
             facts["reason"] = self.reason
@@ -127,12 +127,13 @@ class Run:
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
     """Plan a scenario's first route; return the grid and the planner's checked answer.
 
-    Movers are not on the grid; planners in space and time get their motions. An invalid answer becomes one without a path,
-    with status `INVALID` and the error as reason. If the start is too narrow to follow the path, the answer is `NO_PATH` with
+    Movers are not on the grid; space-time planners get their motions. An invalid plan is returned without its path,
+    with status `INVALID` and the error as reason. If the start is too narrow to follow the path, the answer is
+    `NO_PATH` with
     the reason. Without a map, the plan uses the first scan.
 
     Raises:
-        PlannerError: the planner raised an exception, or its answer is no `PlanResult`.
+        PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
     """
     return compose(s).guide.first()
 
@@ -147,12 +148,12 @@ def run(
 
     Args:
         s: the scenario
-        planned: the result of `plan` for the scenario, or an own plan on that grid, which is checked; None: plan first
+        planned: the result of `plan` for the scenario, or your own plan on its grid, which is checked; None: plan first
             -
         progress: called with the completed fraction of the route
 
     Raises:
-        PlannerError: the planner raised an exception, or its answer is no `PlanResult`.
+        PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
     """
     parts = compose(s)
     grid, answer = parts.guide.first() if planned is None else parts.guide.accept(*planned)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class LossFactors:
-    """Factors of the loss of margin, as a calibration distinguishes them."""
+    """Inputs of a margin calibration: scenarios with equal factors share one."""
 
     robot: RobotSpec  # the robot
     controller: PurePursuit  # the controller
@@ -98,7 +98,7 @@ class Scenario(Settings):
             raise FieldError("start", f"{self.robot.name} at {at} {overlap}; move the start away from it")
 
     def _check_kinds(self) -> None:
-        """Refuse objects of the wrong type with the name of their field."""
+        """Raise FieldError for objects of the wrong type."""
         kinds: dict[str, type] = {"task": Task, "robot": RobotSpec, "perception": Perception, "unseen": tuple}
         kinds |= {name: type(SETTINGS[name].default) for name in ("controller", "avoidance", "replanning")}
         for name, kind in kinds.items():
@@ -110,7 +110,7 @@ class Scenario(Settings):
             raise FieldError("unseen", f"must hold Disc objects, got {self.unseen!r:.60}")
 
     def _check_sensing(self) -> None:
-        """Refuse invalid combinations of map, localisation, perception, planner and robot."""
+        """Raise FieldError for invalid combinations of map, localisation, perception, planner and robot."""
         try:
             Odometry().scaled(self.odometry)
         except FieldError as error:
@@ -132,11 +132,11 @@ class Scenario(Settings):
                 "the robot's frame; write lidar, or localise by fixes or true",
             )
         if self.map == "given" and self.localisation == "matching":
-            raise FieldError("localisation", "matching: needs map none, since scans are matched to the robot's own map")
+            raise FieldError("localisation", "matching: needs map none, since scans are matched to the occupancy map")
         can = capabilities_of(self.planner)
         if self.map == "none" and can.needs_motions:
             raise FieldError(
-                "map", f"none: {self.planner_label} needs the motions of movers, which a robot without a map lacks"
+                "map", f"none: {self.planner_label} needs ground-truth motions of movers, which a mapless robot lacks"
             )
 
     @classmethod
@@ -179,7 +179,7 @@ class Scenario(Settings):
         )
 
     def identity(self, *more: object, without: Collection[str] = ()) -> str:
-        """Return the SHA-256 of everything that the drive depends on, and of `more`.
+        """Return the SHA-256 of the drive's inputs and of `more`.
 
         Args:
             more: further inputs of the result

@@ -47,7 +47,7 @@ class Setting:
     axis: bool = False  # whether a campaign file lists values under its key; else it belongs to `settings`
     column: str = ""  # column of a campaign's table; empty: the key
     usual: str = ""  # meaning of the default None, for `--help`
-    # format version of campaign keys that added the setting; later ones are omitted at their default
+    # version of the campaign-key format that added the setting; settings added after version 1 are omitted at their default
     since: int = 1
 
 
@@ -88,7 +88,7 @@ class Settings:
         Ge(0),
         Setting(
             "clearance of plans on top of the robot's radius [m], or auto: the smallest margin predicted to suffice for robot, "
-            "noise and smoothing, calibrated once with 80 short drives per tried margin",
+            "noise and smoothing, calibrated once with 80 short drives per candidate margin",
             "Planner",
             "METRES|auto",
             form="margin",
@@ -99,7 +99,7 @@ class Settings:
     cell: Annotated[
         float | None,
         Gt(0),
-        Setting("side of a grid cell [m]", "Planner", "METRES", usual="the world's own; without a map 0.05 at most"),
+        Setting("side of a grid cell [m]", "Planner", "METRES", usual="the world's own; at most 0.05 without a map"),
     ] = None
     map: Annotated[
         str,
@@ -138,7 +138,7 @@ class Settings:
             "KIND[:METRES]",
             key="sees",
             form="perception",
-            usual="velocities; without a map lidar",
+            usual="velocities; lidar without a map",
         ),
     ] = None
     avoidance: Annotated[
@@ -225,7 +225,7 @@ class DeclaredSetting:
 
     @property
     def is_word(self) -> bool:
-        """Whether one word is one value, so that a list of words gives several; seeds have their own notation."""
+        """Whether a single word is a value, so that a list of words is a list of values; seeds have their own notation."""
         return self.setting.form in ("plain", "margin", "perception") and self.name != "seed"
 
     @property
@@ -235,7 +235,7 @@ class DeclaredSetting:
         return self.field.default if made is dataclasses.MISSING else made()
 
     def check(self, value: Any) -> None:
-        """Refuse a number of the wrong type or out of bounds, and an unknown word."""
+        """Raise FieldError for a value of the wrong type, a number out of bounds or an unknown word."""
         if self.kind not in (int, float, str) or (value is None and self.optional):
             return
         choices = self.setting.choices

@@ -26,7 +26,7 @@ class Grid:
     """Free cells and allowed moves, for a robot of radius `inflate`.
 
     Attributes:
-        free: cells at whose centre the robot has no contact (R, C), read-only
+        free: whether the robot, centred on the cell, touches nothing (R, C), read-only
         moves: bit k is set where the move `DIRECTIONS[k]` is allowed (R, C), read-only
         cell: side of a cell [m]
         origin: centre of cell (0, 0), x and y [m]
@@ -85,7 +85,7 @@ class Grid:
             "cells": f"{rows} × {cols}",
             "free": f"{100 * self.free.mean():.1f} %",
             "cell": f"{self.cell:g} m",
-            "inflated by": f"{self.inflate:g} m",
+            "radius + margin": f"{self.inflate:g} m",
         }
         return card(cells_svg(self.free), f"grid of {rows} × {cols} cells", facts)
 

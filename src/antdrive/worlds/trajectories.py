@@ -1,4 +1,4 @@
-"""Trajectories of a run's movers, in numpy only, so that logs are checked without compiler or physics."""
+"""Trajectories of a run's movers, in numpy only: logs can be verified without numba or PyBullet."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Trajectories:
 
         Args:
             world: the world
-            start: the robot's start, avoided by wanderers' random first cells [m]
+            start: the robot's start; random first cells of wanderers avoid it [m]
             seed: the run's random seed, for wanderers without their own
 
         Raises:
@@ -73,7 +73,7 @@ class Trajectories:
         return _stacked([motion.velocities(times) for motion in self.motions], (len(times), 0, 2))
 
     def travel(self, t: npt.ArrayLike) -> Floats:
-        """Return an upper bound of each mover's travel between consecutive times, without jumps, shape (T - 1, M) [m].
+        """Return an upper bound on each mover's travel between consecutive times, without jumps, shape (T - 1, M) [m].
 
         Args:
             t: times (T,) [s]

@@ -70,7 +70,7 @@ def test_the_command_changes_where_a_mover_blocks_the_route(tracked, turtlebot):
 
 
 def test_a_high_clearance_weight_makes_the_robot_leave_the_route(tracked, turtlebot):
-    beside = (2.0, turtlebot.radius + 0.2 + 0.15)  # 5 cm more than the least clearance
+    beside = (2.0, turtlebot.radius + 0.2 + 0.15)  # 5 cm more than the minimum clearance
     assert not avoid(tracked, turtlebot, beside, clearance_weight=0.0)[1]
     assert avoid(tracked, turtlebot, beside, clearance_weight=20.0)[1]
 

@@ -1,4 +1,4 @@
-"""A mover turns straight at the robot from close by: the robot dodges where it can no longer keep the least clearance."""
+"""A mover turns straight at the robot from close by: the robot dodges where it can no longer keep the minimum clearance."""
 
 import math
 

@@ -164,7 +164,7 @@ def test_movers_are_predicted_as_the_perception_allows(tick, told):
 
 
 def test_a_robot_with_too_little_clearance_gains_more(turtlebot):
-    """A mover that starts closer than the least clearance follows it slowly."""
+    """A mover that starts closer than the minimum clearance follows it slowly."""
     creeps = keyframed((0.0, 1.51, 3.0), (20.0, -2.5, 3.0), radius=0.25)
     assert among(creeps, robot=turtlebot, avoidance=None).outcome is Outcome.COLLIDED
     done = among(creeps, robot=turtlebot)

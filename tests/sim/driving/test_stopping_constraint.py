@@ -1,4 +1,4 @@
-"""Under the stopping constraint a robot touches no standing obstacle, whatever the command: exact kinematics and scans."""
+"""Under the stopping constraint a robot touches no static obstacle, whatever the command: exact kinematics and scans."""
 
 import math
 from dataclasses import replace

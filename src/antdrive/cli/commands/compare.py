@@ -50,7 +50,7 @@ def compare(
         ),
     ] = None,
     robot: options.Robot = "turtlebot",
-    seeds: Annotated[int, option("NUMBER", "Seeds per world, from --seed on.", min=1, max=10_000)] = 1,
+    seeds: Annotated[int, option("NUMBER", "Seeds per world, starting at --seed.", min=1, max=10_000)] = 1,
     ends: Ends,
     out: options.Out = None,
     figures: options.Figures = True,

@@ -18,7 +18,7 @@ def export_drive(
     scans: Annotated[
         bool,
         flag(
-            "Simulate scans missing in the log.",
+            "Simulate scans that the log lacks.",
             "--scans/--no-scans",
         ),
     ] = True,

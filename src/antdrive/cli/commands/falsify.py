@@ -34,7 +34,8 @@ def falsify(
     setup: Setup,
     out: options.Out = None,
     seconds: Annotated[
-        float, option("SECONDS", "Time to shrink a failure [s]; 0: none.", "--shrink", min=0.0, max=1e6)
+        float,
+        option("SECONDS", "Time limit for shrinking each failure [s]; 0 disables it.", "--shrink", min=0.0, max=1e6),
     ] = 20.0,
     film: Annotated[bool, flag("Film and draw each failure.", "--film/--no-film")] = True,
     json: options.Json = False,
@@ -43,7 +44,7 @@ def falsify(
     """Search for worlds in which a configuration fails.
 
     Every world has a path. Failures are repeated in another process, shrunk, and written as a suite with films.
-    Ctrl-C keeps the failures so far. Exit code 0: no failure. Exit code 1: at least one failure.
+    Ctrl-C ends the search and keeps the failures found so far. Exit code 0: no failure. Exit code 1: at least one failure.
     """
     from antdrive.planners.user_code import is_user_code
     from antdrive.runs.failures.hunt import find_failures

@@ -27,7 +27,7 @@ def find_margin(
     kind: Annotated[str | None, option("KIND", "Random worlds instead of WORLD: forest or barn.", "--generate")] = None,
     ends: Ends,
     setup: Setup = ASTAR,
-    seeds: Annotated[int, option("NUMBER", "Number of drives, seeded from --seed on.", min=1, max=10_000)] = 10,
+    seeds: Annotated[int, option("NUMBER", "Number of drives; their seeds start at --seed.", min=1, max=10_000)] = 10,
     max_speed: Annotated[
         float | None, option("SPEED", "Speed limit [m/s].  [default: the robot's own]", min=0.05)
     ] = None,
@@ -37,7 +37,8 @@ def find_margin(
 ) -> bool:
     """Find the smallest margin at which all drives are safe.
 
-    `--margin auto` of other commands predicts a margin for any world. Exit code 0: a margin of at most 0.2 m is safe.
+    To predict a margin for any world instead, use `--margin auto` of other commands. Exit code 0: a margin of at most
+    0.2 m is safe.
     """
     from antdrive.runs.margins.choice import find_margin as search
     from antdrive.sim.pipeline import run as drive

@@ -28,7 +28,7 @@ def render(
     ] = None,
     fps: Annotated[int, option("NUMBER", "Frames per second.", min=1, max=240)] = 30,
     speed: options.Speed = 1.0,
-    at: Annotated[float | None, option("SECONDS", "Frame at this time [s]: .png or .webp.", min=0.0)] = None,
+    at: Annotated[float | None, option("SECONDS", "Write the frame at this time [s] (.png or .webp).", min=0.0)] = None,
     prelude: options.Prelude = 0.0,
     json: options.Json = False,
 ) -> None:

@@ -19,7 +19,7 @@ def reproduce(
     out: options.Out = None,
     seeds: Annotated[int, option("NUMBER", "Seeds per experiment.", min=1, max=1000)] = 10,
     quick: Annotated[
-        bool, flag("Six seeds, fewer ant steps, two maps per figure, no slow experiments.", "--quick")
+        bool, flag("At most six seeds, fewer ant steps, two maps per figure, no slow experiments.", "--quick")
     ] = False,
     jobs: options.Jobs = None,
     films: Annotated[bool, flag("Film one plan and drive per paper.", "--film")] = False,

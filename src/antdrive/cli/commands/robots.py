@@ -68,7 +68,9 @@ def import_robot(
             min=0.0,
         ),
     ] = None,
-    footprint: Annotated[str, option("KIND", "disc, rectangle, polygon or auto (first that fits).")] = "auto",
+    footprint: Annotated[
+        str, option("KIND", "disc, rectangle, polygon or auto (the first of these that fits).")
+    ] = "auto",
     wheel_radius: Annotated[float | None, option("METRES", "Radius of the driven wheels [m].", min=0.0)] = None,
     given: Annotated[
         list[str] | None,

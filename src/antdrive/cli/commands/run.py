@@ -65,7 +65,7 @@ def run(
 
 
 def _check_views(scenario: "Scenario", film: Path | None, prelude: float, gui: bool) -> None:
-    """Raise an error before any work if the film or the window cannot be made afterwards."""
+    """Raise InputError before any work if the film cannot be written or the window cannot be opened."""
     if gui:
         from antdrive.views.window import check_display
 

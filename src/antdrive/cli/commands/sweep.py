@@ -37,7 +37,7 @@ def sweep(
         ),
     ] = None,
     robot: Annotated[list[str] | None, option("NAME", "Robot name or file. Repeatable.")] = None,
-    seeds: Annotated[str | None, option("SEEDS", "Number of seeds (10), or seeds (0-9 or 3,7).")] = None,
+    seeds: Annotated[str | None, option("SEEDS", "Number of seeds (10) or a list of seeds (0-9, or 3,7).")] = None,
     tasks: Annotated[
         str | None,
         option(
@@ -67,7 +67,7 @@ def sweep(
         list[str] | None,
         option("NAME", "Repeat runs of a planner or with an outcome, such as planner_fault. Repeatable."),
     ] = None,
-    dry_run: Annotated[bool, flag("Only count all and missing runs.", "--dry-run")] = False,
+    dry_run: Annotated[bool, flag("Only print the number of runs and of missing runs.", "--dry-run")] = False,
     report: Annotated[
         Path | None,
         option("FILE", "Also write a report: .html, .md, .tex or .csv."),

@@ -82,7 +82,7 @@ def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
     failed = [drive for drive in drives if drive["passed"] == "false"]
     text = [f"### Drives: {len(drives) - len(failed)} of {len(drives)} passed", ""]
     if failed:
-        text += ["| test | outcome | least clearance [m] | time [s] | fault |", "|---|---|---|---|---|"]
+        text += ["| test | outcome | minimum clearance [m] | time [s] | fault |", "|---|---|---|---|---|"]
         text += [
             "| "
             + " | ".join(

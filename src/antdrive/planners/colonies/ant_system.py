@@ -52,9 +52,9 @@ class AntSystem(Colony):
         initial: the initial pheromone on every arc
         heuristic: "goal": eta = 1 / distance from the next cell to the goal (ibraheem2016 eq. 6, lee2008);
             "step": eta = 1 / length of the move (suganthi2019 eq. 6)
-        ranks: length of an iteration's ranking list: the best `ranks` ants deposit, the first all of eq. 4, each
-            later one a fraction 1 / `ranks` less; None: all ants that arrive deposit all of eq. 4. Section V of
-            lee2008 gives its conventional colony a list of 100 without defining its use
+        ranks: number of ants that deposit per iteration: the best deposits the full amount of eq. 4, each later
+            one 1 / `ranks` of it less; None: all arriving ants deposit the full amount. Section V of lee2008 mentions
+            a ranking list of 100 for the conventional colony, without saying how it is used
 
     Raises:
         FieldError: an option is out of range; names it and the valid range.
@@ -135,7 +135,7 @@ class AgeingAnts(AntSystem):
     Ant m of M deposits Q_m / length, and Q_m falls from Q_max to Q_min with m (eq. 5). The paper gives no
     values for the two bounds.
 
-    Known weaknesses, measured (docs/papers/ibraheem2016.md): ants die in dead ends like those of `AntSystem`, and
+    Known weaknesses, measured (docs/papers/ibraheem2016.md): as in `AntSystem`, ants die in dead ends, and
     ageing does not pay off. On maps of 30 x 30 and 40 x 40 cells paths are longer than those of `AntSystem` in
     170 of 400 runs and shorter in 71; no values of the bounds change that.
 
@@ -173,9 +173,9 @@ class ExploringAnts(AntSystem):
     """Common ants, exploratory ants that avoid pheromone, and an elite: the improved ACO of suganthi2019.
 
     Section IV of suganthi2019: common ants choose by tau^alpha eta^beta (eq. 1), exploratory ants by eta^beta
-    / tau^alpha (eq. 5), and the best ants of an iteration, of either kind, deposit more (eq. 7-8). By the text
-    below eq. 7, its second term is the deposit of common ants and its third has the factor alpha = 1: the
-    default here. With `depositors="all"` exploratory ants deposit like common ones.
+    / tau^alpha (eq. 5), and the best ants of an iteration, of either kind, deposit more (eq. 7-8). According to the
+    text below eq. 7, the second term is the deposit of common ants, and the third has the factor alpha = 1. Both are
+    the defaults here. With `depositors="all"` exploratory ants deposit like common ones.
 
     The paper does not define the behaviour in dead ends nor whether loops are cut. With `backtrack=False` and
     `shortcut=False` ants die in dead ends and walk in loops. docs/papers/suganthi2019.md compares the
@@ -247,7 +247,7 @@ class ExploringAnts(AntSystem):
 
 
 def ranked(lengths: Floats, ranks: int) -> Floats:
-    """Return the fraction of its deposit that each ant makes (ants,): 1 for the best, 1 / ranks less per rank."""
+    """Return each ant's fraction of its full deposit (ants,): 1 for the best, 1 / ranks less per rank."""
     rank = np.empty(len(lengths), dtype=np.int64)
     rank[np.argsort(lengths, kind="stable")] = np.arange(len(lengths))
     return np.maximum(1.0 - rank / ranks, 0.0)
@@ -276,7 +276,7 @@ class MaxMinAnts(AntSystem):
     Stützle & Hoos 2000: the depositing ant is the best of the iteration or the best so far (section 5), the
     bounds follow the best tour (eq. 7 and 11), and all trails start at the upper bound (section 3.3) and return
     there when the search stagnates (section 3.4). The paper's problems have no dead ends; on a grid these ants
-    backtrack out of them. Cutting tours short replaces the paper's local search; evaporation and schedule are
+    backtrack out of them. Shortcutting tours replaces the paper's local search; evaporation and schedule are
     those of the paper with local search.
 
     Known weakness, measured (docs/notebook/planner-quality.md): paths get longer with the grid's size. With a

@@ -42,11 +42,11 @@ class Replanner(Protocol):
 
     @property
     def query(self) -> Query:
-        """The current query. Its grid is read-only and changes with every edit."""
+        """The current query. Its grid is a read-only view that reflects every edit."""
         ...
 
     def move(self, start: Cell) -> None:
-        """Report that the robot is at another cell, `start`, which need not be on the path.
+        """Set the robot's cell `start`, which need not be on the path.
 
         Raises:
             ValueError: the cell lies outside the grid.
@@ -68,7 +68,7 @@ class Replanner(Protocol):
         ...
 
     def change(self, grid: Grid) -> int:
-        """Replace the grid by another one of the same shape.
+        """Replace the grid with another of the same shape.
 
         Returns the number of cells whose moves changed.
         """
@@ -107,11 +107,11 @@ class CachedReplanner(abc.ABC):
 
     @property
     def query(self) -> Query:
-        """The current query. Its grid is read-only and changes with every edit."""
+        """The current query. Its grid is a read-only view that reflects every edit."""
         return self._query
 
     def move(self, start: Cell) -> None:
-        """Report that the robot is at another cell, `start`, which need not be on the path."""
+        """Set the robot's cell `start`, which need not be on the path."""
         self._query = dataclasses.replace(self._query, start=start)
 
     def block(self, cells: npt.ArrayLike) -> int:
@@ -126,7 +126,7 @@ class CachedReplanner(abc.ABC):
         return self._mark(cells, True)
 
     def change(self, grid: Grid) -> int:
-        """Replace the grid by another one of the same shape; returns the number of cells whose moves changed."""
+        """Replace the grid with another of the same shape; returns the number of cells whose moves changed."""
         if grid.shape != self._query.grid.shape:
             raise FieldError("grid", f"must have the shape {self._query.grid.shape}, got {grid.shape}")
         self._free[:] = grid.free
@@ -146,7 +146,7 @@ class CachedReplanner(abc.ABC):
 
     @abc.abstractmethod
     def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
-        """Return the plan for a query with free ends, after the moves of the `changed` flat cells changed."""
+        """Return the plan for a query with free ends; `changed` holds the flat indices of the cells whose moves changed."""
 
     def _remaining_path(self) -> PlanResult | None:
         """Return the rest of the last path if nothing has changed and the robot is on it."""
@@ -230,7 +230,7 @@ class IncrementalPlanner(GridPlanner):
 class DStar(IncrementalPlanner):
     """The shortest path over the grid's moves by basic D* (Stentz 1994), repaired when the map changes.
 
-    Known weakness, measured (docs/notebook/planning-speed.md): the search is not directed. A first plan on 200 x
+    Known weakness, measured (docs/notebook/planning-speed.md): the search has no heuristic. A first plan on 200 x
     200 cells among discs takes 4.4 ms, four times as long as with D* Lite; the median repair takes 43 us against
     30.
     """

@@ -7,9 +7,9 @@ sequences of two constant twists, forwards or backwards, within the robot's dyna
 IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing still is a
 candidate as well, so the robot moves out of the path of an approaching mover.
 
-A mover that turns close by may leave no candidate with the least clearance. While the robot can still stop in time,
+If a mover turns nearby, there may be no candidate with the minimum clearance. While the robot can still stop in time,
 it takes the candidate with the latest contact. After that it takes the one that stays farthest from movers, and
-stops only if all have contact (T. Fraichard and H. Asama, *Inevitable collision states*, Advanced Robotics 18,
+stops only if every candidate ends in a contact (T. Fraichard and H. Asama, *Inevitable collision states*, Advanced Robotics 18,
 2004, evaluate a state by its best escape in the same way).
 """
 
@@ -29,15 +29,15 @@ from antdrive.robots.control._kernels_pursuit import reachable_twist
 from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
 from antdrive.robots.spec import Footprint, RobotSpec
 
-SPEED_WEIGHT = 0.3  # worth of final speed along the route, as progress [m per m/s]
-PERSISTENCE = 0.05  # worth of keeping the last decision, as progress [m]
+SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progress [m per m/s]
+PERSISTENCE = 0.05  # value of keeping the last decision, in metres of progress [m]
 
 
 class AvoidanceState(NamedTuple):
     """Avoidance state between two control periods.
 
     Attributes:
-        candidate: the pair of twists in execution, a row of the candidate table; empty if there is none
+        candidate: the pair of twists being executed, a row of the candidate table; empty if there is none
         remaining: remaining time of its first twist [s]
     """
 
@@ -52,8 +52,8 @@ class Avoidance:
     Attributes:
         horizon: prediction horizon [s]
         step: time between two predicted instants [s]
-        min_clearance: least clearance to movers; one already closer may come only slightly closer [m]
-        preferred_clearance: clearance beyond the least above which the cost is zero [m]
+        min_clearance: minimum clearance to movers; a mover already closer may come only slightly closer [m]
+        preferred_clearance: clearance beyond `min_clearance` at which the cost reaches zero [m]
         clearance_weight: cost of each metre below the preferred clearance [m/m]
         cross_track_weight: cost of each metre off the route [m/m]
         heading_weight: cost of each radian off the route's direction [m/rad]
@@ -116,7 +116,7 @@ class Avoidance:
             places: the movers' predicted positions at the `prediction_times` (K + 1, M, 2) [m]
             radii: their radii (M,) [m]
             speed_limit: speed limit from the schedule of a timed plan [m/s]
-            backwards: highest speed backwards, for a robot without a view to the rear; lifted if it leads to a contact [m/s]
+            backwards: maximum reverse speed, for a robot that cannot see behind; ignored if it would cause a contact [m/s]
         """
         candidates = self._candidates(spec, state, speed_limit, backwards)
         situation = (
@@ -197,7 +197,7 @@ _NOT_NEGATIVE = (
 def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
     """Return a robot's candidates (N, 6): the controller's motion at full and lower speeds, and pairs of twists.
 
-    Row 1 is a placeholder for the last decision. The second twist of a pair drives straight or stands.
+    Row 1 is a placeholder for the last decision. The second twist of a pair drives straight or stops.
     """
     fractions = (1.0, 1.0, 0.7, 0.45, 0.2)
     rows = [(kernels.FOLLOW_ROUTE, fraction * max_speed, 0.0, 0.0, 0.0, 0.0) for fraction in fractions]

@@ -1,6 +1,6 @@
 """Pure pursuit with clearance-checked lookahead (after R. C. Coulter, CMU-RI-TR-92-01, 1992).
 
-The carrot is the point of the route at the lookahead distance from the robot, in a straight line. Before a drive, the
+The carrot is the point of the route whose straight-line distance from the robot is the lookahead. Before a drive, the
 controller computes the longest clear lookahead at samples along the route: the straight line to the carrot keeps its
 clearance. During the drive it shortens the lookahead until the arc to the carrot is clear. The robot is slow where the
 lookahead is short, and rotates in place if the shortest arc is not clear.
@@ -76,7 +76,7 @@ class PursuitState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrackedPath:
-    """A route prepared for tracking, with everything that is computed once.
+    """A route prepared for tracking, with its precomputed data.
 
     Attributes:
         route: the route
@@ -113,12 +113,12 @@ class TrackedPath:
 
     @property
     def ignoring_turn_clearance(self) -> TrackedPath:
-        """The path with rotations in place by the shorter turn, without contact checks."""
+        """A copy whose rotations in place take the shorter turn, without contact checks."""
         return replace(self, tuning=self.tuning._replace(half_length=0.0, half_width=0.0, corners=np.empty((0, 2))))
 
     @property
     def preferring_arcs(self) -> TrackedPath:
-        """The path with a robot at rest taking every clear arc that a moving robot takes, instead of rotating first."""
+        """A copy for which a robot at rest takes the same arcs as a moving one, instead of rotating in place first."""
         return replace(self, tuning=self.tuning._replace(rotate_above_at_rest=self.tuning.rotate_above))
 
 
@@ -128,7 +128,7 @@ class PurePursuit:
 
     Attributes:
         lookahead_time: lookahead divided by speed [s]
-        preferred_lookahead_min: shortest lookahead if it is clear [m]
+        preferred_lookahead_min: lookahead at low speed; reduced to `lookahead_min` where it is not clear [m]
         lookahead_min: shortest lookahead [m]
         lookahead_max: longest lookahead [m]
         lookahead_margin: fraction of the safety margin kept by lines and arcs to the carrot
@@ -141,7 +141,7 @@ class PurePursuit:
         corner_lookahead_time: `lookahead_time` for routes with corners, such as those through cells [s]
         corner_blend: `blend` for such routes [m]
         min_speed_near_obstacles: speed limit at zero clearance [m/s]
-        clearance_time: clearance divided by this is added to that limit [s]
+        clearance_time: the limit grows by clearance / `clearance_time` [s]
         creep_speed: slowest forward speed [m/s]
         goal_distance: remaining route length at which the robot stops, at most half the goal tolerance [m]
 
@@ -253,7 +253,7 @@ class PurePursuit:
             command: the command of the last period
             state: the state returned by the last call; initially `PursuitState()`
         """
-        if tracked.backwards:  # reversed, a differential drive is one that drives forwards
+        if tracked.backwards:  # backwards is forwards with the heading turned by pi
             reversed_ = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
             ahead, after = self.step(replace(tracked, backwards=False), *reversed_, state)
             return Twist(-ahead.speed, ahead.yaw_rate), after

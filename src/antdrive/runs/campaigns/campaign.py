@@ -212,7 +212,7 @@ class Campaign:
 
         Args:
             location: path to the value
-            problem: what is invalid, and what is valid
+            problem: the error and the fix
         """
         return self.document.error(location, problem)
 
@@ -299,7 +299,7 @@ def _alternatives(document: Document, key: str, value: Any, place: Location) -> 
     if isinstance(value, dict):
         inner = [one if isinstance(one, list) else [one] for one in value.values()]
         choices: list[Any] = [dict(zip(value, values, strict=True)) for values in itertools.product(*inner)]
-    elif key == "unseen":  # one value is a list itself
+    elif key == "unseen":  # a single value is itself a list
         choices = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
     else:
         choices = value if isinstance(value, list) else [value]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MEDIANS = {
     "driven_length_m": "length m",
     "duration_s": "duration s",
-    "min_clearance_m": "least clearance m",
+    "min_clearance_m": "minimum clearance m",
     "plan_s": "planning ms",
 }
 

@@ -1,1 +1,1 @@
-"""Failures made small and searched for: the smallest world that still fails, and worlds in which a set-up fails."""
+"""Failures: minimal reproducers, and a search for worlds in which a configuration fails."""

@@ -1,6 +1,7 @@
 """Search for worlds of a few cylinders in which a configuration fails, within a budget of runs.
 
-The next world is random, or the one of many in which a rehearsal without physics comes closest to a contact.
+The next world is random or, for the guided search, the one of many random worlds whose rehearsal without physics
+comes closest to a contact.
 """
 
 from __future__ import annotations
@@ -129,7 +130,7 @@ METHODS: Mapping[str, Callable[[Draw], Scenario | None]] = MappingProxyType(
 
 
 def rehearsed_clearance(s: Scenario) -> float:
-    """Return the least clearance of a drive whose wheels execute commands exactly, without movers [m].
+    """Return the minimum clearance of a drive whose wheels execute commands exactly, without movers [m].
 
     The noise is that of the real run. Infinite if no path is planned; minus infinity if the planner raises an error, as
     that is a failure.
@@ -219,7 +220,7 @@ class Finding:
         line: the driven line (N, 2) [m]; (0, 2) if nothing was driven
         number: number of the run in the search, from 1
         is_new: whether it differs from all earlier findings; see `antdrive.runs.failures.hunt.is_new`
-        fingerprint: the run in one text, see `antdrive.runs.failures.failure.Attempt`
+        fingerprint: the run as one string, see `antdrive.runs.failures.failure.Attempt`
     """
 
     scenario: Scenario
@@ -264,7 +265,7 @@ def find_failures(
     """Search for worlds of a few cylinders in which a configuration fails although a path exists.
 
     In every world tried, the exact shortest path keeps the claimed clearance: the robot's radius and the margin. A run that
-    finds no path on its grid is a failure only if a path exists with one cell more clearance. A planner that raises an error
+    finds no path on its grid is a failure only if a path exists with one extra cell of clearance. A planner that raises an error
     has failed.
 
     Args:

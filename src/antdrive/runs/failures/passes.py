@@ -216,7 +216,7 @@ def _rest_of_route(rollout: Rollout, row: int) -> Floats:
 
 
 def _failing_row(rollout: Rollout) -> int:
-    """Return the row of the first contact, else of the least clearance, else the last."""
+    """Return the row of the first contact, else of the minimum clearance, else the last."""
     if len(rollout.contacts):
         return int(rollout.contacts[0, 0])
     return int(rollout.clearance.argmin()) if rollout.outcome.key == "succeeded" else len(rollout.t) - 1

@@ -244,7 +244,7 @@ class MarginResult:
     impassable: int  # number of worlds that this margin closes, not counted as drives
     # seed of the failed drive: no success, not certified, or too little clearance left; None if none failed
     failed: int | None
-    left: float  # least clearance of all drives [m]
+    left: float  # minimum clearance of all drives [m]
 
     @property
     def safe(self) -> bool:

@@ -137,7 +137,7 @@ def calibration_key(conditions: LossFactors) -> str:
 def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     """Return the margin that a drive along a random course uses up; infinite if it misses the goal.
 
-    A loss is the margin minus the least clearance that a certificate would prove. It exceeds the margin if the drive could
+    A loss is the margin minus the minimum clearance that a certificate would prove. It exceeds the margin if the drive could
     not be certified. The footprint's loss is negative if the footprint stayed farther from obstacles than the planned disc.
     """
     c, robot = conditions, conditions.robot

@@ -23,7 +23,7 @@ from antdrive.sim.pipeline import Run, versions
 
 #: Distance at the same time beyond which two drives diverge [m].
 APART = 0.01
-SAME = "world, robot and settings are the baseline's"
+SAME = "world, robot and settings equal the baseline's"
 
 
 @dataclass(frozen=True)
@@ -295,7 +295,7 @@ def limits(demands: Demands, baseline: Baseline) -> Iterator[Bound]:
 
 
 def _place(name: str, rollout: Rollout) -> str:
-    """Return where a metric is at its worst, for metrics with a place."""
+    """Return the place of a metric's worst value; empty for metrics without a place."""
     if name not in _PLACED:
         return ""
     nearest = nearest_of(rollout)

@@ -74,7 +74,7 @@ class StuckClock(NamedTuple):
     farthest: float = 0.0  # farthest arc length that the robot has reached [m]
     driving: int = 0  # control periods since then with a driving command
     turning: int = 0  # control periods since then with a turn on the spot
-    held: int = 0  # how many of these the stopping constraint limited
+    held: int = 0  # number of these periods limited by the stopping constraint
 
     def after(self, pursuit: PursuitState, waiting: bool) -> StuckClock:
         """Return the clock after one more control period."""
@@ -141,7 +141,7 @@ class Driver(Decider):
         return ending
 
     def gives_up(self, state: State) -> Ending | None:
-        """End the drive of a robot without progress. Turns on the spot get the time of a full turn on top."""
+        """End the drive of a robot without progress. A robot that turns on the spot gets the time of a full turn in addition."""
         clock = self._clock
         if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
             return None

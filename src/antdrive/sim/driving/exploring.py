@@ -49,16 +49,16 @@ CORRIDOR = 1.2  # smoothing considers obstacles within this distance of the plan
 SAMPLES = 0.06  # spacing of the points of a route that get speed limits and lookaheads [m]
 SPARE = 0.25  # the controller knows obstacles this much beyond its longest arcs [m]
 INTERVAL = 0.15  # shortest time between two plans [s]
-COVERS = 1e-3  # hits within this distance of the robot or its goal cover it [m]
+COVERS = 1e-3  # hits this close to the robot or its goal count as map errors [m]
 ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
-FORGIVING = 0.005  # arcs of a disc may come this much closer to hits than to obstacles of a given map [m]
+FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hits than to mapped obstacles [m]
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
-LATELY = 30.0  # failed searches up to this old explain how a drive ended [s]
+LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
 
 class Exploration(RouteGuide):
-    """Guide that plans through the robot's own map.
+    """Guide that plans on the occupancy map.
 
     Attributes:
         log: every search for a new route
@@ -192,7 +192,7 @@ class Exploration(RouteGuide):
 
     def _known(self, pose: Pose, bounds: Bounds) -> Task:
         """Return the task with the map's discs as obstacles, from a pose."""
-        # The bounds of a grid are exact except for rounding.
+        # Bounds recovered from a grid carry rounding errors.
         key = self.survey.map, len(self.survey.scans), pose, tuple(round(side, 9) for side in bounds)
         if self._known_as[0] == key:
             return self._known_as[1]
@@ -238,7 +238,7 @@ class Exploration(RouteGuide):
         return None if self.may_wait else self.replan(tick, pose, MISSED)
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
-        """Return why a new route is due; empty if none is."""
+        """Return the trigger of a new route; empty if none is due."""
         now = tick / self._hz
         if self._movers is not None:
             self._movers.observe(tick, pose, waiting)
@@ -322,7 +322,7 @@ class Exploration(RouteGuide):
         self._recovery.note_held(tick / self._hz, held)
 
     def failure_note(self, tick: int) -> str:
-        """Say that the last searches found no path; empty if they are long ago or found one."""
+        """Return a note that the latest searches found no path; empty if one did, or after `LATELY`."""
         if tick / self._hz - self._gave_up_at > LATELY:
             return ""
         return f"no way through what was seen, last at t = {self._gave_up_at:.1f} s"

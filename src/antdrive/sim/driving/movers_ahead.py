@@ -1,6 +1,6 @@
 """Traffic: replan triggers by movers, the ground that they cover soon, and the zones where they roam.
 
-A robot without a map knows movers by the tracks of `antdrive.sim.driving.survey` only, so zones grow with its
+A mapless robot knows movers by the tracks of `antdrive.sim.driving.survey` only, so zones grow with its
 observations.
 """
 
@@ -288,7 +288,7 @@ class MoversAhead:
 
 
 class MoversSeenAhead(MoversAhead):
-    """Replan triggers by lidar tracks, for a robot without a map."""
+    """Replan triggers by lidar tracks, for a mapless robot."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Recovery behaviours of a robot without a map: scan turn, backing off along its track, moving ahead for room."""
+"""Recovery behaviours of a mapless robot: scan turn, backing off along its track, moving ahead for room."""
 
 from __future__ import annotations
 

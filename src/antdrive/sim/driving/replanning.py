@@ -6,7 +6,7 @@ Triggers: `trigger` queries `MoversAhead` for movers; thresholds are those of `a
 - Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown like the
   grid's obstacles; cells that movers have left are cleared.
 - Planners that need the world plan in a world with discs in place of movers.
-- Planners in space and time plan again when the robot is late.
+- Space-time planners plan again when the robot is late.
 - Cell-by-cell planners choose one cell after the other, as hasan's robot does.
 """
 

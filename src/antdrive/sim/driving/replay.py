@@ -1,8 +1,9 @@
 """Replay of a log: play the logged motor targets open loop, in the record's world with the record's robot.
 
 The replay depends on physics alone. The record's seed reproduces the noise, which must turn the logged commands into the
-logged targets and the logged poses into the logged estimates. Logged scans are measured again and, for a robot without
-a map, matched. The machine and versions that wrote a log reproduce it bit for bit; `ROUNDING` is the tolerance for others.
+logged targets and the logged poses into the logged estimates. Logged scans are measured again and, for a mapless
+robot, matched. The machine and versions that wrote a log reproduce it bit for bit; `ROUNDING` is the tolerance for
+others.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class RoutePlanner:
     smoothing: str  # how plans become routes
     hz: int  # control periods per second
     seed: int  # the seed of the drive's random numbers
-    motions: tuple[MoverMotion, ...] = ()  # motions of the movers, for planners in space and time
+    motions: tuple[MoverMotion, ...] = ()  # motions of the movers, for space-time planners
     mapped: bool = True  # whether all plans use the grid of the given map
 
     def __post_init__(self) -> None:
@@ -145,7 +145,7 @@ class RoutePlanner:
 
 
 class OneRoute(RouteGuide):
-    """Guide that keeps the first route. Its grid has no movers; planners in space and time get their motions."""
+    """Guide that keeps the first route. Its grid has no movers; space-time planners get their motions."""
 
     def __init__(self, planner: RoutePlanner) -> None:
         self.log, self.walls = [], []
@@ -211,7 +211,7 @@ def grid_of(world: Keyed[World], cell: float, inflate: float) -> Grid:
 
 
 def by_contents(grid: Grid, task: Task) -> Keyed[tuple[Grid, Task]]:
-    """Return a grid and a task as a cache key over their bits: cells, numbers, walls and standing cylinders."""
+    """Return a grid and a task as a cache key over their bits: cells, numbers, walls and static cylinders."""
     numbers = bits(grid.cell, *grid.origin, grid.inflate, *task.start, *task.goal, task.goal_tolerance)
     cells = grid.shape, grid.free.tobytes(), grid.moves.tobytes()
     return Keyed((grid, task), (numbers, cells, by_geometry(task.world)))

@@ -1,4 +1,4 @@
-"""Stopping constraint: a robot without a map can always stop on ground observed as free."""
+"""Stopping constraint: a mapless robot can always stop on ground observed as free."""
 
 from __future__ import annotations
 

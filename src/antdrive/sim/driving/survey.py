@@ -1,4 +1,4 @@
-"""Lidar processing during a drive, in the frame of the estimates: scans, mover detection, and the robot's own map."""
+"""Lidar processing during a drive, in the frame of the estimates: scans, mover detection, and the occupancy map."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from antdrive.worlds import Task, Trajectories, World
 
 MAP_CELL = 0.05  # side of the map's cells [m]
 HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # range up to which hits enter the map [m]
-RECENT = 1.0  # after a reset, scans of this time enter the new map [s]
+RECENT = 1.0  # after a reset, scans up to this age enter the new map [s]
 PAD = 0.01  # distance kept from hits and from unknown ground, for rounding of ranges and cells [m]
 PATIENCE = 3  # failed plans in a row before the map is reset
 TOLERANCE = 0.008  # clearance that a route may lose without a replan [m]
@@ -51,7 +51,7 @@ def turning_room(radius: float) -> float:
 
 
 def reset_ticks(record: DriveRecord) -> Iterator[int]:
-    """Yield the control periods in which a robot without a map reset its map: after some failed plans in a row."""
+    """Yield the control periods in which a mapless robot reset its map, after `PATIENCE` failed plans in a row."""
     failures = 0
     for replan in record.replans:
         if failures >= PATIENCE and replan.trigger != SCANNED:
@@ -63,7 +63,7 @@ def reset_ticks(record: DriveRecord) -> Iterator[int]:
 def table_logged(
     taken: Iterable[tuple[int, npt.NDArray[Any]]], columns: int, log: Rows, per_tick: int
 ) -> npt.NDArray[np.float32]:
-    """Return a table (K, columns) of a log: lines noted in control periods, each after the row of its period."""
+    """Return a table (K, columns) of a log: entries noted in control periods; each begins with the log row of its period."""
     kept = [(tick * per_tick, lines) for tick, lines in taken if tick * per_tick < len(log.t)]
     tables = [np.column_stack((np.full(len(lines), row), lines)) for row, lines in kept]
     return np.concatenate(tables or [np.empty((0, columns))]).astype(np.float32)
@@ -129,7 +129,7 @@ class SimulatedLidar:
     """Simulated lidar in the true world."""
 
     scanner: Scanner  # ray casting in the true world
-    world: World  # the standing obstacles
+    world: World  # the static obstacles
     trajectories: Trajectories | None  # true motions of the movers; None without movers
     rng: np.random.Generator | None  # source of range noise; None for no noise
     hz: int  # control periods per second
@@ -149,7 +149,7 @@ class SimulatedLidar:
         return np.column_stack((movers.positions(np.zeros(1))[0], movers.radii)) if movers else None
 
     def due(self, tick: int, last: int) -> bool:
-        """Return whether a scan is due in a control period, after one in period `last`; negative: after none."""
+        """Return whether a scan is due in a control period. `last` is the period of the latest scan; negative: none yet."""
         return last < 0 or (tick != last and self.scanner.lidar.due(tick, self.hz))
 
     def ranges(self, tick: int, pose: Pose) -> Floats:
@@ -205,9 +205,9 @@ class MoverDetector(Scans):
 
 
 class Survey(Scans):
-    """Mapping for a robot without a map.
+    """Mapping for a mapless robot.
 
-    True poses and the true world serve the ranges of scans, with one exception: at the start, the free ground within the
+    True poses and the true world are used only for scan ranges, with one exception: at the start, the free ground within the
     robot's turning circle is given.
 
     Attributes:

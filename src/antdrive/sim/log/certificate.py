@@ -7,7 +7,7 @@
    (c_i + c_{i+1} - travel) / 2. For a mover its own travel is added; where the mover teleports, the bound is
    min(c_i, c_{i+1}) - travel.
 
-Movers must follow the record's task and seed. Further checks detect logs that were changed or do not describe one drive;
+Movers must follow the record's task and seed. Further checks detect logs that were altered or do not describe a single drive;
 each is a function `_check_...` that yields a sentence per error.
 """
 
@@ -90,13 +90,13 @@ class Certificate:
     def sentence(self) -> str:
         """Statement with its distances."""
         least, bound = in_metres(self.min_clearance), in_metres(self.bound)
-        return f"{self.statement}: least clearance {least}, between steps at least {bound}"
+        return f"{self.statement}: minimum clearance {least}, between steps at least {bound}"
 
     def _repr_html_(self) -> str:
         from antdrive.worlds.svg import card
 
         facts: dict[str, object] = {
-            "least clearance": in_metres(self.min_clearance),
+            "minimum clearance": in_metres(self.min_clearance),
             "between steps at least": in_metres(self.bound),
             "contact points": self.contacts,
             "moved at most": in_metres(self.moved),
@@ -248,7 +248,7 @@ def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.
 
 
 def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving: Floats) -> Floats:
-    """Return a lower bound of the clearance between consecutive rows, shape (T - 1,) [m]; for one row, its clearance."""
+    """Return a lower bound on the clearance between consecutive rows, shape (T - 1,) [m]; for one row, its clearance."""
     if len(still) < 2:
         return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
     radius = rollout.record.robot.footprint.radius
@@ -434,7 +434,7 @@ def _check_contacts(rollout: Rollout) -> Iterator[str]:
 
 
 def _approach(rollout: Rollout) -> Floats:
-    """Return how much nearer to each contact's obstacle the robot can come in the step of the contact (K,) [m].
+    """Return an upper bound on the approach between robot and obstacle in the step of each contact (K,) [m].
 
     Physics measures distances before a step and prevents overlaps at its end. Surfaces with a force may therefore be apart by
     the robot's motion, including sideways slip, plus the mover's travel.

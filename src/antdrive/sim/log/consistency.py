@@ -30,7 +30,7 @@ POINT_SPACING = 0.05  # spacing of the route points whose clearance is checked [
 
 def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
     """Yield every contradiction of the plan with the world, itself or the rows."""
-    if rollout.record.exploring:  # its plans refer to the robot's own map, in the frame of its odometry
+    if rollout.record.exploring:  # its plans refer to the occupancy map, in the frame of its odometry
         yield from _check_movers_known(rollout)
         yield from _check_replans(rollout)
         return
@@ -48,7 +48,7 @@ def _by_cells(rollout: Rollout) -> bool:
 
 
 def _check_routes(rollout: Rollout) -> Iterator[str]:
-    """Check that routes lie in the world, avoid standing obstacles, and lead from the start to the goal."""
+    """Check that routes lie in the world, avoid static obstacles, and lead from the start to the goal."""
     record, route = rollout.record, rollout.route
     task, near = record.task, NEAR * record.cell
     if len(route) < 2:
@@ -76,7 +76,7 @@ def _short_of_goal(rollout: Rollout) -> float:
 
 
 def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
-    """Check that a route keeps the inflation from standing obstacles; near a narrow start, the room of the start.
+    """Check that a route keeps the inflation from static obstacles; near a narrow start, the room of the start.
 
     A replan begins anywhere, even beside a mover, so its first leg may pass closer to other obstacles.
     """
@@ -97,7 +97,7 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
 
 
 def _room(rollout: Rollout, points: Floats) -> Floats:
-    """Return the distances of points (N, 2) [m] from known standing obstacles (N,) [m]."""
+    """Return the distances of points (N, 2) [m] from known static obstacles (N,) [m]."""
     world = rollout.record.task.world
     xmin, ymin, xmax, ymax = world.bounds
     room = np.minimum(points - (xmin, ymin), (xmax, ymax) - points).min(axis=1)

@@ -7,7 +7,7 @@ pushed into is part of the push. The outcome of a touch is
   the robot could not stop;
 - `HIT_WHILE_STANDING` if the obstacle is a mover and, just before the contact, no point of the robot moved faster than
   0.02 m/s or faster than the mover;
-- `COLLIDED` otherwise, as always with walls and standing cylinders.
+- `COLLIDED` otherwise, as always with walls and static cylinders.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Attribution:
         return touches
 
     def _outcome(self, step: int, mover: int) -> Outcome:
-        """Return the outcome of a touch; `mover` is outside 0 to M - 1 for standing obstacles."""
+        """Return the outcome of a touch; `mover` is outside 0 to M - 1 for static obstacles."""
         if not 0 <= mover < self.movers.shape[1]:
             return Outcome.COLLIDED
         if self._teleported(step, mover):

@@ -40,7 +40,7 @@ class Contribution:
     t: float  # time of the largest loss [s]
     x: float  # its position [m]
     y: float  # [m]
-    at_tightest: float  # loss, or negative gain, at the place of least clearance [m]
+    at_tightest: float  # loss, or negative gain, at the place of minimum clearance [m]
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def driven_length_m(rollout: Rollout) -> float:
 def gap_to_grid_optimum(rollout: Rollout) -> float:
     """Planned length over the shortest path on the same grid, minus 1; below 0 where an any-angle line is shorter.
 
-    Not a number for a robot without a map, whose first plan precedes its knowledge of the world.
+    NaN for a mapless robot, whose first plan precedes its knowledge of the world.
     """
     if rollout.record.exploring:
         return math.nan
@@ -152,7 +152,7 @@ def duration_s(rollout: Rollout) -> float:
 
 
 def arrival_s(rollout: Rollout) -> float:
-    """Arrival by the BARN challenge's clock: simulated time from 0.1 m off the start until first within the goal's tolerance.
+    """Arrival by the BARN challenge's clock: simulated time from 0.1 m of travel to first entering the goal's tolerance.
 
     Infinite if the robot never gets there.
     """
@@ -176,7 +176,7 @@ def drive_wall_s(rollout: Rollout) -> float:
 
 
 def turning_rad_per_m(rollout: Rollout) -> float:
-    """Total change of heading over the distance travelled."""
+    """Total absolute change of heading divided by the distance driven."""
     turned = np.abs(wrap_angle(np.diff(rollout.pose[:, 2]))).sum()
     length = driven_length_m(rollout)
     return float(turned / length) if length > 0 else 0.0
@@ -216,7 +216,7 @@ def replans(rollout: Rollout) -> float:
 
 
 def avoiding_s(rollout: Rollout) -> float:
-    """Time during which the robot avoided movers, simulated."""
+    """Time in simulation during which the robot avoided movers."""
 
     limiters = rollout.record.limiters
     if AVOIDING not in limiters:
@@ -227,8 +227,8 @@ def avoiding_s(rollout: Rollout) -> float:
 def explored_m2(rollout: Rollout) -> float:
     """Ground within the walls that a mapless robot's lidar observed from the true poses, in cells of 0.1 m.
 
-    A cell counts if the beam nearest to its centre in direction reached beyond it, at any range. The robot's own map holds
-    less, since its beams must not be farther apart than a cell. Not a number for a robot with a map.
+    A cell counts if the beam nearest to its centre in direction reached beyond it, at any range. The occupancy map
+    covers less: it uses beams only up to the range at which they are one cell apart. NaN for a robot with a map.
     """
     if not (rollout.record.exploring and len(rollout.scans)):
         return math.nan

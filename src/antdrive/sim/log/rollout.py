@@ -172,7 +172,7 @@ class Rollout:
         estimate: the estimated pose (T, 3) of a noisy robot, x, y [m] and yaw [rad]; (0, 3) for a perfect robot
         actuated: forward speed [m/s] and yaw rate [rad/s] that the motors of a noisy robot were set to (T, 2), after
             delay and slip; (0, 2) for a perfect robot, whose motors are set to `command`
-        scans: lidar ranges of a robot without a map or with lidar perception (S, beams) [mm]; 0 where nothing was in range, 1
+        scans: lidar ranges of a mapless robot or with lidar perception (S, beams) [mm]; 0 where nothing was in range, 1
             where something was too near to measure. This array and the next three are omitted from files and from the digest
             where they are empty
         scan_rows: the row of each scan (S,)
@@ -375,7 +375,7 @@ class Rollout:
             "planner": self.record.planner.name,
             "robot": self.record.robot.name,
             "time": f"{self.t[-1]:.1f} s",
-            "least clearance": f"{self.clearance.min():.3f} m",
+            "minimum clearance": f"{self.clearance.min():.3f} m",
         }
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
 

@@ -168,7 +168,7 @@ class OccupancyMap:
         return np.asarray(measured * turned + (x, y), dtype=np.float64)
 
     def explained(self, points: Floats, settle: int) -> Mask:
-        """Return whether points belong to standing obstacles (N,): they lie in or beside cells that have long been occupied.
+        """Return whether points belong to static obstacles (N,): they lie in or beside cells that have long been occupied.
 
         Points on ground that was observed as free less than `settle` scans ago do not, whether or not their scan has been
         entered.

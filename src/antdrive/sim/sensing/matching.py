@@ -1,4 +1,4 @@
-"""Scan matching: corrects odometry drift against the robot's own map."""
+"""Scan matching: corrects odometry drift against the occupancy map."""
 
 from __future__ import annotations
 

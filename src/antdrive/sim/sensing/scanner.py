@@ -23,7 +23,7 @@ class Scanner:
 
     Args:
         lidar: the lidar
-        discs: standing cylinders: x, y and radius (N, 3) [m]
+        discs: static cylinders: x, y and radius (N, 3) [m]
         heights: the cylinders' heights (N,) [m]; those below the beams are invisible. None: all are visible
         bounds: the inner faces of the walls [m], always high enough; None: no walls
         mover_heights: the movers' heights (M,) [m]; None: all are visible

@@ -2,7 +2,8 @@
 
 Each track is a Kalman filter with constant velocity (Y. Bar-Shalom, X. Li, T. Kirubarajan, *Estimation with Applications to
 Tracking and Navigation*, 2001, chapter 6). Tracks that expect points in one cluster share it, so that passing movers keep
-their tracks; other clusters and tracks are matched nearest first. A given map, or the robot's own, explains standing
+their tracks; the remaining clusters and tracks are associated greedily, nearest first. A given map, or the robot's
+own, explains static
 obstacles.
 """
 
@@ -32,11 +33,11 @@ class Hits(NamedTuple):
 
     beams: npt.NDArray[np.intp]  # numbers of the beams with a hit in range (N,)
     points: Floats  # their ends, in the frame of the estimate (N, 2) [m]
-    explained: npt.NDArray[np.bool_]  # whether standing obstacles explain them (N,)
+    explained: npt.NDArray[np.bool_]  # whether static obstacles explain them (N,)
 
 
 class Ground(Protocol):
-    """Map that explains hits by standing obstacles."""
+    """Map that explains hits by static obstacles."""
 
     @property
     def complete(self) -> bool:
@@ -85,7 +86,7 @@ class KnownGround:
 
 
 class MappedGround:
-    """The robot's own map. It explains lasting hits, and hits on unknown ground.
+    """The occupancy map. It explains lasting hits, and hits on unknown ground.
 
     Attributes:
         complete: false
@@ -131,8 +132,8 @@ class TrackedMovers(NamedTuple):
         positions: their centres (T, 2) [m]
         velocities: their velocities (T, 2) [m/s]
         radii: their radii (T,) [m]
-        numbers: their unique numbers (T,), in the order of detection
-        met: whether the last scan hit them (T,); else they are hidden and predicted
+        numbers: their track IDs (T,), in order of detection
+        met: whether the last scan hit them (T,); if not, they are occluded and predicted
     """
 
     positions: Floats
@@ -144,12 +145,12 @@ class TrackedMovers(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingPolicy:
-    """Tracking policy.
+    """Parameters of mover tracking.
 
     Attributes:
         gap: neighbouring points farther apart belong to different objects [m]
-        least: points that start a track
-        settle: time after which an object on once free ground belongs to the robot's own map [s]
+        least: minimum number of points that starts a track
+        settle: time after which an object on once free ground belongs to the occupancy map [s]
         smallest: least estimated radius [m]
         largest: largest estimated radius [m]
         gate: largest distance between a cluster and a track's prediction [m]
@@ -158,7 +159,7 @@ class TrackingPolicy:
         error: standard deviation of a measured centre [m]
         confirmed: scans that must hit a mover before it counts
         way: distance that a mover must cover before it counts [m]; 0 on a given map
-        patience: time for which a hidden track is kept [s]
+        patience: time for which an occluded track is kept [s]
         doubt: the same for an unconfirmed track [s]
 
     Raises:
@@ -256,7 +257,7 @@ class MoverTracker:
             ground: the map before this scan
             pose: the robot's estimated pose
             ranges: the scan (beams,) [m]
-            time: time of the scan [s]; later than the scan before
+            time: time of the scan [s]; must increase from scan to scan
         """
         dt = time - self._time if math.isfinite(self._time) else 0.0
         self._time = time
@@ -298,7 +299,7 @@ class MoverTracker:
         return out
 
     def _make_room(self, points: int) -> None:
-        """Extend the tracks by those that a scan may begin."""
+        """Grow the track array to hold all tracks that a scan may start."""
         needed = self._count + points // self.policy.least + 1
         if needed > len(self._tracks):
             longer = np.zeros(2 * needed, dtype=kernels.TRACK)

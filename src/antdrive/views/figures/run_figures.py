@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 ERROR = LinearSegmentedColormap.from_list("error", ["#ffd9a0", "#ff7a0e", "#7a1f00"])
 
-#: One colour per speed-limiting rule; most are Okabe and Ito's, safe for any colour vision.
+#: One colour per speed-limiting rule; most are from the colour-blind-safe palette of Okabe and Ito.
 LIMITER_COLOURS = (
     *("#c9ced6", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#cc79a7"),
     *("#d55e00", "#5b6576", "#f0e442", "#7a4b9e", "#1b2333", "#a3d9c9"),

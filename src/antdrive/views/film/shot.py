@@ -1,4 +1,4 @@
-"""Frames of one run by one camera, with trail, route, labels, legend and band."""
+"""Frames of one run by one camera, with trail, route, labels, legend and status bar."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ class Shot:
         """Show the route after `count` replans and the places of these replans."""
         playback = self.playback
         route = playback.replans[count - 1].route if count else self._route
-        if self._own_map is not None:  # planned on the robot's own map
+        if self._own_map is not None:  # planned on the occupancy map
             route = self._own_map.to_world(route)
         places = [playback.pose(event.t)[:2] for event in playback.replans[:count] if event.caption]
         self._compositor.show_route(route, np.array(places).reshape(-1, 2))

@@ -17,7 +17,7 @@ from antdrive.worlds.formats.movingai import import_movingai_task
 from antdrive.worlds.formats.sdf import import_sdf
 from antdrive.worlds.world import Task
 
-#: Values of every task; a format without these options provides them itself.
+#: Values that every task needs; formats without these options read them from the file.
 _OF_EVERY_TASK = ("start", "goal", "bounds")
 
 
@@ -38,7 +38,7 @@ def _read_map_server(path: Path, unknown: str = "blocked", **options: Any) -> li
     return [import_map_server(path, unknown_is_free=unknown == "free", **options)]
 
 
-#: The import formats by name; the first one with a suffix is the suffix's default.
+#: The import formats by name; of formats that share a suffix, the first is the default.
 IMPORTS: Mapping[str, Format] = MappingProxyType(
     {
         "sdf": Format(
@@ -95,7 +95,7 @@ def import_format(path: str | os.PathLike[str], *, barn: bool = False) -> Format
 
 
 def import_file(path: str | os.PathLike[str], *, barn: bool = False, **options: Any) -> list[Task]:
-    """Import the tasks in a file of another program: one task, or one for each world of a DynaBARN set.
+    """Import the tasks in another program's file: one task, or one for each world of a DynaBARN set.
 
     The suffix determines the format; see `IMPORTS` for the options of each format.
 
