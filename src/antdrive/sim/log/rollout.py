@@ -179,7 +179,6 @@ class Rollout:
         seen: the discs behind each replan (K, 4): the row of the plan, x, y and radius [m], in the frame of the estimates
         tracks: the movers tracked by lidar (K, 7): the row of the scan, the mover's number in the order of detection, x, y [m],
             velocity along x and y [m/s] and radius [m], in the frame of the estimates
-            the estimated poses; left out as the three above are
         record: the scenario, the plan and the outcome
     """
 
@@ -262,7 +261,7 @@ class Rollout:
         """Write the log with its digest, atomically.
 
         Args:
-            path: the file to write, by custom with the suffix .npz
+            path: the file to write, usually with the suffix .npz
 
         Raises:
             InputError: the file cannot be written.
@@ -280,8 +279,8 @@ class Rollout:
         """Read a log.
 
         Raises:
-            InputError: the file is missing or no rollout, a later version wrote it, or an array or a key of the record is missing
-                or invalid.
+            InputError: the file is missing or not a rollout, a later version wrote it, or an array or a key of the record is
+                missing or invalid.
         """
         with guarded_log(path) as archive:
             there = [name for name in SENSED if f"{name}.npy" in archive.namelist()]
