@@ -179,7 +179,6 @@ class Rollout:
         seen: the discs behind each replan (K, 4): the row of the plan, x, y and radius [m], in the frame of the estimates
         tracks: the movers tracked by lidar (K, 7): the row of the scan, the mover's number in the order of detection, x, y [m],
             velocity along x and y [m/s] and radius [m], in the frame of the estimates
-            the estimated poses; left out as the three above are
         record: the scenario, the plan and the outcome
     """
 
