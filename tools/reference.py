@@ -69,10 +69,14 @@ def keys_of(schema: Mapping[str, Any]) -> list[str]:
     def row(key: str, value: Mapping[str, Any]) -> Row:
         default = "" if value.get("default") is None else code(json.dumps(value["default"]))
         required = key in schema.get("required", [])
-        return code(key), kind_of(value), "required" if required else default, cell(value.get("description", ""))
+        return code(key), kind_of(value), "required" if required else default, cell(_summary(value))
 
     rows = [row(key, value) for key, value in schema["properties"].items()]
-    return [" ".join(schema.get("description", "").split()), "", *table("key, value, default, meaning", rows)]
+    return [" ".join(_summary(schema).split()), "", *table("key, value, default, meaning", rows)]
+
+
+def _summary(schema: Mapping[str, Any]) -> str:
+    return re.split(r"\n+\s*(?:Attributes|Raises):", str(schema.get("description", "")))[0]
 
 
 def keys(kind: str) -> list[str]:
