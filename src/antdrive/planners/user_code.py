@@ -42,7 +42,7 @@ def record_name(name: str) -> str:
 
 
 class UserCodeError(InputError):
-    """A user's file or module that is missing, fails to import, or lacks the class.
+    """An error of a user's file or module: it is missing, fails to import, or lacks the class.
 
     Attributes:
         problem: the error on one line
@@ -83,7 +83,7 @@ def load_object(source: str, word: str, folder: Path | None = None, *, is_file: 
 
 
 def is_importable_elsewhere(planner: object) -> bool:
-    """Return whether other processes can import a planner's class: not from a file or a module beside a suite."""
+    """Return whether other processes can import a planner's class; false for files and for modules beside a suite."""
     home = type(planner).__module__
     return not home.startswith(FROM_FILE) and home not in _OWNERS
 

@@ -203,7 +203,7 @@ class DeclaredSetting:
 
     name: str  # the scenario's field
     kind: Any  # the field's type; types of other records as text
-    optional: bool  # whether None is a value
+    optional: bool  # whether None is a valid value
     bounds: tuple[Ge | Gt | Le, ...]  # bounds of numbers, as pydantic takes them
     setting: Setting  # its notation
     field: "dataclasses.Field[Any]"  # the record's field

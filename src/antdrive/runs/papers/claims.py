@@ -121,7 +121,7 @@ class Measured:
     runs: int  # counted runs, or pairs of them
     ours: str  # the value with its interval, in words
     why: str = ""  # further values, in words
-    unknown: str = ""  # reason why no decision is possible, whatever the interval
+    unknown: str = ""  # reason why no decision is possible, regardless of the interval
     few: str = ""  # message for too few runs, if not the default
     exact: bool = False  # the interval is valid for any number of runs, so that even few can refute
 
@@ -200,8 +200,8 @@ def _gain(claim: Claim, runs: RunsByArm) -> Measured:
 def _balance(claim: Claim, runs: RunsByArm) -> Measured:
     """Return the fraction of pairs with the first value above the second, minus that below [points].
 
-    For values with many ties, such as lengths on small maps, whose median difference is always 0. Equivalent planners have a
-    balance of 0, whose interval never lies at or below 0; so "no worse" tolerates a small effect.
+    It suits values with many ties, such as lengths on small maps, whose median difference is always 0. Equivalent planners
+    have a balance of 0, whose interval never lies at or below 0; so "no worse" tolerates a small effect.
     """
     first, second, world = _paired(claim, runs)
     difference = np.round(first - second, 9)

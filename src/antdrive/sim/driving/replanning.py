@@ -5,7 +5,7 @@ Triggers: `trigger` queries `MoversAhead` for movers; thresholds are those of `a
 
 - Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown like the
   grid's obstacles; cells that movers have left are cleared.
-- Planners that need the world plan in a world with discs in place of movers.
+- Planners that need the world get one with discs in place of movers.
 - Space-time planners plan again when the robot is late.
 - Cell-by-cell planners choose one cell after the other, as hasan's robot does.
 """
@@ -77,7 +77,7 @@ class Replanning(OneRoute):
 
     @property
     def blocked(self) -> str:
-        """Description of the mover that blocks every route, once the robot's patience is over; empty before."""
+        """Description of the mover that blocks every route, once the robot's patience is over; else empty."""
         return self.blockage.reason
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
