@@ -112,7 +112,7 @@ def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float
 
 
 def turns(shape: float, size: tuple[int, int]) -> bool:
-    """Return whether to turn the view along -x: ground of this width over height is tall, and the picture wide."""
+    """Return whether to turn the view along -x: the ground (`shape`: width over height) is tall, the picture wide."""
     return shape < 0.75 and size[0] > size[1]
 
 

@@ -165,7 +165,7 @@ class ReportedRun:
 
     @property
     def problems(self) -> list[str]:
-        """Problems of the certificate and contradictions of the log by result.json, a sentence each."""
+        """Problems of the certificate and contradictions between result.json and the log, a sentence each."""
         return [*self.log.certificate.problems, *self.log.contradictions] if self.log else []
 
     @property

@@ -138,7 +138,7 @@ def _window(edges: Floats, centre: float, radius: float) -> tuple[int, int]:
 
 
 def cover(cells: CellMap, overhang: float | None = None) -> Cover:
-    """Cover the blocked cells adjacent to free ones with discs, chosen greedily to be few.
+    """Cover the blocked cells adjacent to free ones with few discs, chosen greedily.
 
     The discs leave no passage that the map does not have. Blocked cells without a free neighbour are omitted.
     """
