@@ -144,7 +144,7 @@ def _from_file(source: str, folder: Path | None) -> ModuleType:
 
 
 class _Source(importlib.machinery.SourceFileLoader):
-    """A loader that always compiles: cached bytecode may belong to another text of the same second and length."""
+    """A loader that always compiles: cached bytecode may stem from a text of equal length saved in the same second."""
 
     def get_code(self, fullname: str) -> CodeType:
         path = self.get_filename(fullname)

@@ -148,7 +148,6 @@ def run(
     Args:
         s: the scenario
         planned: the result of `plan` for the scenario, or your own plan on its grid, which is checked; None: plan first
-            -
         progress: called with the completed fraction of the route
 
     Raises:

@@ -64,7 +64,7 @@ class ReplanPolicy:
 
     Attributes:
         around_movers: whether predicted movers count as obstacles; if not, the robot replans only after a deviation
-                from its route
+            from its route
         obstruction_range: replan when a mover is predicted on the route within this distance ahead [m]
         max_wait: replan when the robot has waited for movers for this long [s]
         max_deviation: replan when the robot is farther off its route than this [m]

@@ -44,7 +44,7 @@ class Setting:
     flag: str | None = None  # option; None: `--` and the key; empty: no option
     form: str = "plain"  # name of the form of its values, see `antdrive.sim.forms`
     choices: tuple[str, ...] = ()  # allowed words
-    axis: bool = False  # whether a campaign file lists values under its key; else it belongs to `settings`
+    axis: bool = False  # whether a campaign file lists values under its key; else under `settings`
     column: str = ""  # column of a campaign's table; empty: the key
     usual: str = ""  # meaning of the default None, for `--help`
     # version of the campaign-key format that added the setting; settings added after version 1 are omitted at their default

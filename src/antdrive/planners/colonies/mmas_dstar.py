@@ -180,7 +180,7 @@ class PheromoneAgent(SteppingAgent):
 
     @property
     def note(self) -> str:
-        """A remark on what the agent changed to make progress; may be empty."""
+        """A remark on the agent's changes to make progress; may be empty."""
         circles = f"went in circles {self.stats.cycles} times" if self.stats.cycles else ""
         return "; ".join(
             filter(None, (*self._notes, circles, self._planner.describe_exponents(self._alpha, self._beta)))

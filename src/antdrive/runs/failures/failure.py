@@ -155,7 +155,7 @@ class Attempt:
         return f"{self.run.outcome.key}: {self.run.reason}" if self.run.rollout is None else self.run.rollout.digest
 
     def failure(self, bound: Bound | None = None) -> Failure | None:
-        """Return how it failed, by `failure_of`; an error of the planner is a failure, whatever the bound."""
+        """Return how it failed, by `failure_of`; an error of the planner is a failure for any bound."""
         return failure_of_planner(self.error) if self.run is None else failure_of(self.run, bound)
 
 

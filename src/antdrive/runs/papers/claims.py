@@ -21,7 +21,7 @@ from antdrive.runs.papers.paper_runs import PaperRun
 from antdrive.runs.statistics.intervals import Interval, means_by_world, medians_by_world, resampled, wilson
 from antdrive.runs.statistics.significance import wilcoxon
 
-#: The margin of "no longer than" [points]: a small effect, A = 0.56 (Vargha & Delaney 2000), is 56 : 44.
+#: The margin of "no longer than" [points]: a small effect, A = 0.56 (Vargha & Delaney 2000), wins 56 : 44.
 SMALL_EFFECT = 12.0
 
 
@@ -46,7 +46,7 @@ class Claim:
     reading: str = "ours"  # interpretation of the planner, if not our default
     printed: str  # the paper's values
     statistic: str  # a key of `STATISTICS`
-    quantity: tuple[str, ...] = ("gap",)  # properties of `PaperRun`; a second one belongs to the second planner
+    quantity: tuple[str, ...] = ("gap",)  # properties of `PaperRun`; a second one is that of the second planner
     relation: str  # a key of `RELATIONS`
     bound: float
     cases: tuple[tuple[Arm, ...], ...]  # for each map, the planners measured together

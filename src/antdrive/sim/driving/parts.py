@@ -158,7 +158,7 @@ class Guide(Protocol):
         return 0.0
 
     def failure_note(self, tick: int) -> str:
-        """Return what the guide adds to the reason of a drive that is stuck or timed out; may be empty."""
+        """Return the guide's addition to the reason of a drive that is stuck or timed out; may be empty."""
         return ""
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:

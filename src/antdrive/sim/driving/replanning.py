@@ -134,7 +134,7 @@ class Replanning(OneRoute):
             plan = self._routes.around(task, self._grid, discs)
         route = None
         if plan.solved and len(plan.cells) and not self._routes.plan_error:
-            # The times of a timed plan belong to its cells, so its route must follow them.
+            # A timed plan has times for its cells only, so its route must follow them.
             smoothing = "none" if self._timed else self._routes.smoothing
             route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
             self._track(plan, route)

@@ -5,8 +5,8 @@ that the robot is pushed into belong to the push. The outcome of a touch is
 
 - `HIT_BY_TELEPORT` if the mover has just teleported to within the robot's braking distance (0 for a standing robot), so that
   the robot could not stop;
-- `HIT_WHILE_STANDING` if the obstacle is a mover and, just before the contact, every point of the robot was slower than
-  both 0.02 m/s and the mover, or as slow;
+- `HIT_WHILE_STANDING` if the obstacle is a mover and, just before the contact, the fastest point of the robot exceeded
+  neither 0.02 m/s nor the mover's speed;
 - `COLLIDED` otherwise, as always with walls and static cylinders.
 """
 

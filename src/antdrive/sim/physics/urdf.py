@@ -2,9 +2,8 @@
 
 The robot rolls on spheres, within 0.1 % of the commanded twist at 240 Hz (`python -m benchmarks.physics`); URDF cylinders
 were measured to be 5 % off. The casters hang 0.5 mm above the floor, because coplanar casters would carry most of the
-weight. No sphere protrudes from the footprint: where a wheel is thinner than a sphere of its radius, a smaller sphere stands
-under the wheel's middle, geared to the wheel's speed and force on the floor. The mass is centred on the axle wherever the
-footprint is.
+weight. No sphere protrudes from the footprint: where a sphere of the wheel's radius would, a smaller sphere stands under the
+wheel's middle, geared to the wheel's speed and force on the floor. The mass is centred on the axle for any footprint.
 """
 
 from __future__ import annotations

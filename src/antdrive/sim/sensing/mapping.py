@@ -168,9 +168,9 @@ class OccupancyMap:
         return np.asarray(measured * turned + (x, y), dtype=np.float64)
 
     def explained(self, points: Floats, settle: int) -> Mask:
-        """Return whether points belong to static obstacles (N,): they lie in or beside cells that have long been occupied.
+        """Return whether points belong to static obstacles (N,): they lie in or beside cells occupied for long.
 
-        Points on ground observed as free less than `settle` scans ago do not belong, whether or not their scan has been
+        Points on ground observed as free less than `settle` scans ago do not count, whether or not their scan has been
         entered.
 
         Args:
