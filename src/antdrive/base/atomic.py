@@ -23,7 +23,7 @@ LONGEST_STEM = 100  # characters of the target's name in a temporary file's name
 def atomic_write(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path that replaces `path` on success and is removed on failure.
 
-    Temporary files that killed processes left for the same target are removed.
+    Temporary files left behind by killed processes for the same target are removed.
     """
     target = Path(path)
     try:

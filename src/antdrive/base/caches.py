@@ -1,7 +1,7 @@
 """Per-process LRU caches.
 
 Every cached value is a function of its key alone: a file's text, or a world's numbers. A run therefore gives bit-identical
-results, whatever the process ran before. `clear_caches` frees the memory.
+results, regardless of what the process ran before. `clear_caches` frees the memory.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _caches: list[Any] = []  # all cached functions, for `clear_caches`
 
 
 def cached(maxsize: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator that caches a function's last results by arguments and argument types.
+    """Return a decorator that caches a function's most recent results by arguments and argument types.
 
     The function must be pure, and callers must not modify its results. Exceptions are not cached.
     """

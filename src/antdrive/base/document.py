@@ -22,7 +22,7 @@ MAX_DEPTH = 20  # levels of nesting; stops recursive aliases
 MAX_VALUES = 200_000  # values after alias expansion; nested aliases in a small file can expand to gigabytes
 
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d*|(?=\.\d))(\.\d*)?([eE][-+]?\d+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
-# Marks that libyaml and PyYAML treat differently: errors that only one reports, and line numbers of empty values.
+# Marks on which libyaml and PyYAML differ: errors that only one reports, and line numbers of empty values.
 _READ_OTHERWISE = ("\t", "\r", "?", "%", "@", "`", "|", ">", "&", "*", "!", "---", "...")
 _TAG = "tag:yaml.org,2002:"
 _PLAIN_NUMBER = r"-?(?:0|[1-9]\d{0,17})(?:\.\d+(?:e[-+]\d+)?)?"  # a number in YAML 1.1 as well

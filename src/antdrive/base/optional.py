@@ -1,4 +1,4 @@
-"""Optional packages, installed by extras and imported when first needed."""
+"""Optional packages, installed through extras and imported on first use."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def resumable(folder: Path) -> Iterator[None]:
 
 
 def _without_again(words: list[str]) -> Iterator[str]:
-    """Return a command without --again, so that resuming does not repeat those runs twice."""
+    """Return a command without --again, so that resuming does not repeat those runs a second time."""
     rest = iter(words)
     for word in rest:
         if word == "--again":

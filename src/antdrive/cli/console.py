@@ -42,7 +42,7 @@ def _progress(
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[float], None]]:
     """Show a progress bar. Yields a function that takes the completed fraction."""
-    on_top = sys.stdout.isatty()  # a redirected stdout must keep its own output
+    on_top = sys.stdout.isatty()  # print above the bar on a terminal; leave a redirected stdout alone
     columns = ("{task.percentage:>3.0f} %", "TimeRemainingColumn")
     with _progress(label, *columns, total=1.0, redirect_stdout=on_top) as show:
         yield lambda fraction: show(completed=fraction) if show else None

@@ -27,7 +27,7 @@ class Entrant:
 
 
 def check_worlds(words: Sequence[str]) -> None:
-    """Raise an error about unknown worlds before errors about planners, which campaigns do not need."""
+    """Raise an error for unknown worlds. Call it before parsing planners, which campaign folders do not need."""
     from antdrive.base.checks import resolve
     from antdrive.worlds.files.world_file import list_worlds
 

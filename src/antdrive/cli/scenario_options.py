@@ -97,7 +97,7 @@ class Setup:
     robot: Robot = "turtlebot"
 
     def scenario(self, world: "str | Task", given: Mapping[str, Any]) -> "Scenario":
-        """Build the scenario from the options and from `given`, values of settings by key in the form of files.
+        """Build the scenario from the options and from `given`, which maps keys to settings as in files.
 
         The margin "auto" calibrates the robot, unless a calibration exists.
         """

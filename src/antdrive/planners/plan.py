@@ -75,7 +75,7 @@ class Query:
     def between(cls, grid: Grid, task: Task) -> Query:
         """Build the query for a task: each end becomes the nearest free cell reachable on a straight line.
 
-        If an end has no such cell, `unreachable` says so and planners return `NO_PATH`.
+        If an end has no such cell, `unreachable` gives the reason and planners return `NO_PATH`.
         """
         from antdrive.worlds.geometry import point_clearance  # imports the compiler
 
@@ -125,7 +125,7 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -
     centres = grid.xy(near)
     distance = np.hypot(*(centres - point).T)
     ends = np.broadcast_to(np.asarray(point, dtype=np.float64), centres.shape)
-    # If the point is closer to a disc than the inflation, the line must not come closer than the point.
+    # If the point is within the inflation of a disc, the line must not come closer to a disc than the point.
     needed = min(grid.inflate, own)
     order = np.argsort(distance, kind="stable")
     order = order[distance[order] <= within]

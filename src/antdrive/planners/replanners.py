@@ -96,7 +96,7 @@ class OnlineAgent(Protocol):
         ...
 
     def move(self, cell: Cell) -> None:
-        """Set the robot's cell, if it is not the one that the agent chose.
+        """Set the robot's cell if it differs from the agent's choice.
 
         Raises:
             ValueError: the cell lies outside the grid.
@@ -158,7 +158,7 @@ class SteppingAgent(abc.ABC):
         return ""
 
     def move(self, cell: Cell) -> None:
-        """Set the robot's cell, if it is not the one that the agent chose."""
+        """Set the robot's cell if it differs from the agent's choice."""
         self._query = dataclasses.replace(self._query, start=cell)
         self._cell = self._query.start
 

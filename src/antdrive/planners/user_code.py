@@ -42,7 +42,7 @@ def record_name(name: str) -> str:
 
 
 class UserCodeError(InputError):
-    """A user's file or module that is missing, fails to import, or lacks the class.
+    """An error of a user's file or module: it is missing, fails to import, or lacks the class.
 
     Attributes:
         problem: the error on one line
@@ -83,7 +83,7 @@ def load_object(source: str, word: str, folder: Path | None = None, *, is_file: 
 
 
 def is_importable_elsewhere(planner: object) -> bool:
-    """Return whether other processes can import a planner's class: not from a file or a module beside a suite."""
+    """Return whether other processes can import a planner's class; false for files and for modules beside a suite."""
     home = type(planner).__module__
     return not home.startswith(FROM_FILE) and home not in _OWNERS
 
@@ -144,7 +144,7 @@ def _from_file(source: str, folder: Path | None) -> ModuleType:
 
 
 class _Source(importlib.machinery.SourceFileLoader):
-    """A loader that always compiles: cached bytecode may belong to another text of the same second and length."""
+    """A loader that always compiles: cached bytecode may stem from a text of equal length saved in the same second."""
 
     def get_code(self, fullname: str) -> CodeType:
         path = self.get_filename(fullname)

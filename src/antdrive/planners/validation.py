@@ -31,7 +31,7 @@ from antdrive.planners.plan import (
 from antdrive.worlds.route import end_reach, longest_line
 
 RELATIVE = 1e-9  # relative tolerance of costs and lengths
-NEAR = 1e-6  # m: tolerance of waypoints and clearances
+NEAR = 1e-6  # tolerance of waypoints and clearances [m]
 
 
 def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
@@ -45,7 +45,7 @@ def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name:
 
     Raises:
         InputError: the planner rejects the query.
-        PlannerError: the planner raised another exception, or returned no `PlanResult`.
+        PlannerError: the planner raised another exception, or did not return a `PlanResult`.
     """
     with planner_errors(planner, name):
         answer: Any = planner.plan(query, rng)
@@ -337,7 +337,7 @@ def _too_close(query: Query, xy: Floats) -> Any:
 
 
 def _rounded_off(xy: Floats) -> float:
-    """Return how much rounding the corners with arcs can shorten a line (M, 2)."""
+    """Return the length by which arcs at the corners can shorten a line (M, 2)."""
     sides = segment_lengths(xy)
     steps = np.diff(xy, axis=0)[sides > 0]
     heading, sides = np.arctan2(steps[:, 1], steps[:, 0]), sides[sides > 0]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:  # `RobotSpec` imports this module to draw itself
 WIDTH = 240  # of a drawing [px]
 BODY, BODY_EDGE, WHEEL, HEADING, RULER = "#e8ecf6", "#345cbe", "#39424f", "#ff7a0e", "#5b6576"
 WHEEL_ASPECT = 0.4  # drawn thickness of a wheel as a fraction of its diameter; robot files do not give it
-MM = 1000.0  # the drawing's unit, because browsers render text in units of a metre badly
+MM = 1000.0  # drawing units in a metre; browsers render text badly at a scale of metres
 
 
 def robot_svg(spec: RobotSpec) -> str:

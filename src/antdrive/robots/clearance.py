@@ -89,7 +89,7 @@ def overlap_at(world: World, spec: RobotSpec, pose: Pose, unseen: tuple[Disc, ..
         world: the obstacles and walls; movers do not count
         spec: the robot
         pose: x, y and yaw of its centre [m, rad]
-        unseen: further obstacles
+        unseen: further obstacles, placed after planning
     """
     full = World(world.name, world.bounds, world.obstacles + unseen)
     gap = footprint_distances(full, spec, [pose])[0]

@@ -14,7 +14,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.records import require_ranges
 from antdrive.base.types import Floats, Pose
 
-FULL_CIRCLE = 2 * math.pi - 1e-4  # least field of view that counts as a full circle [rad]
+FULL_CIRCLE = 2 * math.pi - 1e-4  # minimum field of view that counts as a full circle [rad]
 
 
 @dataclass(frozen=True, kw_only=True)

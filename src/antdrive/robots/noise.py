@@ -1,6 +1,6 @@
 """Noise of a drive: wheel slip, encoder errors, delayed commands and pose estimation.
 
-A robot's file has the levels (`Noise`). A drive scales them; 0 means a perfect robot. All random numbers come from the
+The robot file sets the levels (`Noise`). A drive scales them; 0 means a perfect robot. All random numbers come from the
 caller's generator.
 """
 
@@ -44,7 +44,7 @@ class NoiseModel:
         self._ticks_per_fix = max(1, round(1 / (noise.pose_rate * period)))
         self._tick = 0
         self.estimate = start
-        # Variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors accumulate over several.
+        # Variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over fixes.
         correlated = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
         drift = (noise.encoder**2 + correlated * noise.slip**2) / noise.pose_rate**2
         self._gain = _steady_gain(drift / 2, noise.pose_xy**2), _steady_gain(2 * drift / track**2, noise.pose_yaw**2)

@@ -92,7 +92,7 @@ class Noise:
 
 
 FOOTPRINT_RANGE = (0.02, 20.0)  # of the diameter, or of length and width [m]
-WHEEL_ROOM = 0.05  # least distance from a wheel's centre to the footprint's edge [wheel radii]
+WHEEL_ROOM = 0.05  # minimum distance from a wheel's centre to the footprint's edge [wheel radii]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Workers on this or other machines through dask's `distributed`. They run chunks of runs, each safe to repeat."""
+"""Workers on this or other machines through dask's `distributed`. They execute chunks of runs that are safe to repeat."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from antdrive.base.errors import input_error
 from antdrive.base.optional import optional
 from antdrive.runs.pool import ATTEMPTS, Done, Item, Result, Ticket, Waiting
 
-CHUNKS_EACH = 3  # chunks at a worker or on their way to it
+CHUNKS_EACH = 3  # chunks per worker, in progress or queued
 PATIENCE = 10.0  # longest absence of the scheduler before the campaign ends [s]
 WORKERS_EVERY = 2.0  # period of the query for the number of workers [s]
 TICK = 0.005  # polling period of the tasks [s]
@@ -46,7 +46,7 @@ def run_on_cluster(
                 waiting.processes, counted = _workers(client, address), time.monotonic()
             while waiting and len(at_work) < CHUNKS_EACH * waiting.processes:
                 _submit(client, work, waiting.chunk(), at_work, limit)
-            # A dead worker leaves all runs of its chunk under suspicion: each is retried alone.
+            # Any run of a dead worker's chunk may have killed it, so each is retried alone.
             if not at_work:
                 tried, since = suspects.pop(), time.monotonic()
                 _submit(client, work, [tried], at_work, limit)
@@ -73,7 +73,7 @@ def _submit(
     at_work: dict[Any, list[Ticket[Item]]],
     limit: float | None,
 ) -> None:
-    # As part of the function, the runs are not searched for results of other tasks, which is slow.
+    # dask searches arguments for results of other tasks, which is slow; it does not search a partial's arguments.
     made = functools.partial(run_chunk, work, [ticket.item for ticket in chunk], limit)
     at_work[client.submit(made, pure=False)] = chunk
 
@@ -81,7 +81,7 @@ def _submit(
 def run_chunk(
     work: Callable[[Item], Result], items: Sequence[Item], limit: float | None = None
 ) -> tuple[list[Result], float]:
-    """Make runs in sequence; return their results and the time taken [s]."""
+    """Execute runs in sequence; return their results and the time taken [s]."""
     started, results = time.monotonic(), []
     for item in items:
         with _ended_after(limit):
@@ -91,7 +91,7 @@ def run_chunk(
 
 @contextmanager
 def _ended_after(limit: float | None) -> Iterator[None]:
-    """Kill this process after `limit` seconds: nothing else stops a planner."""
+    """Kill this process after `limit` seconds, since nothing else stops a planner."""
     if limit is None:
         yield
         return

@@ -34,7 +34,7 @@ class Compared:
     world: str  # the world's name
     seed: int  # the random seed
     facts: Mapping[str, Any]  # `Run.as_dict`
-    drive: str  # SHA-256 of the drive, whatever the plan; empty without a drive
+    drive: str  # SHA-256 of the drive alone, without its plan; empty without a drive
     plan: bytes  # the planned line as bytes
 
     @classmethod
@@ -58,7 +58,7 @@ class Compared:
 def differences(runs: Sequence[Compared]) -> list[dict[str, Any]]:
     """Compare each planner's drives with the first planner's in the same world and with the same seed.
 
-    Pairs count if both succeeded. Each metric has its median, least and largest difference.
+    Pairs count if both succeeded. Each entry holds the median, least and largest difference of every metric.
     """
     first = runs[0].label
     reference = {(run.world, run.seed): run for run in runs if run.label == first}

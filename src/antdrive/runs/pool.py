@@ -28,7 +28,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 ATTEMPTS = 2  # for a run that kills its process
-STILLBORN = 3  # consecutive workers that die before they are ready; then the pool gives up
+STILLBORN = 3  # after this many consecutive workers that die before they are ready, the pool gives up
 POLL_INTERVAL = 1.0  # longest wait for a result before other duties [s]
 GRACE = 1.0  # time for workers to end by themselves [s]
 CHUNK_SECONDS = 2.0  # target duration of a chunk [s]
@@ -49,7 +49,7 @@ class Ticket(Generic[Item]):
 class Waiting(Generic[Item]):
     """Queue of runs, by group.
 
-    A process stays with the group of its last run, then takes an untouched one, then helps with the largest. Chunks
+    A process stays with the group of its last run, then takes an untouched group, then helps with the largest. Chunks
     are sized for about two seconds, from the mean time of recent runs, and are shorter near the end.
 
     Attributes:
@@ -91,7 +91,7 @@ class Waiting(Generic[Item]):
         most = self._chunk_length()
         while self._length and len(tickets) < most:
             if self._first:
-                # One by one: if one of these kills its process, only that one is under suspicion.
+                # Returned runs go one by one, so that a dying process identifies its run.
                 tickets, most = [self._first.popleft()], 1
                 self._length -= 1
             else:
@@ -152,7 +152,7 @@ def cores() -> int:
 
 
 def processes_for(jobs: int | None) -> int:
-    """Return the number of processes for `jobs` (None: one per core); 0, this process, for one or in a worker."""
+    """Return the number of processes for `jobs` (None: one per core); 0 (this process) for one job or in a worker."""
     jobs = cores() if jobs is None else jobs
     return 0 if jobs == 1 or multiprocessing.parent_process() is not None else jobs
 
@@ -289,7 +289,7 @@ class Pool:
         return max(0.0, min([POLL_INTERVAL, *left]))
 
     def _end_slow(self) -> None:
-        """Kill workers whose run exceeds the limit; their closed pipe shows it."""
+        """Kill workers whose run exceeds the limit; their closed pipe reports it."""
         for worker in self._workers:
             at_work = worker.ready and worker.handed and not worker.pipe.poll()
             if self._limit is not None and at_work and time.monotonic() - worker.since > self._limit:
@@ -363,7 +363,7 @@ def _start(work: Callable[[Any], Any]) -> _Worker:
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Shield processes started in this context from Ctrl-C; for this process it is only delayed.
+    """Shield processes started in this context from Ctrl-C; this process receives it with a delay.
 
     A terminal sends Ctrl-C to every process, but the parent decides when its workers end.
     """

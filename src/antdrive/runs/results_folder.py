@@ -14,7 +14,7 @@ from antdrive.base.files import write_json
 
 
 def free_folder(folder: Path, manifest: str, own: str) -> Path:
-    """Return the folder; if its manifest has another fingerprint, one with ours in its name."""
+    """Return the folder, or one named with our fingerprint if the folder's manifest has another."""
     try:
         data = json.loads((folder / manifest).read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -30,7 +30,9 @@ from antdrive.sim.sensing.tracking import KnownGround
 from antdrive.worlds import Cruising, Disc, Task, World
 
 DRIFTING_SHARE = 0.6  # `GOAL_SHARE` of a mapless robot that tracks movers by lidar
-BLIND_SHARE = 0.3  # such a robot backs into its blind sector at this fraction of its top speed, unless a mover is met
+BLIND_SHARE = (
+    0.3  # such a robot backs into its blind sector at this fraction of its top speed, unless it avoids a mover
+)
 
 _rehearsed: set[str] = set()  # keys of the replanning warm-ups in this process
 
@@ -147,7 +149,7 @@ def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
 
 
 def _exploration(s: Scenario, survey: Survey) -> Exploration:
-    """Create the guide of a mapless robot; it plans around tracked movers if the policy asks for it."""
+    """Create the guide of a mapless robot; it plans around tracked movers if the policy says so."""
     policy, ahead = s.replanning or ReplanPolicy(), None
     if survey.tracking is not None and s.replanning is not None and policy.around_movers:
         tracked = Tracked(survey.tracking, perception_of(s), s.control_hz)

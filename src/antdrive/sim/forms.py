@@ -72,7 +72,7 @@ MarginValue = Annotated[Any, PlainValidator(_margin), WithJsonSchema(_MARGIN_SCH
 
 @dataclasses.dataclass(frozen=True)
 class Form:
-    """Form of numbers and words, written as they are."""
+    """Form of numbers and words, written unchanged."""
 
     written: Any = None  # pydantic type of a file's value; None: the field's own type and bounds
     usual: Any = None  # the file's value for the default; None: the default itself
@@ -90,7 +90,7 @@ class Form:
         return value
 
     def words(self, flag: str, value: Any) -> list[str] | None:
-        """Return the options of `antdrive run` for a file's value; None where there are none."""
+        """Return the options of `antdrive run` for a file's value; None if it has none."""
         return [] if value is None else [flag, option_text(value)] if flag else None
 
 
@@ -258,7 +258,7 @@ def given_settings(entry: BaseModel) -> dict[str, Any]:
 
 
 def setting_words(given: Mapping[str, Any]) -> list[str] | None:
-    """Return the words of `antdrive run` for values of files; None where it lacks options for them."""
+    """Return the options of `antdrive run` for values of files; None if a value has no option."""
     words: list[str] = []
     for one in SETTINGS.values():
         if one.key not in given or (not one.flag and given[one.key] == one.default):

@@ -129,8 +129,7 @@ def plan(s: Scenario) -> tuple[Grid, PlanResult]:
 
     Movers are not on the grid; space-time planners get their motions. An invalid plan is returned without its path,
     with status `INVALID` and the error as reason. If the start is too narrow to follow the path, the answer is
-    `NO_PATH` with
-    the reason. Without a map, the plan uses the first scan.
+    `NO_PATH` with the reason. Without a map, the plan uses the first scan.
 
     Raises:
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
@@ -149,7 +148,6 @@ def run(
     Args:
         s: the scenario
         planned: the result of `plan` for the scenario, or your own plan on its grid, which is checked; None: plan first
-            -
         progress: called with the completed fraction of the route
 
     Raises:

@@ -33,7 +33,7 @@ class Perception:
     """Perception of movers in every control period: exact, or by lidar.
 
     Attributes:
-        kind: `positions`: exact positions; movers are predicted to stay. `velocities`: exact velocities too; constant
+        kind: `positions`: exact positions; movers are predicted to stay. `velocities`: also exact velocities; constant
             velocity is predicted. `motions`: exact positions at any time, with turns and teleports; the prediction is
             exact. `lidar`: tracks from the robot's scans, see `antdrive.sim.sensing.MoverTracker`; constant velocity is
             predicted.
@@ -64,7 +64,7 @@ class ReplanPolicy:
 
     Attributes:
         around_movers: whether predicted movers count as obstacles; if not, the robot replans only after a deviation
-                from its route
+            from its route
         obstruction_range: replan when a mover is predicted on the route within this distance ahead [m]
         max_wait: replan when the robot has waited for movers for this long [s]
         max_deviation: replan when the robot is farther off its route than this [m]
@@ -73,7 +73,7 @@ class ReplanPolicy:
         min_interval: shortest time between two replans [s]
         prediction_time: ground that movers are predicted to cover within this time is blocked [s]
         patience: the drive ends as blocked when standing movers have closed every route for this long [s]
-        max_traffic: if more movers per second would meet a standing robot, routes lead around the zones that movers
+        max_traffic: if a standing robot would meet more movers per second than this, routes avoid the zones that movers
             roam [1/s]
         max_detour: longest such route, as a multiple of the straight line to the goal
 

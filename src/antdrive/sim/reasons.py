@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from antdrive.sim.driving.routes import RoutePlanner
 
 FINER = (2, 4, 8)  # cells are tried this many times smaller
-HALVINGS = 7  # bisection steps for the passable radius in a world of very many obstacles
-MOST_CELLS = 2_000_000  # largest grid that is made only to test whether it has a path
+HALVINGS = 7  # bisection steps for the passable radius in a world with too many gaps to try each
+MOST_CELLS = 2_000_000  # largest grid built only to test for a path
 
 
 def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
-    """Explain why a planner found no path: what it said, for which disc, and what would help."""
+    """Explain why a planner found no path: its reason, the disc that does not fit, and a remedy."""
     robot = s.robot
     disc = f"a disc of {s.inflate:.3g} m (radius {robot.radius:.3g} + margin {s.margin:.3g})"
     says = f": {said}" if said else ""
@@ -54,7 +54,7 @@ def _narrowest_place(s: RoutePlanner) -> str:
 
 
 def _what_it_takes(s: RoutePlanner, passes: float) -> str:
-    """Describe what the robot needs where only discs of a radius `passes` fit [m], and what would help."""
+    """Describe the room that the robot needs where only discs of radius `passes` [m] fit, and a remedy."""
     robot, foot = s.robot, s.robot.footprint
     fits = passes - robot.radius
     helps = f"a margin below {fits:.3g} m leaves a way, on cells that are fine enough" if fits > 0 else ""

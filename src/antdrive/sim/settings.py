@@ -44,7 +44,7 @@ class Setting:
     flag: str | None = None  # option; None: `--` and the key; empty: no option
     form: str = "plain"  # name of the form of its values, see `antdrive.sim.forms`
     choices: tuple[str, ...] = ()  # allowed words
-    axis: bool = False  # whether a campaign file lists values under its key; else it belongs to `settings`
+    axis: bool = False  # whether a campaign file lists values under its key; else under `settings`
     column: str = ""  # column of a campaign's table; empty: the key
     usual: str = ""  # meaning of the default None, for `--help`
     # version of the campaign-key format that added the setting; settings added after version 1 are omitted at their default
@@ -203,7 +203,7 @@ class DeclaredSetting:
 
     name: str  # the scenario's field
     kind: Any  # the field's type; types of other records as text
-    optional: bool  # whether None is a value
+    optional: bool  # whether None is a valid value
     bounds: tuple[Ge | Gt | Le, ...]  # bounds of numbers, as pydantic takes them
     setting: Setting  # its notation
     field: "dataclasses.Field[Any]"  # the record's field

@@ -20,7 +20,7 @@ SAME = 1e-9  # relative tolerance of numbers that are written twice
 
 
 def read_result(path: Path) -> Mapping[str, Any]:
-    """Read a `result.json`; return an empty mapping if it is no object."""
+    """Read a `result.json`; return an empty mapping if it is not a JSON object."""
     if not path.is_file():
         raise input_error(str(path), "cannot be read (no regular file)")
     if path.stat().st_size > MAX_RESULT_BYTES:
@@ -99,7 +99,7 @@ def verify_log(
 
         try:
             check = replayed(rollout)
-        except ValueError as error:  # the record is of no drive
+        except ValueError as error:  # the record cannot describe a drive
             problems.append(f"replay: {error}")
         else:
             results["replay"] = check.as_dict()

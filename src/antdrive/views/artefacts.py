@@ -60,7 +60,7 @@ class Results:
         return self.folder.joinpath(*map(file_name, (*parts, stem, name)))
 
     def should_film(self, *, failed: bool) -> bool:
-        """Return whether to film a test. Of failed tests only the first `MOST_FILMS` are filmed, one place each."""
+        """Return whether to film a test. Of the failed tests, only the first `MOST_FILMS` are filmed; each claims a place."""
         if self.films != "failed":
             return self.films == "always"
         return failed and (self.places is None or any(_claim(self.places / str(k)) for k in range(MOST_FILMS)))
@@ -78,7 +78,7 @@ def _claim(place: Path) -> bool:
 def file_name(name: str) -> str:
     """Return a name that every file system accepts, such as aisle-0 for aisle[0].
 
-    Only aisle[0] and aisle-0 share a name; a baseline holds its test's name, which prevents a mix-up.
+    Only names such as aisle[0] and aisle-0 collide; baselines hold their test's name, which prevents a mix-up.
     """
     plain = re.sub(r"\[(\d+)\]$", r"-\1", name)
     if re.fullmatch(r"[\w.-]{1,120}", plain, re.ASCII):

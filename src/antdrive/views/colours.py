@@ -67,7 +67,7 @@ OUTCOME_LABELS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
     }
 )
 
-#: Colours from standstill to the robot's top speed: viridis without its palest end, invisible on light ground.
+#: Colours from standstill to the robot's top speed: viridis without its palest end, which is invisible on light ground.
 SPEED_STOPS: tuple[Colour, ...] = (
     *((72, 26, 108), (68, 58, 131), (57, 86, 140), (44, 113, 142), (33, 138, 141)),
     *((32, 163, 134), (64, 185, 112), (116, 206, 75), (168, 218, 50)),
@@ -77,8 +77,8 @@ SPEED_STOPS: tuple[Colour, ...] = (
 #: Colours of a planner's field, such as pheromone, from its low to its high values.
 FIELD_STOPS: tuple[Colour, ...] = ((244, 246, 249), (213, 228, 243), (143, 188, 224), (63, 131, 191), (18, 63, 122))
 
-#: One colour per planner. The first seven are Okabe and Ito's without yellow, invisible on white; each other one is far
-#: (CIELAB) from its predecessors for full colour vision and for deuteranopia.
+#: One colour per planner. The first seven are Okabe and Ito's without yellow, which is invisible on white. Each later one
+#: is far (CIELAB) from its predecessors for full colour vision and for deuteranopia.
 PLANNER_COLOURS: tuple[Colour, ...] = (
     *((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (27, 35, 51)),
     *((17, 68, 204), (85, 68, 0), (221, 187, 136), (119, 0, 51), (170, 0, 136), (221, 51, 68), (68, 34, 119)),
@@ -126,8 +126,8 @@ def hexed(colour: Colour) -> str:
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
-DARK_LUMINANCE = 0.22  # least luminance on a dark page: a contrast of 4.3
-LIGHT_LUMINANCE = 0.45  # largest luminance on a light page
+DARK_LUMINANCE = 0.22  # minimum luminance on a dark page: a contrast of 4.3
+LIGHT_LUMINANCE = 0.45  # maximum luminance on a light page
 
 
 class LabelStyle(NamedTuple):

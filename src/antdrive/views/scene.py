@@ -17,7 +17,7 @@ from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Task, World
 
-MIN_JUMP = 0.05  # least distance between two rows that counts as a jump of a mover [m]
+MIN_JUMP = 0.05  # minimum distance between two rows that counts as a jump of a mover [m]
 PLANNED_TRACK = 30.0  # duration of the movers' tracks in a plan's figure [s]
 
 

@@ -1,6 +1,6 @@
 """Motions of movers as functions of time.
 
-Random steps are drawn once, from the run's seed. The result for a time is bit-identical, whatever other times are
+Random steps are drawn once, from the run's seed. The result for a time is bit-identical, regardless of the other times
 requested.
 """
 
@@ -20,7 +20,7 @@ from antdrive.base.types import Bounds, Floats, Point
 from antdrive.worlds.limits import MAX_DRAWS
 from antdrive.worlds.movers import Cruising, Keyframed, Mover, Wandering
 
-CLEAR_OF_ROBOT = 1.0  # least distance from a wanderer's surface in its random first cell to the robot's start [m]
+CLEAR_OF_ROBOT = 1.0  # minimum distance from a wanderer's surface in its random first cell to the robot's start [m]
 TRIES = 10_000  # draws of a wanderer's first cell
 PATH_POINTS = 120  # points of a drawn path
 _NEIGHBOURS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.float64)  # x, y
@@ -54,7 +54,7 @@ class Motion(ABC):
     """
 
     radius: float  # the mover's radius [m]
-    draws: int = 0  # random draws of a wanderer's first cell
+    draws: int = 0  # number of random draws for a wanderer's first cell
 
     @abstractmethod
     def at(self, t: Floats) -> Floats:
@@ -66,7 +66,7 @@ class Motion(ABC):
 
     @abstractmethod
     def travelled(self, t: Floats) -> Floats:
-        """Return an upper bound of the distance travelled at each time, without jumps, (T,) [m]."""
+        """Return an upper bound on the distance travelled at each time, without jumps, (T,) [m]."""
 
     def jumped(self, t: Floats) -> npt.NDArray[np.int64]:
         """Return the number of jumps up to each time, (T,)."""
@@ -94,14 +94,14 @@ def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, start: Po
 
 
 def path_ahead(motion: Motion, seconds: float) -> Floats:
-    """Return a mover's path from the run's start to its first jump, to draw (N, 2) [m]."""
+    """Return a mover's path from the run's start to its first jump, for drawing (N, 2) [m]."""
     end = float(min(motion.jump_times(seconds), default=seconds))
     times = np.linspace(0.0, end, PATH_POINTS)
     return motion.at(times[:-1] if end < seconds else times)
 
 
 class _KeyframedMotion(Motion):
-    """Motion along keyframes; each segment is a cubic in its elapsed fraction of time."""
+    """Motion along keyframes; each segment is a cubic in the elapsed fraction of its time."""
 
     def __init__(self, mover: Keyframed) -> None:
         frames = np.array(mover.keyframes, dtype=np.float64)
@@ -177,7 +177,7 @@ class _KeyframedMotion(Motion):
 
 
 def _longest(terms: Floats) -> Floats:
-    """Return an upper bound of each cubic segment's length: duration times highest speed, (K,) [m]."""
+    """Return an upper bound on each cubic segment's length: duration times highest speed, (K,) [m]."""
     _, a, b, c = terms
     ends = [np.abs(a), np.abs(a + 2 * b + 3 * c)]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -24,8 +24,8 @@ class _Body:
     """A moving upright cylinder.
 
     Attributes:
-        radius: as built, never inflated [m], > 0
-        height: [m], > 0
+        radius: true radius, never inflated [m], > 0
+        height: height of the cylinder [m], > 0
         phase: time into the motion at a run's start [s], >= 0
     """
 
@@ -45,16 +45,16 @@ class Keyframed(_Body):
     """A mover with given positions at given times. It stands at the first position until the first keyframe.
 
     Attributes:
-        radius: as built, never inflated [m], > 0
-        height: [m], > 0
+        radius: true radius, never inflated [m], > 0
+        height: height of the cylinder [m], > 0
         phase: time into the motion at a run's start [s], >= 0
         keyframes: time [s], x [m] and y [m] of each, at least two, in order of time; with equal positions the mover
             stands still
         loop: after the last keyframe the mover goes back and forth ("pingpong"), jumps to the first position
             ("teleport"), or stops ("once")
         interpolation: straight at constant speed ("linear"), or along a cubic through all positions ("catmull-rom").
-            The cubic is uniform in each segment's fraction of time, as in Gazebo's animations, and much faster than
-            linear where a short segment follows a long one.
+            The cubic is uniform in each segment's fraction of time, as in Gazebo's animations. Where a
+            short segment follows a long one, the mover is much faster than with "linear".
 
     Raises:
         FieldError: fewer than two keyframes, times that do not increase, or more than 20 m/s between keyframes.
@@ -86,8 +86,8 @@ class Cruising(_Body):
     """A mover at constant speed whose surface bounces off the walls.
 
     Attributes:
-        radius: as built, never inflated [m], > 0
-        height: [m], > 0
+        radius: true radius, never inflated [m], > 0
+        height: height of the cylinder [m], > 0
         phase: time into the motion at a run's start [s], >= 0
         position: initial centre, x and y [m]
         velocity: initial velocity, x and y [m/s]
@@ -117,8 +117,8 @@ class Wandering(_Body):
     period.
 
     Attributes:
-        radius: as built, never inflated [m], > 0
-        height: [m], > 0
+        radius: true radius, never inflated [m], > 0
+        height: height of the cylinder [m], > 0
         phase: time into the motion at a run's start [s], >= 0
         cell: side of the cells of a grid over the world [m]
         period: time for one step, straight or diagonal [s]

@@ -1,9 +1,9 @@
 """Routes, and the rule that joins a task's start and goal to the grid.
 
 Planning and all checks share the rule. A start or a goal need not lie at the centre of a free cell. A straight lead, at
-most `end_reach` long, joins it to a free cell nearby. If the start has less clearance than paths keep, its lead, and
-nothing else of the path, may be as close to obstacles as the start. If the goal has less clearance, the path ends within
-the goal tolerance. The line of an any-angle planner is at most `DETOUR` longer than its path of cells.
+most `end_reach` long, joins it to a free cell nearby. If the start has less clearance than paths keep, only its lead may be
+as close to obstacles as the start. If the goal has less clearance, the path ends within the goal tolerance. The line of an
+any-angle planner is at most `DETOUR` longer than its path of cells.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ DETOUR = 3.0  # largest excess of an any-angle planner's line over its path of c
 
 
 def cells_beside(inflate: float, cell: float) -> int:
-    """Return how many rows and columns away an end may be joined to the grid.
+    """Return the largest distance from an end to its grid cell, in rows and in columns.
 
-    Reaching farther cells would need a plan of its own.
+    A farther cell would need a planned lead.
     """
     return max(3, math.ceil(inflate / cell) + 1)
 
@@ -45,7 +45,7 @@ class Route:
 
     Attributes:
         xy: the points (N, 2), N >= 2, read-only [m]; consecutive duplicates are removed
-        curvature: of the exact curve from each point to the next (N,) [1/m]; None: unknown
+        curvature: curvature of the exact curve from each point to the next (N,) [1/m]; None: unknown
         kind: how the plan was smoothed
         note: why the requested smoothing was not applied; empty if it was
 
@@ -67,7 +67,8 @@ class Route:
             curvature = np.array(self.curvature, dtype=np.float64)
             if curvature.shape != xy.shape[:1] or not np.isfinite(curvature).all():
                 raise FieldError("curvature", f"must be {len(xy)} finite numbers, got shape {curvature.shape}")
-            curvature = curvature[np.append(moves_on, True)]  # the last of equal points has the next segment's
+            # The last of equal points has the next segment's curvature.
+            curvature = curvature[np.append(moves_on, True)]
             curvature.setflags(write=False)
             object.__setattr__(self, "curvature", curvature)
         xy = np.ascontiguousarray(xy[np.insert(moves_on, 0, True)])

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from antdrive.base.types import Bounds, Floats, Pose
 
 LONGER_SIDE = 420  # of a world's drawing [px]
-MAX_DRAWN = 200  # cells along the longer side of a drawn grid; more slow notebooks down
+MAX_DRAWN = 200  # cells along the longer side of a drawn grid; more would slow notebooks down
 OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#ff7a0e"
 MOVER = "#a8329e"
 

@@ -17,7 +17,7 @@ from antdrive.worlds.world import World
 class Trajectories:
     """All movers of a run as functions of time.
 
-    The result for a time is bit-identical, whatever other times are requested.
+    The result for a time is bit-identical, regardless of the other times requested.
 
     Attributes:
         radii: each mover's radius (M,) [m]

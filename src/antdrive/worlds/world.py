@@ -105,7 +105,7 @@ class World:
                 first_cell(mover, self.bounds, self.discs)
 
     def _require_short_walks(self) -> None:
-        """Raise FieldError if wanderers have too many steps before the start: each one is drawn."""
+        """Raise FieldError if wanderers have too many steps before the start: each one is sampled."""
         steps = {i: math.floor(m.phase / m.period) for i, m in enumerate(self.movers) if isinstance(m, Wandering)}
         if not steps:
             return
@@ -139,7 +139,7 @@ class World:
         return card(world_svg(self.bounds, self.discs, movers=self.mover_paths()), self.name, facts)
 
     def mover_paths(self, start: Point | None = None, seed: int | None = None) -> list[tuple[Floats, float]]:
-        """Return the path over the next 20 s (N, 2) [m] and the radius [m] of each mover, to draw.
+        """Return the path over the next 20 s (N, 2) [m] and the radius [m] of each mover, for drawing.
 
         Args:
             start: the robot's start [m]

@@ -53,7 +53,7 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
 def _prediction(log: "Rollout") -> dict[str, float | None] | None:
     """Return the loss predicted by --margin auto and the footprint's actual loss; None for a fixed margin.
 
-    The prediction covers static obstacles known to the planner only, so drives among others have no actual loss.
+    The prediction covers only static obstacles known to the planner. With movers or unseen obstacles the actual loss is None.
     """
     from antdrive.sim.log.certificate import certify
 

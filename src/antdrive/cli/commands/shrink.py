@@ -97,7 +97,7 @@ def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
 
 
 def _broken_bound(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | None":
-    """Return the broken bound of a test, or of its baseline, whose drive ends as expected."""
+    """Return the bound of a test or its baseline that the drive breaks although it ends as expected."""
     from antdrive.runs.failures.failure import Attempt, bound_broken_in
 
     if case is None or not (case.demands.bounds or case.entry.baseline):

@@ -171,10 +171,9 @@ def import_world(
 ) -> None:
     """Convert another program's world or map to a world file.
 
-    World files consist of upright cylinders. SDF cylinders are kept as they are. In a map, cylinders cover every
-    blocked cell next to
-    free ground reachable from start or goal, so no passage becomes wider. The key `source` of the world file states the
-    overhang of cylinders beyond blocked cells.
+    World files consist of upright cylinders. SDF cylinders are kept as they are. In a map, cylinders cover every blocked
+    cell next to free ground reachable from start or goal, so no passage becomes wider. The key `source` of the world file
+    states the overhang of cylinders beyond blocked cells.
     """
     from antdrive.worlds import import_file, save_task
     from antdrive.worlds.formats.cellmap import conversion_progress

@@ -39,13 +39,13 @@ class CheckResult:
     Attributes:
         address: the test's name in commands
         passed: whether the test passed
-        case: the test's name in its baseline; empty without one
+        case: the test's name in its baseline; empty without a baseline
         outcome: the run's outcome, such as succeeded
         certified: whether the drive is certified collision-free
         faults: reasons for failing, one sentence each
         gains: improvements over the baseline, one sentence each
         details: explanations of the faults, one sentence each
-        accepted: change of the baseline: written, renewed, unchanged, or empty
+        accepted: change to the baseline: written, renewed, unchanged, or empty
         commands: commands that repeat the test
         files: written files by name
         unfilmed: whether the test failed and has no film because `MOST_FILMS` exist
@@ -111,7 +111,7 @@ class Check:
         files, unfilmed = dict[str, str](), False
         try:
             files, unfilmed = self._written(run, evaluation, baseline)
-        except Exception as error:  # drawing an invalid plan may fail in many ways
+        except Exception as error:  # drawing an invalid plan can raise any exception
             if evaluation.passed:
                 raise
             message = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"

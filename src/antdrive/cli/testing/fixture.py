@@ -25,7 +25,7 @@ from antdrive.worlds import Task, list_worlds
 
 
 class DriveFailure(AssertionError):
-    """A drive fails its test; the message states the reasons.
+    """Failure of a drive in its test; the message states the reasons.
 
     Attributes:
         result: the result of the test
@@ -139,7 +139,7 @@ class DriveFixture:
         robot: str | Path | RobotSpec | None = None,
         **settings: Any,
     ) -> Run:
-        """Drive, without judging.
+        """Drive a scenario without evaluating it.
 
         Args:
             world: a scenario (then all settings are its own), a task, a world of the catalogue, or a world file relative to
@@ -183,10 +183,10 @@ def assert_collision_free(run: Run | Rollout, clearance: float = 0.0) -> None:
 
     Args:
         run: a run, or the log of one
-        clearance: least distance to obstacles to be proved, between the log's rows as well [m]
+        clearance: minimum distance to obstacles to prove, including between the log's rows [m]
 
     Raises:
-        AssertionError: it is not; the message names the obstacle, place and time.
+        AssertionError: it is not certified; the message names the obstacle, place and time.
     """
     __tracebackhide__ = True
     rollout = run.rollout if isinstance(run, Run) else run
@@ -214,7 +214,7 @@ def assert_reached_goal(run: Run) -> None:
         run: the run
 
     Raises:
-        AssertionError: it did not; the message states the outcome.
+        AssertionError: a condition is not met; the message states the outcome.
     """
     __tracebackhide__ = True
     if run.outcome is not Outcome.SUCCEEDED and not run.outcome.with_contact:

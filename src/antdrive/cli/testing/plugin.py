@@ -208,7 +208,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Find baselines of removed tests in fully collected modules."""
     if any("::" in str(word) for word in config.args) or config.getoption("lf", False):
-        return  # modules are partly collected
+        return  # modules may be collected only in part
     modules: dict[Path, set[str]] = {}
     for item in items:
         if not isinstance(item, DriveItem):

@@ -17,7 +17,7 @@ from antdrive.worlds.route import longest_line
 if TYPE_CHECKING:  # importing kernels loads the compiler
     from antdrive.planners.anyangle._kernels_lines import Terrain
 
-CONTACT = 5e-10  # m: an end short of the clearance by no more than this has exactly the clearance
+CONTACT = 5e-10  # an end that lacks no more than this of the clearance has exactly the clearance [m]
 
 
 class RouteEnds(NamedTuple):
@@ -44,9 +44,9 @@ class RouteEnds(NamedTuple):
 def route_ends(query: Query, *, touching: bool = False) -> RouteEnds:
     """Return the exact start and goal of the query's task; without a task, the centres of its end cells.
 
-    From a start below the clearance, the robot leaves on the straight line to the centre of its cell, which
-    `Query.between` has checked. With a goal below the clearance, the route ends at the centre of its cell. A goal
-    with exactly the clearance is reached from that centre.
+    From a start with less than the clearance, the robot leaves on the straight line to the centre of its cell, which
+    `Query.between` has checked. For such a goal, the route ends at the centre of its cell. A goal with exactly the
+    clearance is reached from that centre.
     """
     (start, goal) = (_point(xy) for xy in query.grid.xy([query.start, query.goal]))
     if query.task is None:
@@ -92,7 +92,7 @@ def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
     """Return a path of allowed moves along a polyline in fractional cells; empty if there is none.
 
     It is the shortest path within a corridor around the polyline; the corridor widens until it contains a path.
-    If the line loops or runs beside itself, that path would cut it short. The path then goes leg by leg, from the
+    If the line loops or runs beside itself, that path would take a shortcut. The path then goes leg by leg, from the
     cell of one waypoint to that of the next.
     """
     line = np.ascontiguousarray(waypoints, dtype=np.float64).reshape(-1, 2)

@@ -39,7 +39,7 @@ def feasible(task: Task, clearance: float) -> bool:
 def widest_passage(task: Task, most: float) -> Passage | None:
     """Return the bottleneck on the path of the widest disc from the task's start to its goal, up to radius `most` [m].
 
-    None if not even a point passes, or in worlds of more than `MOST_OBSTACLES` obstacles.
+    None if not even a point passes, or if the world has more than `MOST_OBSTACLES` obstacles.
     """
     world = task.world
     if len(world.obstacles) > MOST_OBSTACLES:

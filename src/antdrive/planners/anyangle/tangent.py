@@ -145,7 +145,7 @@ class Tangent(GridPlanner):
 
     A* on the tangent graph of Liu & Arimoto (1992); the result is exact. It plans among the discs of the query's
     world, so it may find a path that the grid is too coarse for. `cells` are then the cells under the path, and
-    `cost` is infinite. Ends below the clearance connect through the centres of their cells, as for all planners.
+    `cost` is infinite. Ends that lack the clearance connect through their cells' centres, as for all planners.
 
     Known weaknesses, measured (docs/notebook/planner-quality.md): the path grazes discs at exactly the clearance,
     which leaves a driving robot no margin. The number of tangents grows with the square of the number of discs.

@@ -35,8 +35,8 @@ class AcoHan(Colony):
     moves to unvisited cells that priority.
 
     Known weakness, measured (docs/papers/han2007.md): walks are long and full of loops. On the thesis' map
-    paths are 7 per cent longer than the shortest in the median, on 100 x 100 cells with a quarter of them
-    blocked 19 per cent.
+    paths are 7 per cent longer than the shortest in the median; on 100 x 100 cells with a quarter blocked,
+    19 per cent longer.
 
     Attributes:
         ants: ants per iteration

@@ -135,7 +135,7 @@ class MaxMinDStar(GridPlanner):
         """Yield alpha and beta in the order of attempts; each cycle of the ant triggers the next attempt.
 
         alpha rises up to `alpha_max`, which reduces the influence of the straight distance; finally beta is 0.
-        That always arrives, as pheromone alone decreases at every step.
+        With beta 0 the ant always arrives, since pheromone decreases at every step.
 
         Args:
             factor: factor on alpha per cycle
@@ -160,7 +160,7 @@ class PheromoneAgent(SteppingAgent):
 
     The robot moves to the allowed neighbour with the smallest `pheromone^alpha * distance^beta`. Before it returns
     to a cell visited with the current exponents, it detects a cycle and takes the next exponents of
-    `MaxMinDStar.exponents`. If blocked cells still hold it up, it respreads pheromone around them.
+    `MaxMinDStar.exponents`. If blocked cells still stop it, it respreads pheromone around them.
     """
 
     def __init__(self, planner: MaxMinDStar, query: Query) -> None:
@@ -180,7 +180,7 @@ class PheromoneAgent(SteppingAgent):
 
     @property
     def note(self) -> str:
-        """A remark on what the agent changed to make progress; may be empty."""
+        """A remark on the agent's changes to make progress; may be empty."""
         circles = f"went in circles {self.stats.cycles} times" if self.stats.cycles else ""
         return "; ".join(
             filter(None, (*self._notes, circles, self._planner.describe_exponents(self._alpha, self._beta)))

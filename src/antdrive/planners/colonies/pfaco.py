@@ -39,8 +39,8 @@ class PotentialFieldAnts(IterativePlanner):
     The paper leaves three points open, each an option here: the definition of U_ij (`form`), whether an ant may
     return to a cell (`memory`), and the constants from `attraction` on. docs/papers/lee2008.md compares the
     interpretations. Only those in which U_ij depends on differences of the potential reach the paper's claims on
-    100 x 100 cells. Taken literally, U of two neighbours far from the start differs by a few per cent, and ants
-    walk almost at random.
+    100 x 100 cells. With U_ij = U_j, two neighbours far from the start differ by a few per cent, and ants walk
+    almost at random.
 
     Known weaknesses, measured on the same page. The potential has no maximum at the goal: unless the goal is the
     cell farthest from the start, ants are drawn past it, and paths may be three times as long as the shortest;

@@ -36,7 +36,7 @@ class SafeIntervals(GridPlanner):
 
     Known weaknesses, measured (docs/notebook/planning-speed.md): all motions must be known in advance, and the
     effort grows with their number. Among 40 movers in circles the median plan takes 43 ms on 50 x 50 cells and 92
-    ms on 200 x 200, among 10 of them 12 and 30 ms.
+    ms on 200 x 200; among 10 movers, 12 and 30 ms.
 
     Attributes:
         speed: the robot's speed on every move [m/s]

@@ -38,8 +38,8 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
     """Return the plan's line in metres from the exact start to the goal, without collinear points.
 
     The first or last point of the plan is omitted if the straight line past it keeps the grid's clearance. This
-    avoids a kink between the exact end and the centre of its cell. If the goal is below the grid's clearance,
-    the route ends at the plan's last point.
+    avoids a kink between the exact end and the centre of its cell. If the goal has less than the grid's
+    clearance, the route ends at the plan's last point.
 
     Args:
         plan: a plan with a path
@@ -239,7 +239,7 @@ class TautString:
 
 
 def _runs(xy: Floats, world: World, inflate: float) -> Iterator[tuple[Floats, bool]]:
-    """Split the polyline where it begins or ceases to keep the clearance; yields each part and whether it does."""
+    """Yield the parts of a polyline that keep the clearance and those that do not, and whether each keeps it."""
     clear = (
         segment_clearance(world, xy[:-1], xy[1:]) >= inflate - 1.01 * SLACK
     )  # joined lines have exactly the clearance

@@ -4,10 +4,10 @@ In every control period the controller's motion is simulated among the predicted
 clearance, it is used unchanged. Otherwise it competes with other candidates: the same route at lower speeds, and
 sequences of two constant twists, forwards or backwards, within the robot's dynamic window
 (after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
-IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing still is a
-candidate as well, so the robot moves out of the path of an approaching mover.
+IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing still is only
+one of the candidates, so the robot moves out of the path of an approaching mover.
 
-If a mover turns nearby, there may be no candidate with the minimum clearance. While the robot can still stop in time,
+If a nearby mover turns, there may be no candidate that keeps the minimum clearance. While the robot can still stop in time,
 it takes the candidate with the latest contact. After that it takes the one that stays farthest from movers, and
 stops only if every candidate ends in a contact (T. Fraichard and H. Asama, *Inevitable collision states*, Advanced Robotics 18,
 2004, evaluate a state by its best escape in the same way).
@@ -51,13 +51,13 @@ class Avoidance:
 
     Attributes:
         horizon: prediction horizon [s]
-        step: time between two predicted instants [s]
+        step: time step of the prediction [s]
         min_clearance: minimum clearance to movers; a mover already closer may come only slightly closer [m]
         preferred_clearance: clearance beyond `min_clearance` at which the cost reaches zero [m]
         clearance_weight: cost of each metre below the preferred clearance [m/m]
         cross_track_weight: cost of each metre off the route [m/m]
         heading_weight: cost of each radian off the route's direction [m/rad]
-        reversal_time: horizon for a sudden reversal of a mover [s]
+        reversal_time: prediction horizon for a mover's sudden reversal [s]
         reversal_margin: clearance to a reversing mover beyond `min_clearance` [m]
         reversal_weight: cost of each metre below this clearance [m/m]; 0 ignores reversals
 
@@ -86,7 +86,7 @@ class Avoidance:
 
     @property
     def prediction_times(self) -> Floats:
-        """Times from now of the predictions that `avoid` needs (K + 1,) [s]."""
+        """Times of the predictions that `avoid` needs, from now (K + 1,) [s]."""
         return _instants(self.horizon, self.step)
 
     def avoid(
@@ -109,14 +109,14 @@ class Avoidance:
             tracked: the controller's path
             spec: the robot
             pose: its estimated pose
-            last: the command of the last period
+            last: the command of the previous period
             before: the controller's state before it chose `wanted`
             wanted: the controller's command for this period
-            state: the state returned in the last period
+            state: the state returned in the previous period
             places: the movers' predicted positions at the `prediction_times` (K + 1, M, 2) [m]
             radii: their radii (M,) [m]
             speed_limit: speed limit from the schedule of a timed plan [m/s]
-            backwards: maximum reverse speed, for a robot that cannot see behind; ignored if it would cause a contact [m/s]
+            backwards: maximum reverse speed, for a robot that cannot see behind; ignored if obeying it causes a contact [m/s]
         """
         candidates = self._candidates(spec, state, speed_limit, backwards)
         situation = (

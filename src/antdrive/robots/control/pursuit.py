@@ -1,7 +1,7 @@
 """Pure pursuit with clearance-checked lookahead (after R. C. Coulter, CMU-RI-TR-92-01, 1992).
 
 The carrot is the point of the route whose straight-line distance from the robot is the lookahead. Before a drive, the
-controller computes the longest clear lookahead at samples along the route: the straight line to the carrot keeps its
+controller computes, at samples along the route, the longest lookahead whose straight line to the carrot keeps its
 clearance. During the drive it shortens the lookahead until the arc to the carrot is clear. The robot is slow where the
 lookahead is short, and rotates in place if the shortest arc is not clear.
 """
@@ -28,8 +28,8 @@ from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
 
 SPACING = 0.02  # distance between the samples along a route [m]
-SQUARE = 0.5  # least side of a square of the obstacle index [m]
-EVERYTHING = 1e6  # side of a single square with all obstacles [m]
+SQUARE = 0.5  # minimum side of a square of the obstacle index [m]
+EVERYTHING = 1e6  # side of the single square that holds all obstacles [m]
 MAX_SQUARES = 250_000  # larger worlds have larger squares
 
 #: The rules that can limit the robot's speed. Logs contain the index.
@@ -37,7 +37,7 @@ LIMITERS: tuple[str, ...] = (
     "cruise",  # no rule: the robot drives at its top speed
     "curvature",  # lateral acceleration or yaw rate in a curve
     "route",  # the route's bends, lines of sight or clearance, here or within braking distance
-    "yaw rate",  # the yaw rate is still below the curve's
+    "yaw rate",  # the yaw rate has not reached the curve's
     "goal",  # braking for the goal
     "rotate",  # rotating in place
     "creep",  # no arc to the carrot is clear: creep speed
@@ -137,7 +137,7 @@ class PurePursuit:
         rotate_in_place_above_at_rest: the same for a robot at rest [rad]
         rotate_in_place_until: bearing below which the rotation ends [rad]
         braking: fraction of the robot's deceleration for planned braking
-        blend: distance for averaging the route's curvature [m]
+        blend: length over which the route's curvature is averaged [m]
         corner_lookahead_time: `lookahead_time` for routes with corners, such as those through cells [s]
         corner_blend: `blend` for such routes [m]
         min_speed_near_obstacles: speed limit at zero clearance [m/s]
@@ -250,7 +250,7 @@ class PurePursuit:
         Args:
             tracked: the path to follow, from `prepare`
             pose: the robot's estimated pose
-            command: the command of the last period
+            command: the command of the previous period
             state: the state returned by the last call; initially `PursuitState()`
         """
         if tracked.backwards:  # backwards is forwards with the heading turned by pi
@@ -291,7 +291,7 @@ class PurePursuit:
         )
 
     def _index(self, world: World, clearance: float) -> ObstacleIndex:
-        """Index the world's obstacles by the squares from which the longest lookahead reaches them."""
+        """Index the world's obstacles by square: each square lists those within reach of the longest lookahead."""
         bounds = np.asarray(world.bounds, dtype=np.float64)
         side = max(SQUARE, math.sqrt(math.prod(world.size) / MAX_SQUARES))
         distance = self.lookahead_max + clearance + side

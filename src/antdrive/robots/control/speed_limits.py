@@ -32,7 +32,7 @@ class SpeedProfile:
         time: arrival time, from 0 (S,) [s]
         curvature: curvature of the path with rounded corners (S,) [1/m]
         heading: unwrapped heading on that path, including rotations in place (S,) [rad]
-        limit: speed limit for any approach speed (S,) [m/s]
+        limit: speed limit, irrespective of the speed at earlier points (S,) [m/s]
     """
 
     arc: Floats
@@ -70,7 +70,7 @@ def speed_profile(
             wheels
         blend: distance on both sides for averaging the route's curvature with triangular weights, because robots cannot
             follow a jump in curvature at speed [m]
-        rotate_in_place_above: least angle of a corner at which the robot stops and rotates in place [rad]
+        rotate_in_place_above: minimum angle of a corner at which the robot stops and rotates in place [rad]
         braking: fraction of the robot's deceleration for braking
         step: longest distance between two samples [m]
 
@@ -99,7 +99,7 @@ def speed_profile(
 
 
 def _speeds(arc: Floats, curvature: Floats, change: Floats, spec: RobotSpec, braking: float) -> tuple[Floats, Floats]:
-    """Return speed and limit along a leg from rest to rest; the limit holds for any initial speed."""
+    """Return speed and limit along a leg from rest to rest; the limit is independent of the initial speed."""
     from antdrive.robots.control import _kernels_profile
 
     limit = np.empty(len(arc))
@@ -147,7 +147,7 @@ def _headings(route: Route, rotate_in_place_above: float) -> tuple[Floats, Float
     corner = np.ones(len(turn), dtype=np.bool_)
     if route.curvature is not None:
         bend = route.curvature[:-1]
-        corner = (bend[:-1] != bend[1:]) | (bend[1:] == 0.0)  # the other points are vertices of a drawn arc
+        corner = (bend[:-1] != bend[1:]) | (bend[1:] == 0.0)  # other points are vertices of a sampled arc
         middle = (heading[1:] + heading[:-1]) / 2
         at_start[1:][~corner] = at_end[:-1][~corner] = middle[~corner]
     arc = route.arc
@@ -198,9 +198,9 @@ def limits_along(
     near_obstacles: tuple[float, float],
     braking: float,
 ) -> Floats:
-    """Return the speed limit at the samples of a route (S,) [m/s]: the least of profile, clearance and lookahead.
+    """Return the speed limit at the samples of a route (S,) [m/s]: the minimum of profile, clearance and lookahead.
 
-    Near obstacles the limit is a least speed [m/s] plus the clearance [m] divided by a time [s]: `near_obstacles`.
+    `near_obstacles` holds a speed [m/s] and a time [s]: the limit near obstacles is speed + clearance / time.
     """
     spacing = tuning.spacing
     at = spacing * np.arange(len(lookahead))

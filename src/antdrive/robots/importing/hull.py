@@ -12,8 +12,8 @@ MAX_OUTLINE = 12  # corners of a computed outline
 STEP = 1e-5  # resolution of a computed outline [m]
 LOOSE = 1e-8  # tolerance for rounded quarter turns such as 1.5707963 [m]
 ALIKE = 1e-4  # tolerance of mirror symmetry between left and right [m]
-CHEAP = 1e-4  # fraction of its area that an outline may gain for one corner less
-LIKE = 0.97  # least filled fraction of a disc or rectangle that replaces an outline
+CHEAP = 1e-4  # relative gain in area that is accepted for one corner less
+LIKE = 0.97  # minimum fraction of a disc or rectangle filled by the outline that it replaces
 
 
 def convex_hull(points: Iterable[Point]) -> list[Point]:
@@ -31,9 +31,9 @@ def convex_hull(points: Iterable[Point]) -> list[Point]:
 
 
 def fewer_corners(corners: list[Point], most: int) -> list[Point]:
-    """Enclose a convex polygon in one with at most `most` corners by removing the edges that add the least area.
+    """Enclose a convex polygon in one with at most `most` corners by removing the edges whose removal adds the least area.
 
-    Edges that add almost no area are always removed: a wheel with a quarter turn of 1.57 is slightly askew. Symmetry is
+    Edges whose removal adds almost no area are always removed: a wheel turned by 1.57 is slightly askew. Symmetry is
     preserved: edges are removed together with their mirror images.
     """
     corners = list(corners)
@@ -148,7 +148,7 @@ def _near(value: float) -> float:
 
 
 def _up(value: float) -> float:
-    """Round a length up to 0.01 mm, except for rounding errors."""
+    """Round a length up to 0.01 mm, ignoring rounding errors."""
     return math.ceil((value - LOOSE) / STEP) / 1e5
 
 
@@ -157,7 +157,7 @@ def _area(a: Point, b: Point, c: Point) -> float:
 
 
 def _meeting(a: Point, b: Point, d: Point, c: Point) -> Point | None:
-    """Return the intersection of the rays from a through b and from d through c beyond b and c; None without one."""
+    """Return the intersection of the rays from a through b and from d through c beyond b and c; None if they do not meet."""
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - d[0], c[1] - d[1]
     cross = ux * vy - uy * vx
     if cross >= -1e-12:  # the rays diverge or are antiparallel

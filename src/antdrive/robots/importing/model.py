@@ -1,6 +1,6 @@
 """URDF models, with all joints at zero. Lengths in metres.
 
-xacro files are expanded without ROS; packages are searched beside the file and in its parent folders, or given.
+xacro files are expanded without ROS. Packages not given are searched for beside the file and in its parent folders.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MAX_PACKAGES = 100  # referenced by one file
 
 
 def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Path | None:
-    """Return a package's folder: the given one, or one of its name beside the file or above it; None without one."""
+    """Return a package's folder: the given one, or one of that name beside or above the file; None if missing."""
     if name in packages:
         return packages[name]
     above = source.resolve().parents
@@ -46,7 +46,7 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
         try:
             document = xacrodoc.XacroDoc.from_file(str(path), subargs=dict(arguments), resolve_packages=False)
             return str(document.to_urdf_string())
-        except Exception as error:  # xacro passes on any exception of its expressions
+        except Exception as error:  # xacro's expressions can raise any exception
             missing = _missing_package(error)
             folder = None if missing is None or missing in known else package_folder(path, missing, known)
             if missing is None or folder is None:
@@ -69,7 +69,7 @@ def _missing_package(error: Exception) -> str | None:
 
 
 def _help(error: Exception) -> str:
-    """Return how to fix the error; empty if unknown."""
+    """Return a hint on how to fix the error; empty if unknown."""
     if _missing_package(error) is not None:
         return "; give its folder with --package NAME=FOLDER"
     missing = next((cause for cause in _causes(error) if type(cause).__name__ == "ArgException"), None)
@@ -94,7 +94,7 @@ def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
     return {name: Path(folder) for name, folder in given.items()}
 
 
-# Polygon around the unit circle, as long and as wide as the circle.
+# Polygon circumscribed about the unit circle, with the same bounding box.
 CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
 MAX_LINKS = 10_000
 
@@ -109,10 +109,10 @@ class UrdfJoint:
     child: str  # child link
     place: Floats  # its frame in the root's frame (4, 4)
     axis: Floats  # its axis in the root's frame (3,)
-    velocity: float | None  # speed limit [rad/s]; None without one
-    effort: float | None  # torque limit [N m]; None without one
+    velocity: float | None  # speed limit [rad/s]; None if not given
+    effort: float | None  # torque limit [N m]; None if not given
     range: float  # from its lower to its upper limit [rad]; inf if it turns freely
-    # speed limit in <ros2_control>, inf without one [rad/s]; None without a velocity interface
+    # speed limit in <ros2_control> [rad/s]: inf if unlimited, None without a velocity interface
     commanded: float | None = None
 
 
@@ -150,7 +150,7 @@ class UrdfModel:
             link = holders[link].parent
 
     def drive_number(self, *tags: str) -> tuple[str, float | None]:
-        """Return the first tag of the drive plugin with a positive number, and the number; None without one."""
+        """Return the first tag of the drive plugin with a positive number, and the number; None if there is none."""
         for tag in tags:
             try:
                 value = float(self.drive.get(tag, ""))
@@ -414,7 +414,7 @@ class _Shapes:
         return vertices * _unit(file)
 
     def _candidates(self, name: str) -> Iterator[Path]:
-        """Yield candidate paths of a mesh; package://NAME/meshes/a.stl is below a folder NAME or the given folder."""
+        """Yield candidate paths of a mesh; package://NAME/FILE resolves below a folder NAME or the given folder."""
         bare = name.partition("://")[2] if "://" in name else name
         package, _, inside = bare.partition("/") if name.startswith("package://") else ("", "", bare)
         if package in self._packages:

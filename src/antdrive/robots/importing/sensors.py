@@ -16,10 +16,10 @@ from antdrive.robots.spec import require_on_robot
 from antdrive.worlds.formats.xml import rotation_matrix
 
 KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")  # Gazebo's sensor types for lidars
-LEVEL = 0.99  # least vertical component of a planar lidar's axis
+LEVEL = 0.99  # minimum vertical component of a planar lidar's axis
 RATE = 10.0  # default scan rate [Hz]
 HALF_TURN = 3.141592  # pi in six digits, rounded down [rad]
-ALL_AROUND = 2 * math.pi - 0.01  # least field of view that means a full circle [rad]
+ALL_AROUND = 2 * math.pi - 0.01  # minimum field of view that means a full circle [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfS
 def import_lidar(
     sensors: tuple[UrdfSensor, ...], frame: Floats, floor: float, foot: Footprint
 ) -> tuple[Lidar | None, str]:
-    """Return the first lidar that fits a robot file, with its origin; or None, with the reasons."""
+    """Return the first lidar that a robot file can hold, with a note on its source; or None, with the reasons."""
     problems = []
     for k, sensor in enumerate(sensors):
         try:

@@ -1,6 +1,6 @@
 """Conversion of URDF models to robot files, with a comment on the origin of each value.
 
-The comment of a value also names the limits that it overrides.
+Each comment also names the limits that its value overrides.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
 from antdrive.robots.spec import GRAVITY, RobotSpec, yaw_inertia_of
 
 ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # defaults, if the motors allow them [m/s^2], [rad/s^2]
-SPEED, YAW_RATE = 0.5, 2.0  # defaults without limits in the file [m/s], [rad/s]
+SPEED, YAW_RATE = 0.5, 2.0  # defaults if the file has no limits [m/s], [rad/s]
 DEFAULT_YAW_RATE = 3.14  # default if only the wheels limit it: half a turn a second [rad/s]
 SPARE = 0.9  # used fraction of the motors' capability
 FRICTION = 1.5  # of wheels
 RANGES = ranges_of(RobotSpec)
 NO_LIMIT = "assumed: the file has no limit"
-MIN_MOTOR_ACCELERATION = 0.05  # effort limits for less are not the motors' [m/s^2]
+MIN_MOTOR_ACCELERATION = 0.05  # an effort limit for less than this is not a motor's [m/s^2]
 
 Origins = dict[str, tuple[float, str]]  # values of a robot file with their origins
 
 
 class _Limit(NamedTuple):
-    """A limit and its origin in the file; inf without one."""
+    """A limit and its origin in the file; inf if unlimited."""
 
     value: float
     where: str
@@ -125,7 +125,7 @@ def add_forces(
 
 
 def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: float, radius: float) -> tuple[float, str]:
-    """Return the lowest plausible torque limit; its origin names all others."""
+    """Return the lowest plausible torque limit; its origin text names all others."""
     limits = [_lowest(wheels, "effort", "N m")]
     tag, stated = model.drive_number("max_wheel_torque", "wheelTorque", "torque")
     if stated:
@@ -179,7 +179,7 @@ KINDS = ("auto", "disc", "rectangle", "polygon")
 RADII = (("wheel_radius", 1.0), ("wheelRadius", 1.0), ("wheel_diameter", 0.5), ("wheelDiameter", 0.5))
 TRACKS = (("wheel_separation", 1.0), ("wheelSeparation", 1.0))
 DENSITY = 150.0  # assumed without masses in the file [kg/m^3]
-DIFFERENT = 0.01  # relative difference from which a drive plugin contradicts the geometry
+DIFFERENT = 0.01  # relative difference beyond which a drive plugin contradicts the geometry
 NOISE = "{pose_xy: 0.01, pose_yaw: 0.01, pose_rate: 20.0, encoder: 0.02, slip: 0.02, delay: 0.05}"  # the catalogue's assumption
 
 
@@ -197,7 +197,7 @@ class ImportedRobot:
 
     spec: RobotSpec
     text: str  # the robot file, with a comment for each value
-    # collision geometry below the import's height: points of each piece in the robot's frame, from above (N, 2) [m]
+    # collision geometry below the import's height: each piece's points in the robot's frame, in top view (N, 2) [m]
     pieces: tuple[Floats, ...]
     above: tuple[Floats, ...]  # collision geometry above that height
     missing_meshes: tuple[str, ...]
@@ -265,7 +265,7 @@ def _checked(given: Mapping[str, float]) -> dict[str, float]:
 
 
 def _frame(wheels: tuple[DrivenWheel, DrivenWheel]) -> Floats:
-    """Return the robot's frame from above, in the root's frame: origin, x and y as rows (3, 2)."""
+    """Return the robot's planar frame in the root's frame: origin, x and y as rows (3, 2)."""
     left, right = wheels
     across = (left.centre - right.centre)[:2]
     y = across / np.linalg.norm(across)
@@ -277,7 +277,7 @@ def _from_above(points: Floats, frame: Floats) -> Floats:
 
 
 def _with_wheels(points: list[Floats], wheels: tuple[DrivenWheel, DrivenWheel]) -> list[tuple[float, float]]:
-    """Return the points of all pieces and the corners of both wheels, from above."""
+    """Return the points of all pieces and the corners of both wheels in top view."""
     half = float(np.linalg.norm(wheels[0].centre - wheels[1].centre)) / 2
     corners = [(float(x), float(y)) for piece in points for x, y in piece]
     for side, wheel in zip((1, -1), wheels, strict=True):
@@ -332,7 +332,7 @@ def _contradiction(model: UrdfModel, value: float, *tags: tuple[str, float]) -> 
 
 
 def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
-    """Return the sum of the links' masses, or the mass of a box [m^3] of typical density."""
+    """Return the sum of the links' masses, or the mass of a box of this volume [m^3] at typical density."""
     heavy = [name for name, mass in model.masses.items() if mass > 0]
     if not heavy:
         return DENSITY * box, f"assumed: {DENSITY:g} kg/m3, as the file has no masses"

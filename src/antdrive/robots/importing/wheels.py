@@ -15,7 +15,7 @@ from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
 
 LEVEL = 0.1  # largest vertical component of a wheel's axis
 SAME = 0.02  # relative tolerance for equal radii and a common axle
-SWIVEL = 0.9  # least vertical component of the axis of a caster or a steering joint
+SWIVEL = 0.9  # minimum vertical component of the axis of a caster or a steering joint
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,5 +2,5 @@
 
 import lazy_loader
 
-# What this package offers is listed, with its types, in __init__.pyi; each name is imported when first used.
+# __init__.pyi lists the exports with their types; each name is imported on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -58,7 +58,7 @@ def _of(item: dict[str, Any]) -> dict[str, Any]:
 Names = Annotated[list[str], Field(min_length=1), BeforeValidator(_listed), WithJsonSchema(_of({"type": "string"}))]
 NamesOrMappings = Annotated[list[TextOrMapping], Field(min_length=1), BeforeValidator(_listed)]
 
-#: The settings with keys of their own in a campaign; the others belong to `settings`.
+#: The settings with their own keys in a campaign; the others go under `settings`.
 AXES = MappingProxyType({name: one for name, one in SETTINGS.items() if one.setting.axis and name != "seed"})
 SettingsEntry = create_model(
     "SettingsEntry",
@@ -204,7 +204,7 @@ class Campaign:
     places: tuple[Location, ...]
 
     def values(self, name: str) -> list[Any]:
-        """Return the values of a setting with a key of its own."""
+        """Return the values of a setting with its own key."""
         return list(getattr(self.entry, AXES[name].key))
 
     def error(self, location: Location, problem: str) -> InputError:

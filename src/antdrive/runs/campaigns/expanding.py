@@ -31,7 +31,7 @@ class Expansion:
     # runs in the campaign's order: by world, task, robot, smoothing, noise, margin, planner and seed
     jobs: tuple[Job, ...]
     duplicates: int  # number of combinations omitted as equal to an earlier one
-    counts: dict[str, int]  # number of worlds, tasks in each, robots and so on, by name
+    counts: dict[str, int]  # numbers of worlds, tasks in each world, robots and other axes, by name
     worlds: dict[str, Task]  # world files named by the runs' commands, by path relative to the campaign's folder
     robots: dict[str, Path]  # robot files, likewise
     planners: dict[str, Path]  # files of custom planners, likewise

@@ -30,7 +30,7 @@ OWN = "own"  # name of a world's default task
 
 
 def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
-    """Return the worlds of a campaign with their default tasks, in its order; files of a pattern by name.
+    """Return the worlds of a campaign with their default tasks, in its order; files of a pattern are sorted by name.
 
     Worlds with the same name get their path or options as part of the name, so names are unique. Several problems of
     one map are tasks of one world.
@@ -215,7 +215,7 @@ def values_of(campaign: Campaign, place: Location, value: Any) -> list[Any]:
 
 
 NAMED = "named"  # value of the key tasks: those of the world files
-TRIES = 1000  # random pairs for one task
+TRIES = 1000  # most random pairs of start and goal drawn for one task
 ROOM = 0.03  # margin of random tasks if the campaign's margin is auto [m]
 
 

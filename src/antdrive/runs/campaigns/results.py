@@ -67,7 +67,7 @@ class SweepResults:
         return dict(Counter(self.table["outcome"].to_pylist()).most_common())
 
     def medians(self) -> Iterator[tuple[str, ...]]:
-        """Yield a table row for each planner: its successes, and median and extremes of `MEDIANS` in them."""
+        """Yield a table row for each planner: its successes, and the median and extremes of `MEDIANS` over them."""
         rows = [row for row in self.table.select(["planner", "succeeded", *MEDIANS]).to_pylist() if row["succeeded"]]
         for planner in dict.fromkeys(row["planner"] for row in rows):
             own = [row for row in rows if row["planner"] == planner]
@@ -125,7 +125,7 @@ Columns = Mapping[str, Sequence[Any]]
 
 
 def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Sequence[str]) -> tuple[RunTable, int]:
-    """Return the finished runs that match a selection, and how many matching runs the campaigns have."""
+    """Return the finished runs that match a selection, and the number of matching runs in the campaigns."""
     base, names = common_folder(folders), _names(folders)
     tables: dict[str, RunTable] = {}
     missing: dict[str, Columns] = {}
@@ -142,7 +142,7 @@ def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Seque
 
 
 def common_folder(folders: Sequence[Path]) -> Path:
-    """Return the common parent of the campaigns' folders, to which logs are relative; a single one is its own."""
+    """Return the common parent of the campaigns' folders, to which logs are relative; a single folder itself."""
     return Path(os.path.commonpath([folder.resolve() for folder in folders]))
 
 
@@ -187,7 +187,7 @@ def _chosen(
 
 
 def _count(left: Mapping[str, Columns], table: RunTable, planners: Sequence[str]) -> int:
-    """Count the missing runs, of some planners only if they are named."""
+    """Count the missing runs; if planners are named, only theirs."""
     if not planners:
         return sum(len(columns["key"]) for columns in left.values())
     labels = set(table.texts("planner"))

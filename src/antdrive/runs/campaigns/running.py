@@ -68,7 +68,7 @@ class Driving:
 
 
 def prepare(job: Job) -> Scenario:
-    """Return the scenario of a run. Anything that runs in the same world can share within a process belongs here."""
+    """Return the scenario of a run. Add here any preparation that runs in one world can share within a process."""
     return job.case.scenario(job.seed)
 
 

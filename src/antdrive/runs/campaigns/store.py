@@ -2,13 +2,13 @@
 
     manifest.json   the campaign as written, its size and hash, the versions of the latest command
     grid.parquet    a row for each run: its configuration and seed
-    parts/          results: a file for every few seconds, merged from time to time
+    parts/          results: a new file every few seconds, merged from time to time
     rollouts/       the logs that are kept
     worlds/, robots/  files for the commands that repeat runs
     runs.parquet    the table of all finished runs, written at the start and the end of a command
 
 Every file is written under a temporary name, synced to the disk and renamed, so a killed process leaves no partial
-file. A run made twice is in two parts, but only once in the table.
+file. A run made twice is in two parts but has one row in the table.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 MANIFEST, GRID_FILE, PARTS, TABLE = "manifest.json", "grid.parquet", "parts", "runs.parquet"
 FLUSH_EVERY = 2.0  # finished runs are written at least this often [s]
-TRIES = 100  # at reading parts while another process merges them
+TRIES = 100  # attempts to read parts while another process merges them
 MOST_PARTS = 200  # more are merged into one
 UNFINISHED = ".new-"  # prefix of temporary files
 
@@ -59,7 +59,7 @@ class Store:
         write_table(joined(self.folder), self.folder / TABLE)  # until the final one replaces it
 
     def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
-        """Keep a run's result; it is on the disk after `FLUSH_EVERY` seconds if `tick` is called as often."""
+        """Keep a run's result; it is on the disk after `FLUSH_EVERY` seconds if `tick` is called that often."""
         if log is not None:
             try:
                 with atomic_write(self.folder / row["rollout"]) as part:

@@ -50,8 +50,8 @@ def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = 
 def room_in(scenario: Scenario, failure: Failure) -> float | None:
     """Return the clearance with which a path exists in the world of a failing scenario [m]; None if none exists.
 
-    It is the clearance that the scenario claims. If the planner found no path, one cell more if a path exists with that,
-    so the failure is not due to the grid. Worlds of more than `MOST_OBSTACLES` are not checked.
+    This is the clearance that the scenario claims. If the planner found no path, one cell is added where a path with that
+    exists, so that the grid cannot explain the failure. Worlds of more than `MOST_OBSTACLES` are not checked.
     """
     task, claimed = scenario.task, scenario.inflate
     if len(task.world.obstacles) > MOST_OBSTACLES:
@@ -61,7 +61,7 @@ def room_in(scenario: Scenario, failure: Failure) -> float | None:
 
 
 class CandidateRunner:
-    """Runs candidates and finds those that fail in one given way, in worlds with as much room.
+    """Runner that finds the candidates that fail in one given way, in worlds with as much room.
 
     The answers depend on the candidates alone, not on time, processes or the journal.
 
@@ -181,7 +181,7 @@ def identity_of(scenario: Scenario) -> str:
 
 
 def _text_of(planner: Planner) -> str:
-    """Return a planner as text; without a `repr` of its own by class and attributes, as an address differs per process."""
+    """Return a planner as text, by class and attributes if its `repr` is the default, whose address differs per process."""
     kind = type(planner)
     if kind.__repr__ is not object.__repr__:
         return repr(planner)

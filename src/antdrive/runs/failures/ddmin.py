@@ -15,7 +15,7 @@ Item = TypeVar("Item")
 def one_minimal(
     items: Sequence[Item], first: Callable[[Iterable[Sequence[Item]]], Sequence[Item] | None]
 ) -> Sequence[Item]:
-    """Return a sublist that keeps the property and loses it without any single one of its items."""
+    """Return a sublist that has the property and loses it when any single item is removed."""
     kept, parts = list(items), 2
     if kept and first([[]]) is not None:
         return []

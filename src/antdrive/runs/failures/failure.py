@@ -149,13 +149,13 @@ class Attempt:
 
     @property
     def fingerprint(self) -> str:
-        """A text that is equal if two runs are bitwise equal, or the planner raises the same error."""
+        """Text that is equal for bitwise equal runs, or for equal errors of the planner."""
         if self.run is None:
             return without_numbers(str(self.error))
         return f"{self.run.outcome.key}: {self.run.reason}" if self.run.rollout is None else self.run.rollout.digest
 
     def failure(self, bound: Bound | None = None) -> Failure | None:
-        """Return how it failed, by `failure_of`; an error of the planner is a failure, whatever the bound."""
+        """Return how it failed, by `failure_of`; an error of the planner is a failure for any bound."""
         return failure_of_planner(self.error) if self.run is None else failure_of(self.run, bound)
 
 
@@ -165,7 +165,7 @@ def failure_of_planner(error: PlannerError | None) -> Failure:
 
 
 def without_numbers(text: str) -> str:
-    """Remove from a reason what differs between worlds: numbers, and the names of single obstacles."""
+    """Remove the world-specific parts of a reason: numbers, and the names of single obstacles."""
     masked = re.sub(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
     masked = re.sub(r"the (?:left|lower|right|upper) wall|(?:obstacles|movers|unseen)\[#\]", "#", masked)
     return re.sub(r" at \(#, #\)(?: with radius #)?", "", masked)

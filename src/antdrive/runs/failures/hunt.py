@@ -151,7 +151,7 @@ def rehearsed_clearance(s: Scenario) -> float:
 
 
 class Rehearsing(Decider):
-    """Follows a path with the controller alone until the robot stands at its end."""
+    """Decider that follows a path with the controller alone until the robot stands at its end."""
 
     def __init__(self, path: TrackedPath, controller: PurePursuit) -> None:
         self.step = Step()

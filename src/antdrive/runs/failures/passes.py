@@ -261,7 +261,7 @@ def _tighter(scenario: Scenario, side: int) -> Iterator[Bounds]:
 
 
 def _walled(scenario: Scenario, side: int, bounds: Bounds) -> Scenario | None:
-    """Return the scenario with one wall moved, and the cylinders that remain as whole as before."""
+    """Return the scenario with one wall moved, without the cylinders that it would newly cut or leave outside."""
     axis, low, before = side % 2, side < 2, scenario.task.world.bounds[side]
 
     def stands(disc: Disc) -> bool:

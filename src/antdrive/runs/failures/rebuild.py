@@ -94,7 +94,7 @@ def _own_planner(words: str, name: str, settings: Mapping[str, Any]) -> Planner:
 
 
 def _options(kind: Any, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a planner's options as they were."""
+    """Return a planner's recorded options."""
     hints = typing.get_type_hints(kind)
     return {key: _restored(hints.get(key), value) for key, value in settings.items()}
 

@@ -20,7 +20,7 @@ from antdrive.runs.failures.passes import PASSES
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim.scenario import Scenario
 
-ROUNDS = 20  # far above any need: passes undo nothing, so rounds end by themselves
+ROUNDS = 20  # a safe limit: passes undo nothing, so rounds end by themselves
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ def shrink(
     """Shrink a failing scenario: fewer obstacles and movers, less noise, a nearer start, fewer digits.
 
     Every accepted step fails in the same way: same outcome, same kind of thing touched, same cause. If a path with the
-    claimed clearance existed at first, one exists in every accepted world, by the exact shortest path. On completion the
-    failure vanishes without any single remaining obstacle, mover or unseen obstacle. The result depends on the scenario
+    claimed clearance existed at first, one exists in every accepted world, by the exact shortest path. On completion,
+    removing any single obstacle, mover or unseen obstacle makes the failure vanish. The result depends on the scenario
     alone, unless the time runs out.
 
     Args:

@@ -56,7 +56,7 @@ class Calibration:
 
 
 def predicted_loss(losses: Sequence[float], probability: float = PROBABILITY) -> float:
-    """Predict the loss that a further drive exceeds with a given probability [m]; infinite if a loss is.
+    """Predict the loss that a further drive exceeds with a given probability [m]; infinite if any loss is infinite.
 
     Excesses over a high threshold follow a generalised Pareto distribution (Pickands 1975; Balkema & de Haan 1974), fitted
     by probability-weighted moments (Hosking & Wallis 1987). Its shape is limited to between a bounded and an exponential
@@ -86,8 +86,8 @@ def least_margin(
 ) -> Calibration:
     """Find the least margin whose predicted loss leaves a reserve, to within `CLOSE`.
 
-    The loss depends on the margin: with a larger one a robot cuts corners more and drives faster. Each next margin is
-    where a line through the last results meets the reserve.
+    The loss depends on the margin: with a larger one a robot cuts corners more and drives faster. The next margin tried
+    is the point where a line through the last results meets the reserve.
     """
     most = max(MOST[0], MOST[1] * radius)
     margin, calibration = FIRST_GUESS, None
@@ -248,7 +248,7 @@ class MarginResult:
 
     @property
     def safe(self) -> bool:
-        """Whether there were drives and none failed."""
+        """Whether at least one drive was made and none failed."""
         return self.failed is None and self.drives > 0
 
     @property

@@ -21,7 +21,7 @@ from antdrive.runs.papers.paper_runs import PaperRun
 from antdrive.runs.statistics.intervals import Interval, means_by_world, medians_by_world, resampled, wilson
 from antdrive.runs.statistics.significance import wilcoxon
 
-#: The margin of "no longer than" [points]: a small effect, A = 0.56 (Vargha & Delaney 2000), is 56 : 44.
+#: The margin of "no longer than" [points]: a small effect, A = 0.56 (Vargha & Delaney 2000), wins 56 : 44.
 SMALL_EFFECT = 12.0
 
 
@@ -46,7 +46,7 @@ class Claim:
     reading: str = "ours"  # interpretation of the planner, if not our default
     printed: str  # the paper's values
     statistic: str  # a key of `STATISTICS`
-    quantity: tuple[str, ...] = ("gap",)  # properties of `PaperRun`; a second one belongs to the second planner
+    quantity: tuple[str, ...] = ("gap",)  # properties of `PaperRun`; a second one is that of the second planner
     relation: str  # a key of `RELATIONS`
     bound: float
     cases: tuple[tuple[Arm, ...], ...]  # for each map, the planners measured together
@@ -121,7 +121,7 @@ class Measured:
     runs: int  # counted runs, or pairs of them
     ours: str  # the value with its interval, in words
     why: str = ""  # further values, in words
-    unknown: str = ""  # reason why no decision is possible, whatever the interval
+    unknown: str = ""  # reason why no decision is possible, regardless of the interval
     few: str = ""  # message for too few runs, if not the default
     exact: bool = False  # the interval is valid for any number of runs, so that even few can refute
 
@@ -200,8 +200,8 @@ def _gain(claim: Claim, runs: RunsByArm) -> Measured:
 def _balance(claim: Claim, runs: RunsByArm) -> Measured:
     """Return the fraction of pairs with the first value above the second, minus that below [points].
 
-    For values with many ties, such as lengths on small maps, whose median difference is always 0. Equivalent planners have a
-    balance of 0, whose interval never lies at or below 0; so "no worse" tolerates a small effect.
+    It suits values with many ties, such as lengths on small maps, whose median difference is always 0. Equivalent planners
+    have a balance of 0, whose interval never lies at or below 0; so "no worse" tolerates a small effect.
     """
     first, second, world = _paired(claim, runs)
     difference = np.round(first - second, 9)

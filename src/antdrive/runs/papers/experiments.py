@@ -139,10 +139,10 @@ def _han_experiments(where: str, query: Query, planner: str, settings: Sequence[
 
 
 def suganthi2019() -> list[Experiment]:
-    """Return table 2: four sizes, three planners, and interpretations of what the paper leaves open.
+    """Return table 2: four sizes, three planners, and interpretations of the paper's open points.
 
-    It omits what an ant does in a dead end, whether loops are cut, and whether the elite's factor in eq. 7 is the alpha of
-    eq. 5. The constants of `pfaco` are those of Table 1, whose first value is missing in the text.
+    The paper does not state what an ant does in a dead end, whether loops are cut, or whether the elite's factor in eq. 7
+    is the alpha of eq. 5. The constants of `pfaco` are those of Table 1, whose first value is missing in the text.
     """
     common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
     freed, letter = {"backtrack": True, "shortcut": True}, {"backtrack": False, "shortcut": False}

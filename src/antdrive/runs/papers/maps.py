@@ -133,7 +133,7 @@ MEANDERS = 200_000  # paths drawn per winding candidate
 LEGS = (
     (1, 5),
     (3, 10),
-)  # legs of a winding path in moves, straight and diagonal: at least, below
+)  # lengths of a winding path's legs, straight and diagonal: from, to (exclusive) [moves]
 APART, LATER = 3, 6  # cells of a winding path at least `LATER` moves apart are at least `APART` cells apart
 
 
@@ -179,8 +179,8 @@ def candidate(
 ) -> Query:
     """Return a random map whose shortest path has the given straight and diagonal moves.
 
-    It begins with random obstacles. Further ones are put onto the shortest path until it has the wanted length, and never
-    exceed it.
+    It begins with random obstacles. Further ones are put onto the shortest path until it has, but never exceeds, the
+    wanted length.
     """
     rng = np.random.default_rng(seed)
     for _ in range(MAPS):

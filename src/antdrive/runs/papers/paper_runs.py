@@ -37,7 +37,7 @@ from antdrive.worlds import DIRECTIONS, Grid
 
 @dataclass(frozen=True, kw_only=True)
 class FirstTouchDStar(GridPlanner):
-    """Spreads costs from the goal, nearest to the start first, and never lowers a cost.
+    """Search that spreads costs from the goal, nearest to the start first, and never lowers a cost.
 
     Both follow hasan's listing: a cell gets its cost when it is new, and the order of the open list is not given. Paths
     around concave obstacles are longer than the shortest.

@@ -250,7 +250,7 @@ class NonInferiority:
 
     @property
     def not_worse(self) -> bool:
-        """Whether the whole interval lies above the allowed difference."""
+        """Whether the whole interval lies above `-allowed`."""
         return self.interval.low > -self.allowed
 
     def as_dict(self) -> dict[str, Any]:
@@ -306,7 +306,7 @@ def _world_means(gap: Floats, world: npt.NDArray[np.int64]) -> Floats:
 
 
 def _needed(means: Sequence[float] | Floats, allowed: float, alpha: float, success: bool) -> int:
-    """Return the number of worlds after which the interval lies above `-allowed`; at least that without disagreement."""
+    """Return the number of worlds that puts the interval above `-allowed`; at least the number needed if all runs agree."""
     z = statistics_library("scipy.stats").norm.ppf([1 - alpha / 2, POWER])
     spread = float(np.std(means, ddof=1)) if len(means) > 1 else math.nan
     normal = 0 if math.isnan(spread) else math.ceil((z.sum() * spread / allowed) ** 2)

@@ -36,7 +36,7 @@ def wilson(successes: int, total: int, confidence: float = CONFIDENCE) -> Interv
         raise FieldError("successes", f"must be 0 to total, and total at least 1; got {successes} of {total}")
     proportion = statistics_library("statsmodels.stats.proportion")
     low, high = proportion.proportion_confint(successes, total, alpha=1 - confidence, method="wilson")
-    # At 0 and at `total` the interval ends exactly there; rounding may leave 1e-17.
+    # For 0 or `total` successes the interval ends exactly at 0 or 1; rounding may leave 1e-17.
     return Interval(0.0 if successes == 0 else float(low), 1.0 if successes == total else float(high))
 
 

@@ -1,4 +1,4 @@
-"""Cost of driving without a map: extra time and length compared with the same drives with it."""
+"""Cost of driving without a map: extra time and length relative to the same drives with a map."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Price:
         worlds: number of worlds of these pairs
         lost: number of pairs in which only the drive with the map succeeded
         won: number of pairs in which only the drive without it succeeded
-        unpaired: number of drives without a map that lack one with it
+        unpaired: number of drives without a map that lack a partner with it
         time: ratio of the arrival times
         length: ratio of the driven lengths
     """
@@ -73,7 +73,7 @@ class Price:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all fields as plain values; numbers of no pairs are null."""
+        """Return all fields as plain values; ratios without pairs are null."""
         fields = dataclasses.asdict(self)
         for name in ("time", "length"):
             ratio = getattr(self, name)._asdict()
@@ -82,7 +82,7 @@ class Price:
 
 
 def prices(table: RunTable, *, any_robot: bool = False) -> list[Price]:
-    """Return the cost for each planner, robot, localisation and odometry factor with drives without a map."""
+    """Return the cost for each planner, robot, localisation and odometry factor that has mapless drives."""
     if "map" not in table:
         return []
     left_out = {*SENSING, DRIVEN, *(("robot", "robot_hash") if any_robot else ())}

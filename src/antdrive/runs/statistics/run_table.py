@@ -91,7 +91,7 @@ SETTINGS = ("robot", "robot_hash", *(name for name in SETTING_COLUMNS if name !=
 SENSING = tuple(one.column for one in DECLARED.values() if one.setting.group == "Sensing")
 #: The margin as requested, such as "auto", and the one used: runs are paired by the first.
 ASKED, DRIVEN = "margin_asked", "margin"
-#: A world's own cell size is not a setting of the campaign, so seeds are not separated by it.
+#: A world's own cell size is not a setting of the campaign, so it does not separate seeds.
 OF_WORLDS = ("cell",)
 #: Hashes distinguish equal names; pages show the names.
 HASHES = ("world_hash", "robot_hash")

@@ -104,7 +104,7 @@ def sums_by_world(values: Floats, world: Ints, worlds: int) -> Floats:
 def holm(p_values: Floats) -> Floats:
     """Return Holm's adjusted p-values (Holm 1979), (K,); nan stays nan and does not count.
 
-    The k-th smallest of m is multiplied by m + 1 - k, and none is below a smaller one's.
+    The k-th smallest of m is multiplied by m + 1 - k; adjusted values never decrease with k.
     """
     adjusted = np.full(len(p_values), np.nan)
     known = np.flatnonzero(~np.isnan(p_values))

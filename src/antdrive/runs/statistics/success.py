@@ -27,7 +27,7 @@ class PlannerSuccess:
     planner: str  # its label
     runs: int  # number of all its runs
     elsewhere: int  # runs omitted because another planner lacks their instance
-    # distinct runs among the rest: if the seed changes no drive, one run represents all seeds
+    # distinct runs among the remaining ones: if the seed changes no drive, one run represents all seeds
     counted: int
     successes: int  # number of counted runs that succeeded
     interval: Interval  # Wilson's 95 % interval of the fraction
@@ -60,7 +60,7 @@ class PlannerSuccess:
 def success_table(paired: PairedRuns) -> list[PlannerSuccess]:
     """Return a row for each planner, in the order of the runs.
 
-    Fractions are over the instances that every planner ran; without any, over each planner's own.
+    Fractions are over the instances that every planner ran; if there are none, over each planner's own instances.
     """
     outcomes = paired.table.texts("outcome")
     shared = paired.shared if paired.shared.any() else np.ones(len(paired.row), dtype=np.bool_)
@@ -112,7 +112,7 @@ def common_medians(paired: PairedRuns, metrics: Sequence[str]) -> tuple[int, dic
 
 
 class StepCurve(NamedTuple):
-    """A step function that rises."""
+    """A rising step function."""
 
     x: Floats  # positions of the steps, ascending, (M,)
     fraction: Floats  # value from there on, 0 to 1, (M,)

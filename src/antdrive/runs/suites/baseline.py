@@ -210,7 +210,7 @@ class Baseline:
         return baseline
 
     def gaps(self) -> Iterator[tuple[str, str]]:
-        """Yield missing and surplus parts, as key and problem; a comparison needs complete ones."""
+        """Yield missing and surplus parts, as key and problem; a comparison needs complete baselines."""
         parts = {name: getattr(self, name) for name in ("metrics", "nearest", "hashes", "drive_digest", "line")}
         if self.outcome in ENDED_BY.values() and not any(parts.values()):
             return

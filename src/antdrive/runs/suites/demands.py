@@ -19,7 +19,7 @@ from antdrive.sim.log.outcome import Outcome
 #: The distance between the ends of two drives, compared like a metric [m].
 END = "end_m"
 END_TOLERANCE = Tolerance(0.05)
-LEAST_TRAJECTORY = 0.002  # baselines hold positions in whole millimetres [m]
+LEAST_TRAJECTORY = 0.002  # least allowed distance: baselines hold positions in whole millimetres [m]
 
 #: Kinds of things that a robot can touch.
 CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"
@@ -59,7 +59,7 @@ class Bound:
         return not math.isnan(measured) and _SIGNS[self.sign](measured, self.value)
 
     def broken(self, measured: float) -> Bound | None:
-        """Return the bound of all values that break this one on the same side; None if the value keeps it or is NaN.
+        """Return the opposite bound, which the value meets; None if the value keeps this bound or is NaN.
 
         Args:
             measured: the metric of a drive

@@ -49,12 +49,12 @@ class Divergence:
 
 
 def _rule(name: str) -> str:
-    """Return a rule's name as the subject of a sentence; at cruise there is none."""
+    """Return a rule's name as the subject of a sentence; no rule limits a robot at cruising speed."""
     return "no rule" if name == "cruise" else f"the rule {name!r}"
 
 
 def distances(baseline: Baseline, rollout: Rollout) -> Floats:
-    """Return the distance between the robots at each sample of the baseline's line (N,) [m]; after arrival they stay."""
+    """Return the robots' distance at each sample of the baseline's line (N,) [m]; a robot rests where its drive ended."""
     places = np.column_stack([np.interp(baseline.times, rollout.t, rollout.pose[:, axis]) for axis in (0, 1)])
     return np.asarray(np.hypot(*(places - baseline.xy).T))
 
@@ -210,7 +210,7 @@ def _certified(run: Run) -> bool:
 
 
 def unmet_demands(run: Run, demands: Demands) -> Iterator[str]:
-    """Yield the demands that a run does not meet, whatever the baseline, a sentence each."""
+    """Yield the demands that a run does not meet, regardless of the baseline, a sentence each."""
     certified = _certified(run)
     if run.outcome is not demands.outcome:
         reason = f" ({run.reason})" if run.reason else ""
@@ -268,7 +268,7 @@ def _compare(
     now, then = metric(rollout), baseline.metric(name)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
     if not math.isfinite(then) or (math.isnan(now) and rollout.record.exploring):
-        return  # earlier versions compared the first plan of a mapless robot with the optimum
+        return  # old baselines compare the first plan of a mapless robot with the optimum
     if not math.isfinite(now):
         faults.append(f"{name}: {now:g}, in the baseline {then:.6g}{unit}")
         return

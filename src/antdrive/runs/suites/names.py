@@ -16,7 +16,7 @@ from antdrive.robots.robot_file import list_robots
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
 from antdrive.worlds.files.world_file import list_worlds
 
-#: Keys that say where a planner comes from, beside its options.
+#: Keys of a planner entry that give its source; other keys are options.
 SOURCES = frozenset({"module", "file"})
 
 

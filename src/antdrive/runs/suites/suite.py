@@ -23,7 +23,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.settings import SETTINGS
 
 SUFFIX = ".drive.yaml"
-MAX_CASES = 100_000  # scenarios times seeds of one suite
+MAX_CASES = 100_000  # most tests (scenarios times seeds) in one suite
 BASELINES = "baselines"  # subfolder beside a suite
 
 #: Python names and likely misnomers of some keys.

@@ -1,9 +1,9 @@
 """Blocked routes: ground that movers will cover, gaps beside standing movers, and goals that movers cut off.
 
-Plans keep the safety margin from movers; local avoidance keeps more. Replans would send a waiting robot back into a
-narrow gap. The guide therefore notes the mover and plans with the distance that avoidance keeps. If no other route
-exists and all movers have stood still since, the robot passes at the safety margin, as it passes a cylinder. If it
-has to wait again, it does not retry.
+Plans keep the safety margin from movers; local avoidance keeps a larger clearance. A replan could therefore send a
+waiting robot back into the same narrow gap. The guide notes the mover and plans with the clearance of avoidance. If no
+other route exists and all movers have stood still since, the robot passes at the safety margin, as it passes a
+cylinder. If it has to wait again, it does not retry.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ MIN_RADIUS = 0.01  # smaller discs are omitted [m]
 STILL = 0.05  # a mover that stays within this distance stands still [m]
 GAP_RANGE = 3.0  # length of the route ahead that is checked for gaps [m]
 GAP_STEP = 0.05  # spacing of the checked points [m]
-GAP_SLACK = 0.05  # avoidance may refuse a gap with this much more than it keeps [m]
-STANDING_STEP = 1.0  # predictions are checked this often for a mover that starts moving [s]
+GAP_SLACK = 0.05  # avoidance may refuse gaps up to this much wider than its clearance [m]
+STANDING_STEP = 1.0  # time step of the check whether a prediction starts to move [s]
 
 
 def covered_discs(
@@ -48,7 +48,9 @@ def covered_discs(
     only: npt.NDArray[np.int64] | None = None,
     wider: float = 0.0,
 ) -> list[Disc]:
-    """Return the discs that movers cover within `duration` [s] of a tick; with `only`, those of these movers, `wider` [m].
+    """Return the discs that movers cover within `duration` [s] of a tick.
+
+    `only` selects movers by number; `wider` [m] is added to their radii.
 
     Discs shrink where their inflation would cover one of the `ends` (N, 2) [m], so movers close neither end. The
     first end is the robot's position.
@@ -83,7 +85,7 @@ def blocked_cells(grid: Grid, discs: Sequence[Disc]) -> npt.NDArray[np.bool_]:
 
 
 def closed_cells(query: Query, discs: Sequence[Disc], zone: Zone | None = None) -> npt.NDArray[np.bool_]:
-    """Return which cells (R, C) discs and a zone close, except the start and the goal."""
+    """Return the cells (R, C) closed by discs and a zone, except the start and the goal."""
     closed = blocked_cells(query.grid, discs)
     if zone is not None:
         closed |= zone.blocked
@@ -119,12 +121,12 @@ def with_obstacles(task: Task, discs: Sequence[Disc]) -> Task:
 class Blockage:
     """Failed searches behind standing movers, and the narrow gaps beside such movers.
 
-    A moving mover may open a route and never counts. While the same movers stand where they stood at the first
+    Movers in motion may open a route and do not count. While the same movers stand where they stood at the first
     failure, the wait before the next search doubles.
 
     Attributes:
         failures: failed searches in a row
-        reason: which mover blocks the robot and where, once its patience is over; empty before
+        reason: which mover blocks the robot and where, once the robot's patience is over; else empty
     """
 
     def __init__(
@@ -189,7 +191,7 @@ class Blockage:
         return True
 
     def note_gaps(self, tick: int, position: Point, tracked: TrackedPath, arc: float) -> None:
-        """Note the movers that the route ahead passes within the clearance of avoidance, or of the last note."""
+        """Note the standing movers that the route ahead passes too closely for avoidance; noted ones need more each time."""
         standing = self.standing(tick, position)
         if self._keeps <= self._grid.inflate or not len(standing):
             return

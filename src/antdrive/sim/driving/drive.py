@@ -141,7 +141,7 @@ class Driver(Decider):
         return ending
 
     def gives_up(self, state: State) -> Ending | None:
-        """End the drive of a robot without progress. A robot that turns on the spot gets the time of a full turn in addition."""
+        """End the drive of a robot without progress. Turning on the spot adds the time of a full turn to the limit."""
         clock = self._clock
         if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
             return None

@@ -42,7 +42,7 @@ from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, ras
 from antdrive.worlds.world import PointWorld
 
 GROWTH = (4.0, 16.0)  # extent of the planning area beyond start and goal; the second if no path is found [m]
-MARGINS = (1.0, 0.0)  # fractions of the margin that plans keep; the second if the route is long or there is none
+MARGINS = (1.0, 0.0)  # fractions of the margin that plans keep; the second if no route exists or it is long
 FAIR = 1.25  # a route longer than the straight line by more than this factor is long
 DETOUR = 1.15  # a route with less margin must be shorter by this factor
 CORRIDOR = 1.2  # smoothing considers obstacles within this distance of the plan, beyond the inflation [m]
@@ -113,7 +113,7 @@ class Exploration(RouteGuide):
         return first
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
-        """Return an externally made plan unchanged."""
+        """Return an external plan unchanged."""
         return grid, plan
 
     # ---- plans
@@ -191,7 +191,7 @@ class Exploration(RouteGuide):
         )
 
     def _known(self, pose: Pose, bounds: Bounds) -> Task:
-        """Return the task with the map's discs as obstacles, from a pose."""
+        """Return a task that starts at a pose, with the map's discs as obstacles."""
         # Bounds recovered from a grid carry rounding errors.
         key = self.survey.map, len(self.survey.scans), pose, tuple(round(side, 9) for side in bounds)
         if self._known_as[0] == key:
@@ -224,7 +224,7 @@ class Exploration(RouteGuide):
     # ---- the driver's queries
 
     def refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
-        """Return the path with the obstacles that the lidar has just seen near the robot."""
+        """Return the path with the obstacles just detected near the robot."""
         if self._indexed == self.survey.whole:
             return path
         self._indexed = self.survey.whole

@@ -29,11 +29,11 @@ def is_narrow(world: World, robot: RobotSpec, pose: Pose) -> bool:
 def cannot_leave(
     tracked: TrackedPath, controller: PurePursuit, world: World, robot: RobotSpec, start: Pose, control_hz: int
 ) -> str:
-    """Say what the robot would hit when it leaves a narrow start, and the room that a turn needs; empty if it gets out.
+    """Describe the obstacle that keeps the robot in a narrow start, and the room that a turn needs; empty if it gets out.
 
     The rehearsal follows the controller's commands exactly, from rest, until the robot can turn freely. Only the
-    route that the controller takes counts. The robot turns the shorter way round. A robot that is not centred on its
-    axle turns the other way where only the shorter is blocked.
+    route that the controller takes counts. The robot turns the shorter way round. If that is blocked, a robot not
+    centred on its axle turns the other way.
     """
     if robot.footprint.corners:
         halting = Leaving(tracked, controller, world, robot, halts=True)

@@ -1,6 +1,6 @@
 """Localisers: exact pose, noisy pose fixes, dead reckoning (optionally corrected by scan matching), true pose.
 
-All of them share wheel slip and command delay. To add one, write a class and a word of `LOCALISATIONS` in
+All but `Exact` share wheel slip and command delay. To add one, write a class and add its name to `LOCALISATIONS` in
 `antdrive.sim.settings`. `Scenario` checks its requirements, `antdrive.sim.log.consistency` its log.
 `antdrive.sim.driving.survey` corrects estimates with scans.
 """

@@ -77,7 +77,7 @@ class Traffic:
         return float(self._predictor.predict(tick, position, np.zeros(1))[1].max(initial=0.0))
 
     def zones(self, tick: int, position: Point, goal: Point, grid: Grid) -> list[Zone]:
-        """Return the zones that movers roam, seen from a position [m]: estimated, then observed.
+        """Return the zones that movers roam, seen from a position [m]: the estimated box, then the observed one.
 
         The box of n uniform samples is too small by a fraction of about 1 / (n + 1) on each side.
         """
@@ -117,7 +117,7 @@ class TrackedTraffic(Traffic):
     def rate(self, tick: int, position: Point) -> float:
         """Return how many fast movers would meet a standing robot per second on visible ground [1/s].
 
-        Movers hidden for a while still exist, so the highest rate seen counts, and fades.
+        Hidden movers still exist, so the highest rate observed counts and fades slowly.
         """
         return self._most
 
@@ -158,7 +158,7 @@ class Zone:
         self.discs = [Disc(x, y, size) for x, y, size in rows_of_discs]
 
     def holds(self, disc: Disc) -> bool:
-        """Return whether a predicted disc is where movers go. A mover would turn before it leaves."""
+        """Return whether a predicted disc lies in the zone. Movers turn before they leave it."""
         return bool(_depth(np.array([disc.x, disc.y]), self._box, STRAY) > 0)
 
     def crossed(self, tracked: TrackedPath, arc: float) -> bool:
@@ -265,7 +265,7 @@ class MoversAhead:
         return covered if self._blockage is None else covered + self._blockage.discs(tick, ends)
 
     def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
-        """Return the zones that movers roam, largest first: estimated, then observed."""
+        """Return the zones that movers roam, largest first: the estimated box, then the observed one."""
         assert self._traffic is not None
         return self._traffic.zones(tick, pose[:2], self._goal, grid)
 
@@ -315,7 +315,7 @@ class MoversSeenAhead(MoversAhead):
         return rasterise(World("around movers", around), COARSE, self._grid.inflate)
 
     def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
-        """Return the zones, largest first: all but a lane along the outermost observed walls, estimated, observed."""
+        """Return the zones, largest first: all but a lane along the outermost walls, the estimated box, the observed one."""
         zones = self._roamed.zones(tick, pose[:2], self._goal, grid)
         roamed, radius = self._roamed.box, self._roamed.widest(tick, pose[:2])
         lane = radius + 2 * self._grid.inflate + SLACK

@@ -106,7 +106,7 @@ class Localiser(Protocol):
         """Return the motor targets for a command."""
 
 
-#: Scans from the true pose if a scan is due in a control period; returns the estimate, possibly corrected.
+#: Callback that scans from the true pose if a scan is due; returns the estimate, possibly corrected.
 Scanning: TypeAlias = Callable[[int, Pose, Pose], Pose]
 
 
@@ -124,7 +124,7 @@ class Guide(Protocol):
 
     @property
     def blocked(self) -> str:
-        """Description of the mover that blocks every route, once the robot's patience is over; empty before."""
+        """Description of the mover that blocks every route, once the robot's patience is over; else empty."""
         return ""
 
     @property
@@ -158,7 +158,7 @@ class Guide(Protocol):
         return 0.0
 
     def failure_note(self, tick: int) -> str:
-        """Return what the guide adds to the reason of a drive that is stuck or timed out; may be empty."""
+        """Return the guide's addition to the reason of a drive that is stuck or timed out; may be empty."""
         return ""
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
@@ -183,7 +183,7 @@ class RouteGuide(Guide, Protocol):
         """Plan from the start; return the grid and the checked plan."""
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
-        """Check an externally made plan on the grid of `first`."""
+        """Check an external plan on the grid of `first`."""
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         """Return the route of a plan, and its path for the controller."""

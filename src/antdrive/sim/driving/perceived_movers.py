@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 CHUNK = 240  # control periods whose positions and velocities are computed at once
 STANDS = 0.08  # tracks slower than this stand still [m/s]
 
-#: The numbers (P,) of movers.
+#: Numbers (P,) that identify movers.
 Numbers: TypeAlias = npt.NDArray[np.int64]
 
 

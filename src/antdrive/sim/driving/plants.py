@@ -40,7 +40,7 @@ class Drive:
 
 
 class Bullet:
-    """Robot of an engine, placed at a pose. It logs one row per physics step.
+    """Robot in a physics engine, placed at a pose. It logs one row per physics step.
 
     Attributes:
         state: true pose and velocity in the last row

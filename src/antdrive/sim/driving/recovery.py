@@ -68,9 +68,9 @@ class ScanTurn:
 class Recovery:
     """Recovery behaviours for a robot that stalls or that the stopping constraint holds.
 
-    A robot that re-planned without success, or that the constraint holds, backs off along its track. If it has not moved
-    yet, it drives straight ahead over free ground, to have room for a turn. If its lidar does not see all around, it then
-    makes a scan turn, as it does whenever unknown ground holds it.
+    If re-planning has failed or the constraint holds the robot, it backs off along its track. If it has not moved yet, it
+    drives straight ahead over free ground, to have room for a turn. A robot whose lidar has a blind sector then makes a
+    scan turn, as it does whenever unknown ground holds it.
 
     Attributes:
         scan_turn: the current scan turn; None if there is none
@@ -114,7 +114,7 @@ class Recovery:
         return now - self._rest[0] > STALL_TIME
 
     def held(self, now: float, pose: Pose) -> bool:
-        """Return whether a scan turn is due: unknown ground held the robot for long, or a narrow lidar has not turned yet."""
+        """Return whether a scan turn is due: held by unknown ground for long, or a narrow field of view and no turn so far."""
         if not self._may_turn(pose):
             return False
         if self._turned_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW:
@@ -155,7 +155,7 @@ class Recovery:
         self._stalled_at = pose[:2]
 
     def escape(self, pose: Pose) -> Route | None:
-        """Return an escape route for a robot that stalls again or is held: back along the track, else ahead; None if none."""
+        """Return an escape route after a repeated stall or a hold: back along the track, else ahead; None if there is none."""
         tries = self._stalls - 2 if self._held_since == math.inf else self._stalls - 1
         if not 0 <= tries <= len(LENGTHS):
             return None
@@ -186,7 +186,7 @@ class Recovery:
         return not self._survey.lidar.full_circle and math.dist(self._turned_at, pose[:2]) >= ELSEWHERE
 
     def _turns(self, pose: Pose) -> Iterator[float]:
-        """Yield the turns that show the lidar all directions, as far as they are free."""
+        """Yield the turns that let the lidar cover all directions, as far as they are free."""
         needed = FULL_CIRCLE - self._survey.lidar.field_of_view + OVERLAP
         left, right = (
             min(needed, self._survey.clear_turn(pose, side, needed + SPARE_TURN) - SPARE_TURN) for side in (1.0, -1.0)

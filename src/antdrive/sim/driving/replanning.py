@@ -5,7 +5,7 @@ Triggers: `trigger` queries `MoversAhead` for movers; thresholds are those of `a
 
 - Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown like the
   grid's obstacles; cells that movers have left are cleared.
-- Planners that need the world plan in a world with discs in place of movers.
+- Planners that need the world get one with discs in place of movers.
 - Space-time planners plan again when the robot is late.
 - Cell-by-cell planners choose one cell after the other, as hasan's robot does.
 """
@@ -77,7 +77,7 @@ class Replanning(OneRoute):
 
     @property
     def blocked(self) -> str:
-        """Description of the mover that blocks every route, once the robot's patience is over; empty before."""
+        """Description of the mover that blocks every route, once the robot's patience is over; else empty."""
         return self.blockage.reason
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
@@ -134,7 +134,7 @@ class Replanning(OneRoute):
             plan = self._routes.around(task, self._grid, discs)
         route = None
         if plan.solved and len(plan.cells) and not self._routes.plan_error:
-            # The times of a timed plan belong to its cells, so its route must follow them.
+            # A timed plan has times for its cells only, so its route must follow them.
             smoothing = "none" if self._timed else self._routes.smoothing
             route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
             self._track(plan, route)

@@ -32,7 +32,7 @@ from antdrive.sim.physics.engine import Engine, State
 
 #: Tolerance of a replay on another machine or version, in metres, radians, m/s and rad/s.
 ROUNDING = 1e-3
-#: Tolerance of reproduced noise, in metres, radians, m/s and rad/s: it takes a few dozen operations only.
+#: Tolerance of reproduced noise, in metres, radians, m/s and rad/s; small, since few operations compute the noise.
 SAME_NOISE = 1e-6
 
 
@@ -44,7 +44,7 @@ class ReplayCheck:
     position: float  # largest distance between replayed and logged positions [m]
     turn: float  # largest difference of headings [rad]
     twist: float  # largest difference of speeds [m/s] or yaw rates [rad/s]
-    problems: tuple[str, ...]  # why the log is not that of a drive, one sentence each
+    problems: tuple[str, ...]  # why the log cannot come from a drive, one sentence each
 
     @property
     def sentence(self) -> str:

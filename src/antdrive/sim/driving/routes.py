@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from antdrive.sim.driving.movers_ahead import Zone
 
 
-KEPT = 4  # replanners kept for repair: two margins within near and wide bounds
+KEPT = 4  # replanners kept for repair: two margins for each of two bounds
 
 
 @dataclass(eq=False, kw_only=True)
@@ -49,7 +49,7 @@ class RoutePlanner:
 
     Attributes:
         rng: the random stream of replans
-        plan_error: why the planner's first invalid plan is invalid; empty if none was
+        plan_error: error of the planner's first invalid plan; empty if all plans were valid
     """
 
     planner: Planner  # finds the paths
@@ -99,8 +99,8 @@ class RoutePlanner:
     def around(self, task: Task, grid: Grid, discs: Sequence[Disc] = (), zone: Zone | None = None) -> PlanResult:
         """Re-plan around discs and a zone.
 
-        Planners that need the world plan in one with additional discs. Others use a replanner with closed cells; without a map
-        and movers only if they provide their own.
+        Planners that need the world get one with additional discs. Others repair with a replanner and closed cells. Without a
+        map and movers to avoid, planners without their own replanner plan from scratch.
         """
         can, moving = capabilities_of(self.planner), bool(discs) or zone is not None
         if can.needs_world and (self.mapped or moving):
@@ -166,7 +166,7 @@ class OneRoute(RouteGuide):
         return grid, self._drivable(grid, plan)
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
-        """Check an externally made plan on the grid of `first`."""
+        """Check an external plan on the grid of `first`."""
         if plan.status is PlanStatus.INVALID:
             return grid, plan
         return grid, self._drivable(grid, self._routes.checked(self._routes.query(grid, self._routes.task), plan))

@@ -47,7 +47,7 @@ class Schedule:
         return self.due(t) - arc > MAX_LAG
 
     def speed_limit(self, t: float, arc: float) -> float:
-        """Return the speed [m/s] that keeps a robot at `arc` [m] from getting ahead at time `t` [s]; inf at the end."""
+        """Return the speed [m/s] that keeps a robot at `arc` [m] at time `t` [s] from getting ahead; inf at the end."""
         if t + LOOKAHEAD >= self.t[-1]:
             return math.inf
         return max(0.0, self.due(t + LOOKAHEAD) - arc) / LOOKAHEAD

@@ -18,7 +18,7 @@ STILL = Twist(0.0, 0.0)
 
 
 class StoppingConstraint:
-    """Rule: limit the command to what the robot can stop on observed free ground.
+    """Rule: limit the command so that the robot can stop on observed free ground.
 
     Every command is checked, since even a creeping robot reaches an obstacle. A command passes, or is slowed on its own arc,
     only if the robot can then stop on that arc over free ground. Otherwise the robot brakes as hard as it can on its current

@@ -36,10 +36,10 @@ from antdrive.worlds.limits import MAX_NEAR_DISTANCES
 from antdrive.worlds.trajectories import Trajectories
 
 SAME_CLEARANCE = 1e-9  # tolerance of closed-form distances that are computed twice [m]
-# Contact points describe the pose before a step, and a robot sinks some millimetres into what it hits. A contact reported
-# with more clearance than this contradicts closed form [m].
+# Contact points describe the pose before a step, and a robot sinks some millimetres into an obstacle. A contact at a larger
+# closed-form clearance than this is a contradiction [m].
 CONTACT_SLACK = 0.012
-# Physics reports surfaces up to 0.1 mm apart, rounded up here, and those with a force [m].
+# Physics reports contacts of surfaces up to 0.1 mm apart (rounded up here), and all contacts with a force [m].
 TOUCHING = 2e-4
 START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the task's start [m], [rad]
 # Tolerance of poses relative to integrated measured speeds: per step, and over some seconds, where errors would add up but
@@ -48,12 +48,12 @@ STEP_SLIP, STEP_SLIP_TURN = 0.001, 0.002  # [m], [rad], per step at USUAL_HZ or 
 USUAL_HZ = 240
 DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.004, 0.015, 0.05  # [m], fraction of the distance covered, [rad]
 DRIFT_WINDOWS = (0.25, 1.0, 4.0)  # [s]
-# A robot that gains speed slides sideways, depending on its heading, because the solver treats friction along the world's x
-# and y in turn: at up to 0.33 of its gain per physics step. Where commands change faster than the wheels' grip allows,
-# the wheels spin; the robot then slides at 0.19 of its gain per control period, for the fraction of time in which they spin.
+# An accelerating robot slides sideways, because the solver treats friction along the world's x and y in turn. Depending on
+# the heading, it slides at up to 0.33 of the speed gained per physics step. Where commands change faster than the grip
+# allows, the wheels spin; the robot then slides at 0.19 of the speed gained per control period, while they spin.
 SKID, SPINNING = 0.4, 0.25
 GRAVITY = 9.81  # [m/s^2]
-SAFE_GRIP = 0.75  # a robot that uses more of its grip may slide farther
+SAFE_GRIP = 0.75  # fraction of the grip; a robot that uses more may slide farther
 BLOCK = 60  # rows that share one search for the nearest discs
 NOWHERE = 0.001  # a robot that stays within this distance of its start went nowhere [m]
 BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good moves less [m]
@@ -305,7 +305,7 @@ def _check_times(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_clearances(rollout: Rollout, clearance: Floats) -> Iterator[str]:
-    """Check that logged clearances are those of the logged poses."""
+    """Check that logged clearances match the logged poses."""
     error = np.abs(rollout.clearance - clearance)
     if not error.max() <= SAME_CLEARANCE:
         at = int(error.argmax())
@@ -389,7 +389,7 @@ def _grip_warning(robot: RobotSpec) -> str:
 
 
 def _check_outcome(rollout: Rollout) -> Iterator[str]:
-    """Check that the outcome is that of the first contact, or that the robot stands at the goal."""
+    """Check that the outcome matches the first contact, or that the robot stands at the goal."""
     outcome, contacts, task = rollout.outcome, len(rollout.contacts), rollout.record.task
     if outcome.with_contact != bool(contacts):
         yield f"outcome: {outcome.key}, with {contacts} contacts"

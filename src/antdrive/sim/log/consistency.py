@@ -69,7 +69,7 @@ def _check_routes(rollout: Rollout) -> Iterator[str]:
 
 
 def _short_of_goal(rollout: Rollout) -> float:
-    """Return how far from the goal the route may end [m]: a goal in a narrow place is not reached itself."""
+    """Return how far from the goal the route may end [m]; routes end short of goals in narrow places."""
     task, near = rollout.record.task, NEAR * rollout.record.cell
     room = float(_room(rollout, np.array([task.goal]))[0])
     return max(near, task.goal_tolerance) if room < rollout.record.inflate + JUST_ROOM else near
@@ -136,7 +136,7 @@ def _leads(rollout: Rollout) -> tuple[float, float]:
 
 
 def _check_lengths(rollout: Rollout) -> Iterator[str]:
-    """Check that the plan's length is that of its cells, and not below the shortest."""
+    """Check that the plan's length is that of its cells, and not below the optimum."""
     plan, cell, task = rollout.record.plan, rollout.record.cell, rollout.record.task
     length = polyline_length(rollout.cells) * cell
     slack = SAME_LENGTH * max(1.0, length)
@@ -365,7 +365,7 @@ def windowed(values: Floats, rows: int) -> Floats:
 
 
 def _check_estimate(rollout: Rollout) -> Iterator[str]:
-    """Check that the estimate is as near to the true pose as pose fixes and odometry keep it."""
+    """Check that the error of the estimate is within that of pose fixes and odometry."""
     if not len(rollout.estimate):
         return
     if rollout.record.localisation != "fixes":
@@ -384,12 +384,12 @@ def _check_estimate(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_unfixed_estimate(rollout: Rollout) -> Iterator[str]:
-    """Check that the estimate without pose fixes is the pose, or drifts no faster than documented odometry."""
+    """Check that the estimate without pose fixes is the true pose, or drifts no faster than documented odometry."""
     record = rollout.record
     off = rollout.estimate - rollout.pose
     apart, turned = np.hypot(off[:, 0], off[:, 1]), np.abs(wrap_angle(off[:, 2]))
     if record.localisation == "true":
-        # A row between two control periods keeps the error of the earlier one, which is none.
+        # A row between two control periods keeps the error of the earlier one, which is zero.
         if apart.max() > EXACT or turned.max() > EXACT:
             yield "estimate: must be the pose where the robot is localised without error"
         return

@@ -1,12 +1,12 @@
 """Attribution of contacts to the robot or to a mover, from the log.
 
-Contact points within half a second of each other form one touch, attributed to the first obstacle: whatever the robot is
-pushed into is part of the push. The outcome of a touch is
+Contact points within half a second of each other form one touch, attributed to the first obstacle: contacts with obstacles
+that the robot is pushed into belong to the push. The outcome of a touch is
 
 - `HIT_BY_TELEPORT` if the mover has just teleported to within the robot's braking distance (0 for a standing robot), so that
   the robot could not stop;
-- `HIT_WHILE_STANDING` if the obstacle is a mover and, just before the contact, no point of the robot moved faster than
-  0.02 m/s or faster than the mover;
+- `HIT_WHILE_STANDING` if the obstacle is a mover and, just before the contact, the fastest point of the robot exceeded
+  neither 0.02 m/s nor the mover's speed;
 - `COLLIDED` otherwise, as always with walls and static cylinders.
 """
 

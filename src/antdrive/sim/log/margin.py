@@ -1,6 +1,6 @@
 """Margin budget: how a drive used up its safety margin.
 
-Planners keep the disc around the robot `margin` metres from every surface. Drives come closer for several reasons.
+Planners keep the disc around the robot `margin` metres from every surface. Drives come closer, for the reasons in `CAUSES`.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Budget:
 
     @property
     def largest(self) -> Contribution:
-        """Contribution of the cause that took most."""
+        """Contribution with the largest loss."""
         return max(self.contributions, key=lambda part: part.metres)
 
     def as_dict(self) -> dict[str, Any]:

@@ -100,7 +100,7 @@ def gap_to_grid_optimum(rollout: Rollout) -> float:
 
 
 def gap_to_euclidean_optimum(rollout: Rollout) -> float:
-    """Length of the route over the exact shortest path among the inflated discs, minus 1; not a number without a map."""
+    """Length of the route over the exact shortest path among the inflated discs, minus 1; NaN without a map."""
     if rollout.record.exploring:
         return math.nan
     return _over(route_length_m(rollout), rollout.record.plan.euclidean_optimum_m)

@@ -12,7 +12,7 @@ class Outcome(enum.Enum):
 
     The first contact ends a drive, and the outcome says who caused it; `antdrive.sim.log.contacts` has the exact rule.
     `COLLIDED` is the robot's own doing, even if a mover comes towards the driving robot. `HIT_WHILE_STANDING` and
-    `HIT_BY_TELEPORT` are no fault of the planner, but no success either; no drive with a contact is certified. `BLOCKED`: movers
+    `HIT_BY_TELEPORT` are not the planner's fault, but count as failures; no drive with a contact is certified. `BLOCKED`: movers
     closed every route and stood still until the robot's patience (`ReplanPolicy.patience`) was over. `NO_PATH`, `STOPPED` and
     `INVALID_PLAN` end a run before the robot drives, without a rollout. An invalid replan ends the drive as `INVALID_PLAN`,
     with the rows until then.

@@ -63,7 +63,7 @@ class ComponentRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class PlanRecord:
-    """Size of the plan beside the shortest possible paths.
+    """Length of the plan and of the shortest possible paths, with the planning effort.
 
     Attributes:
         cost_m: length of the planned cells along the grid's eight directions [m]; null where the grid has no path, but an
@@ -146,9 +146,9 @@ class SensingRecord:
     """Knowledge of the world and of the robot's pose.
 
     Attributes:
-        map: given, or none: only the observations of its lidar
+        map: given, or none (the robot maps with its lidar)
         localisation: fixes, odometry, matching or true
-        odometry: the factor on the errors of odometry
+        odometry: factor on the odometry errors
     """
 
     map: str
@@ -219,7 +219,7 @@ class DriveRecord:
         unseen: cylinders {x, y, radius, height} [m] in the driven world, unknown to planner and controller
         seed: the seed of all random numbers
         planner: the planner and its settings
-        plan: the plan's size beside the shortest possible paths
+        plan: lengths of the plan and of the shortest possible paths
         robot: the robot's specification, with the keys of `RobotSpec`: footprint, drive, limits and noise;
             `footprint.corners` only for a polygon or a footprint off the axle
         controller: the controller and its settings
@@ -530,7 +530,7 @@ def hashes_of(record: DriveRecord) -> dict[str, str]:
 
 
 def canonical_hash(value: Task | RobotSpec) -> str:
-    """Return the SHA-256 of a world with start and goal, or of a robot, as `hashes_of` finds it in logs."""
+    """Return the SHA-256 of a world with start and goal, or of a robot, as `hashes_of` computes it for logs."""
     return _sha256(_meaning(value))
 
 

@@ -261,7 +261,7 @@ class Rollout:
         """Write the log with its digest, atomically.
 
         Args:
-            path: the file to write, by custom with the suffix .npz
+            path: the file to write, usually with the suffix .npz
 
         Raises:
             InputError: the file cannot be written.
@@ -279,8 +279,8 @@ class Rollout:
         """Read a log.
 
         Raises:
-            InputError: the file is missing or no rollout, a later version wrote it, or an array or a key of the record is missing
-                or invalid.
+            InputError: the file is missing or not a rollout, a later version wrote it, or an array or a key of the record is
+                missing or invalid.
         """
         with guarded_log(path) as archive:
             there = [name for name in SENSED if f"{name}.npy" in archive.namelist()]

@@ -87,12 +87,12 @@ def beams_of(rollout: Rollout, k: int) -> Beams:
 
 
 def meet(rollout: Rollout, k: int, met: Floats) -> None:
-    """Note the cylinders that a scan hits first."""
+    """Note the cylinders hit for the first time by a scan."""
     _meet(rollout, k, rollout.record.world.discs, met)
 
 
 def _meet(rollout: Rollout, k: int, discs: Floats, met: Floats) -> None:
-    """Note the discs (N, 3) that a scan hits first."""
+    """Note the discs (N, 3) hit for the first time by a scan."""
     lidar, (eye, first, reaches) = lidar_of(rollout), beams_of(rollout, k)
     slack, now = 4 * lidar.sigma + lidar.resolution / 2 + ROUNDING, float(rollout.t[rollout.scan_rows[k]])
     kernels.first_meetings(eye, first, lidar.spacing, lidar.full_circle, reaches, discs, slack, now, met)
@@ -179,8 +179,8 @@ def passed(rollout: Rollout) -> list[Sighting]:
 def seen_ground(rollout: Rollout) -> tuple[npt.NDArray[np.bool_], float]:
     """Return the cells within the walls that the lidar observed (rows, cols), from the lower left, and their side [m].
 
-    A cell is observed if the beam nearest to its centre in direction reached beyond the centre. Ten scans per second count,
-    and the last one.
+    A cell is observed if the beam nearest to its centre in direction reached beyond the centre. Ten scans per second and the
+    last scan count.
     """
     lidar = lidar_of(rollout)
     x0, y0, x1, y1 = rollout.record.world.bounds

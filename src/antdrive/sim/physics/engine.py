@@ -38,7 +38,7 @@ MAX_JOINT_VELOCITY = 1e6  # speed limit of wheels; Bullet's default of 100 would
 RESIDUAL = 5e-7  # solver residual for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
 USUAL_RESIDUAL = 1e-7  # solver residual for other wheels, Bullet's default [(rad/s)^2]
 OVERSPEED = 1.5  # bound of a robot's own speed, as a multiple of its top speed
-# Any other body, the robot's link -1, any link of the other: naming these costs 0.4 us a step.
+# Arguments "any other body, the robot's link -1, any link of the other": passing them by name costs 0.4 us a step.
 CHASSIS_AND_ANY = (-1, -1, -2)
 BATCH = 5000  # most bodies built in one call
 MANY_BODIES = 1000  # in worlds with more cylinders, only those near the robot have bodies
@@ -158,7 +158,7 @@ class Engine:
             self._movers.restart()
 
     def command(self, speed: float, yaw_rate: float) -> None:
-        """Set the wheel motors' targets to a twist, which they reach as far as their torque allows.
+        """Set the wheel motors' targets to a twist, which the motors approach within their torque limits.
 
         Args:
             speed: forward [m/s]
@@ -246,7 +246,7 @@ class Engine:
         torque = self.robot.wheel_torque * (self._rolling / self.robot.wheel_radius)
         self._torques = torque, torque
         gear = self.robot.wheel_radius / self._rolling
-        # The solver measures in rad/s, and smaller spheres turn faster. The client may hold the value of another robot.
+        # The residual is in rad/s, and smaller spheres turn faster. The client may hold the value of another robot.
         residual = RESIDUAL * gear**2 if gear > 1 else USUAL_RESIDUAL
         p.setPhysicsEngineParameter(solverResidualThreshold=residual, physicsClientId=self._client)
         text = robot_urdf(self.robot, self._com_drop)
@@ -282,7 +282,7 @@ class Engine:
         return MoverBodies(trajectories, self.robot.radius, fast, where, self.physics_hz, self._client)
 
     def _near_bodies(self) -> NearBodies:
-        """Create the bodies near the robot, which covers less than their range between two updates."""
+        """Create the bodies near the robot, within a range that it cannot leave between two updates."""
         way = OVERSPEED * self.robot.max_speed * CHECK_EVERY / self.physics_hz
         reach = self.robot.radius + way + NEAR_MARGIN
         return NearBodies(self.world.obstacles, reach, _size, self._build_cylinders, self._obstacles, self._client)
@@ -300,7 +300,7 @@ class Engine:
     def _build_obstacles(self, indices: list[int], shape: int, centres: list[Point3]) -> list[int]:
         """Build bodies of one shape with these contact indices; return their numbers.
 
-        One call for many takes a tenth of the time of one call each.
+        A batched call takes a tenth of the time of single calls.
         """
         p = self._p
         bodies = [

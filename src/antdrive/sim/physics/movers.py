@@ -155,7 +155,7 @@ class _Chunk(NamedTuple):
         positions = trajectories.positions(t)
         velocity = np.diff(positions, axis=0) * hz
         jumps = trajectories.jumps(t)
-        if jumps.any():  # In the step of a jump, a body starts from where its next velocity would have brought it from.
+        if jumps.any():  # In the step of a jump, a body starts one step back along its next velocity.
             velocity[:-1] = np.where(jumps[:-1, :, None], velocity[1:], velocity[:-1])
         came_from = positions[1:] - velocity / hz
         changed = np.ones(jumps[:-1].shape, dtype=np.bool_)

@@ -2,9 +2,8 @@
 
 The robot rolls on spheres, within 0.1 % of the commanded twist at 240 Hz (`python -m benchmarks.physics`); URDF cylinders
 were measured to be 5 % off. The casters hang 0.5 mm above the floor, because coplanar casters would carry most of the
-weight. No sphere protrudes from the footprint: where a wheel is thinner than a sphere of its radius, a smaller sphere stands
-under the wheel's middle, geared to the wheel's speed and force on the floor. The mass is centred on the axle wherever the
-footprint is.
+weight. No sphere protrudes from the footprint: where a sphere of the wheel's radius would, a smaller sphere stands under the
+wheel's middle, geared to the wheel's speed and force on the floor. The mass is centred on the axle for any footprint.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ CASTER_GAP = 5e-4  # height of wheels and casters above the floor at placement [
 DRAWN = '<visual><geometry><box size="0.01 0.01 0.01"/></geometry></visual>'
 CHASSIS_FILE = "chassis.obj"
 MESH_MARGIN = 0.001  # collision margin of Bullet's meshes in URDF files [m]
-INSIDE = 0.99  # largest fraction of the room up to the footprint's edge that wheels and casters fill
+INSIDE = 0.99  # wheels and casters fill at most this fraction of the room up to the footprint's edge
 
 
 class _Ball(NamedTuple):
@@ -68,7 +67,7 @@ def robot_urdf(robot: RobotSpec, com_drop: float) -> str:
 def chassis_mesh(robot: RobotSpec) -> str | None:
     """Return the chassis as Wavefront OBJ in the base frame; None for discs and rectangles, which are simpler shapes.
 
-    Bullet moves a mesh's surface outwards by its collision margin, so the mesh is smaller by that.
+    Bullet moves a mesh's surface outwards by its collision margin, so the mesh is smaller by that margin.
     """
     foot = robot.footprint
     if len(foot.corners) < 3 or foot.box is not None:

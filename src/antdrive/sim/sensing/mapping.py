@@ -40,8 +40,8 @@ class OccupancyMap:
     """Occupancy map in the frame of the robot's odometry.
 
     A cell is unknown, free or occupied. It is free once a beam has passed it, as far as beams lie no farther apart than a
-    cell; a thinner object may stand between two of them. One hit makes a cell occupied. It is free again once the beams on both
-    sides of its hits have ended beyond them: at the ninth time, for cells with many hits.
+    cell; an object thinner than that may stand between two of them. One hit makes a cell occupied. It is free again once the
+    beams on both sides of its hits have ended beyond them; cells with many hits need nine such scans.
 
     Every `share`-th scan is entered as a whole. The others contribute their hits only: obstacles appear at once, and free
     ground with the next whole scan. Free paths are those of every `turns`-th beam, in turn, and of all beams of the first
@@ -168,9 +168,9 @@ class OccupancyMap:
         return np.asarray(measured * turned + (x, y), dtype=np.float64)
 
     def explained(self, points: Floats, settle: int) -> Mask:
-        """Return whether points belong to static obstacles (N,): they lie in or beside cells that have long been occupied.
+        """Return whether points belong to static obstacles (N,): they lie in or beside cells occupied for long.
 
-        Points on ground that was observed as free less than `settle` scans ago do not, whether or not their scan has been
+        Points on ground observed as free less than `settle` scans ago do not count, whether or not their scan has been
         entered.
 
         Args:
@@ -268,7 +268,7 @@ class OccupancyMap:
         new.occupied[listed], new.slot[listed] = True, np.arange(count)
 
     def _blocks(self, west: float, south: float, east: float, north: float) -> tuple[int, int, int, int]:
-        """Return the cells to add on each side for so many metres: whole blocks, none below 0."""
+        """Return the cells to add on each side for distances [m], in whole blocks; none for negative distances."""
         w, s, e, n = (max(0, math.ceil(side / self.cell / BLOCK)) * BLOCK for side in (west, south, east, north))
         return w, s, e, n
 

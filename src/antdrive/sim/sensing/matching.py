@@ -13,11 +13,11 @@ from antdrive.sim.sensing.mapping import OccupancyMap
 
 BEAMS = 180  # most beams of a scan that are matched
 FAR = 8.0  # default range of matched hits [m]
-NEAR = 3  # search radius for partners, in grains of the map
-FEWEST = 25  # fewest pairs of a match
+NEAR = 3  # search radius for the map's nearest hit, in grains (half cells)
+FEWEST = 25  # fewest matched pairs of hits
 CHORD = 10  # beams between the two hits that define a surface's direction
 LONGEST_STEP = 0.2  # hits of neighbouring beams farther apart belong to different surfaces [m]
-HELD = 0.1  # a direction is constrained if this fraction of the surfaces face it
+HELD = 0.1  # a direction is constrained if at least this fraction of the surfaces faces it
 MOST = (0.02, 0.01)  # largest correction by one scan; a larger one is a mismatch [m], [rad]
 
 

@@ -69,8 +69,8 @@ class Scanner:
     ) -> Floats:
         """Scan, and return the ranges (beams,) [m].
 
-        With `rng`, ranges have the lidar's noise. Each scan draws one number per beam, whatever the beams hit, so invisible
-        objects change nothing.
+        With `rng`, ranges have the lidar's noise. Each scan draws one number per beam, hit or not, so invisible objects
+        change nothing.
 
         Args:
             pose: the robot's true pose, not the lidar's

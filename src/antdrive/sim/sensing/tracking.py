@@ -2,9 +2,8 @@
 
 Each track is a Kalman filter with constant velocity (Y. Bar-Shalom, X. Li, T. Kirubarajan, *Estimation with Applications to
 Tracking and Navigation*, 2001, chapter 6). Tracks that expect points in one cluster share it, so that passing movers keep
-their tracks; the remaining clusters and tracks are associated greedily, nearest first. A given map, or the robot's
-own, explains static
-obstacles.
+their tracks; the remaining clusters and tracks are associated greedily, nearest first. The given map, or the robot's
+occupancy map, explains hits on static obstacles.
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ class KnownGround:
         world: the map; its movers do not count
         reach: hits farther than this from the lidar are omitted [m]
         pose_xy: standard deviation of the estimated position [m]
-        pose_yaw: and of the heading [rad]
+        pose_yaw: standard deviation of the estimated heading [rad]
     """
 
     complete = True
@@ -150,7 +149,7 @@ class TrackingPolicy:
     Attributes:
         gap: neighbouring points farther apart belong to different objects [m]
         least: minimum number of points that starts a track
-        settle: time after which an object on once free ground belongs to the occupancy map [s]
+        settle: time after which an object on formerly free ground belongs to the occupancy map [s]
         smallest: least estimated radius [m]
         largest: largest estimated radius [m]
         gate: largest distance between a cluster and a track's prediction [m]
@@ -197,7 +196,7 @@ class MoverTracker:
         lidar: the scanning lidar
         policy: the tracking policy; None: the default
         pose_xy: standard deviation of the estimated positions [m]
-        pose_yaw: and of the headings [rad]
+        pose_yaw: standard deviation of the estimated headings [rad]
     """
 
     def __init__(

@@ -26,7 +26,7 @@ from antdrive.worlds.files.world_file import save_task
 LAYOUT = ".foxglove.json"
 SCENE = "3D!drive"
 MARGIN = 1.1  # shown extent relative to the world's
-ASPECT = 0.75  # least width over height of the scene's panel: a window of 1400 x 900 with an open side bar
+ASPECT = 0.75  # minimum width over height of the scene's panel: a window of 1400 x 900 with an open side bar
 
 
 def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False, scans: bool = True) -> list[Path]:
@@ -100,7 +100,7 @@ def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path
 def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
     """Return a layout for Foxglove and Lichtblick: the scene in top view, with plots beside it.
 
-    Topics have explicit settings if the defaults fail: scans without intensities would have no colour.
+    Topics have explicit settings where the defaults fail: scans without intensities would have no colour.
     """
     layout: dict[str, Any] = json.loads(Path(__file__).with_name("layout.json").read_text(encoding="utf-8"))
     x0, y0, x1, y1 = rollout.record.world.bounds

@@ -1,8 +1,9 @@
 """ROS topics and frames of an exported drive, and MCAP files that hold them, alone or in a rosbag2 folder.
 
-Frames: `map` is the source map's; `odom` is the world's, in which the robot drives; both are equal unless the world file sets
-the world's pose in its map. `base_link` is the robot's: on the floor, below the axle's centre, x forward. Mover i has
-`mover_i`. A robot's own occupancy map has `robot_map`, whose pose in `odom` changes with the error of the estimate.
+`map` is the frame of the source map. `odom` is the frame of the world, in which the robot drives; it equals `map` unless the
+world file sets the world's pose in its map. `base_link` is fixed to the robot, on the floor below the axle's centre, x
+forward. `mover_i` is fixed to mover i. `robot_map` is the frame of the robot's own occupancy map; its pose in `odom` changes
+with the error of the estimate.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in colours.FIELD_STOPS])
-MANY = 1000  # cylinders: above, they have no edges
+MANY = 1000  # cylinders; larger numbers are drawn without edges
 SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in colours.SPEED_STOPS])
 
 

@@ -182,7 +182,7 @@ def convergence_figure(
 def _draw(
     axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool
 ) -> tuple[float, float]:
-    """Draw a curve and return the least and the largest length to show."""
+    """Draw a curve and return the smallest and the largest length to show."""
     colour, dash = _style(curve, number, among, single)
     scale = 1.0 if curve.steps is None else 1e-6
     if single:

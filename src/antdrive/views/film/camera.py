@@ -87,7 +87,7 @@ class Camera:
         return np.column_stack([(1 + ndc[:, 0]) * width / 2, (1 - ndc[:, 1]) * height / 2])
 
     def sees(self, centres: Floats, radii: Floats) -> Flags:
-        """Return which balls at centres (N, 3) with radii (N,) [m] may be visible, without those behind the camera."""
+        """Return which balls at centres (N, 3) with radii (N,) [m] may be visible; balls behind the camera are not."""
         x, y, z = (centres @ self.view[:3, :3].T + self.view[:3, 3]).T
         depth = -z
         inside: Flags = depth > radii
@@ -112,7 +112,7 @@ def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float
 
 
 def turns(shape: float, size: tuple[int, int]) -> bool:
-    """Return whether a wide picture shows ground of this width over height turned, along -x."""
+    """Return whether to turn the view along -x: the ground (`shape`: width over height) is tall, the picture wide."""
     return shape < 0.75 and size[0] > size[1]
 
 

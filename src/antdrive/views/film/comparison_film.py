@@ -25,7 +25,7 @@ from antdrive.views.scene import Scene
 
 MAX_RUNS = 6
 FULL = (1280, 720)  # default size [px]
-LEAST_TILE = 360  # least width of a tile, for the text in its header [px]
+LEAST_TILE = 360  # minimum width of a tile, so that its header's text fits [px]
 FILLED = 0.92  # fraction of a picture's sides that the world fills, in top view
 
 
@@ -43,7 +43,7 @@ def compare_film(
 ) -> FilmInfo:
     """Film two to six runs side by side. A run that ends before the others keeps its last picture.
 
-    The arguments are those of `film`, with a title per run and a mark at a place.
+    The arguments are those of `film`, plus a title per run and a mark at a place.
     """
     target = Path(path)
     known_suffix(target, ENCODERS)
@@ -60,7 +60,7 @@ def compare_film(
 class Mark(NamedTuple):
     """Labelled place in a film."""
 
-    t: float  # time of its appearance [s]
+    t: float  # time at which it appears [s]
     x: float  # place [m]
     y: float  # place [m]
     text: str  # label

@@ -187,7 +187,7 @@ class Compositor:
         put(frame, sprite, left, top)
 
     def pixel(self, x: float, y: float, z: float = 0.0) -> tuple[float, float]:
-        """Where a point of the world [m] appears: column and row [px]."""
+        """Return the column and row [px] at which a point of the world [m] appears."""
         at = self.camera.pixels([(x, y, z)])[0]
         return float(at[0]), float(at[1])
 
@@ -290,7 +290,7 @@ class Compositor:
 
 
 def drawn_height(scene: Scene) -> float:
-    """Return the largest drawn height of cylinders [m]: taller ones would hide the robot."""
+    """Return the maximum drawn height of cylinders [m]; taller ones would hide the robot."""
     return max(0.3, 2.0 * robot_height(scene.robot))
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 VEIL, LINES = 0.62, 0.75  # opacity of the veil over unknown ground and of its hatching
 PALENESS = 0.80  # of undetected obstacles
 TINT, BEAMS = 0.13, 0.30  # opacity of the scanned area and of the beams
-DRAWN_BEAMS = 90  # in a full circle, at most
+DRAWN_BEAMS = 90  # maximum number of drawn beams in a full circle
 HATCHING = 9.0  # spacing of the hatching [px]
 
 

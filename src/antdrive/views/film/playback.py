@@ -12,7 +12,7 @@ from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.scene import Scene, contact_point, jumps
 
-CAMERA_WINDOW = 0.6  # half the averaging window of a following camera's target [s]
+CAMERA_WINDOW = 0.6  # half the window over which a following camera's target is averaged [s]
 
 SLOW_MOTION = 4.0  # slow-down factor around a contact
 SLOW_BEFORE, SLOW_AFTER = 0.3, 0.1  # slow motion before and after a contact [s]

@@ -56,13 +56,13 @@ def summarise_campaign(
     Args:
         folder: the campaign's folder, or several; the folder's name distinguishes equal configurations of several folders, as
             in "astar @today"
-        title: of the report; default: the folders' names
-        metrics: to compare besides success; default: driven length, duration and planning time
+        title: the report's title; default: the folders' names
+        metrics: metrics to compare besides success; default: driven length, duration and planning time
         against: label of the planner to compare with all others; default: every pair
         planners: labels of the planners to include; default: all
-        allow: largest acceptable loss against `against` to count as not worse, such as {"success": 0.02}
+        allow: largest loss against `against` that counts as not worse, such as {"success": 0.02}
         where: values of the runs to include, by column, such as {"noise": "1"}, "0,1" or, for numbers, "10..20"
-        strict: raise if no two planners can be compared, instead of a note in the report
+        strict: whether to raise, instead of adding a note, if no two planners can be compared
 
     Raises:
         InputError: the folder holds no campaign, no finished run, or no such planner or metric.
@@ -98,11 +98,11 @@ def report_campaign(
         folder: the campaign's folder, or several; the folder's name distinguishes equal configurations of several folders, as
             in "astar @today"
         out: the file to write: .html, .md, .tex or .csv
-        title: of the report; default: the folders' names
-        metrics: to compare besides success; default: driven length, duration and planning time
+        title: the report's title; default: the folders' names
+        metrics: metrics to compare besides success; default: driven length, duration and planning time
         against: label of the planner to compare with all others; default: every pair
         planners: labels of the planners to include; default: all
-        allow: largest acceptable loss against `against` to count as not worse, such as {"success": 0.02}
+        allow: largest loss against `against` that counts as not worse, such as {"success": 0.02}
         where: values of the runs to include, by column, such as {"noise": "1"}, "0,1" or, for numbers, "10..20"
 
     Returns:

@@ -196,7 +196,7 @@ def _best(rows: Sequence[PlannerSuccess], paired: PairedRuns) -> tuple[str, str]
 
 
 def _shares(summary: CampaignSummary) -> list[str]:
-    """Return a note on the instances of the success rates if planners ran different ones."""
+    """Return a note if the planners' success rates are over different instances."""
     paired = summary.paired
     shared = int(paired.shared.sum())
     if shared == len(paired.row):
@@ -210,7 +210,7 @@ def _shares(summary: CampaignSummary) -> list[str]:
 
 
 def _mixed(summary: CampaignSummary) -> list[str]:
-    """Return a note for each setting with several values in the success rates and medians."""
+    """Return a note for each setting whose values are pooled in the success rates and medians."""
     table, notes = summary.table, []
     worlds = table.texts("world")
     for name in table.settings:

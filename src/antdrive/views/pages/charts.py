@@ -30,7 +30,10 @@ CURVE_POINTS = 400  # per curve, at most
 PROFILED = ("driven_length_m", "plan_s")
 DISTRIBUTED = ("duration_s", "plan_s")
 BOXED = ("plan_s", "gap_to_grid_optimum")
-AREA, OPTIMUM = "area_m2", "grid_optimum_m"  # columns of a world's size; the second if all areas are equal
+AREA, OPTIMUM = (
+    "area_m2",
+    "grid_optimum_m",
+)  # columns that measure a world's size; the second is used if all areas are equal
 #: CSS variables that replace the colours of the canvas's style.
 PAGE_COLOURS = {hexed(INK): "--ink", hexed(MUTED): "--muted", "#aab2bf": "--axis", "#e6e9ee": "--line"}
 
@@ -143,7 +146,7 @@ def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[L
 
 
 def _edges(sizes: Floats) -> Floats:
-    """Return the edges of up to `BINS` groups of equal number, the last beyond the largest size."""
+    """Return the edges of up to `BINS` groups: the distinct sizes with the last one repeated, or quantiles if there are more."""
     distinct = np.unique(sizes)
     if len(distinct) < 2:
         return distinct

@@ -28,7 +28,7 @@ class TextTable(NamedTuple):
 
 
 def percent(fraction: float) -> str:
-    """Format a fraction in percent with one digit; 100.0 is exact."""
+    """Format a fraction in percent with one decimal; 100.0 is shown only if exact."""
     if math.isnan(fraction):
         return NONE
     shown = f"{100 * fraction + 0.0:.1f}"

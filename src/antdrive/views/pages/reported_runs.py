@@ -59,7 +59,7 @@ SETTINGS: Mapping[str, str] = MappingProxyType(
 WORDS = ("world", "planner", "outcome", "robot", "options", "route", "map", "pose by")  # headings of text columns
 EXPLORED = "explored_m2"
 SENSED = {"map": "given", "localisation": "fixes"}  # defaults
-LISTED_SIGHTS = 40  # cylinders with the closest approaches
+LISTED_SIGHTS = 40  # number of listed cylinders, those with the closest approaches
 
 #: Meaning of the less obvious columns.
 COLUMN_NOTES = tuple(
@@ -97,12 +97,12 @@ class LogFacts:
     scans: int  # number of scans
     digest: str  # of the log's content
     settings: Mapping[str, Any]  # by the keys of result.json
-    contradictions: tuple[str, ...]  # contradictions by result.json, a sentence each
+    contradictions: tuple[str, ...]  # contradictions between result.json and the log, a sentence each
 
 
 @dataclass
 class ReportedRun:
-    """Run in the report's templates: from its log alone, or as claims of result.json without a log."""
+    """Run in the report's templates, from its log alone or, without a log, from the claims of result.json."""
 
     folder: Path | None  # folder of the run's files; None for a run from Python
     result: Mapping[str, Any]  # content of result.json
@@ -165,7 +165,7 @@ class ReportedRun:
 
     @property
     def problems(self) -> list[str]:
-        """Problems of the certificate and contradictions by result.json, a sentence each."""
+        """Problems of the certificate and contradictions between result.json and the log, a sentence each."""
         return [*self.log.certificate.problems, *self.log.contradictions] if self.log else []
 
     @property
@@ -256,7 +256,7 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
 
 
 def log_facts(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts:
-    """Compute the facts of a log, and the contradictions by the result beside it."""
+    """Compute the facts of a log, and its contradictions with the result beside it."""
     try:
         certificate, metrics, digest = certify(rollout), measure(rollout), rollout.digest
         sights = tuple(passed(rollout))
@@ -298,7 +298,7 @@ def run_columns(runs: Sequence[ReportedRun]) -> dict[str, list[Any]]:
 
 
 def _numeric(texts: list[str]) -> list[Any]:
-    """Convert texts to numbers, empty ones to None, if all are numeric; else return them unchanged."""
+    """Convert texts to numbers, and empty ones to None, if all are numeric; otherwise return them unchanged."""
     try:
         return [None if text == "" else float(text) for text in texts]
     except ValueError:

@@ -71,7 +71,7 @@ def write_report(
     Args:
         runs: one or more runs, or folders with runs of `antdrive run --out`
         out: the file to write: a page (.html) or Markdown for a pull request (.md)
-        title: of the report; default: the folder's name
+        title: the report's title; default: the folder's name
         embed_films: embed films of folders instead of linking them
         figures: embed each run's figures in the page
         films: film each run from Python and embed the film

@@ -15,7 +15,7 @@ BARN_GOAL: Point = (-2.25, 13.0)
 BARN_TOLERANCE = 1.0
 #: In every BARN world a row of cylinders along each of three sides touches these bounds; the goal's side is open.
 BARN_BOUNDS: Bounds = (-4.5, 0.0, 0.0, 14.4)
-#: The spacing of the lattice on which BARN's cylinders stand [m]; grid cells on it lose no passage to rounding.
+#: The spacing of the lattice on which BARN's cylinders stand [m]; a grid of these cells loses no passage to rounding.
 BARN_CELL = 0.15
 
 

@@ -138,7 +138,7 @@ def _window(edges: Floats, centre: float, radius: float) -> tuple[int, int]:
 
 
 def cover(cells: CellMap, overhang: float | None = None) -> Cover:
-    """Cover the blocked cells adjacent to free ones with discs, chosen greedily to be few.
+    """Cover the blocked cells adjacent to free ones with few discs, chosen greedily.
 
     The discs leave no passage that the map does not have. Blocked cells without a free neighbour are omitted.
     """
@@ -156,7 +156,7 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
         raise input_error("map", f"has {rows} x {cols} reachable cells; the limit is {MAX_COVERED}")
     _report.get()(REACHABLE_DONE)
     needed = _beside(free) & ~free
-    # The map counts as surrounded by free cells here, so that no disc reaches beyond it.
+    # Treat the map as surrounded by free cells, so that no disc reaches beyond it.
     distance2 = np.empty((2 * free.shape[0] + 5, 2 * free.shape[1] + 5), dtype=np.int32)
     kernels.squared_distances(np.pad(free, 1, constant_values=True), CAP, distance2)
     distance2 = np.ascontiguousarray(distance2[2:-2, 2:-2])
@@ -199,7 +199,7 @@ def map_task(
     Args:
         cells: the map
         start: the robot's start pose [m, m, rad]
-        goal: [m]
+        goal: the goal position [m]
         name: the world's name
         source: origin of the map
         overhang: largest protrusion of discs beyond blocked cells [m]; see `cover`

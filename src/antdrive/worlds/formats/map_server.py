@@ -120,7 +120,7 @@ def import_map_server(
     Args:
         path: the YAML file
         start: the robot's start pose in the map [m, m, rad]; required unless `export_map_server` wrote the map
-        goal: in the map [m]; required unless `export_map_server` wrote the map
+        goal: the goal position in the map [m]; required unless `export_map_server` wrote the map
         unknown_is_free: whether unknown cells are free instead of blocked
         overhang: largest protrusion of discs beyond blocked cells [m]; see `map_task`
         cell: the task's grid resolution [m]; by default the map's

@@ -1,6 +1,6 @@
 """Maps and problems of the MovingAI benchmarks (N. Sturtevant, *Benchmarks for grid-based pathfinding*, 2012).
 
-A `.map` file begins with the map's top line. It becomes the last row: rows grow upwards, as in `Grid`.
+A `.map` file begins with the map's top line, which becomes the last row: rows run upwards, as in `Grid`.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ if TYPE_CHECKING:  # importing Grid loads the compiler
 
 MapCell: TypeAlias = tuple[int, int]  # (row, col)
 
-PASSABLE = b".GS"  # ground (two letters), swamp entered from the ground
-BLOCKED = b"@OTW"  # out of bounds (two letters), trees, water
+PASSABLE = b".GS"  # ground (. and G), swamp (S), passable from ground
+BLOCKED = b"@OTW"  # out of bounds (@ and O), trees (T), water (W)
 
 MAX_BYTES = 100_000_000
 
@@ -83,7 +83,7 @@ def import_movingai_task(
     Args:
         path: the `.map` file; its lower left corner becomes (0, 0)
         start: the robot's start pose [m, m, rad]; required without a problem
-        goal: [m]; required without a problem
+        goal: the goal position [m]; required without a problem
         problem: index, from 0, of the `.scen` file's problem that gives start and goal
         resolution: side of the map's cells [m]
         overhang: largest protrusion of discs beyond blocked cells [m]; see `map_task`

@@ -188,7 +188,7 @@ def import_sdf(
     Args:
         path: the SDF file
         start: the robot's start pose in the file's coordinates [m, m, rad]; by default at the lower left, towards the goal
-        goal: in the file's coordinates [m]; by default at the upper right
+        goal: the goal position in the file's coordinates [m]; by default at the upper right
         bounds: the walls' inner faces, in the world's own frame [m]; by default 1 m around the cylinders, start and goal
         cell: the task's grid resolution [m]; by default 0.25
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
@@ -306,8 +306,8 @@ def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Poin
 def export_sdf(task: Task, path: str | Path) -> None:
     """Write a world for Gazebo (SDF 1.6): static cylinders, the bounds as four walls, a floor and a sun.
 
-    Positions are those in the world's source map: models have the pose of the world's `frame`, links the positions in
-    the world. The task is stored in an element `antdrive:task`, which Gazebo ignores; `import_sdf` restores it bit by bit.
+    Positions are in the world's source map: models have the pose of the world's `frame`, and links the positions in
+    the world. The task is stored in an element `antdrive:task`, which Gazebo ignores; `import_sdf` restores it bit for bit.
 
     Raises:
         InputError: the file cannot be written, or the world has movers.

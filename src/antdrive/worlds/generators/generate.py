@@ -51,10 +51,10 @@ def forest(
         size: side of the square [m]
         count: number of cylinders
         radius: smallest and largest radius of a cylinder [m]
-        clearance: least distance from the start and the goal to any surface [m]
-        spacing: of the grid points for the cylinders' centres [m]
-        gap: least distance between the surfaces of two cylinders [m]; None: cylinders may overlap
-        robot_radius: of the robot that must be able to cross the world [m]
+        clearance: minimum distance from the start and the goal to any surface [m]
+        spacing: distance between the grid points for the cylinders' centres [m]
+        gap: minimum distance between the surfaces of two cylinders [m]; None: cylinders may overlap
+        robot_radius: radius of the robot that must be able to cross the world [m]
         cell: the task's grid resolution, used to test crossing [m]
         tries: attempts for the world, and for each cylinder
         name: the world's name
@@ -162,14 +162,14 @@ def barn(
     of 0.15 m are filled at random and smoothed in rounds. In each round, cells with five or more of eight neighbours
     filled are filled, and cells with at most one are cleared. The walls at the field's sides stay filled, and all cells
     beyond them count as filled. Each filled cell becomes a cylinder of radius 0.075 m. Layout, start and goal are those
-    of the BARN set. Worlds that the robot cannot cross are discarded (BARN carved a passage instead): at fill 0.30 a
-    Jackal crosses one in several hundred, which takes up to some seconds.
+    of the BARN set. Worlds that the robot cannot cross are discarded (BARN carved a passage instead). At fill 0.30 a
+    Jackal can cross only one in several hundred, so generation takes up to a few seconds.
 
     Args:
         rng: the source of randomness
         fill: initial probability of a filled cell; BARN's are `BARN_FILLS`
         rounds: rounds of smoothing; BARN's are `BARN_ROUNDS`
-        robot_radius: of the robot that must be able to cross the world [m]
+        robot_radius: radius of the robot that must be able to cross the world [m]
         tries: attempts
         name: the world's name
 
