@@ -35,7 +35,7 @@ from typing import Any
 from antdrive.runs.campaigns import canonical_bytes, expand, make_campaign, read_results
 from antdrive.runs.campaigns.expanding import Expansion
 from antdrive.runs.campaigns.job import Job
-from antdrive.runs.campaigns.rows import fault_row
+from antdrive.runs.campaigns.rows import failed_row
 from antdrive.runs.campaigns.running import Finished
 from antdrive.runs.campaigns.store import parts_in
 from antdrive.runs.campaigns.sweeping import sweep
@@ -59,7 +59,7 @@ class Sleeping:
     def __call__(self, job: Job) -> Finished:
         if self.seconds:  # sleep(0) would yield the processor
             time.sleep(self.seconds)
-        return Finished(fault_row(job.key, "succeeded", hashlib.sha256(job.key.encode()).hexdigest()))
+        return Finished(failed_row(job.key, "succeeded", hashlib.sha256(job.key.encode()).hexdigest()))
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Computing:
         digest = job.key.encode()
         for _ in range(self.rounds):
             digest = hashlib.sha256(digest).digest()
-        return Finished(fault_row(job.key, "succeeded", digest.hex()))
+        return Finished(failed_row(job.key, "succeeded", digest.hex()))
 
 
 def campaign(runs: int) -> dict[str, Any]:

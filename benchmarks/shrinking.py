@@ -63,7 +63,7 @@ def main() -> None:
                 f"60 → {counts[-1]}",
                 f"1 → {small.noise:g}",
                 f"{small.task.world.size[0]:g} × {small.task.world.size[1]:g} m",
-                str(shrunk.trials),
+                str(shrunk.runs),
                 f"{wall:.0f} s",
                 f"{cpu:.1f} s",
                 "yes" if shrunk.complete and is_one_minimal(small) else "no",

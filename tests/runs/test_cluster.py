@@ -101,7 +101,7 @@ def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(tmp_
         if done == 3:
             process.kill()
 
-    with pytest.raises(InputError, match=r"^--dask: tcp://.*: the scheduler is gone; the same command goes on"):
+    with pytest.raises(InputError, match=r"^--dask: tcp://.*: the scheduler is gone; repeat the command to resume"):
         sweep(campaign, tmp_path / "killed", expansion=expansion, dask=address, work=Deadly(seconds=0.2), progress=kill)
     assert 3 <= len(read_results(tmp_path / "killed").table) < len(expansion.jobs)
     sweep(campaign, tmp_path / "killed", expansion=expansion, jobs=0, work=Deadly())
@@ -111,7 +111,7 @@ def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(tmp_
 
 @pytest.mark.parametrize("address", ["local:", "local:x", "local:0", "localhost:8786", "tcp://"])
 def test_a_wrong_address_is_refused(address):
-    with pytest.raises(InputError, match="write local:N with a number of processes above 0, or tcp://HOST:PORT"):
+    with pytest.raises(InputError, match="write local:N with N processes, at least 1, or tcp://HOST:PORT"):
         next(run_on_cluster(Deadly(), [], address))
 
 
