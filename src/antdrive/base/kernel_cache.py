@@ -17,7 +17,7 @@ PACKAGES = ("base", "worlds", "planners", "robots", "sim", "views")
 def sources_stamp() -> str:
     """Return the SHA-256 of all kernel files' texts as imported by this process.
 
-    Modules are imported lazily, so editing files meanwhile mixes two versions in one process. Code compiled then belongs to
+    Modules are imported lazily, so a file edited while the process runs mixes two versions in it. Code compiled then belongs to
     neither version: its stamp covers both texts.
     """
     first, then, stamp = _first_state()

@@ -33,7 +33,7 @@ def sweep(
         list[str] | None,
         option(
             "NAME",
-            "Planner or FILE.py:CLASS, with options as in as:ants=10,50 or as:ants=10..50..20. Repeatable.",
+            "Planner or FILE.py:CLASS; options follow a colon: as:ants=10,50 or as:ants=10..50..20. Repeatable.",
         ),
     ] = None,
     robot: Annotated[list[str] | None, option("NAME", "Robot name or file. Repeatable.")] = None,
@@ -42,7 +42,7 @@ def sweep(
         str | None,
         option(
             "TASKS",
-            "Tasks per world: NUMBER[:METRES] random ones at least METRES apart, or named (those of the world file).  "
+            "Tasks per world: NUMBER[:METRES] random ones, start and goal at least METRES apart, or named (the world file's).  "
             "[default: the main task]",
         ),
     ] = None,

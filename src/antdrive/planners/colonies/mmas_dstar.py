@@ -23,20 +23,20 @@ from antdrive.planners.replanners import SteppingAgent
 
 RESPREAD = "respread pheromone around blocked cells"
 PATIENCE = 4  # consecutive waits, or visits of one cell, before an agent respreads pheromone
-ONLINE_FACTOR = 2.0  # factor on alpha per cycle of an agent, as the robot drives every cycle
+ONLINE_FACTOR = 2.0  # factor on alpha per cycle of an agent; large, because the robot has to drive each cycle
 
 
 @dataclass(frozen=True, kw_only=True)
 class MaxMinDStar(GridPlanner):
-    """One ant that follows pheromone spread from the goal like the costs of D*: hasan's improved max-min algorithm.
+    """One ant follows pheromone, which spreads from the goal like the costs of D*: hasan's improved max-min algorithm.
 
     The ant always takes the neighbour with the smallest `pheromone^alpha * distance^beta` (eq. 1, as in the
     paper's program). Because of the straight distance to the goal, the ant may cycle in front of a wall. The
-    author chose other exponents for such maps; here the rule `exponents` covers all maps and always arrives. The
+    author chose other exponents for such maps; here the rule `exponents` serves all maps, and the ant always arrives. The
     result's `reason` reports the changes.
 
     Known weaknesses, measured (docs/papers/hasan.md): with alpha 1 and beta 1, alpha must be raised in five of
-    the paper's six environments; with the paper's exponents in none. Paths are up to 11 per cent longer than the
+    the paper's six environments; with the paper's exponents, in none of them. Paths are up to 11 per cent longer than the
     shortest. With a quarter of 50 x 50 cells blocked they are 1.8 per cent longer in the median and 44 per cent at
     worst.
 
@@ -45,8 +45,8 @@ class MaxMinDStar(GridPlanner):
         beta: initial exponent of the distance; in the paper 0 to 3
         alpha_max: maximum alpha before beta becomes 0
         evaporation: fraction of pheromone lost; the paper's rho, 0.98, is the fraction retained
-        gates: whether cells between two diagonally opposite blocked cells are closed, the paper's gate raise
-            state; if that leaves no path, they are reopened
+        gates: whether to close cells between two diagonally opposite blocked cells (the paper's
+            "gate raise state"); if that leaves no path, they are reopened
     """
 
     alpha: float = 1.0
@@ -156,7 +156,7 @@ class MaxMinDStar(GridPlanner):
 
 
 class PheromoneAgent(SteppingAgent):
-    """hasan's robot: one decision per cell, on pheromone spread once from the goal, and never into an occupied cell.
+    """hasan's robot: it decides once per cell, by pheromone spread once from the goal, and never enters an occupied cell.
 
     The robot moves to the allowed neighbour with the smallest `pheromone^alpha * distance^beta`. Before it returns
     to a cell visited with the current exponents, it detects a cycle and takes the next exponents of

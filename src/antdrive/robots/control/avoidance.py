@@ -9,8 +9,8 @@ one of the candidates, so the robot moves out of the path of an approaching move
 
 If a nearby mover turns, there may be no candidate that keeps the minimum clearance. While the robot can still stop in time,
 it takes the candidate with the latest contact. After that it takes the one that stays farthest from movers, and
-stops only if every candidate ends in a contact (T. Fraichard and H. Asama, *Inevitable collision states*, Advanced Robotics 18,
-2004, evaluate a state by its best escape in the same way).
+stops only if every candidate ends in a contact. T. Fraichard and
+H. Asama, *Inevitable collision states*, Advanced Robotics 18, 2004, also evaluate a state by its best escape.
 """
 
 from __future__ import annotations

@@ -76,8 +76,9 @@ def shrink(
 ) -> Shrunk:
     """Shrink a failing scenario: fewer obstacles and movers, less noise, a nearer start, fewer digits.
 
-    Every accepted step fails in the same way: same outcome, same kind of thing touched, same cause. If a path with the
-    claimed clearance existed at first, one exists in every accepted world, by the exact shortest path. On completion,
+    Every accepted step fails in the same way: same outcome, same kind of thing touched, same cause. If the given
+    world has a path with the claimed clearance, so has every accepted world; an exact shortest-path search
+    checks this. On completion,
     removing any single obstacle, mover or unseen obstacle makes the failure vanish. The result depends on the scenario
     alone, unless the time runs out.
 

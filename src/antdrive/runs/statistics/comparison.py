@@ -55,7 +55,7 @@ class PairedComparison:
     worlds: int  # number of worlds of these pairs
     dropped: int  # pairs omitted because not both succeeded; 0 for success
     unpaired: int  # runs of either planner without a partner
-    # pairs in which the first planner's value is better, or lower if no direction is better
+    # pairs in which the first planner's value is better; with direction "neither", lower
     first_wins: int
     second_wins: int  # pairs in which the second planner's value is better, or lower
     ties: int  # pairs with equal values
@@ -228,7 +228,7 @@ def _corrected(
     ]
 
 
-POWER = 0.8  # of the test with the needed worlds, if the two are equally good
+POWER = 0.8  # power of the non-inferiority test with `needed` worlds, if planner and reference are equally good
 TAIL_RESAMPLES = 20  # least number of resamples beyond each end of an interval
 FEWEST_WORLDS = 6
 
@@ -245,7 +245,8 @@ class NonInferiority:
     advantage: float
     interval: Interval  # of the advantage; all intervals of the table hold jointly with 95 %
     worlds: int  # number of worlds of the pairs
-    # worlds needed to show it with a power of 80 % if the two are equally good, from the spread between these worlds
+    # worlds needed to show that the planner is not worse, with a power of 80 % if both are equally good;
+    # estimated from the spread between these worlds
     needed: int
 
     @property

@@ -11,7 +11,7 @@ from antdrive.robots.lidar import Lidar
 from antdrive.sim.sensing import _kernels_matching
 from antdrive.sim.sensing.mapping import OccupancyMap
 
-BEAMS = 180  # most beams of a scan that are matched
+BEAMS = 180  # maximum number of beams matched per scan
 FAR = 8.0  # default range of matched hits [m]
 NEAR = 3  # search radius for the map's nearest hit, in grains (half cells)
 FEWEST = 25  # fewest matched pairs of hits
@@ -49,8 +49,8 @@ class ScanMatcher:
 def without_sliding(before: Pose, after: Pose, points: Floats) -> Pose:
     """Remove the part of a correction that the scan does not constrain, such as a shift along the only visible wall.
 
-    The normals of the hit surfaces constrain the pose along those eigenvectors of their mean outer product whose eigenvalues
-    are not small.
+    Take the mean outer product of the hit surfaces' normals. The scan constrains the pose along its eigenvectors with
+    eigenvalues of at least `HELD`.
     """
     along = points[CHORD:] - points[:-CHORD]
     length = np.hypot(along[:, 0], along[:, 1])
