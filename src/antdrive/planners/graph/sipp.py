@@ -22,8 +22,8 @@ from antdrive.worlds import MoverMotion
 
 STEP = 0.05  # initial sampling period of a motion; refined where it turns [s]
 INSTANT = 1e-6  # a motion that is not straight over this time is a jump [s]
-# Maximum distance of a motion from its samples' chords, and of the samples from the legs that replace them [m]. Twice
-# this is added to the clearance.
+# Maximum distance between a motion and the chords that join its samples, and between the samples and the legs that
+# replace them [m]. Twice this is added to the clearance.
 TOLERANCE = 1e-3
 UNIT = "safe intervals expanded"
 
@@ -76,8 +76,9 @@ def plan_in_time(
 
     The robot makes each move at `speed` and may wait in any cell for any time. Straight legs, at most
     `2 * TOLERANCE` off, replace each motion. On these legs, the robot's centre keeps `inflate + 2 * TOLERANCE`
-    from a mover's surface, and so at least the grid's `inflate` from the mover itself. Over the legs the plan is
-    exact: no path on this grid, at this speed, arrives sooner. Motions are sampled every `STEP`, more densely near
+    from a mover's surface, and so at least the grid's `inflate` from the mover itself. With the legs as motions the
+    plan is exact: no path on this grid, at this speed, arrives sooner. Motions are sampled every `STEP`, more densely
+    near
     turns and jumps; two turns within half a `STEP` may be missed.
 
     Args:
@@ -163,7 +164,8 @@ def _samples(mover: MoverMotion, start: float, end: float) -> tuple[Floats, Floa
     while len(unchecked):
         middle = (t[unchecked] + t[unchecked + 1]) / 2
         there = np.asarray(mover.at(middle), dtype=np.float64)
-        # Two straight legs that meet within an interval deviate from its chord at most twice as far as its midpoint.
+        # A motion that turns once within an interval deviates from the interval's chord at most twice as far as it
+        # does at half time.
         stray = 2 * np.hypot(*(there - (xy[unchecked] + xy[unchecked + 1]) / 2).T)
         bent = (stray > TOLERANCE) & (t[unchecked + 1] - t[unchecked] > INSTANT)
         if not bent.any():

@@ -98,7 +98,7 @@ def sweep(
         campaign: a campaign, its file, or plain data with the keys of such a file
         folder: the folder of results
         expansion: the campaign's runs, if known
-        jobs: number of processes; None: one per core; 0: this process, which a crashing run ends
+        jobs: number of processes; None: one per core; 0: this process; a run that crashes ends it
         dask: a cluster to run on: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
         keep: which runs' logs are kept: none, failed or all; None: the campaign's choice
         retry_crashed: whether to repeat crashed runs
@@ -186,7 +186,7 @@ def campaign_of(campaign: Campaign | str | os.PathLike[str] | Mapping[str, Any])
 
 
 def _begin(store: Store, campaign: Campaign, expansion: Expansion, jobs: Sequence[Job]) -> None:
-    """Write the manifest, the grid, and the worlds and robots that commands name."""
+    """Write the manifest, the grid, and the files of worlds, robots and planners that the runs' commands name."""
     keys = "\n".join(sorted(job.key for job in jobs))
     manifest = {
         "schema": 1,

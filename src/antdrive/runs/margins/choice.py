@@ -59,8 +59,8 @@ def predicted_loss(losses: Sequence[float], probability: float = PROBABILITY) ->
     """Predict the loss that a further drive exceeds with a given probability [m]; infinite if any loss is infinite.
 
     Excesses over a high threshold follow a generalised Pareto distribution (Pickands 1975; Balkema & de Haan 1974), fitted
-    by probability-weighted moments (Hosking & Wallis 1987). Its shape is limited to between a bounded and an exponential
-    tail, the limit for sums of many small errors. The prediction is at least the largest loss observed.
+    by probability-weighted moments (Hosking & Wallis 1987). Its shape lies between a bounded tail and an exponential
+    one; the latter is the limit for sums of many small errors. The prediction is at least the largest loss observed.
     """
     ordered = np.sort(np.asarray(losses, dtype=np.float64))
     tail = round(TAIL * len(ordered))

@@ -221,7 +221,7 @@ class CellByCell(Replanning):
         return None
 
     def _note_no_path(self, tick: int, pose: Pose) -> None:
-        """Note that the robot makes no progress; log the attempt at which it gives up."""
+        """Record an attempt without progress; log the one at which the robot gives up."""
         now = tick / self._hz
         if self.blockage.pause(tick, pose[:2]) or now - self._noted_at < self.policy.min_interval:
             return

@@ -1,8 +1,8 @@
 """Consistency of a log: rows against the record, plan against itself. Limits, commands, noise, outcome, route, replans.
 
-Each check is a function that yields a sentence per error. Tolerances are multiples of what genuine drives show, over the
-catalogue's worlds and robots and generated worlds, with every planner, with and without noise; collided drives up to the
-contact.
+Each check is a function that yields a sentence per error. Tolerances are multiples of what genuine drives show: in
+the catalogue's worlds and generated ones, with its robots and every planner, with and without noise. Collided drives
+count up to the contact.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.route import end_reach, longest_line
 
-NEAR = 1.5  # most cells between a route's end and a point with room
+NEAR = 1.5  # largest distance from a route's end to a point with room [cells]
 JUST_ROOM = 1e-6  # a goal with at most this much more room than the inflation may count as too narrow [m]
 ROUTE_SLACK = 0.012  # smoothed routes keep the inflation; logged replans are rounded to 0.1 mm [m]
 SAME_LENGTH = 1e-6  # relative tolerance of lengths that are computed twice
@@ -217,8 +217,8 @@ SIGMAS = 8.0  # bound of noise in standard deviations; genuine drives: 4.2
 ACCELERATION_WINDOW, HARDER = 0.25, 1.5  # window [s], multiple of the robot's limit; genuine drives: 1.16
 SLOWEST_PHYSICS = 60  # at a lower rate robots jerk, and poses do not follow from the speeds [Hz]
 EXACT = 1e-6  # relative tolerance of commands at their limits
-# Tolerance between the distances by measured speeds and by motor targets over some seconds; motors lag by a few periods while
-# speeds change. Genuine drives in 0.25 s: 2.1 mm and 0.011 rad.
+# Tolerance between the distance that measured speeds give over a window and the one that motor targets give; motors
+# lag by a few periods while speeds change. Genuine drives in 0.25 s: 2.1 mm and 0.011 rad.
 FOLLOW_WINDOWS = (0.25, 1.0, 4.0)  # [s]
 FOLLOW, FOLLOW_TURN, FOLLOW_SHARE = 0.01, 0.05, 0.02  # [m], [rad], fraction of the distance
 LATE = 2.0  # largest lag of the motors, in periods of control and of physics
@@ -230,7 +230,7 @@ STOPPED = 0.02  # a robot that stands is slower than this [m/s], [rad/s]
 
 
 def inconsistencies(rollout: Rollout) -> Iterator[str]:
-    """Yield every contradiction of the rows before the first contact with the record."""
+    """Yield every contradiction between the record and the rows before the first contact."""
     end = len(rollout.t)
     if len(rollout.contacts):
         end = max(1, int(rollout.contacts[0, 0]))

@@ -39,13 +39,15 @@ ROOM = 4.0  # initial extent of a growing map beyond its horizon [m]
 class OccupancyMap:
     """Occupancy map in the frame of the robot's odometry.
 
-    A cell is unknown, free or occupied. It is free once a beam has passed it, as far as beams lie no farther apart than a
-    cell; an object thinner than that may stand between two of them. One hit makes a cell occupied. It is free again once the
-    beams on both sides of its hits have ended beyond them; cells with many hits need nine such scans.
+    A cell is unknown, free or occupied. It is free once a beam has passed it, out to the distance where neighbouring
+    beams are one cell apart; an object thinner than a cell may stand between two beams. One hit makes a cell
+    occupied. It is free again once the beams on both sides of its hits have ended beyond them; cells with many hits
+    need nine such scans.
 
     Every `share`-th scan is entered as a whole. The others contribute their hits only: obstacles appear at once, and free
-    ground with the next whole scan. Free paths are those of every `turns`-th beam, in turn, and of all beams of the first
-    scan.
+    ground with the next whole scan. A whole scan enters the free paths of every `turns`-th beam, of other beams each
+    time; the first scan enters those of all beams.
+
     Attributes:
         cell: side of a cell [m]
         horizon: hits farther than this are omitted [m]
@@ -281,7 +283,8 @@ class OccupancyMap:
         more: tuple[int, int, int, int],
         old: kernels.MapArrays | None = None,
     ) -> None:
-        """Allocate arrays for cells from a corner, and `more` cells in the west, south, east and north; lists as in `old`."""
+        """Allocate arrays for `rows` x `cols` cells from a corner, plus `more` cells on each side (west, south, east,
+        north); keep the lists of `old`."""
         west, south, east, north = more
         shape = (rows + south + north, cols + west + east)
         frame = np.array([x0 - west * self.cell, y0 - south * self.cell, self.cell])
@@ -353,8 +356,8 @@ def clear_distance(
 ) -> float:
     """Return how far the footprint, swept along a twist's arc, stays on observed free ground, at most `limit` [m].
 
-    Unknown ground counts by whole cells, hits by their discs. The result is a lower bound, to 1 mm. Overlaps at the
-    start stop only motion that comes nearer.
+    Unknown ground counts by whole cells, hits by their discs. The result is a lower bound, to 1 mm. An overlap at the
+    start stops only a motion that comes nearer to it.
 
     Args:
         seen: the map

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from antdrive.worlds import Grid
 
 
-HIDDEN_OPACITY = 0.16  # of a robot behind a cylinder
+HIDDEN_OPACITY = 0.16  # of a body behind a cylinder
 SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
 RING_SIDES, RING_OFF = 32, 0.05  # ring around a tracked mover: sides, distance from its surface [m]
 FORECAST = 1.5  # horizon of the movers' drawn motion [s]
