@@ -27,7 +27,6 @@ from antdrive.worlds import Disc, Grid, Task, rasterise
 from antdrive.worlds.world import PointWorld
 
 if TYPE_CHECKING:
-    from antdrive.planners import Query
     from antdrive.sim.driving.movers_ahead import Zone
 
 STEP = 0.25  # longest time between predicted positions [s]

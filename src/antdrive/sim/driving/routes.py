@@ -97,7 +97,7 @@ class RoutePlanner:
         return plan
 
     def around(self, task: Task, grid: Grid, discs: Sequence[Disc] = (), zone: Zone | None = None) -> PlanResult:
-        """Re-plan around discs and a zone.
+        """Replan around discs and a zone.
 
         Planners that need the world get one with additional discs. Others repair with a replanner and closed cells. Without a
         map and movers to avoid, planners without their own replanner plan from scratch.
@@ -112,8 +112,8 @@ class RoutePlanner:
             return unreachable
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
             return self.plan(query, self.rng)
+        closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
         with planner_errors(self.planner):
-            closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
             # Without a map, movers change so many cells that repair is no faster than a new search.
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
         answer = require_result(self.planner, answer)
