@@ -1,5 +1,6 @@
 """Logs on disk: what is saved is read again, and what is no log is refused in one line that names the file and the key."""
 
+import dataclasses
 import hashlib
 import io
 import json
@@ -17,7 +18,7 @@ from antdrive.base.errors import FieldError
 from antdrive.sim import Outcome, Rollout, certify, measure
 from antdrive.sim.log import rollout
 from antdrive.sim.log.margin import budget
-from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.record import PROOFS, DriveRecord, PlanRecord, Proof, TimesRecord, proofs_of
 from antdrive.sim.log.rollout import ARRAYS, read_record
 from antdrive.worlds.movers import Cruising, Keyframed, Wandering
 from tests.records import changed, made_up_record
@@ -340,3 +341,26 @@ def _edit(record, rng):
         else:
             place[key] = ODD[rng.integers(len(ODD))]
             return
+
+
+def test_every_value_of_a_record_declares_its_check(small_run):
+    record = small_run.rollout.record
+    keys = {key.partition(".")[0].removesuffix("[]") for key in PROOFS}
+    assert keys == {field.name for field in dataclasses.fields(record)}
+    assert {f"plan.{key}" for key in record.as_dict()["plan"]} == {key for key in PROOFS if key.startswith("plan.")}
+    assert "replans[].route" in PROOFS
+    assert PROOFS["versions"] is PROOFS["times.plan_s"] is PROOFS["task.name"] is Proof.CLAIM
+
+    @dataclasses.dataclass
+    class Undeclared:
+        plan: PlanRecord
+        more: int
+
+    with pytest.raises(TypeError, match="more declares no proof"):
+        dict(proofs_of(Undeclared))
+
+
+def test_times_are_not_negative():
+    for key, value in (("plan_s", -1.0), ("drive_wall_s", -1e-9), ("replans_s", (0.1, -0.1))):
+        with pytest.raises(FieldError, match=f"{key}.*must be at least 0"):
+            TimesRecord(**{"plan_s": 0.0, "drive_wall_s": 0.0, "replans_s": (), key: value})

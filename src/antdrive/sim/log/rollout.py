@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,7 @@ from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.record import DriveRecord, Proof
 from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK, MAX_NEAR_DISTANCES
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
@@ -181,33 +181,43 @@ MAX_ROWS = 20_000_000  # a day at 240 Hz
 MAX_VALUE = 1e12  # largest number in the arrays; sums and squares of larger ones lose all precision
 MAX_RECORD = 32_000_000  # characters of the record; a world of 20,000 cylinders takes 2 million
 ROWS, NOISY = "rows", "rows or none"  # lengths in shapes: the log's rows; the log's rows, or none for a perfect robot
-#: Shape and dtype of each array; None for any length.
-FORMS: Mapping[str, tuple[tuple[int | str | None, ...], str]] = MappingProxyType(
+
+
+class ArrayForm(NamedTuple):
+    """Form of an array of a log."""
+
+    shape: tuple[int | str | None, ...]  # None for any length
+    dtype: str
+    proof: Proof = Proof.REPLAY  # how it is checked
+
+
+#: Form of each array.
+FORMS: Mapping[str, ArrayForm] = MappingProxyType(
     {
-        "t": ((ROWS,), "<f8"),
-        "pose": ((ROWS, 3), "<f8"),
-        "twist": ((ROWS, 2), "<f8"),
-        "command": ((ROWS, 2), "<f8"),
-        "clearance": ((ROWS,), "<f8"),
-        "limiter": ((ROWS,), "u1"),
-        "movers": ((ROWS, None, 2), "<f8"),
-        "contacts": ((None, 4), "<f8"),
-        "route": ((None, 2), "<f8"),
-        "cells": ((None, 2), "<i4"),
-        "estimate": ((NOISY, 3), "<f8"),
-        "actuated": ((NOISY, 2), "<f8"),
-        "scans": ((None, None), "<u2"),
-        "scan_rows": ((None,), "<i4"),
-        "seen": ((None, 4), "<f4"),
-        "tracks": ((None, 7), "<f4"),
+        "t": ArrayForm((ROWS,), "<f8", Proof.LOG),
+        "pose": ArrayForm((ROWS, 3), "<f8"),
+        "twist": ArrayForm((ROWS, 2), "<f8"),
+        "command": ArrayForm((ROWS, 2), "<f8"),
+        "clearance": ArrayForm((ROWS,), "<f8", Proof.LOG),
+        "limiter": ArrayForm((ROWS,), "u1"),
+        "movers": ArrayForm((ROWS, None, 2), "<f8", Proof.LOG),
+        "contacts": ArrayForm((None, 4), "<f8"),
+        "route": ArrayForm((None, 2), "<f8"),
+        "cells": ArrayForm((None, 2), "<i4"),
+        "estimate": ArrayForm((NOISY, 3), "<f8"),
+        "actuated": ArrayForm((NOISY, 2), "<f8"),
+        "scans": ArrayForm((None, None), "<u2"),
+        "scan_rows": ArrayForm((None,), "<i4"),
+        "seen": ArrayForm((None, 4), "<f4"),
+        "tracks": ArrayForm((None, 7), "<f4"),
     }
 )
 
 
 def _none_of(name: str) -> Callable[[], npt.NDArray[Any]]:
     """Return a factory of the empty array."""
-    shape, dtype = FORMS[name]
-    return lambda: np.empty([n if isinstance(n, int) else 0 for n in shape], dtype=dtype)
+    form = FORMS[name]
+    return lambda: np.empty([n if isinstance(n, int) else 0 for n in form.shape], dtype=form.dtype)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -360,7 +370,7 @@ class Rollout:
             yield "t: the log is empty"
         elif rows > MAX_ROWS:
             yield f"t: must have at most {MAX_ROWS} rows, found {rows}"
-        for name, (form, dtype) in FORMS.items():
+        for name, (form, dtype, _) in FORMS.items():
             array = getattr(self, name)
             lengths = {ROWS: rows, NOISY: rows if np.size(array) else 0}
             shape = tuple(lengths[n] if isinstance(n, str) else n for n in form)
