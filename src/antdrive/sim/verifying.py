@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from antdrive.base.errors import input_error
+from antdrive.base.files import parse_json
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.record import DriveRecord, differences, hashes_of, plain_value
@@ -26,7 +26,7 @@ def read_result(path: Path) -> Mapping[str, Any]:
     if path.stat().st_size > MAX_RESULT_BYTES:
         raise input_error(str(path), f"cannot be read (larger than {MAX_RESULT_BYTES // 1_000_000} MB)")
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = parse_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise input_error(str(path), f"cannot be read ({error})") from None
     return content if isinstance(content, dict) else {}

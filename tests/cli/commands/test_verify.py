@@ -81,7 +81,7 @@ def test_the_folder_of_a_run_stands_for_its_log(antdrive, refused, log, tmp_path
         assert f"{tmp_path}: contains no rollout.npz; its run ended before the robot drove" in line
 
 
-def test_the_folder_of_a_run_is_verified_with_its_result(antdrive, small_run, tmp_path):
+def test_the_folder_of_a_run_is_verified_with_its_result(antdrive, refused, small_run, tmp_path):
     folder = tmp_path / "r"
     folder.mkdir()
     small_run.rollout.save(folder / "rollout.npz")
@@ -90,6 +90,9 @@ def test_the_folder_of_a_run_is_verified_with_its_result(antdrive, small_run, tm
         assert antdrive("verify", folder)[0] == code
     assert "result.json: noise: differs from the log, which says 0.0" in antdrive("verify", folder)[1]
     assert antdrive("verify", folder / "rollout.npz")[0] == 0, "the log alone is genuine"
+    result = folder / "result.json"
+    result.write_text(result.read_text().replace('"noise":', '"noise": 0.0, "noise":'))
+    assert f"{result}: cannot be read (noise: is given twice; keep one)" in refused("verify", folder)
 
 
 def test_a_log_that_cannot_be_read_hides_no_other_verdict(antdrive, log, tmp_path):

@@ -24,6 +24,7 @@ from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from antdrive.base.document import MAX_DEPTH
 from antdrive.base.errors import FieldError
+from antdrive.base.files import parse_json
 from antdrive.base.records import STRICT, attributes_of
 from antdrive.base.types import Point
 from antdrive.robots.spec import RobotSpec
@@ -385,8 +386,10 @@ class DriveRecord:
             FieldError: a key is missing or unknown, or a value is invalid.
         """
         try:
-            content = json.loads(text, parse_constant=_refuse_constant)
+            content = parse_json(text, parse_constant=_refuse_constant)
             _require_shallow(content)
+        except FieldError as error:
+            raise error.under("record") from None
         except (RecursionError, ValueError) as error:
             problem = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise FieldError("record", f"not JSON: {problem}") from None
