@@ -16,7 +16,9 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
+from antdrive.base.document import MAX_BYTES
 from antdrive.base.errors import InputError, Terminated, input_error
+from antdrive.base.files import read_bytes
 
 DIGITS = 8  # hexadecimal digits of a file's hash
 FROM_FILE = "_antdrive_user_"  # name prefix of modules loaded from files
@@ -108,11 +110,9 @@ def _hash(content: bytes) -> str:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise UserCodeError(f"{path}: no such file") from None
-    except OSError as error:
-        raise UserCodeError(f"{path}: cannot be read ({error.strerror})") from None
+        return read_bytes(path, MAX_BYTES, "a Python file")
+    except InputError as error:
+        raise UserCodeError(str(error)) from None
 
 
 def _choices(module: ModuleType, word: str) -> str:

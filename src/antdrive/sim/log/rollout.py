@@ -11,8 +11,6 @@ import dataclasses
 import hashlib
 import itertools
 import math
-import os
-import stat
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,6 +24,7 @@ import numpy.typing as npt
 
 from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.files import open_regular
 from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
@@ -44,17 +43,9 @@ LONGEST_PROBLEM = 300  # characters of a message
 def guarded_log(path: str | Path) -> Iterator[Archive]:
     """Open the archive of a log; every error inside becomes one line that names the file."""
     try:
-        with open(path, "rb", opener=_without_waiting) as raw:
-            kind = os.fstat(raw.fileno())
-            if not stat.S_ISREG(kind.st_mode):
-                raise input_error(str(path), "not a rollout (no regular file)")
-            if kind.st_size > MAX_BYTES:
-                raise input_error(str(path), f"not a rollout (larger than {MAX_BYTES >> 20} MB)")
-            with zipfile.ZipFile(raw) as archive:
-                _check_members(archive)
-                yield archive
-    except FileNotFoundError:
-        raise input_error(str(path), "no such file") from None
+        with open_regular(path, MAX_BYTES, "a rollout") as raw, zipfile.ZipFile(raw) as archive:
+            _check_members(archive)
+            yield archive
     except InputError as error:
         text = str(error)
         raise (error if text.startswith(f"{path}: ") else _problem(path, text)) from None
@@ -89,11 +80,6 @@ def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
             raise FieldError(name, f"its header promises {wanted} bytes, the file has {_more(len(content), wanted)}")
     flat = np.frombuffer(content, dtype=dtype) if wanted else np.empty(0, dtype=dtype)
     return flat.reshape(shape, order="F" if fortran else "C")
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file without waiting for the writer of a pipe."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _check_members(archive: Archive) -> None:
