@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.atomic import write_text
-from antdrive.base.errors import InputError, input_error
+from antdrive.base.errors import FieldError, InputError, input_error
 
 
 def file_name(name: str, keep: str = "-_.", *, ascii_only: bool = False) -> str:
@@ -21,6 +21,29 @@ def file_name(name: str, keep: str = "-_.", *, ascii_only: bool = False) -> str:
 def as_json(value: Any) -> str:
     """Format a value as indented strict JSON: infinities and nan become null."""
     return json.dumps(_json_value(value), indent=2, allow_nan=False)
+
+
+def parse_json(text: str | bytes, **options: Any) -> Any:
+    """Parse JSON in which no object has a key twice: readers differ in which of the values they use.
+
+    Args:
+        text: the JSON text
+        **options: further arguments of `json.loads`
+
+    Raises:
+        FieldError: a key is given twice.
+        ValueError: the text is not JSON.
+    """
+    return json.loads(text, object_pairs_hook=_object, **options)
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the pairs as a mapping; refuse equal keys."""
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise FieldError(next(key for key in keys if keys.count(key) > 1)[:40], "is given twice; keep one")
+    return values
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -15,8 +15,8 @@ import numpy as np
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from antdrive.base.atomic import write_text
-from antdrive.base.errors import input_error
-from antdrive.base.files import read_bytes
+from antdrive.base.errors import FieldError, input_error
+from antdrive.base.files import parse_json, read_bytes
 from antdrive.base.plane import wrap_angle
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
@@ -174,7 +174,9 @@ class Baseline:
         again = "accept the drive again with antdrive accept"
         try:
             text = read_bytes(path, 10 * MAX_BYTES, "a baseline").decode("utf-8")
-            data = json.loads(text)
+            data = parse_json(text)
+        except FieldError as error:
+            raise input_error(str(path), f"{error}, or {again}") from None
         except (UnicodeDecodeError, ValueError, RecursionError) as error:
             if type(error).__name__ == "InputError":
                 raise
