@@ -253,10 +253,10 @@ def arrays() -> list[str]:
     from antdrive.sim.log.rollout import FORMS, Rollout
 
     rows, contents = [], described(Rollout)
-    for name, (_, dtype) in FORMS.items():
+    for name, form in FORMS.items():
         shape = re.search(r"\((T|N|K|P|S)[\w, ]*\)", contents[name])
         if shape:
-            rows.append((code(name), shape[0], np.dtype(dtype).name, cell(contents[name])))
+            rows.append((code(name), shape[0], np.dtype(form.dtype).name, cell(contents[name])))
     return table("array, shape, dtype, content", rows)
 
 
@@ -273,6 +273,28 @@ def record() -> list[str]:
                 yield from rows(getattr(records, inner[1]), f"{name}[]." if of.startswith("tuple") else f"{name}.")
 
     return table("key, JSON, content", rows(records.DriveRecord))
+
+
+def proofs() -> list[str]:
+    """Return which level of verification checks each array and each key of a log's record."""
+    from antdrive.sim.log.record import PROOFS, Proof
+    from antdrive.sim.log.rollout import FORMS
+
+    levels = {
+        Proof.LOG: "`verify` recomputes",
+        Proof.WORLD: "`--world` compares or recomputes",
+        Proof.ROBOT: "`--robot` compares",
+        Proof.REPLAY: "`--replay` recomputes",
+        Proof.INPUT: "inputs, with which `--replay` drives",
+        Proof.CLAIM: "nothing checks",
+    }
+
+    def row(proof: Proof) -> Row:
+        arrays = [code(name) for name, form in FORMS.items() if form.proof is proof]
+        keys = [code(key) for key, one in PROOFS.items() if one is proof]
+        return levels[proof], ", ".join(arrays), ", ".join(keys)
+
+    return table("level, arrays, keys of the record", map(row, Proof))
 
 
 def json_type(annotation: str) -> str:
@@ -349,7 +371,7 @@ def _class(part: object) -> str:
 GENERATED: dict[str, Callable[..., list[str]]] = {
     "arrays": arrays, "commands": commands, "composition": composition, "controller": controller,
     "exit-codes": exit_codes, "keys": keys,
-    "metrics": metrics, "outcomes": outcomes, "planner": planner, "planners": planners, "record": record,
+    "metrics": metrics, "outcomes": outcomes, "planner": planner, "planners": planners, "proofs": proofs, "record": record,
     "robots": robots, "tolerances": tolerances, "worlds": worlds,
 }  # fmt: skip
 

@@ -70,7 +70,7 @@ def test_wrong_drives_settings_and_logs_are_refused_in_one_line(
             with np.load(path) as file:
                 arrays = dict(file)
             text = str(arrays.pop("record")).replace('"@"', "[" * 50_000 + "]" * 50_000)
-            np.savez(path, record=np.array(text), **arrays)
+            np.savez_compressed(path, record=np.array(text), **arrays)
         return read(path)
 
     def read(path):
@@ -167,7 +167,7 @@ def test_wrong_drives_settings_and_logs_are_refused_in_one_line(
                 ),
                 "encrypted": directory(8, raw[raw.rindex(b"PK\x01\x02") + 8] | 1), "a version to come": directory(6, 99),
                 "numbers of 8 bits": lambda path: packed({**content, "pose.npy": eight.getvalue()}, path),
-                "other arrays": lambda path: np.savez(path, a=np.zeros(3)),
+                "other arrays": lambda path: np.savez_compressed(path, a=np.zeros(3)),
                 "a plain array": eight.getvalue(),
             }.items()
         },

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.files import read_bytes
+from antdrive.base.files import parse_json, read_bytes
 
 Location: TypeAlias = tuple[str | int, ...]  # the path to a value: ("obstacles", 0, "radius")
 
@@ -71,7 +71,9 @@ def read_json(path: str | os.PathLike[str]) -> Document:
     source = os.fspath(path)
     text = _read_text(path, "a JSON file")
     try:
-        return Document(source, json.loads(text))
+        return Document(source, parse_json(text))
+    except FieldError as error:
+        raise input_error(source, str(error)) from None
     except json.JSONDecodeError as error:
         raise input_error(f"{source}:{error.lineno}", f"not JSON: {error.msg}") from None
     except (RecursionError, ValueError):  # ValueError: a number with thousands of digits

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antdrive.robots import PursuitState, Twist
-from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Rollout, Scenario, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, hit_within, point_at
@@ -24,6 +23,7 @@ from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, r
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.physics.engine import State
 from antdrive.sim.policy import SCANNED
+from antdrive.sim.rebuild import rebuilt
 from antdrive.sim.sensing import Scanner
 from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.worlds import Cruising, Disc, Task, World, generate, load_task
@@ -389,7 +389,7 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     exploration.replan = lambda tick, pose, trigger: asked.append(trigger)
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
-    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0))
+    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0), Twist(0.0, 0.0))
     assert (ending is None) == lost
     assert asked == ([] if lost else ["missed the goal"])
 

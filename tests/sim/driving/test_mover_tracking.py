@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from antdrive.base.errors import FieldError
-from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.perceived_movers import Tracked
@@ -18,6 +17,7 @@ from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord
 from antdrive.sim.log.rollout import ranges_of
 from antdrive.sim.log.sights import passed
+from antdrive.sim.rebuild import rebuilt
 from antdrive.sim.sensing import KnownGround, Scanner
 from antdrive.worlds import Disc, Keyframed, Task, World
 from tests.records import changed

@@ -1,5 +1,6 @@
 """Logs on disk: what is saved is read again, and what is no log is refused in one line that names the file and the key."""
 
+import dataclasses
 import hashlib
 import io
 import json
@@ -17,7 +18,7 @@ from antdrive.base.errors import FieldError
 from antdrive.sim import Outcome, Rollout, certify, measure
 from antdrive.sim.log import rollout
 from antdrive.sim.log.margin import budget
-from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.record import PROOFS, DriveRecord, PlanRecord, Proof, TimesRecord, proofs_of
 from antdrive.sim.log.rollout import ARRAYS, read_record
 from antdrive.worlds.movers import Cruising, Keyframed, Wandering
 from tests.records import changed, made_up_record
@@ -40,7 +41,7 @@ def rewritten(saved, folder, change):
     record = json.loads(str(arrays.pop("record")))
     change(record)
     path = folder / "changed.npz"
-    np.savez(path, record=np.array(json.dumps(record)), **arrays)
+    np.savez_compressed(path, record=np.array(json.dumps(record, sort_keys=True)), **arrays)
     return path
 
 
@@ -184,7 +185,107 @@ def members(saved):
 def packed(content, path, kind=zipfile.ZIP_DEFLATED):
     with zipfile.ZipFile(path, "w", kind) as archive:
         for name, data in content.items():
-            archive.writestr(name, data)
+            with archive.open(name, "w", force_zip64=True) as member:
+                member.write(data)
+
+
+def test_every_byte_around_the_contents_of_a_log_is_as_numpy_writes_it(saved, tmp_path):
+    """Only the system that wrote the archive may differ: nobody reads it."""
+    raw, path = saved.read_bytes(), tmp_path / "changed.npz"
+    with zipfile.ZipFile(saved) as archive:
+        contents = [(info.header_offset + 50 + len(info.filename), info.compress_size) for info in archive.infolist()]
+        systems, at = set(), archive.start_dir
+        for info in archive.infolist():
+            systems.add(at + 5)
+            at += 46 + len(info.filename)
+    inside = {place for begin, size in contents for place in range(begin, begin + size)}
+    around = [place for place in range(len(raw)) if place not in inside | systems]
+    assert len(around) > 1000
+    for place in around:
+        path.write_bytes(raw[:place] + bytes([raw[place] ^ 1]) + raw[place + 1 :])
+        with pytest.raises(InputError, match="not a rollout"):
+            read_record(path)
+    for place in systems:
+        path.write_bytes(raw[:place] + bytes([0]) + raw[place + 1 :])
+        assert Rollout.load(path).digest == read_record(saved).digest
+
+
+def npy(array, version=None):
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, array, version)
+    return buffer.getvalue()
+
+
+def padded(member):
+    """The array's member with a longer header."""
+    size = int.from_bytes(member[8:10], "little")
+    return member[:8] + (size + 64).to_bytes(2, "little") + member[10 : 9 + size] + b" " * 64 + member[9 + size :]
+
+
+def test_other_bytes_for_the_same_values_are_refused(saved, tmp_path):
+    raw, content, path = saved.read_bytes(), members(saved), tmp_path / "changed.npz"
+    text = str(np.load(saved)["record"])
+    pose = np.load(saved)["pose"]
+
+    def repacked(**changed):
+        packed({name: changed.get(name.removesuffix(".npy"), data) for name, data in content.items()}, path)
+
+    def added(name, data, **after):
+        packed({**content, name: data}, path)
+
+    def texted(other):
+        return lambda: repacked(record=npy(np.array(other)))
+
+    def commented():
+        path.write_bytes(raw)
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.comment = b"drive"
+
+    def behind_the_stream():
+        """Lengthen the first member behind the end of its packed stream."""
+        with zipfile.ZipFile(saved) as archive:
+            first, *others = archive.infolist()
+            at = archive.start_dir
+        data, size = bytearray(raw), (first.compress_size + 4).to_bytes(8, "little")
+        data[at + 20 : at + 24] = size[:4]
+        for info in others:
+            at += 46 + len(first.filename)
+            data[at + 42 : at + 46] = (info.header_offset + 4).to_bytes(4, "little")
+            first = info
+        data[-6:-2] = (int.from_bytes(data[-6:-2], "little") + 4).to_bytes(4, "little")
+        begin = 50 + len("record.npy")
+        data[begin - 8 : begin] = size
+        path.write_bytes(bytes(data[: others[0].header_offset]) + b"more" + data[others[0].header_offset :])
+
+    changes = {
+        "a key twice": (texted('{"seed": 99, ' + text[1:]), "record.seed: is given twice"),
+        "an inner key twice": (texted(text.replace('"name":', '"name": "other", "name":', 1)), "name: is given twice"),
+        "spaces": (texted(text.replace('": ', '":  ', 1)), "record: not the text that antdrive writes"),
+        "another number": (texted(text.replace('"noise": 0.0', '"noise": 0')), "record: not the text"),
+        "another order": (texted(json.dumps(dict(reversed(json.loads(text).items())))), "record: not the text"),
+        "null characters": (lambda: repacked(record=npy(np.array(text, dtype=f"<U{len(text) + 9}"))), "record: not the text"),
+        "a member more": (lambda: added("more.npy", content["pose.npy"]), "more.npy: not a member"),
+        "a member of another name": (lambda: added("pose", b"x"), "pose: not a member"),
+        "an empty array of scans": (lambda: added("scans.npy", npy(np.empty((0, 7), "<u2"))), "omitted where they are empty"),
+        "another order of members": (lambda: packed(dict(reversed(content.items())), path), "in another order"),
+        "a prefix": (lambda: path.write_bytes(b"#!/bin/sh\n" + raw), "other bytes before it"),
+        "bytes behind": (lambda: path.write_bytes(raw + b"more"), "other bytes around its members"),
+        "a comment": (commented, "other bytes around its members"),
+        "stored members": (lambda: packed(content, path, zipfile.ZIP_STORED), "compressed in another way"),
+        "bytes behind a packed stream": (behind_the_stream, "record.npy: damaged"),
+        "a longer header": (lambda: repacked(pose=padded(content["pose.npy"])), "pose: its header is not as numpy"),
+        "a header of version 2": (lambda: repacked(pose=npy(pose, (2, 0))), "pose: its header is not as numpy"),
+        "columns first": (lambda: repacked(pose=npy(np.asfortranarray(pose))), "pose: its header is not as numpy"),
+        "bytes behind an array": (lambda: repacked(pose=content["pose.npy"] + b"more"), "pose: its header promises"),
+    }  # fmt: skip
+    repacked()
+    assert path.read_bytes() == raw, "what is written unchanged is the log itself"
+    for name, (change, words) in changes.items():
+        change()
+        with pytest.raises(InputError, match=words):
+            Rollout.load(path)
+            pytest.fail(name)
+    assert path.exists()
 
 
 def test_no_log_whatever_ends_in_anything_but_one_line(saved, tmp_path):
@@ -198,13 +299,13 @@ def test_no_log_whatever_ends_in_anything_but_one_line(saved, tmp_path):
             path.write_bytes(_flipped(raw, rng))
         elif case % 3 == 1:
             name = str(rng.choice(list(content)))
-            packed({**content, name: _flipped(content[name], rng)}, path, zipfile.ZIP_STORED)
+            packed({**content, name: _flipped(content[name], rng)}, path)
         else:
             record = json.loads(str(np.load(io.BytesIO(content["record.npy"]))[()]))
             _edit(record, rng)
             buffer = io.BytesIO()
-            np.save(buffer, np.array(json.dumps(record)))
-            packed({**content, "record.npy": buffer.getvalue()}, path, zipfile.ZIP_STORED)
+            np.save(buffer, np.array(json.dumps(record, sort_keys=True)))
+            packed({**content, "record.npy": buffer.getvalue()}, path)
         try:
             log = Rollout.load(path)
             certificate = certify(log)
@@ -240,3 +341,26 @@ def _edit(record, rng):
         else:
             place[key] = ODD[rng.integers(len(ODD))]
             return
+
+
+def test_every_value_of_a_record_declares_its_check(small_run):
+    record = small_run.rollout.record
+    keys = {key.partition(".")[0].removesuffix("[]") for key in PROOFS}
+    assert keys == {field.name for field in dataclasses.fields(record)}
+    assert {f"plan.{key}" for key in record.as_dict()["plan"]} == {key for key in PROOFS if key.startswith("plan.")}
+    assert "replans[].route" in PROOFS
+    assert PROOFS["versions"] is PROOFS["times.plan_s"] is PROOFS["task.name"] is Proof.CLAIM
+
+    @dataclasses.dataclass
+    class Undeclared:
+        plan: PlanRecord
+        more: int
+
+    with pytest.raises(TypeError, match="more declares no proof"):
+        dict(proofs_of(Undeclared))
+
+
+def test_times_are_not_negative():
+    for key, value in (("plan_s", -1.0), ("drive_wall_s", -1e-9), ("replans_s", (0.1, -0.1))):
+        with pytest.raises(FieldError, match=f"{key}.*must be at least 0"):
+            TimesRecord(**{"plan_s": 0.0, "drive_wall_s": 0.0, "replans_s": (), key: value})

@@ -15,8 +15,8 @@ import numpy as np
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from antdrive.base.atomic import write_text
-from antdrive.base.errors import input_error
-from antdrive.base.files import read_bytes
+from antdrive.base.errors import FieldError, input_error
+from antdrive.base.files import parse_json, read_bytes
 from antdrive.base.plane import wrap_angle
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
@@ -174,7 +174,9 @@ class Baseline:
         again = "accept the drive again with antdrive accept"
         try:
             text = read_bytes(path, 10 * MAX_BYTES, "a baseline").decode("utf-8")
-            data = json.loads(text)
+            data = parse_json(text)
+        except FieldError as error:
+            raise input_error(str(path), f"{error}, or {again}") from None
         except (UnicodeDecodeError, ValueError, RecursionError) as error:
             if type(error).__name__ == "InputError":
                 raise
@@ -209,15 +211,18 @@ class Baseline:
             raise input_error(shown_path(path), "case", problem)
         return baseline
 
+    @property
+    def later_metrics(self) -> tuple[str, ...]:
+        """The names of metrics to compare that the baseline lacks, because they were added later."""
+        compared = (name for name in METRICS if name not in WALL_CLOCK and METRICS[name].better != "neither")
+        return tuple(name for name in compared if name not in self.metrics)
+
     def gaps(self) -> Iterator[tuple[str, str]]:
         """Yield missing and surplus parts, as key and problem; a comparison needs complete baselines."""
         parts = {name: getattr(self, name) for name in ("metrics", "nearest", "hashes", "drive_digest", "line")}
         if self.outcome in ENDED_BY.values() and not any(parts.values()):
             return
         known = [name for name in METRICS if name not in WALL_CLOCK]
-        missing = [name for name in known if name not in self.metrics and METRICS[name].better != "neither"]
-        if missing:
-            yield "metrics", f"{', '.join(missing[:3])}{' and others' if len(missing) > 3 else ''} missing"
         for name in self.metrics:
             if name not in known:
                 yield f"metrics.{name}", "unknown metric"

@@ -11,9 +11,12 @@ import hashlib
 import json
 import math
 import re
+import typing
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import numpy as np
@@ -21,6 +24,7 @@ from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from antdrive.base.document import MAX_DEPTH
 from antdrive.base.errors import FieldError
+from antdrive.base.files import parse_json
 from antdrive.base.records import STRICT, attributes_of
 from antdrive.base.types import Point
 from antdrive.robots.spec import RobotSpec
@@ -48,6 +52,23 @@ MARGIN_ROUNDING = 1e-9  # [m]
 DECISION = "decision"
 
 
+class Proof(Enum):
+    """Check of a value in a log: the first level of `antdrive verify` that recomputes or compares it."""
+
+    LOG = "verify"  # recomputed from the log alone
+    WORLD = "--world"  # compared with a trusted file, or computed from it
+    ROBOT = "--robot"  # compared with a trusted file
+    REPLAY = "--replay"  # computed again by driving the record's scenario
+    INPUT = "input"  # chosen for the drive: the replay drives with it, so another value must lead to the same log
+    CLAIM = "claim"  # checked by nothing
+
+
+#: Declarations of a field's check.
+LOGGED, OF_WORLD, OF_ROBOT = {"proof": Proof.LOG}, {"proof": Proof.WORLD}, {"proof": Proof.ROBOT}
+REPLAYED = {"proof": Proof.REPLAY}
+CHOSEN, CLAIMED = {"proof": Proof.INPUT}, {"proof": Proof.CLAIM}
+
+
 @dataclass(frozen=True, kw_only=True)
 class ComponentRecord:
     """Named part of the scenario with its settings.
@@ -57,8 +78,8 @@ class ComponentRecord:
         settings: every effective setting by name; null means "no limit"
     """
 
-    name: str
-    settings: Mapping[str, Any]
+    name: str = dataclasses.field(metadata=CHOSEN)
+    settings: Mapping[str, Any] = dataclasses.field(metadata=CHOSEN)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,12 +97,12 @@ class PlanRecord:
         work_unit: what `work` counts, such as "cells expanded"
     """
 
-    cost_m: float | None
-    length_m: float
-    grid_optimum_m: float | None
-    euclidean_optimum_m: float | None
-    work: int
-    work_unit: str
+    cost_m: float | None = dataclasses.field(metadata=REPLAYED)
+    length_m: float = dataclasses.field(metadata=REPLAYED)
+    grid_optimum_m: float | None = dataclasses.field(metadata=OF_WORLD)
+    euclidean_optimum_m: float | None = dataclasses.field(metadata=OF_WORLD)
+    work: int = dataclasses.field(metadata=REPLAYED)
+    work_unit: str = dataclasses.field(metadata=REPLAYED)
 
     def __post_init__(self) -> None:
         _at_least(self, 0.0, *(() if self.cost_m is None else ("cost_m",)), "length_m", "work")
@@ -97,9 +118,9 @@ class SmoothingRecord:
         note: why the smoothing failed; may be empty
     """
 
-    asked: str
-    made: str
-    note: str
+    asked: str = dataclasses.field(metadata=CHOSEN)
+    made: str = dataclasses.field(metadata=REPLAYED)
+    note: str = dataclasses.field(metadata=REPLAYED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,8 +132,8 @@ class PerceptionRecord:
         range_m: the range of perception [m]; null if unlimited
     """
 
-    kind: str
-    range_m: float | None
+    kind: str = dataclasses.field(metadata=CHOSEN)
+    range_m: float | None = dataclasses.field(metadata=CHOSEN)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,12 +149,12 @@ class ReplanRecord:
         route: points (x, y) of the new route [m], rounded to 0.1 mm; empty without one
     """
 
-    t: float
-    trigger: str
-    solved: bool
-    cost_m: float | None
-    work: int
-    route: tuple[Point, ...]
+    t: float = dataclasses.field(metadata=REPLAYED)
+    trigger: str = dataclasses.field(metadata=REPLAYED)
+    solved: bool = dataclasses.field(metadata=REPLAYED)
+    cost_m: float | None = dataclasses.field(metadata=REPLAYED)
+    work: int = dataclasses.field(metadata=REPLAYED)
+    route: tuple[Point, ...] = dataclasses.field(metadata=REPLAYED)
 
     def __post_init__(self) -> None:
         _at_least(self, 0.0, "t")
@@ -151,9 +172,9 @@ class SensingRecord:
         odometry: factor on the odometry errors
     """
 
-    map: str
-    localisation: str
-    odometry: float
+    map: str = dataclasses.field(metadata=CHOSEN)
+    localisation: str = dataclasses.field(metadata=CHOSEN)
+    odometry: float = dataclasses.field(metadata=CHOSEN)
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -171,10 +192,10 @@ class MarginRecord:
         drives: number of drives behind the prediction
     """
 
-    loss_m: float
-    reserve_m: float
-    probability: float
-    drives: int
+    loss_m: float = dataclasses.field(metadata=CLAIMED)
+    reserve_m: float = dataclasses.field(metadata=CLAIMED)
+    probability: float = dataclasses.field(metadata=CLAIMED)
+    drives: int = dataclasses.field(metadata=CLAIMED)
 
     def __post_init__(self) -> None:
         _at_least(self, 0.0, "reserve_m", "probability", "drives")
@@ -190,13 +211,19 @@ class TimesRecord:
         replans_s: each replan, in the order of `replans` [s]
     """
 
-    plan_s: float
-    drive_wall_s: float
-    replans_s: tuple[float, ...]
+    plan_s: float = dataclasses.field(metadata=CLAIMED)
+    drive_wall_s: float = dataclasses.field(metadata=CLAIMED)
+    replans_s: tuple[float, ...] = dataclasses.field(metadata=CLAIMED)
+
+    def __post_init__(self) -> None:
+        _at_least(self, 0.0, "plan_s", "drive_wall_s")
+        for i, seconds in enumerate(self.replans_s):
+            if not 0.0 <= seconds < math.inf:
+                raise FieldError(f"replans_s[{i}]", f"must be at least 0, got {seconds!r:.40}")
 
 
 #: Fields added later are omitted at their default, so older logs and hashes stay valid.
-LATER = {"omit_if_default": True}
+LATER: dict[str, Any] = {"omit_if_default": True}
 
 
 def _to_task(value: Any) -> Task:
@@ -251,35 +278,35 @@ class DriveRecord:
 
     __pydantic_config__ = STRICT
 
-    schema: int = SCHEMA
-    task: Annotated[Task, PlainValidator(_to_task)]
-    unseen: tuple[Disc, ...]
-    seed: int
+    schema: int = dataclasses.field(default=SCHEMA, metadata=LOGGED)
+    task: Annotated[Task, PlainValidator(_to_task)] = dataclasses.field(metadata=OF_WORLD)
+    unseen: tuple[Disc, ...] = dataclasses.field(metadata=CHOSEN)
+    seed: int = dataclasses.field(metadata=CHOSEN)
     planner: ComponentRecord
     plan: PlanRecord
-    robot: RobotSpec
+    robot: RobotSpec = dataclasses.field(metadata=OF_ROBOT)
     controller: ComponentRecord
     smoothing: SmoothingRecord
     perception: PerceptionRecord | None
-    avoidance: Mapping[str, Any] | None
-    replanning: Mapping[str, Any] | None
+    avoidance: Mapping[str, Any] | None = dataclasses.field(metadata=CHOSEN)
+    replanning: Mapping[str, Any] | None = dataclasses.field(metadata=CHOSEN)
     replans: tuple[ReplanRecord, ...]
-    limiters: tuple[str, ...]
-    noise: float
-    margin: float
-    inflate: float
-    cell: float
-    physics_hz: int
-    control_hz: int
-    time_limit: float
-    outcome: Annotated[Outcome, PlainValidator(_to_outcome)]
-    reason: str
-    versions: Mapping[str, str]
+    limiters: tuple[str, ...] = dataclasses.field(metadata=REPLAYED)
+    noise: float = dataclasses.field(metadata=CHOSEN)
+    margin: float = dataclasses.field(metadata=CHOSEN)
+    inflate: float = dataclasses.field(metadata=LOGGED)
+    cell: float = dataclasses.field(metadata=CHOSEN)
+    physics_hz: int = dataclasses.field(metadata=CHOSEN)
+    control_hz: int = dataclasses.field(metadata=CHOSEN)
+    time_limit: float = dataclasses.field(metadata=CHOSEN)
+    outcome: Annotated[Outcome, PlainValidator(_to_outcome)] = dataclasses.field(metadata=REPLAYED)
+    reason: str = dataclasses.field(metadata=REPLAYED)
+    versions: Mapping[str, str] = dataclasses.field(metadata=CLAIMED)
     times: TimesRecord
     margin_choice: MarginRecord | None = dataclasses.field(default=None, metadata=LATER)
     sensing: SensingRecord | None = dataclasses.field(default=None, metadata=LATER)
-    settings: Mapping[str, Any] | None = dataclasses.field(default=None, metadata=LATER)
-    digest: str | None = None
+    settings: Mapping[str, Any] | None = dataclasses.field(default=None, metadata=LATER | CHOSEN)
+    digest: str | None = dataclasses.field(default=None, metadata=LOGGED)
 
     def __post_init__(self) -> None:
         _at_least(self, 0, "seed", "noise", "margin", "inflate")
@@ -359,8 +386,10 @@ class DriveRecord:
             FieldError: a key is missing or unknown, or a value is invalid.
         """
         try:
-            content = json.loads(text, parse_constant=_refuse_constant)
+            content = parse_json(text, parse_constant=_refuse_constant)
             _require_shallow(content)
+        except FieldError as error:
+            raise error.under("record") from None
         except (RecursionError, ValueError) as error:
             problem = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise FieldError("record", f"not JSON: {problem}") from None
@@ -503,12 +532,34 @@ def _shown(value: Any) -> str:
         return "a number too long"
 
 
+def proofs_of(kind: type[Any], prefix: str = "") -> Iterator[tuple[str, Proof]]:
+    """Yield the check of every value that a record declares, by its dotted key.
+
+    Raises:
+        TypeError: a field declares none.
+    """
+    hints = typing.get_type_hints(kind)
+    for field in dataclasses.fields(kind):
+        key, hint = f"{prefix}{field.name}", hints[field.name]
+        inner = [one for one in (hint, *typing.get_args(hint)) if getattr(one, "__module__", "") == __name__]
+        if inner:
+            yield from proofs_of(inner[0], f"{key}[]." if typing.get_origin(hint) is tuple else f"{key}.")
+        elif "proof" not in field.metadata:
+            raise TypeError(f"{kind.__name__}.{field.name} declares no proof")
+        else:
+            yield key, field.metadata["proof"]
+            if isinstance(hint, type) and issubclass(hint, Task | RobotSpec):
+                yield from ((f"{key}.{label}", Proof.CLAIM) for label in LABELS)
+
+
 #: Keys of the record that describe how the drive was planned and driven.
 DRIVEN_WITH = (
     *("seed", "planner", "controller", "perception", "avoidance", "replanning"),
     *("noise", "margin", "cell", "physics_hz", "control_hz", "time_limit"),
 )
-LABELS = ("name", "source")
+LABELS = ("name", "source")  # of worlds and robots, which no comparison reads
+#: Check of every value of the record, by its dotted key; `antdrive.sim.log.rollout.FORMS` has those of the arrays.
+PROOFS: Mapping[str, Proof] = MappingProxyType(dict(proofs_of(DriveRecord)))
 
 
 def hashes_of(record: DriveRecord) -> dict[str, str]:

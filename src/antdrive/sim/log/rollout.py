@@ -9,26 +9,28 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import io
 import itertools
 import math
-import os
-import stat
+import struct
 import zipfile
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.files import open_regular
 from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.record import DriveRecord, Proof
 from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK, MAX_NEAR_DISTANCES
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
@@ -37,6 +39,8 @@ Archive: TypeAlias = zipfile.ZipFile
 
 MAX_BYTES = 1 << 29  # unpacked size of all members and of one array; an hour of a drive takes 0.1 GB
 MAX_MEMBERS = 64
+DIRECTORY = "<4s4B4H3L5H2L"  # an entry of a ZIP archive's directory, before the name
+NO_DATE = 1 << 5 | 1  # January 1st, 1980, which numpy gives every member
 LONGEST_PROBLEM = 300  # characters of a message
 
 
@@ -44,17 +48,9 @@ LONGEST_PROBLEM = 300  # characters of a message
 def guarded_log(path: str | Path) -> Iterator[Archive]:
     """Open the archive of a log; every error inside becomes one line that names the file."""
     try:
-        with open(path, "rb", opener=_without_waiting) as raw:
-            kind = os.fstat(raw.fileno())
-            if not stat.S_ISREG(kind.st_mode):
-                raise input_error(str(path), "not a rollout (no regular file)")
-            if kind.st_size > MAX_BYTES:
-                raise input_error(str(path), f"not a rollout (larger than {MAX_BYTES >> 20} MB)")
-            with zipfile.ZipFile(raw) as archive:
-                _check_members(archive)
-                yield archive
-    except FileNotFoundError:
-        raise input_error(str(path), "no such file") from None
+        with open_regular(path, MAX_BYTES, "a rollout") as raw, zipfile.ZipFile(raw) as archive:
+            _check_members(archive)
+            yield archive
     except InputError as error:
         text = str(error)
         raise (error if text.startswith(f"{path}: ") else _problem(path, text)) from None
@@ -76,24 +72,42 @@ def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
     """Read an array of a log, without pickles and only as large as its member."""
     if f"{name}.npy" not in archive.namelist():
         raise KeyError(f"{name} is not a file in the archive")
-    info = archive.getinfo(f"{name}.npy")
-    with archive.open(info) as member:
-        major, _ = np.lib.format.read_magic(member)
-        header = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
-        shape, fortran, dtype = header(member)
-        if dtype.hasobject or any(n < 0 for n in shape):
-            raise FieldError(name, f"must hold numbers, found {dtype}")
-        wanted = math.prod(shape) * dtype.itemsize
-        content = member.read(min(wanted, MAX_BYTES) + 1)
-        if len(content) != wanted:
-            raise FieldError(name, f"its header promises {wanted} bytes, the file has {_more(len(content), wanted)}")
-    flat = np.frombuffer(content, dtype=dtype) if wanted else np.empty(0, dtype=dtype)
-    return flat.reshape(shape, order="F" if fortran else "C")
+    content = _unpacked(archive, archive.getinfo(f"{name}.npy"))
+    member, usual = io.BytesIO(content), io.BytesIO()
+    major, _ = np.lib.format.read_magic(member)
+    header = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
+    shape, fortran, dtype = header(member)
+    if dtype.hasobject or any(n < 0 for n in shape):
+        raise FieldError(name, f"must hold numbers, found {dtype}")
+    values = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(usual, values)
+    start, wanted = member.tell(), math.prod(shape) * dtype.itemsize
+    if fortran or content[:start] != usual.getvalue():
+        raise FieldError(name, "its header is not as numpy writes it for an array in C order")
+    if len(content) - start != wanted:
+        raise FieldError(name, f"its header promises {wanted} bytes, the file has {len(content) - start}")
+    flat = np.frombuffer(content, dtype=dtype, offset=start) if wanted else np.empty(0, dtype=dtype)
+    return flat.reshape(shape)
 
 
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file without waiting for the writer of a pipe."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+def _unpacked(archive: Archive, info: zipfile.ZipInfo) -> bytes:
+    """Return a member's content, the whole of what its bytes in the file stand for."""
+    assert archive.fp is not None
+    archive.fp.seek(info.header_offset + len(_as_numpy_writes(info).FileHeader(zip64=True)))
+    unpacking = zlib.decompressobj(-zlib.MAX_WBITS)
+    content = unpacking.decompress(archive.fp.read(info.compress_size), info.file_size + 1)
+    whole = unpacking.eof and not unpacking.unused_data
+    if not whole or len(content) != info.file_size or zlib.crc32(content) != info.CRC:
+        raise ValueError(f"{info.filename}: damaged: its bytes are not those of its size and checksum")
+    return content
+
+
+def _as_numpy_writes(info: zipfile.ZipInfo) -> zipfile.ZipInfo:
+    """Return the entry that `np.savez_compressed` writes for a member of this name, size and checksum."""
+    usual = zipfile.ZipInfo(info.filename)
+    usual.compress_type, usual.external_attr = zipfile.ZIP_DEFLATED, 0o600 << 16
+    usual.CRC, usual.compress_size, usual.file_size = info.CRC, info.compress_size, info.file_size
+    return usual
 
 
 def _check_members(archive: Archive) -> None:
@@ -104,15 +118,44 @@ def _check_members(archive: Archive) -> None:
         raise ValueError("two members have the same name")
     if sum(info.file_size for info in members) > MAX_BYTES:
         raise ValueError(f"larger than {MAX_BYTES >> 20} MB when unpacked")
+    known = [f"{name}.npy" for name in ("record", *ARRAYS, *SENSED)]
+    names = [info.filename for info in members]
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{name[:40]}: not a member of a log")
+    if names != sorted(names, key=known.index):
+        raise ValueError("members in another order than antdrive's")
     for info in members:
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        if info.compress_type != zipfile.ZIP_DEFLATED:
             raise ValueError(f"{info.filename}: compressed in another way than numpy's")
         if info.flag_bits & 1:
             raise ValueError(f"{info.filename}: encrypted")
+    _check_layout(archive)
 
 
-def _more(found: int, wanted: int) -> str:
-    return "more" if found > wanted else str(found)
+def _check_layout(archive: Archive) -> None:
+    """Refuse bytes that no array and no record holds, since the digest does not cover them.
+
+    The file must be what `np.savez_compressed` writes: a header and the packed content of each member, then the directory.
+    Only the packing may differ, and the name of the system that wrote the file.
+    """
+    file, at, directory = archive.fp, 0, b""
+    assert file is not None
+    for info in archive.infolist():
+        usual = _as_numpy_writes(info)
+        header, name, sizes = usual.FileHeader(zip64=True), info.filename.encode(), (info.compress_size, info.file_size)
+        file.seek(at)
+        if info.header_offset != at or file.read(len(header)) != header:
+            raise ValueError(f"{info.filename}: other bytes before it than np.savez_compressed writes")
+        made_by = (usual.create_version, info.create_system, usual.extract_version)
+        about = (*made_by, 0, 0, info.compress_type, 0, NO_DATE, info.CRC, *sizes, len(name))
+        directory += struct.pack(DIRECTORY, b"PK\x01\x02", *about, 0, 0, 0, 0, usual.external_attr, at) + name
+        at += len(header) + info.compress_size
+    count = len(archive.infolist())
+    end = struct.pack("<4s4H2LH", b"PK\x05\x06", 0, 0, count, count, len(directory), at, 0)
+    file.seek(at)
+    if file.read() != directory + end:
+        raise ValueError("other bytes around its members than np.savez_compressed writes")
 
 
 def _problem(path: str | Path, text: str) -> InputError:
@@ -124,33 +167,43 @@ MAX_ROWS = 20_000_000  # a day at 240 Hz
 MAX_VALUE = 1e12  # largest number in the arrays; sums and squares of larger ones lose all precision
 MAX_RECORD = 32_000_000  # characters of the record; a world of 20,000 cylinders takes 2 million
 ROWS, NOISY = "rows", "rows or none"  # lengths in shapes: the log's rows; the log's rows, or none for a perfect robot
-#: Shape and dtype of each array; None for any length.
-FORMS: Mapping[str, tuple[tuple[int | str | None, ...], str]] = MappingProxyType(
+
+
+class ArrayForm(NamedTuple):
+    """Form of an array of a log."""
+
+    shape: tuple[int | str | None, ...]  # None for any length
+    dtype: str
+    proof: Proof = Proof.REPLAY  # how it is checked
+
+
+#: Form of each array.
+FORMS: Mapping[str, ArrayForm] = MappingProxyType(
     {
-        "t": ((ROWS,), "<f8"),
-        "pose": ((ROWS, 3), "<f8"),
-        "twist": ((ROWS, 2), "<f8"),
-        "command": ((ROWS, 2), "<f8"),
-        "clearance": ((ROWS,), "<f8"),
-        "limiter": ((ROWS,), "u1"),
-        "movers": ((ROWS, None, 2), "<f8"),
-        "contacts": ((None, 4), "<f8"),
-        "route": ((None, 2), "<f8"),
-        "cells": ((None, 2), "<i4"),
-        "estimate": ((NOISY, 3), "<f8"),
-        "actuated": ((NOISY, 2), "<f8"),
-        "scans": ((None, None), "<u2"),
-        "scan_rows": ((None,), "<i4"),
-        "seen": ((None, 4), "<f4"),
-        "tracks": ((None, 7), "<f4"),
+        "t": ArrayForm((ROWS,), "<f8", Proof.LOG),
+        "pose": ArrayForm((ROWS, 3), "<f8"),
+        "twist": ArrayForm((ROWS, 2), "<f8"),
+        "command": ArrayForm((ROWS, 2), "<f8"),
+        "clearance": ArrayForm((ROWS,), "<f8", Proof.LOG),
+        "limiter": ArrayForm((ROWS,), "u1"),
+        "movers": ArrayForm((ROWS, None, 2), "<f8", Proof.LOG),
+        "contacts": ArrayForm((None, 4), "<f8"),
+        "route": ArrayForm((None, 2), "<f8"),
+        "cells": ArrayForm((None, 2), "<i4"),
+        "estimate": ArrayForm((NOISY, 3), "<f8"),
+        "actuated": ArrayForm((NOISY, 2), "<f8"),
+        "scans": ArrayForm((None, None), "<u2"),
+        "scan_rows": ArrayForm((None,), "<i4"),
+        "seen": ArrayForm((None, 4), "<f4"),
+        "tracks": ArrayForm((None, 7), "<f4"),
     }
 )
 
 
 def _none_of(name: str) -> Callable[[], npt.NDArray[Any]]:
     """Return a factory of the empty array."""
-    shape, dtype = FORMS[name]
-    return lambda: np.empty([n if isinstance(n, int) else 0 for n in shape], dtype=dtype)
+    form = FORMS[name]
+    return lambda: np.empty([n if isinstance(n, int) else 0 for n in form.shape], dtype=form.dtype)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -269,9 +322,10 @@ class Rollout:
         """
         target = Path(path)
         text = dataclasses.replace(self.record, digest=self.digest).to_json()
-        DriveRecord.from_json(text)  # a log must be readable
+        text = DriveRecord.from_json(text).to_json()  # a log must be readable
         with atomic_write(target) as temporary, temporary.open("wb") as file:
-            np.savez_compressed(file, record=np.array(text), **{name: getattr(self, name) for name in self._written})
+            arrays: dict[str, Any] = {name: np.ascontiguousarray(getattr(self, name)) for name in self._written}
+            np.savez_compressed(file, record=np.array(text), **arrays)
         return target
 
     @classmethod
@@ -286,6 +340,8 @@ class Rollout:
             there = [name for name in SENSED if f"{name}.npy" in archive.namelist()]
             arrays = {name: read_array(archive, name) for name in (*ARRAYS, *there)}
             loaded = cls(**arrays, record=_record_in(archive))
+            if (*ARRAYS, *there) != loaded._written:
+                raise ValueError("scans, scan_rows, seen and tracks: omitted where they are empty")
             for problem in loaded.problems():
                 raise ValueError(problem)
         return loaded
@@ -300,7 +356,7 @@ class Rollout:
             yield "t: the log is empty"
         elif rows > MAX_ROWS:
             yield f"t: must have at most {MAX_ROWS} rows, found {rows}"
-        for name, (form, dtype) in FORMS.items():
+        for name, (form, dtype, _) in FORMS.items():
             array = getattr(self, name)
             lengths = {ROWS: rows, NOISY: rows if np.size(array) else 0}
             shape = tuple(lengths[n] if isinstance(n, str) else n for n in form)
@@ -397,9 +453,12 @@ def _record_in(archive: Archive) -> DriveRecord:
         raise FieldError("record", f"must have at most {MAX_RECORD} characters, found {text.dtype.itemsize // 4}")
     if text.shape != () or text.dtype.kind != "U":
         raise FieldError("record", "must be one text")
-    record = DriveRecord.from_json(str(text[()]))
+    written = str(text[()])
+    record = DriveRecord.from_json(written)
     if record.digest is None:
         raise FieldError("record.digest", "missing; a log that antdrive wrote has it")
+    if text.dtype != np.array(written).dtype or written != record.to_json():
+        raise FieldError("record", "not the text that antdrive writes for these values")
     return record
 
 
