@@ -13,7 +13,10 @@ from typing import Any
 
 import typer
 
+from antdrive.base.errors import visible
 from antdrive.base.files import as_json
+
+LAYOUT = "\n\t"  # control characters that lines may hold
 
 
 @contextmanager
@@ -106,12 +109,12 @@ def duration(seconds: float) -> str:
 
 def print_error(message: str) -> None:
     """Print one line on stderr."""
-    typer.echo(f"antdrive: {message}", err=True)
+    typer.echo(f"antdrive: {visible(message, LAYOUT)}", err=True)
 
 
 def print_line(text: str = "") -> None:
     """Print one line on stdout."""
-    typer.echo(text)
+    typer.echo(visible(text, LAYOUT))
 
 
 def print_json(value: Any) -> None:
