@@ -34,7 +34,7 @@ def exit_code_of(words: list[str]) -> int:
     try:
         code = _code_of(application()(args=words, prog_name="antdrive", standalone_mode=False))
     except (InputError, FieldError) as error:
-        print_error(str(error))
+        print_error(str(input_error(str(error))))
         code = INVALID_INPUT
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED

@@ -395,7 +395,7 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     exploration.replan = lambda tick, pose, trigger: asked.append(trigger)
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
-    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0))
+    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0), Twist(0.0, 0.0))
     assert (ending is None) == lost
     assert asked == ([] if lost else ["missed the goal"])
 

@@ -15,7 +15,7 @@ import numpy as np
 from antdrive.base.plane import arc_lengths, polyline_length, wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
-from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.ending import false_endings
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.route import end_reach, longest_line
@@ -258,10 +258,6 @@ FOLLOW_WINDOWS = (0.25, 1.0, 4.0)  # [s]
 FOLLOW, FOLLOW_TURN, FOLLOW_SHARE = 0.01, 0.05, 0.02  # [m], [rad], fraction of the distance
 LATE = 2.0  # largest lag of the motors, in periods of control and of physics
 GRIP = 0.8  # wheels with less friction slide
-AFTER_CONTACT = 0.5  # a drive ends this long after the first contact [s]
-STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
-STUCK_SHARE = 0.25  # a stuck robot covers at most this fraction of its possible travel in that time
-STOPPED = 0.02  # a robot that stands is slower than this [m/s], [rad/s]
 
 
 def inconsistencies(rollout: Rollout) -> Iterator[str]:
@@ -276,7 +272,7 @@ def inconsistencies(rollout: Rollout) -> Iterator[str]:
     yield from _check_estimate(rollout)
     yield from _check_targets(rollout, end)
     yield from contradictions(rollout, end)
-    yield from _check_end(rollout)
+    yield from false_endings(rollout)
 
 
 def _check_record(rollout: Rollout) -> Iterator[str]:
@@ -441,41 +437,6 @@ def _check_unfixed_estimate(rollout: Rollout) -> Iterator[str]:
     wrong = (turned > heading + twist + STILL) | (apart > far + shift + STILL)
     if wrong.any():
         yield f"estimate: farther off the pose than odometry drifts, from t = {rollout.t[int(wrong.argmax())]:.3f} s"
-
-
-def _check_end(rollout: Rollout) -> Iterator[str]:
-    """Check that the drive ends as its outcome says."""
-    record, end = rollout.record, float(rollout.t[-1])
-    period = 1 / record.control_hz
-    # An invalid replan ends the drive as well.
-    wrong_replan = bool(record.replans) and not record.replans[-1].solved and rollout.outcome is Outcome.INVALID_PLAN
-    if rollout.outcome in (Outcome.NO_PATH, Outcome.STOPPED, Outcome.INVALID_PLAN) and not wrong_replan:
-        yield f"outcome: {rollout.outcome.key} ends a run before the robot drives, but the log has rows"
-    if rollout.outcome is Outcome.TIMED_OUT and end < record.time_limit - period:
-        yield f"outcome: timed_out, but the drive ends after {end:.3f} s of {record.time_limit:g} s"
-    if not len(rollout.contacts) and end > record.time_limit + period:
-        yield f"record.time_limit: {record.time_limit:g} s, but the drive lasts {end:.3f} s"
-    if len(rollout.contacts):
-        after = end - float(rollout.contacts[0, 0]) / record.physics_hz
-        if after > AFTER_CONTACT + 2 * period:
-            yield f"contacts: the first contact ends a drive, but the log goes on for {after:.3f} s"
-    if rollout.outcome is Outcome.STUCK:
-        yield from _check_stuck(rollout)
-
-
-def _check_stuck(rollout: Rollout) -> Iterator[str]:
-    """Check that a stuck robot stands off the goal at the end of its route, or has made no progress for some time."""
-    record, task, last = rollout.record, rollout.record.task, rollout.pose[-1, :2]
-    left = math.dist(last, task.goal)
-    stands = bool((np.abs(rollout.twist[-1]) <= STOPPED).all())
-    if stands and left > task.goal_tolerance:
-        return
-    if rollout.t[-1] < STUCK_TIME:
-        yield f"outcome: stuck, but the drive ends after {rollout.t[-1]:.3f} s; that takes {STUCK_TIME:g} s without progress"
-        return
-    before = rollout.pose[-1 - round(STUCK_TIME * record.physics_hz), :2]
-    if math.dist(before, last) > STUCK_SHARE * STUCK_TIME * record.robot.max_speed:
-        yield f"outcome: stuck, but the robot got {math.dist(before, last):.3g} m farther in the last {STUCK_TIME:g} s"
 
 
 def _wheels(twist: Floats, track: float) -> Floats:
