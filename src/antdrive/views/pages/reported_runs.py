@@ -11,6 +11,7 @@ from typing import Any
 
 from antdrive.base.errors import InputError, input_error
 from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.log.margin import has_default
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
@@ -226,6 +227,8 @@ class ReportedRun:
         record = self.log.record.as_dict()
         keys = ("noise", "margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")
         settings = {"route": record["smoothing"]["made"], **{key: record[key] for key in keys}}
+        if has_default(self.log.record):
+            settings["margin"] = f"{settings['margin']:g}, the default for this noise and route"
         lidar = self.log.record.robot.lidar
         if self.log.scans and lidar is not None:
             settings["scans"] = f"{self.log.scans} of {lidar.beams} beams"
