@@ -7,7 +7,7 @@ import sys
 import pyarrow as pa
 import pytest
 
-from antdrive.cli.app import main
+from antdrive.cli.app import ENDS, main
 from antdrive.runs.campaigns.rows import GRID, RESULT, result_schema
 from antdrive.runs.campaigns.store import write_table
 from antdrive.worlds import save_task
@@ -28,7 +28,7 @@ tasks:
 def antdrive(monkeypatch, capsys, tmp_path, request):
     """Call `antdrive` with some words: its exit code, stdout and stderr. The report of a failed test shows how calls ended."""
     monkeypatch.chdir(tmp_path)
-    before = signal.getsignal(signal.SIGTERM)
+    before = {one: signal.getsignal(one) for one in ENDS}
 
     def call(*words):
         monkeypatch.setattr(sys, "argv", ["antdrive", *map(str, words)])
@@ -40,7 +40,8 @@ def antdrive(monkeypatch, capsys, tmp_path, request):
         return code, out, err
 
     yield call
-    signal.signal(signal.SIGTERM, before)  # `main` has set its own, which would fail a later test instead of ending all
+    for one, handler in before.items():  # `main` has set its own, which would fail a later test instead of ending all
+        signal.signal(one, handler)
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import importlib
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -69,18 +70,39 @@ def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small, tmp_pat
     assert json.loads(done.stdout)["succeeded"]
 
 
-@pytest.mark.parametrize("closed", ["stdout", "stderr"])
-def test_a_closed_pipe_ends_the_program_silently(closed):
-    """As in `antdrive planners | head`, and with an error that nobody reads."""
-    words = ["planners"] if closed == "stdout" else ["planners", "--bogus"]
-    reading, writing = os.pipe()
-    os.close(reading)
-    other = "stderr" if closed == "stdout" else "stdout"
-    command = [sys.executable, "-m", "antdrive", *words]
-    streams: dict[str, int] = {closed: writing, other: subprocess.PIPE}
-    done = subprocess.run(command, check=False, **streams)
-    os.close(writing)
-    assert (done.returncode, getattr(done, other)) == (BROKEN_PIPE, b"")
+def in_a_shell(line):
+    """Exit code, stdout and stderr of a line of a shell, in which $A is the command."""
+    env = {**os.environ, "A": f"{sys.executable} -m antdrive"}
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, env=env, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "says"),
+    [
+        ("$A planners | true; exit ${PIPESTATUS[0]}", BROKEN_PIPE, ""),
+        ("$A planners >&-", 2, "antdrive: stdout: cannot be written (Bad file descriptor)\n"),
+        ("$A planners --json >/dev/full", 2, "antdrive: stdout: cannot be written (No space left on device)\n"),
+        ("$A --help >/dev/full", 2, "antdrive: stdout: cannot be written (No space left on device)\n"),
+        ("$A planners --bogus 2>&-", 2, ""),
+        ("$A planners --bogus 2>/dev/full", 2, ""),
+        ("$A planners --bogus 2> >(true)", 2, ""),
+        ("$A planners --bogus <&- >&- 2>&-", 2, ""),
+    ],
+)
+def test_a_stream_that_takes_nothing_is_one_line(line, code, says):
+    assert in_a_shell(line) == (code, "", says)
+
+
+def test_a_result_is_not_lost_with_stderr_and_no_file_takes_a_streams_number(small, tmp_path):
+    """A compiled library prints to number 1 or 2, whatever file that is."""
+    line = f"$A run {small} --no-figures --json --out {tmp_path / 'r'}"
+    code, out, _ = in_a_shell(f"{line} 2>&-")
+    assert (code, json.loads(out)["succeeded"]) == (0, True)
+    code, _, err = in_a_shell(f"{line} >&-")
+    assert (code, err) == (2, "antdrive: stdout: cannot be written (Bad file descriptor)\n")
+    assert json.loads((tmp_path / "r" / "result.json").read_text())["succeeded"]
+    assert in_a_shell(f"$A verify {tmp_path / 'r'} 2>&-")[0] == 0
 
 
 def test_another_closed_pipe_is_a_fault(antdrive, monkeypatch):
@@ -92,14 +114,22 @@ def test_another_closed_pipe_is_a_fault(antdrive, monkeypatch):
     assert (code, err.startswith("antdrive: internal error: BrokenPipeError: ")) == (3, True)
 
 
-def test_ctrl_c_is_one_line(antdrive, monkeypatch):
+@pytest.mark.parametrize(
+    ("number", "code", "says"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated"), (signal.SIGHUP, 129, "terminated")],
+)
+def test_a_signal_is_one_line_that_says_how_to_resume(antdrive, monkeypatch, number, code, says):
     def interrupt(*_, **__):
-        raise KeyboardInterrupt
+        signal.raise_signal(number)
 
     monkeypatch.setattr("antdrive.sim.pipeline.run", interrupt)
-    code, _, err = antdrive("run", "empty")
-    assert code == 130
-    assert err == "antdrive: interrupted\n"
+    monkeypatch.setattr("antdrive.runs.campaigns.sweeping.sweep", interrupt)
+    assert antdrive("run", "empty")[::2] == (code, f"antdrive: {says}\n")
+    words = ["--world", "empty", "--planner", "astar", "-o", "a b"]
+    again = "antdrive sweep --world empty --planner astar -o 'a b'"
+    assert antdrive("sweep", *words, "--again", "astar")[::2] == (
+        code, f"antdrive: {says}; completed runs are kept, resume with: {again}\n"
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -118,7 +148,7 @@ def test_ctrl_c_while_planning_ends_a_command_that_plans_many_times(antdrive, sm
     with on_progress(stop):
         code, out, err = antdrive(*(str(small) if word == "WORLD" else word for word in words))
     *notes, last = err.splitlines()
-    assert (code, out, last) == (130, "", "antdrive: interrupted")
+    assert (code, out, last.split(";")[0]) == (130, "", "antdrive: interrupted")
     assert len(notes) == (words[0] == "reproduce"), "one seed is too few for its claims, it says"
     assert not list((tmp_path / "out").rglob("*.*"))
 
@@ -128,7 +158,9 @@ def test_a_full_disk_is_one_line(refused, monkeypatch):
         raise OSError(28, "No space left on device", "w.yaml")
 
     monkeypatch.setattr("antdrive.worlds.save_task", full)
-    assert refused("worlds", "generate", "forest", "-o", "w.yaml") == "antdrive: w.yaml: No space left on device\n"
+    assert refused("worlds", "generate", "forest", "-o", "w.yaml") == (
+        "antdrive: w.yaml: cannot be written (No space left on device)\n"
+    )
 
 
 class Faulty:

@@ -23,7 +23,8 @@ LONGEST_STEM = 100  # characters of the target's name in a temporary file's name
 def atomic_write(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path that replaces `path` on success and is removed on failure.
 
-    Temporary files left behind by killed processes for the same target are removed.
+    An error of writing without a file's name, as on a full disk, is raised with `path`. Temporary files left behind by
+    killed processes for the same target are removed.
     """
     target = Path(path)
     try:
@@ -40,10 +41,9 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     try:
         yield temporary
         temporary.chmod(0o666 & ~_umask())
-        try:
-            temporary.replace(target)
-        except OSError as error:
-            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+        temporary.replace(target)
+    except OSError as error:
+        raise _not_written(target, temporary, error) from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -69,12 +69,19 @@ def atomic_folder(path: str | Path) -> Iterator[Path]:
     try:
         yield temporary
         temporary.chmod(0o777 & ~_umask())
-        try:
-            temporary.replace(target)
-        except OSError as error:
-            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+        temporary.replace(target)
+    except OSError as error:
+        raise _not_written(target, temporary, error) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _not_written(target: Path, temporary: Path, error: OSError) -> Exception:
+    """Return the error of writing a target; one about another file stays what it is."""
+    named = error.filename
+    if named is not None and temporary not in (one := Path(os.fsdecode(named)), *one.parents):
+        return error
+    return InputError(f"{target}: cannot be written ({error.strerror or error})")
 
 
 def _umask() -> int:

@@ -10,7 +10,7 @@ from typing import TextIO
 
 from antdrive.base.errors import Terminated
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS
-from antdrive.cli.exits import BROKEN_PIPE, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED, TERMINATED
+from antdrive.cli.exits import BROKEN_PIPE, HUNG_UP, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED, TERMINATED
 
 OPTIONS = """Options:
   --version   Show the version and exit.
@@ -18,10 +18,15 @@ OPTIONS = """Options:
   -h, --help  Show this message and exit.
 """
 
+ENDS = {signal.SIGTERM: TERMINATED, signal.SIGHUP: HUNG_UP}  # exit codes of the signals that end a command
+
 
 def main() -> None:
     """Run the command line and exit with its code."""
-    signal.signal(signal.SIGTERM, _terminate)
+    _open_streams()
+    for one in ENDS:
+        if signal.getsignal(one) is not signal.SIG_IGN:  # ignored under nohup
+            signal.signal(one, _terminate)
     words = [word for word in sys.argv[1:] if word != DEBUG]
     try:
         if words in ([], ["-h"], ["--help"]):
@@ -31,21 +36,48 @@ def main() -> None:
 
             code = exit_code_of(words)
     except BrokenPipeError as error:
-        closed = [stream for stream in (sys.__stdout__, sys.__stderr__) if stream is not None and _is_closed(stream)]
-        for stream in closed:  # discard the buffered rest, which Python would otherwise flush at exit
-            with open(os.devnull, "wb") as nowhere:
-                os.dup2(nowhere.fileno(), stream.fileno())
-        if not closed:  # another pipe, such as one to a worker process
+        code = BROKEN_PIPE
+        if sys.__stdout__ is None or not _is_closed(sys.__stdout__):  # another pipe, such as one to a worker process
             from antdrive.cli.groups import print_exception
 
             print_exception(error)
-        code = BROKEN_PIPE if closed else INTERNAL_ERROR
+            code = INTERNAL_ERROR
+    except OSError as error:  # of the list of commands
+        sys.stderr.write(f"antdrive: stdout: cannot be written ({error.strerror})\n")
+        code = INVALID_INPUT
+    for stream in (sys.__stdout__, sys.__stderr__):
+        if stream is not None:
+            _settle(stream)
     sys.exit(code)
 
 
-def _terminate(*_: object) -> None:
+def _open_streams() -> None:
+    """Replace closed standard streams; otherwise the next file would take a stream's number, and prints would go into it.
+
+    Writing to a replaced stdout is an error, as on a full disk; what goes to a replaced stderr is lost.
+    """
+    for number, (name, flags) in enumerate((("stdin", os.O_RDONLY), ("stdout", os.O_RDONLY), ("stderr", os.O_WRONLY))):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, flags)  # takes the lowest free number, which is this one
+            stream = os.fdopen(number, "w" if number else "r", closefd=False)
+            setattr(sys, name, stream)
+            setattr(sys, f"__{name}__", stream)
+
+
+def _settle(stream: TextIO) -> None:
+    """Flush a stream; discard what it cannot take, which Python would complain about at exit."""
+    try:
+        stream.flush()
+    except (OSError, ValueError):
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())
+
+
+def _terminate(number: int, _: object) -> None:
     """Raise `Terminated`, so that temporary files are removed as after Ctrl-C."""
-    raise Terminated(TERMINATED)
+    raise Terminated(ENDS[signal.Signals(number)])
 
 
 def _show_help(words: list[str]) -> int:

@@ -1,16 +1,12 @@
-"""Options of `antdrive sweep`: parsing a campaign and resuming it."""
+"""Campaigns from the options of `antdrive sweep`."""
 
 from __future__ import annotations
 
-import shlex
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError
-from antdrive.cli.console import print_error
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -129,24 +125,3 @@ def _number(option: str, text: str, *, whole: bool = False) -> float | int:
         return int(text) if whole or text.lstrip("+-").isdigit() else float(text)
     except ValueError:
         raise InputError(f"{option} {text}: must be a {'whole ' if whole else ''}number") from None
-
-
-@contextmanager
-def resumable(folder: Path) -> Iterator[None]:
-    """Print the command that resumes a campaign if the block is interrupted."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        command = shlex.join(["antdrive", *_without_again(sys.argv[1:])])
-        print_error(f"{folder}: completed runs are kept; resume with: {command}")
-        raise
-
-
-def _without_again(words: list[str]) -> Iterator[str]:
-    """Return a command without --again, so that resuming does not repeat those runs a second time."""
-    rest = iter(words)
-    for word in rest:
-        if word == "--again":
-            next(rest, None)
-        elif not word.startswith("--again="):
-            yield word

@@ -8,7 +8,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import typer
@@ -108,18 +108,24 @@ def duration(seconds: float) -> str:
 
 
 def print_error(message: str) -> None:
-    """Print one line on stderr."""
-    typer.echo(f"antdrive: {visible(message, LAYOUT)}", err=True)
+    """Print one line on stderr; a stderr that cannot take it costs no results."""
+    with suppress(OSError):
+        typer.echo(f"antdrive: {visible(message, LAYOUT)}", err=True)
 
 
 def print_line(text: str = "") -> None:
-    """Print one line on stdout."""
-    typer.echo(visible(text, LAYOUT))
+    """Print one line on stdout; an error names it."""
+    try:
+        typer.echo(visible(text, LAYOUT))
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "stdout") from None
 
 
 def print_json(value: Any) -> None:
     """Print one JSON object on stdout."""
-    typer.echo(as_json(value))
+    print_line(as_json(value))
 
 
 def show(json: bool, facts: Any, lines: Iterable[str]) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import shlex
 import sys
 import traceback
 from collections import UserDict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 import typer
@@ -33,20 +34,21 @@ def exit_code_of(words: list[str]) -> int:
     try:
         code = _code_of(application()(args=words, prog_name="antdrive", standalone_mode=False))
     except (InputError, FieldError) as error:
-        print_error(str(error))
+        print_error(str(input_error(str(error))))
         code = INVALID_INPUT
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     except BrokenPipeError:
         raise
     except OSError as error:  # such as a full disk
-        print_error(f"{error.filename or 'output'}: {error.strerror}")
+        print_error(f"{error.filename or 'output'}: cannot be written ({error.strerror or error})")
         code = INVALID_INPUT
     except _USAGE_ERROR as error:
         _print_usage_error(error)
         code = INVALID_INPUT
-    except Terminated:
-        raise
+    except Terminated as error:
+        print_error(f"terminated{_resuming(words)}")
+        code = int(error.code or 0)
     except SystemExit as error:
         if isinstance(error.__context__, BrokenPipeError):  # typer turns it into SystemExit
             raise error.__context__ from None
@@ -56,8 +58,26 @@ def exit_code_of(words: list[str]) -> int:
         print_exception(error)
         code = INTERNAL_ERROR
     if code == INTERRUPTED:  # typer's code for Ctrl-C within a command
-        print_error("interrupted")
+        print_error(f"interrupted{_resuming(words)}")
     return code
+
+
+def _resuming(words: Sequence[str]) -> str:
+    """Return how to resume an interrupted command; empty if it starts over."""
+    command = COMMANDS.get(words[0]) if words else None
+    if command is None or not command.resumes:
+        return ""
+    return f"; completed runs are kept, resume with: {shlex.join(['antdrive', *_without_again(words)])}"
+
+
+def _without_again(words: Sequence[str]) -> Iterator[str]:
+    """Return a command without --again, so that resuming does not repeat those runs a second time."""
+    rest = iter(words)
+    for word in rest:
+        if word == "--again":
+            next(rest, None)
+        elif not word.startswith("--again="):
+            yield word
 
 
 def _code_of(result: bool | int | None) -> int:

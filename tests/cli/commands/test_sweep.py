@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from antdrive.base.atomic import folder_lock
-from antdrive.cli.campaign_options import _without_again
 from antdrive.cli.console import duration
+from antdrive.cli.groups import _without_again
 from antdrive.runs.campaigns import canonical_bytes, read_results
 
 CAMPAIGN = (

@@ -1,5 +1,6 @@
 """A campaign's folder: parts are merged, runs count once, and processes that are killed lose nothing and double nothing."""
 
+import itertools
 import os
 import signal
 import subprocess
@@ -13,21 +14,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import antdrive.robots
 from antdrive.base.errors import InputError
 from antdrive.runs.campaigns import canonical_bytes, read_results, store
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.rows import failed_row, grid_table
 from antdrive.runs.campaigns.store import parts_in
+from antdrive.runs.campaigns.sweeping import sweep
 from tests.runs.campaigns.parent import go
+from tests.runs.campaigns.works import Deadly
 
 JOBS = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"], "seeds": 6})).jobs
 
 
 def begun(folder):
-    (folder / "parts").mkdir(parents=True)
+    folder.mkdir(exist_ok=True)
     kept = store.Store(folder)
-    kept.begin({"size": len(JOBS)}, grid_table(JOBS))
+    kept.claim({"size": len(JOBS)})
+    kept.begin(grid_table(JOBS))
     return kept
 
 
@@ -113,7 +118,8 @@ def test_the_table_is_there_while_a_command_goes_on(tmp_path):
     kept = begun(tmp_path)
     kept.add(failed_row(JOBS[0].key, "succeeded", ""))
     kept.finish()
-    store.Store(tmp_path).begin({"size": 3}, grid_table(JOBS[:3]))
+    store.Store(tmp_path).begin(grid_table(JOBS[:3]))
+    assert read_results(tmp_path).size == 3, "though the manifest is that of the command before, as after a kill"
     assert pyarrow.parquet.read_table(tmp_path / "runs.parquet")["key"].to_pylist() == [JOBS[0].key]
 
 
@@ -181,6 +187,48 @@ def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path, undisturbed):
     assert so_far.path.exists(), "the table of what is done was written"
     go(str(tmp_path), 0.0, 0)
     assert canonical_bytes(tmp_path) == undisturbed
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_campaign_killed_at_any_step_goes_on(tmp_path):
+    """A process dies before each change of its folder in turn, the folder's making included."""
+    campaign = {"worlds": ["empty", "gate"], "planners": "astar", "seeds": 2, "robots": ["turtlebot", "jackal"]}
+    (tmp_path / "mine.yaml").write_text((Path(antdrive.robots.__path__[0]) / "catalog" / "jackal.yaml").read_text())
+    campaign = make_campaign({**campaign, "robots": ["turtlebot", "mine.yaml"]}, tmp_path)
+    calm = sweep(campaign, tmp_path / "calm", jobs=0, work=Deadly()).folder
+    step, died = 0, True
+    while died:
+        folder = tmp_path / str(step)
+        child = os.fork()
+        if not child:
+            dies_at(step)
+            sweep(campaign, folder, jobs=0, work=Deadly())
+            os._exit(0)
+        died = os.waitpid(child, 0)[1] != 0
+        sweep(campaign, folder, jobs=0, work=Deadly())
+        assert canonical_bytes(folder) == canonical_bytes(calm), f"killed before step {step}"
+        left = {path.name for path in folder.rglob("*") if path.is_file()}
+        assert not [name for name in left if name[0] == "."], f"killed before step {step}"
+        step += 1
+    assert step > 20
+
+
+def dies_at(step):
+    """End this process without a word before its given change of a file or folder."""
+    steps = itertools.count()
+
+    def watched(function):
+        def change(*words, **named):
+            if next(steps) == step:
+                os._exit(1)
+            return function(*words, **named)
+
+        return change
+
+    for name in ("mkdir", "replace", "unlink", "rename"):
+        setattr(Path, name, watched(getattr(Path, name)))
+    for name in ("mkdir", "open", "fsync"):
+        setattr(os, name, watched(getattr(os, name)))
 
 
 def test_half_a_file_of_a_killed_process_is_removed_and_never_read(tmp_path, undisturbed):

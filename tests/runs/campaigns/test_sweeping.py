@@ -98,10 +98,11 @@ def test_a_corrected_planner_is_run_again_and_said_so(tmp_path):
     mine.write_text(broken)
     first = sweep(make_campaign(campaign, tmp_path), tmp_path / "out", jobs=0)
     mine.write_text(PLANNER)
-    second = sweep(make_campaign(campaign, tmp_path), tmp_path / "out", jobs=0)
+    notes = []
+    second = sweep(make_campaign(campaign, tmp_path), tmp_path / "out", jobs=0, notify=notes.append)
     assert [first.outcomes, second.outcomes] == [{"planner_fault": 1, "succeeded": 1}, {"succeeded": 2}]
-    assert (first.notes, second.made) == ((), 1)
-    (note,) = second.notes
+    assert second.made == 1
+    (note,) = notes
     assert re.fullmatch(r"1 run of mine\.py:Mine came from mine\.py \w{8}; mine\.py \w{8} repeats them", note)
     copy = second.table["command"][0].as_py().split()[4]
     assert (tmp_path / "out" / copy.rpartition(":")[0]).read_text() == PLANNER
@@ -126,6 +127,36 @@ def test_processes_and_order_do_not_show_in_the_table(worlds):
     back = {"worlds": TWO_BY_TWO["worlds"][::-1], "planners": TWO_BY_TWO["planners"][::-1]}
     sweep(back, "back", jobs=1)
     assert canonical_bytes("here") == canonical_bytes("back")
+
+
+def test_another_campaign_does_not_take_the_place_of_the_first(tmp_path):
+    """A campaign that shares no run is refused; one that shares some says what leaves the table."""
+    first, notes, work = {"worlds": "empty", "planners": "astar", "seeds": 3}, [], Deadly()
+    sweep(first, tmp_path, jobs=0, work=work)
+    made = canonical_bytes(tmp_path)
+    files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    for change in ({"worlds": "gate"}, {"margin": 0.05}, {"seeds": [7]}, {"settings": {"cell": 0.1}}):
+        with pytest.raises(
+            InputError, match=r"contains the 3 runs of another campaign .* use another folder \(--out\)"
+        ):
+            sweep({**first, **change}, tmp_path, jobs=0, work=work)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == files
+    part = sweep({**first, "seeds": [2, 5]}, tmp_path, jobs=0, work=work, notify=notes.append)
+    assert (part.size, part.made) == (2, 1)
+    assert [note.split(":")[0] for note in notes] == [
+        f"2 runs of the previous campaign (campaign) leave the table of {tmp_path}"
+    ]
+    sweep(first, tmp_path, jobs=0, work=work, notify=notes.append)
+    assert canonical_bytes(tmp_path) == made
+
+
+def test_runs_of_another_version_are_said(tmp_path, monkeypatch):
+    campaign, notes = {"worlds": "empty", "planners": "astar", "seeds": 2}, []
+    sweep(campaign, tmp_path, jobs=0, work=Deadly())
+    monkeypatch.setattr(sweeping, "versions", lambda: {"antdrive": "9.9"})
+    sweep({**campaign, "seeds": 3}, tmp_path, jobs=0, work=Deadly(), notify=notes.append)
+    (note,) = notes
+    assert re.fullmatch(r"2 runs came from antdrive \S+, new ones come from 9\.9; a new folder repeats all", note)
 
 
 BASE = {"worlds": ["empty", "no-path"], "planners": ["astar"]}
@@ -207,6 +238,26 @@ def test_an_auto_margin_is_chosen_once_for_each_robot_and_its_settings(monkeypat
     assert {one.case.scenario(one.seed).margin for one in auto} == {0.07}
     assert all(one.case.scenario(one.seed).chosen is not None for one in auto)
     assert {sweeping.grid_table([one])["margin"][0].as_py() for one in auto} == {0.07}
+
+
+def test_a_default_margin_is_the_run_with_its_number_and_is_asked_for_as_the_default():
+    campaign = {**BASE, "worlds": ["empty"], "robots": ["turtlebot", "jackal"], "noise": [0, 1], "smoothing": ["none"]}
+    jobs = expand(make_campaign(campaign)).jobs
+    rows = [(one.case.robot.name, one.case.settings.fields["noise"], *_margins(one)) for one in jobs]
+    assert sorted(rows) == [
+        ("jackal", 0, "default", 0.03), ("jackal", 1, "default", 0.057),
+        ("turtlebot", 0, "default", 0.03), ("turtlebot", 1, "default", 0.076),
+    ]  # fmt: skip
+    same = [(robot, noise, number) for robot, noise, _, number in rows]
+    for one, (robot, noise, number) in zip(jobs, same, strict=True):
+        given = {**campaign, "robots": [robot], "noise": [noise], "margin": [number]}
+        assert {other.key for other in expand(make_campaign(given)).jobs} >= {one.key}
+    assert len(expand(make_campaign({**campaign, "noise": [0], "margin": [None, 0.03]})).jobs) == 2
+
+
+def _margins(job):
+    row = sweeping.grid_table([job])
+    return row["margin_asked"][0].as_py(), row["margin"][0].as_py()
 
 
 def test_a_robot_of_ones_own_comes_along_with_the_folder(tmp_path):

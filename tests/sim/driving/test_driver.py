@@ -46,6 +46,11 @@ def driver(robot, guide=None, *rules):
     return Driver(guide or OnePath(), (pursuit, *rules), tracked, TASK, robot, 60)
 
 
+def end_of(robot, tick, pose, state):
+    """How a control period ends the drive of a robot at an estimated pose; None if it goes on."""
+    return robot.arrives(tick, pose, state) or robot.decide(tick, pose, state)
+
+
 def at(driving, arc):
     """The same, so far along its route [m]."""
     driving.step = Step(pursuit=PursuitState(arc=arc))
@@ -100,7 +105,7 @@ def test_a_robot_that_stops_just_outside_the_tolerance_has_not_arrived(turtlebot
     away = TASK.goal_tolerance + outside
     at_end = driver(turtlebot)
     at(at_end, at_end.path.length)
-    endings = [at_end.decide(tick, (x, y, 0.0), State(x - away, y, 0.0, 0.0, 0.0)) for tick in range(9)]
+    endings = [end_of(at_end, tick, (x, y, 0.0), State(x - away, y, 0.0, 0.0, 0.0)) for tick in range(9)]
     assert {ending.outcome for ending in endings if ending is not None} == {outcome}
 
 
@@ -125,7 +130,7 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
         at(at_end, at_end.path.length)
         ending = None
         for tick in range(9):  # the command comes to rest first
-            ending = ending or at_end.decide(tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
+            ending = ending or end_of(at_end, tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
         assert ending.outcome is outcome
         lost = (
             "the robot believed that it was at the goal, 0.00 m from it, but was 0.300 m from it "
@@ -152,7 +157,7 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), sight)
     at_goal = (*TASK.goal, 0.0)
     at(robot, robot.path.length - 0.5)
-    endings = [robot.decide(tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
+    endings = [end_of(robot, tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
     assert robot.step.pursuit.limiter != LIMITERS.index("avoid")
     assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
 
@@ -346,7 +351,7 @@ def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, 
     endings = []
     for tick in range(9):  # the command comes to rest first
         robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.path.length))
-        endings.append(robot.decide(tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
+        endings.append(end_of(robot, tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
     assert bool(monitor.misses) is knows
     assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
 

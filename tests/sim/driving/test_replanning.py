@@ -331,13 +331,14 @@ class Deciding:
         return self
 
     replanner = agent
+    query = None
 
     def step(self, blocked):
         if isinstance(self.what, BaseException):
             raise self.what
         return self.what
 
-    result = block = clear = move = lambda self, cells=None: self.step(cells)
+    result = block = clear = move = change = lambda self, cells=None: self.step(cells)
 
 
 @pytest.mark.parametrize("step", [(0, 0), (3, 999), 5, ("a", 1)], ids=str)
@@ -356,6 +357,15 @@ def test_what_a_planners_own_replanner_raises_is_its_error(error, cell_by_cell):
 def test_an_answer_of_its_own_replanner_that_is_none_is_its_error():
     with pytest.raises(PlannerError, match="planner Deciding returned 5 instead of a PlanResult"):
         run(Scenario.of(MOVING, Deciding(5, cell_by_cell=False), time_limit=10.0))
+
+
+def test_an_error_of_antdrive_around_a_replanner_is_not_the_planners(monkeypatch):
+    def broken(*_):
+        raise KeyError("ours")
+
+    monkeypatch.setattr("antdrive.sim.driving.routes.closed_cells", broken)
+    with pytest.raises(KeyError, match="ours"):
+        run(Scenario.of(MOVING, "dstar-lite", time_limit=10.0))
 
 
 def test_capabilities_of_another_type_are_the_planners_error():

@@ -17,12 +17,13 @@ class Command(NamedTuple):
     module: str  # below `antdrive.cli.commands`
     function: str  # in the module
     summary: str  # first line of the function's docstring
+    resumes: bool = False  # whether the same command resumes an interrupted one
 
 
 ABOUT = """Plan paths, drive them in physics, certify the drives and film them.
 
 Exit codes: 0: success. 1: failed drive or plan, or an uncertified log.
-2: invalid input. 3: planner error or internal error. 130, 143: interrupted.
+2: invalid input. 3: planner error or internal error. 129, 130, 143: interrupted.
 141: output pipe closed.
 """
 DEBUG = "--debug"  # accepted anywhere, so it can be appended to a failed command
@@ -33,8 +34,8 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "run": Command("run", "run", "Plan a path, drive it in physics and certify the drive."),
         "plan": Command("plan", "plan", "Plan a path without driving it."),
         "compare": Command("compare", "compare", "Compare planners on worlds or from campaign results."),
-        "sweep": Command("sweep", "sweep", "Run a campaign: every combination of its settings."),
-        "barn": Command("barn", "barn", "Drive the BARN Challenge worlds and print the results table."),
+        "sweep": Command("sweep", "sweep", "Run a campaign: every combination of its settings.", resumes=True),
+        "barn": Command("barn", "barn", "Drive the BARN Challenge worlds and print the results table.", resumes=True),
         "render": Command("render", "render", "Render films of logged drives from any camera."),
         "report": Command("report", "report", "Write a report on many runs or on a campaign."),
         "export": Command("export", "export_drive", "Export a drive to Foxglove, RViz or CSV."),
@@ -44,8 +45,10 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "margin": Command("margin", "margin", "Break down a drive's safety margin by cause."),
         "find-margin": Command("find_margin", "find_margin", "Find the smallest margin at which all drives are safe."),
         "falsify": Command("falsify", "falsify", "Search for worlds in which a configuration fails."),
-        "shrink": Command("shrink", "shrink", "Reduce a failure to a minimal reproducer."),
-        "reproduce": Command("reproduce", "reproduce", "Repeat a paper's experiments and test its claims."),
+        "shrink": Command("shrink", "shrink", "Reduce a failure to a minimal reproducer.", resumes=True),
+        "reproduce": Command(
+            "reproduce", "reproduce", "Repeat a paper's experiments and test its claims.", resumes=True
+        ),
         "planners": Command("planners", "planners", "List the planners and their options."),
         "schema": Command("schema", "schema", "Print the JSON Schema of a file type."),
         "warm": Command("warm", "warm", "Compile all planners ahead of time."),

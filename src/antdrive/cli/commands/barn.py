@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.campaign_options import OPTIONS, resumable
+from antdrive.cli.campaign_options import OPTIONS
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, campaign_bar, show, table
+from antdrive.cli.console import bar, campaign_bar, print_error, show, table
 from antdrive.cli.options import argument, flag, option
 from antdrive.sim.settings import SETTINGS
 
@@ -57,10 +57,11 @@ def barn(
         given["localisation"] = "fixes"
     data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
+    fastest = challenge.reference_times(folder)
     compile_once()
-    with resumable(out), campaign_bar("driving") as progress:
-        results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress)
-    runs, fastest = challenge.by_map(results.table), challenge.reference_times(folder)
+    with campaign_bar("driving") as progress:
+        results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress, notify=print_error)
+    runs = challenge.by_map(results.table)
     rows = list(challenge.lines(runs[map], fastest))
     known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
     (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.campaign_options import campaign_from, resumable
+from antdrive.cli.campaign_options import campaign_from
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import campaign_bar, print_error, show, table
 from antdrive.cli.options import argument, flag, option
@@ -81,7 +81,7 @@ def sweep(
     override the keys of the campaign file. Exit code 0: all runs are done, whatever their outcomes.
     """
     from antdrive.runs.campaigns.expanding import expand
-    from antdrive.runs.campaigns.sweeping import missing_runs
+    from antdrive.runs.campaigns.sweeping import differences, missing_runs
     from antdrive.runs.campaigns.sweeping import sweep as make_runs
 
     if out is None and not dry_run:
@@ -94,17 +94,18 @@ def sweep(
     expansion = expand(requested)
     rest: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
     if dry_run or out is None:
+        notes = () if out is None else differences(requested, expansion.jobs, out)
+        for note in notes:
+            print_error(note)
         size = len(expansion.jobs)
         missing = size if out is None else len(missing_runs(expansion.jobs, out, **rest).jobs)
         counts = {"duplicates": expansion.duplicates, "counts": expansion.counts}
         show(json, {"runs": size, "missing": missing, **counts}, _size_lines(expansion, missing))
         return
     compile_once()
-    with resumable(out), campaign_bar("driving") as progress:
+    with campaign_bar("driving") as progress:
         rest |= {"jobs": jobs, "dask": dask, "keep": cast("Keep | None", keep)}
-        results = make_runs(requested, out, expansion=expansion, progress=progress, **rest)
-    for note in results.notes:
-        print_error(note)
+        results = make_runs(requested, out, expansion=expansion, progress=progress, notify=print_error, **rest)
     files: list[str] = []
     if report is not None:
         from antdrive.views.pages.campaign_report import report_campaign

@@ -37,14 +37,12 @@ class SweepResults:
         table: Arrow table with a row for each finished run, in the campaign's order
         size: number of runs of the campaign
         made: number of runs made by the call that returned this
-        notes: remarks for continuing the campaign, a sentence each
     """
 
     folder: Path
     table: pyarrow.Table
     size: int
     made: int = 0
-    notes: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -91,8 +89,10 @@ def read_results(folder: str | Path) -> SweepResults:
     Raises:
         InputError: the folder holds no campaign, or a file in it is damaged.
     """
-    path, manifest = Path(folder), read_manifest(folder)
-    return SweepResults(path, joined(path), int(manifest["size"]))
+    path = Path(folder)
+    read_manifest(path)
+    table = joined(path)  # a command killed at its start leaves the manifest of another grid: the grid decides the size
+    return SweepResults(path, table, parquet_library().parquet.read_metadata(path / GRID_FILE).num_rows)
 
 
 def canonical_table(folder: str | Path) -> pyarrow.Table:

@@ -8,7 +8,8 @@
     runs.parquet    the table of all finished runs, written at the start and the end of a command
 
 Every file is written under a temporary name, synced to the disk and renamed, so a killed process leaves no partial
-file. A run made twice is in two parts but has one row in the table.
+file. The manifest comes first, so that a folder without one is no campaign's. A run made twice is in two parts but has
+one row in the table.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError, input_error
+from antdrive.base.files import MAX_JSON_BYTES, open_regular, read_bytes
 from antdrive.base.optional import parquet_library
 from antdrive.runs import results_folder
 from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, result_schema, result_table
@@ -35,6 +37,7 @@ MANIFEST, GRID_FILE, PARTS, TABLE = "manifest.json", "grid.parquet", "parts", "r
 FLUSH_EVERY = 2.0  # finished runs are written at least this often [s]
 TRIES = 100  # attempts to read parts while another process merges them
 MOST_PARTS = 200  # more are merged into one
+MAX_TABLE_VALUES = 200_000_000
 UNFINISHED = ".new-"  # prefix of temporary files
 
 
@@ -51,11 +54,14 @@ class Store:
         self._written = time.monotonic()
         self._parts = len(parts_in(folder))
 
-    def begin(self, manifest: Mapping[str, Any], grid: pyarrow.Table) -> None:
-        """Write the manifest and the grid."""
+    def claim(self, manifest: Mapping[str, Any]) -> None:
+        """Write the manifest, before any other file of a new folder."""
+        write_text(self.folder / MANIFEST, json.dumps(manifest, indent=1, ensure_ascii=False) + "\n")
+        (self.folder / PARTS).mkdir(exist_ok=True)
+
+    def begin(self, grid: pyarrow.Table) -> None:
+        """Write the grid and the table of the runs that it shares with earlier commands."""
         write_table(grid, self.folder / GRID_FILE)
-        text = json.dumps(manifest, indent=1, ensure_ascii=False)
-        write_text(self.folder / MANIFEST, text + "\n")
         write_table(joined(self.folder), self.folder / TABLE)  # until the final one replaces it
 
     def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
@@ -97,14 +103,14 @@ class Store:
         """Delete the results of some runs, so that they are made again."""
         old, table = parts_in(self.folder), _results(self.folder)
         names = table["key"].to_pylist()
-        for i, path in enumerate(table["rollout"].to_pylist()):
-            if path is not None and names[i] in keys:
-                (self.folder / path).unlink(missing_ok=True)
         write_table(
             _rows(table, [i for i, key in enumerate(names) if key not in keys]), self.folder / PARTS / _part_name()
         )
         for path in old:
             path.unlink(missing_ok=True)
+        for i, log in enumerate(table["rollout"].to_pylist()):  # last: a row that names a log has it
+            if log is not None and names[i] in keys:
+                (self.folder / log).unlink(missing_ok=True)
         self._parts = 1
 
     def finish(self) -> pyarrow.Table:
@@ -120,16 +126,15 @@ class Store:
 def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
     """Open a campaign's folder for this process alone."""
     with results_folder.opened(Path(folder), MANIFEST, kind="a campaign") as path:
-        (path / PARTS).mkdir(exist_ok=True)
         for left in (*path.glob(f"{UNFINISHED}*"), *(path / PARTS).glob(f"{UNFINISHED}*")):
             left.unlink(missing_ok=True)  # of a killed process
         yield Store(path)
 
 
-def outcomes_in(folder: Path) -> dict[str, str]:
-    """Return the outcome of every run ever made in a folder, by key, even if the campaign has changed since."""
+def results_in(folder: Path, column: str) -> dict[str, Any]:
+    """Return one column of every run ever made in a folder, by key, even if the campaign has changed since."""
     results = _results(folder)
-    return dict(zip(results["key"].to_pylist(), results["outcome"].to_pylist(), strict=True))
+    return dict(zip(results["key"].to_pylist(), results[column].to_pylist(), strict=True))
 
 
 def former_grid(folder: Path) -> pyarrow.Table | None:
@@ -140,11 +145,12 @@ def former_grid(folder: Path) -> pyarrow.Table | None:
 def read_manifest(folder: str | Path) -> dict[str, Any]:
     """Read the manifest of a campaign's folder."""
     path = Path(folder) / MANIFEST
+    if not path.exists():
+        raise input_error(str(folder), f"no {MANIFEST} here; antdrive sweep writes it")
+    text = read_bytes(path, MAX_JSON_BYTES, "a campaign's manifest")
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise input_error(str(folder), f"no {MANIFEST} here; antdrive sweep writes it") from None
-    except (OSError, ValueError) as error:
+        data = json.loads(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise input_error(str(path), f"cannot be read ({error})") from None
     if not isinstance(data, dict) or type(data.get("size")) is not int:
         raise input_error(str(path), "not a campaign's manifest; antdrive sweep writes a new one")
@@ -247,10 +253,18 @@ def _cast(table: pyarrow.Table, schema: pyarrow.Schema) -> pyarrow.Table:
 
 def _read(path: Path) -> pyarrow.Table:
     arrow = parquet_library()
+    if not path.exists():
+        raise input_error(str(path), "no such file; antdrive sweep writes it")
     try:
-        return arrow.parquet.read_table(path)
-    except FileNotFoundError:
-        raise input_error(str(path), "no such file; antdrive sweep writes it") from None
+        with open_regular(path, kind="a Parquet table") as stream:
+            size = arrow.parquet.read_metadata(stream)
+            if size.num_rows * size.num_columns > MAX_TABLE_VALUES:
+                raise input_error(
+                    str(path), f"has {size.num_rows} rows of {size.num_columns} columns, too many to read"
+                )
+            return arrow.parquet.read_table(stream)
     except (OSError, arrow.ArrowException) as error:
         remedy = "; delete the file to repeat its runs" if path.parent.name == PARTS else ""
-        raise input_error(str(path), f"cannot be read as Parquet ({error}){remedy}") from None
+        raise input_error(
+            str(path), f"cannot be read as Parquet ({getattr(error, 'strerror', None) or error}){remedy}"
+        ) from None

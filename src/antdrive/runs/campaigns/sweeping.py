@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from antdrive.base.atomic import atomic_write
-from antdrive.base.errors import FieldError, InputError
+from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.runs.campaigns.expanding import Expansion, expand
@@ -22,7 +22,7 @@ from antdrive.runs.campaigns.job import Job, SweepCase
 from antdrive.runs.campaigns.results import SweepResults
 from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, TOO_SLOW, grid_table
 from antdrive.runs.campaigns.running import Driving, Finished, Keep, Work, finished_of
-from antdrive.runs.campaigns.store import Store, former_grid, opened, outcomes_in
+from antdrive.runs.campaigns.store import Store, former_grid, opened, read_manifest, results_in
 from antdrive.runs.margins.choice import Calibration, choose_margin
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.pool import Done, Pool, cores
@@ -49,7 +49,7 @@ def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, agai
             raise InputError(
                 f"--again {word}: no such planner or outcome; choose from {', '.join((*planners, *OUTCOMES))}"
             )
-    outcomes, asked = outcomes_in(folder), set(again)
+    outcomes, asked = results_in(folder, "outcome"), set(again)
     wanted, discarded = [], set()
     for job in jobs:
         outcome = outcomes.get(job.key)
@@ -61,22 +61,48 @@ def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, agai
     return MissingRuns(tuple(wanted), frozenset(discarded))
 
 
-def changed_planners(jobs: Sequence[Job], folder: Path) -> Iterator[str]:
-    """Yield a sentence for each planner whose earlier runs are obsolete because its version changed."""
+def differences(campaign: Campaign, jobs: Sequence[Job], folder: Path) -> tuple[str, ...]:
+    """Return a sentence for each way in which a folder's finished runs differ from those of a campaign.
+
+    Raises:
+        InputError: the folder holds another campaign, none of whose finished runs is in this one.
+    """
     former = former_grid(folder)
     if former is None or "planner_version" not in former.column_names:
-        return
+        return ()
     now = {job.case.planner.label: job.case.planner.version for job in jobs}
-    keys, made = {job.key for job in jobs}, outcomes_in(folder)
+    keys, made = {job.key for job in jobs}, results_in(folder, "version.antdrive")
     columns = (former[name].to_pylist() for name in ("key", "planner", "planner_version"))
-    old = Counter(
-        (planner, version)
-        for key, planner, version in zip(*columns, strict=True)
-        if key in made and key not in keys and now.get(planner, version) != version
-    )
-    for (planner, version), count in old.items():
-        runs = "1 run" if count == 1 else f"{count} runs"
-        yield f"{runs} of {planner} came from {version}; {now[planner]} repeats them"
+    finished = [row for row in zip(*columns, strict=True) if row[0] in made]
+    gone = [(planner, version) for key, planner, version in finished if key not in keys]
+    changed = Counter((planner, version) for planner, version in gone if now.get(planner, version) != version)
+    left = len(gone) - changed.total()
+    manifest: Mapping[str, Any] = {}
+    with contextlib.suppress(InputError):  # a damaged one is replaced
+        manifest = read_manifest(folder)
+    if left and left == len(finished) and manifest.get("campaign") != campaign.document.data:
+        said = f"contains the {_runs_of(left)} of another campaign ({manifest.get('source')})"
+        raise input_error(str(folder), f"{said}, none of which is in this one; use another folder (--out)")
+    sentences = [
+        f"{_runs_of(count)} of {planner} came from {version}; {now[planner]} repeats them"
+        for (planner, version), count in changed.items()
+    ]
+    if left:
+        sentences.append(
+            f"{_runs_of(left)} of the previous campaign ({manifest.get('source')}) leave the table of {folder}: they are not "
+            "in this one; the previous command restores them"
+        )
+    current = versions()["antdrive"]
+    old = Counter(made[key] for key, *_ in finished if key in keys and made[key] not in (None, current))
+    sentences += [
+        f"{_runs_of(count)} came from antdrive {version}, new ones come from {current}; a new folder repeats all"
+        for version, count in old.items()
+    ]
+    return tuple(sentences)
+
+
+def _runs_of(count: int) -> str:
+    return "1 run" if count == 1 else f"{count} runs"
 
 
 def sweep(
@@ -90,6 +116,7 @@ def sweep(
     retry_crashed: bool = False,
     again: Sequence[str] = (),
     progress: Callable[[int, int], None] | None = None,
+    notify: Callable[[str], None] | None = None,
     work: Work | None = None,
 ) -> SweepResults:
     """Make all missing runs of a campaign. After an interruption, the same call resumes it.
@@ -104,10 +131,12 @@ def sweep(
         retry_crashed: whether to repeat crashed runs
         again: planners, by label or name, and outcomes whose runs are repeated; their present results are discarded
         progress: called at the start and after each run with the numbers of finished and of all runs
+        notify: called before the first run with a sentence for each way in which earlier runs differ from the campaign's
         work: the work on each run; None: drive it
 
     Raises:
-        InputError: the campaign is invalid, another process writes into the folder, or the scheduler is gone.
+        InputError: the campaign is invalid, the folder holds another one, another process writes into it, or the
+            scheduler is gone.
     """
     campaign = campaign_of(campaign)
     _check(campaign, jobs, dask, keep)
@@ -115,20 +144,23 @@ def sweep(
     parquet_library()
     report = progress or (lambda done, size: None)
     with opened(folder) as store:
-        all_jobs = calibrated(expansion.jobs)
-        missing = missing_runs(all_jobs, store.folder, retry_crashed=retry_crashed, again=again)
-        notes = tuple(changed_planners(all_jobs, store.folder))
+        missing = missing_runs(expansion.jobs, store.folder, retry_crashed=retry_crashed, again=again)
+        for note in differences(campaign, expansion.jobs, store.folder):
+            (notify or (lambda note: None))(note)
+        store.claim(_manifest(campaign, expansion))
         if missing.discarded:
             store.drop(missing.discarded)
-        _begin(store, campaign, expansion, all_jobs)
-        made, before, size = 0, len(all_jobs) - len(missing.jobs), len(all_jobs)
+        all_jobs, wanted = calibrated(expansion.jobs), {job.key for job in missing.jobs}
+        _begin(store, expansion, all_jobs)
+        todo = [job for job in all_jobs if job.key in wanted]
+        made, before, size = 0, len(all_jobs) - len(todo), len(all_jobs)
         report(before, size)
         # Workers on other machines return logs; local ones write them.
         shared = None if dask is not None and not dask.startswith("local:") else str(store.folder.resolve())
         driving = Driving(keep or campaign.entry.rollouts, shared)
         try:
             limit = campaign.entry.run_limit
-            with _runs(missing.jobs, work or driving, jobs, dask, limit=limit, tick=store.tick) as runs:
+            with _runs(todo, work or driving, jobs, dask, limit=limit, tick=store.tick) as runs:
                 for done in runs:
                     finished = finished_of(done, limit)
                     store.add(finished.row, finished.log)
@@ -136,7 +168,7 @@ def sweep(
                     report(before + made, size)
         finally:
             table = store.finish()
-    return SweepResults(Path(folder), table, size, made, notes)
+    return SweepResults(Path(folder), table, size, made)
 
 
 def _check(campaign: Campaign, jobs: int | None, dask: str | None, keep: str | None) -> None:
@@ -185,23 +217,27 @@ def campaign_of(campaign: Campaign | str | os.PathLike[str] | Mapping[str, Any])
     return make_campaign(campaign) if isinstance(campaign, Mapping) else load_campaign(campaign)
 
 
-def _begin(store: Store, campaign: Campaign, expansion: Expansion, jobs: Sequence[Job]) -> None:
-    """Write the manifest, the grid, and the files of worlds, robots and planners that the runs' commands name."""
-    keys = "\n".join(sorted(job.key for job in jobs))
-    manifest = {
+def _manifest(campaign: Campaign, expansion: Expansion) -> dict[str, Any]:
+    """Return the manifest of a campaign's folder."""
+    keys = "\n".join(sorted(job.key for job in expansion.jobs))
+    return {
         "schema": 1,
         "source": Path(campaign.source).name,
         "campaign": campaign.document.data,
-        "size": len(jobs),
+        "size": len(expansion.jobs),
         "hash": hashlib.sha256(keys.encode()).hexdigest(),
         "counts": expansion.counts,
         "duplicates": expansion.duplicates,
         "versions": versions(),
     }
+
+
+def _begin(store: Store, expansion: Expansion, jobs: Sequence[Job]) -> None:
+    """Write the files of worlds, robots and planners that the runs' commands name, and the grid."""
     for path, task in expansion.worlds.items():
         if not (store.folder / path).exists():
             save_task(task, store.folder / path)
     for path, source in {**expansion.robots, **expansion.planners}.items():
         with atomic_write(store.folder / path) as part:
             shutil.copyfile(source, part)
-    store.begin(manifest, grid_table(jobs))
+    store.begin(grid_table(jobs))

@@ -170,6 +170,8 @@ class CellByCell(Replanning):
         """Return the route of the whole plan, which the first decision replaces."""
         self._query = Query.between(grid, self._task)
         self._online = agent_for(self._routes.planner, self._query, self._routes.rng)
+        with planner_errors(self._routes.planner):
+            self._arrived = bool(self._online.arrived)
         self._goal = self._query.goal
         self._noted_at = -math.inf
         return super().route(grid, plan)
@@ -177,14 +179,14 @@ class CellByCell(Replanning):
     @property
     def may_wait(self) -> bool:
         """Whether a robot at the end of its route may wait for a new one."""
-        return not self._online.arrived
+        return not self._arrived
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Return `DECISION` shortly before the robot reaches its cell, and repeatedly while it waits; else empty."""
         if tick == 0:
             return DECISION
         since = tick / self._hz - self._replanned_at
-        if self._online.arrived or since < DECISION_PAUSE:
+        if self._arrived or since < DECISION_PAUSE:
             return ""
         if since >= self.policy.max_wait:  # movers keep the robot from its cell
             self._note_no_path(tick, pose)
@@ -195,13 +197,15 @@ class CellByCell(Replanning):
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return the path to the next cell; None if the robot waits."""
         if trigger == MISSED:  # before arrival the next decision is due soon
-            return super().replan(tick, pose, trigger) if self._online.arrived else None
+            return super().replan(tick, pose, trigger) if self._arrived else None
         now, started = tick / self._hz, time.perf_counter()
         self._replanned_at = now
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
         with planner_errors(self._routes.planner):
             here, propagated = self._online.cell, self._online.stats.propagated
             to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
+            work = int(self._online.stats.propagated - propagated)
+            self._arrived = bool(self._online.arrived)
         self._routes.plan_error = self._routes.plan_error or check_step(self._query, here, to)
         if self._routes.plan_error:
             self.note(now, trigger)
@@ -212,7 +216,6 @@ class CellByCell(Replanning):
         else:
             self._note_no_path(tick, pose)
         if to is not None and bool(np.ptp(xy, axis=0).any()):
-            work = self._online.stats.propagated - propagated
             self.note(now, trigger, time.perf_counter() - started, work, polyline_length(xy), xy)
             return self._prepare(Route(xy))
         if tick == 0:  # the robot waits in place and must not follow the plan's whole route

@@ -10,14 +10,15 @@ from types import MappingProxyType
 from typing import Any
 
 from antdrive.base.errors import InputError, input_error
-from antdrive.runs.failures.repeating import command_of
 from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.log.margin import has_default
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
+from antdrive.sim.repeating import command_of
 from antdrive.sim.verifying import false_claims, logged_settings, read_result
 from antdrive.views.pages.rendering import NONE, TextTable, number, shown
 
@@ -228,6 +229,8 @@ class ReportedRun:
         record = self.log.record.as_dict()
         keys = ("noise", "margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")
         settings = {"route": record["smoothing"]["made"], **{key: record[key] for key in keys}}
+        if has_default(self.log.record):
+            settings["margin"] = f"{settings['margin']:g}, the default for this noise and route"
         lidar = self.log.record.robot.lidar
         if self.log.scans and lidar is not None:
             settings["scans"] = f"{self.log.scans} of {lidar.beams} beams"

@@ -12,10 +12,10 @@ from antdrive.base.files import file_name
 from antdrive.base.plane import polyline_length
 from antdrive.planners import list_planners
 from antdrive.robots import list_robots, load_robot
-from antdrive.runs.failures.rebuild import scenario_values
 from antdrive.sim.forms import option_text, setting_words, written
 from antdrive.sim.log.record import DriveRecord, canonical_hash, settings_of
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.rebuild import scenario_values
 from antdrive.sim.scenario import usual_time_limit
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import Task, list_worlds, load_task
