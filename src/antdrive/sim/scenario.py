@@ -329,6 +329,16 @@ class Scenario(Settings):
         return card(picture_of(self), task.world.name, facts)
 
 
+def usual_time_limit(length: float, robot: RobotSpec) -> float:
+    """Return the time limit of a drive for which neither scenario nor world names one [s].
+
+    Args:
+        length: length of the route [m]
+        robot: the robot
+    """
+    return 30.0 + 10.0 * length / robot.max_speed
+
+
 def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:
     """Draw the driven world as SVG, with start, goal, paths of movers, and lines: points, colour, whether dashed."""
     world, task = s.driven_world, s.task
