@@ -117,6 +117,10 @@ class Scenario(Settings):
             raise FieldError(
                 "odometry", f"{self.odometry:g} times the documented errors is too much: {error}"
             ) from None
+        if self.map == "none" and self.replanning is None:
+            raise FieldError(
+                "replan", "none: a mapless robot finds its way by replanning; false replans around no movers"
+            )
         if self.map == "none" and self.robot.lidar is None:
             raise FieldError("map", f"none: {self.robot.name} {NO_LIDAR}")
         kind = self.known_perception.kind
