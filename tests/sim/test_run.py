@@ -29,7 +29,7 @@ def test_a_run_ends_at_the_goal_certified(small_run):
     log = small_run.rollout
     assert math.dist(log.pose[-1, :2], small_run.scenario.task.goal) < 0.05
     assert len(log.contacts) == 0
-    assert log.clearance.min() > 0.3 * small_run.scenario.margin
+    assert log.clearance.min() > 0.3 * small_run.scenario.planned_margin
     assert log.t[1] == pytest.approx(1 / 240)
     assert log.outcome.key == "succeeded"
     assert json.dumps(small_run.as_dict())

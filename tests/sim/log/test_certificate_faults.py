@@ -487,6 +487,47 @@ def test_cells_are_neighbours():
         assert says(replace(drive(), cells=cells), "must be neighbours") is not fits
 
 
+def test_no_path_among_discs_is_longer_than_the_plan():
+    leads = math.dist((1.0, 1.0), (1.125, 1.125)) + math.dist((5.0, 1.0), (5.125, 1.125))
+
+    def optimum(metres):
+        return changed(drive(), "record.plan", euclidean_optimum_m=metres)
+
+    only_beyond(4.0 + leads, optimum, "euclidean_optimum_m", share=1e-5)
+    assert says(optimum(60.0), "record.plan.euclidean_optimum_m: 60 m is longer than the plan's 4.35355 m")
+    by_cells = ReplanRecord(t=1.0, trigger=DECISION, solved=False, cost_m=None, work=1, route=())
+    assert not says(with_record(optimum(60.0), replans=(by_cells,)), "is longer than the plan's")
+    assert not says(changed(optimum(60.0), "record.plan", cost_m=None), "is longer than the plan's")
+
+
+def test_a_plan_through_a_gap_of_just_its_width_does_not_bound_the_optimum():
+    """Contact closes a gap to the shortest path among discs, which leads around the wall."""
+    room = ROBOT.radius + 0.03
+    discs, y = [Disc(3.0, 1.55 + 0.1 + room, 0.1), Disc(3.0, 1.55 - 0.1 - room, 0.1)], 1.55
+    discs += [Disc(3.0, 1.55 + k * (0.1 + room + 0.18 * j), 0.1) for k in (-1, 1) for j in range(1, 6)]
+    discs = [disc for disc in discs if 0 < disc.y < 3.1]
+    task = Task(World("gap", (0.0, 0.0, 6.0, 5.0), tuple(discs)), (1.0, y, 0.0), (5.0, y), cell=0.1)
+    done = run(Scenario.of(task, "astar", margin=0.03))
+    plan = done.rollout.record.plan
+    assert plan.euclidean_optimum_m > plan.cost_m + 0.5
+    assert done.certificate.problems == ()
+
+
+def replanned(route, *, t=2.0, **changes):
+    """A slow drive that replans at (1.2, 1) after two seconds."""
+    replan = ReplanRecord(t=t, trigger="waited", solved=True, cost_m=4.0, work=1, route=route)
+    return with_record(drive(0.1), replans=(replan,), replanning={}, **changes)
+
+
+def test_replans_keep_the_room_of_the_plan():
+    assert not says(replanned(((1.2, 1.0), (5.0, 1.0))), "past an obstacle")
+    assert says(replanned(((1.2, 1.0), (3.0, 2.1), (5.0, 1.0))), "record.replans[0].route: leads 0.1")
+
+
+def test_replans_begin_at_the_robot():
+    only_beyond(1.5 * 0.25, lambda far: replanned(((1.2 + far, 1.0), (5.0, 1.0))), "m from the robot")
+
+
 def test_a_run_without_a_drive_has_no_rows():
     for outcome in (Outcome.NO_PATH, Outcome.STOPPED):
         assert says(with_record(drive(), outcome=outcome), "before the robot drives")

@@ -60,6 +60,7 @@ class RoutePlanner:
     robot: RobotSpec  # drives the routes
     controller: PurePursuit  # follows them
     margin: float  # clearance on top of the robot's radius [m]
+    usual_margin: float  # the default for robot, noise and smoothing [m]
     cell: float  # side of the grid cells [m]
     smoothing: str  # how plans become routes
     hz: int  # control periods per second

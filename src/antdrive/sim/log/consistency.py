@@ -30,6 +30,7 @@ POINT_SPACING = 0.05  # spacing of the route points whose clearance is checked [
 
 def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
     """Yield every contradiction of the plan with the world, itself or the rows."""
+    yield from _check_optima(rollout)
     if rollout.record.exploring:  # its plans refer to the occupancy map, in the frame of its odometry
         yield from _check_movers_known(rollout)
         yield from _check_replans(rollout)
@@ -81,9 +82,7 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
     A replan begins anywhere, even beside a mover, so its first leg may pass closer to other obstacles.
     """
     record = rollout.record
-    arc = arc_lengths(route)
-    along = np.linspace(0.0, arc[-1], min(100_000, 2 + math.ceil(float(arc[-1]) / POINT_SPACING)))
-    points = np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
+    points = _spaced(route)
     own = min(record.inflate, float(_room(rollout, route[:1])[0])) if name == "route" else -math.inf
     leaving = np.hypot(*(points - route[0]).T) <= end_reach(record.inflate, record.cell)
     needed = np.where(leaving, own, record.inflate)
@@ -94,6 +93,13 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
         yield (
             f"{name}: leads {room[worst]:.3g} m past an obstacle; the plan's inflation is {record.inflate:.3g} m{start}"
         )
+
+
+def _spaced(route: Floats) -> Floats:
+    """Return points (N, 2) along a route, `POINT_SPACING` apart or closer [m]."""
+    arc = arc_lengths(route)
+    along = np.linspace(0.0, arc[-1], min(100_000, 2 + math.ceil(float(arc[-1]) / POINT_SPACING)))
+    return np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
 
 
 def _room(rollout: Rollout, points: Floats) -> Floats:
@@ -127,17 +133,20 @@ def _check_cells(rollout: Rollout) -> Iterator[str]:
 
 def _leads(rollout: Rollout) -> tuple[float, float]:
     """Return the distances of the first cell from the start and of the last from the goal [m]; 0 without cells."""
-    record, cells = rollout.record, rollout.cells
-    if not len(cells):
+    if not len(rollout.cells):
         return 0.0, 0.0
-    xmin, ymin, _, _ = record.world.bounds
-    first, last = (cells[[0, -1], ::-1] + 0.5) * record.cell + (xmin, ymin)
-    return math.dist(first, record.task.start[:2]), math.dist(last, record.task.goal)
+    task, (first, last) = rollout.record.task, _centres(rollout)[[0, -1]]
+    return math.dist(first, task.start[:2]), math.dist(last, task.goal)
+
+
+def _centres(rollout: Rollout) -> Floats:
+    """Return the centres of the planned cells (P, 2) [m]."""
+    return np.asarray((rollout.cells[:, ::-1] + 0.5) * rollout.record.cell + rollout.record.world.bounds[:2])
 
 
 def _check_lengths(rollout: Rollout) -> Iterator[str]:
     """Check that the plan's length is that of its cells, and not below the optimum."""
-    plan, cell, task = rollout.record.plan, rollout.record.cell, rollout.record.task
+    plan, cell = rollout.record.plan, rollout.record.cell
     length = polyline_length(rollout.cells) * cell
     slack = SAME_LENGTH * max(1.0, length)
     if plan.cost_m is None:
@@ -148,13 +157,39 @@ def _check_lengths(rollout: Rollout) -> Iterator[str]:
     elif plan.grid_optimum_m is not None and plan.grid_optimum_m > plan.cost_m + slack:
         yield f"record.plan.grid_optimum_m: {plan.grid_optimum_m:.6g} m is longer than the plan's {plan.cost_m:.6g} m"
     leads = sum(_leads(rollout))
-    straight = math.dist(task.start[:2], task.goal) - max(leads, 2 * NEAR * cell)
-    for key in ("length_m", "euclidean_optimum_m", "grid_optimum_m"):
-        value = getattr(plan, key)
-        if value is not None and not _by_cells(rollout) and value < straight:
-            yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
+    if not _by_cells(rollout) and plan.length_m < _straight(rollout, leads):
+        yield f"record.plan.length_m: {plan.length_m:.6g} m, but start and goal are farther apart"
+    free = plan.euclidean_optimum_m
+    if plan.cost_m is not None and free is not None and free > plan.cost_m + leads + slack and _is_clear(rollout):
+        yield f"record.plan.euclidean_optimum_m: {free:.6g} m is longer than the plan's {plan.cost_m + leads:.6g} m"
     if plan.cost_m is not None and plan.length_m > longest_line(plan.cost_m, leads, cell) + slack:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
+
+
+def _straight(rollout: Rollout, leads: float) -> float:
+    """Return a lower bound of every path's length [m]; ends may lead away by `leads` [m]."""
+    task = rollout.record.task
+    return math.dist(task.start[:2], task.goal) - max(leads, 2 * NEAR * rollout.record.cell)
+
+
+def _is_clear(rollout: Rollout) -> bool:
+    """Return whether the cells lead from start to goal with more room than the inflation; contact closes a free path."""
+    record = rollout.record
+    if _by_cells(rollout):
+        return False
+    between = POINT_SPACING**2 / (8 * record.inflate) + JUST_ROOM  # the largest room lost between two points
+    return bool(_room(rollout, _spaced(_centres(rollout))).min() > record.inflate + between)
+
+
+def _check_optima(rollout: Rollout) -> Iterator[str]:
+    """Check that the shortest paths are no shorter than the straight line. `verify --world` computes them."""
+    record = rollout.record
+    elsewhere = record.exploring or _by_cells(rollout)  # the cells end elsewhere
+    leads = 2 * end_reach(record.inflate, record.cell) if elsewhere else sum(_leads(rollout))
+    for key in ("euclidean_optimum_m", "grid_optimum_m"):
+        value = getattr(record.plan, key)
+        if value is not None and value < _straight(rollout, leads):
+            yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
 
 
 def _check_movers_known(rollout: Rollout) -> Iterator[str]:
