@@ -55,6 +55,7 @@ def barn(
     folder = challenge.unpacked(source, out / "worlds")
     if map == "given" and given["localisation"] == "matching":
         given["localisation"] = "fixes"
+        print_error("localisation: fixes, because matching needs --map none")
     data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
     fastest = challenge.reference_times(folder)
