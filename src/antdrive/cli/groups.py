@@ -115,7 +115,9 @@ class _Panelled(typer.core.TyperCommand):
         given = Counter(one for one in self.make_parser(ctx).parse_args(args=list(args))[2] if _is_single(one))
         twice = next((one for one, times in given.items() if times > 1), None)
         if twice is not None:
-            raise InputError(f"{'/'.join((*twice.opts[:1], *twice.secondary_opts))}: given {given[twice]} times; keep one")
+            raise InputError(
+                f"{'/'.join((*twice.opts[:1], *twice.secondary_opts))}: given {given[twice]} times; keep one"
+            )
         return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
