@@ -72,9 +72,10 @@ def show_world(
     from antdrive.base.plane import world_to_map
     from antdrive.planners import Query, load_planner, reachable
     from antdrive.robots import list_robots, load_robot, overlap_at
+    from antdrive.robots.default_margin import LEAST
     from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
 
-    margin = settings["margin"]
+    margin = LEAST if settings["margin"] is None else settings["margin"]
     if margin == "auto":
         raise InputError("--margin auto: applies to drives only; give a number of metres")
     given, spec = ends.of(world), load_robot(robot)
