@@ -189,6 +189,53 @@ class Mine(AStar):
 """
 
 
+RAISES = "def end(error):\n    raise error\n\nend({})\n"
+
+
+@pytest.mark.parametrize("error", ["GeneratorExit()", "KeyboardInterrupt()", "BaseException('a\\nb')", "MemoryError()"])
+def test_anything_raised_on_import_is_said_in_one_line(tmp_path, error):
+    (tmp_path / "mine.py").write_text(RAISES.format(error))
+    with pytest.raises(
+        InputError, match=rf"mine.py: cannot be imported \({error.partition('(')[0]}.*, mine.py:2\)$"
+    ) as said:
+        load_planner(f"{tmp_path}/mine.py:Mine")
+    assert str(said.value).isprintable()
+
+
+WRONG = """
+from dataclasses import dataclass
+from antdrive.planners import GridPlanner
+@dataclass{}
+class Mine(GridPlanner):
+    width: int
+    def _plan(self, query, rng): ...
+class Bare: ...
+class Short:
+    def plan(self, query): ...
+class Ends:
+    def __init__(self): raise GeneratorExit
+    def plan(self, query, rng): ...
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "frozen", "words"),
+    [
+        ("", True, r"mine.py names no class; write .*mine.py:CLASS; it has Mine, Short, Ends$"),
+        (":", True, r"mine.py names no class; write .*mine.py:CLASS; it has Mine, Short, Ends$"),
+        (":Mine", False, r"mine.py: Mine needs @dataclass\(frozen=True\), as its base class has \(mine.py:4\)"),
+        (":Mine", True, r"mine.py:Mine' cannot be created: give all its options default values \(.*'width'\)"),
+        (":Bare", True, r"it has no method plan\(query, rng\); write one, or inherit antdrive.planners.GridPlanner"),
+        (":Short", True, r"its method must be plan\(query, rng\) \(too many positional arguments\)"),
+        (":Ends", True, r"mine.py:Ends' cannot be loaded: GeneratorExit \(mine.py:12\)"),
+    ],
+)
+def test_a_class_that_is_no_planner_is_told_what_to_write(tmp_path, name, frozen, words):
+    (tmp_path / "mine.py").write_text(WRONG.format("(frozen=True)" if frozen else ""))
+    with pytest.raises(InputError, match=words):
+        load_planner(f"{tmp_path}/mine.py{name}")
+
+
 def test_a_file_is_read_again_when_it_has_changed(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(MINE)

@@ -4,6 +4,7 @@ import dataclasses
 import math
 import pickle
 import re
+import signal
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from hypothesis import strategies as st
 from antdrive.base import InputError
 from antdrive.base.errors import Terminated
 from antdrive.planners import (
+    Capabilities,
+    GridPlanner,
     History,
     PlannerError,
     PlanResult,
@@ -20,10 +23,14 @@ from antdrive.planners import (
     Query,
     SafeIntervals,
     TimedPlan,
+    agent_for,
+    as_iterative,
+    capabilities_of,
     check_plan,
     checked,
     load_planner,
     path_cost,
+    replanner_for,
     request_plan,
 )
 from antdrive.worlds import Cruising, Disc, Grid, Task, Trajectories, World, rasterise
@@ -244,9 +251,130 @@ def test_an_answer_that_is_no_plan_result_is_a_planner_error(answer):
         request_plan(Broken(answer), QUERY, RNG(0))
 
 
-def test_a_planner_that_exits_is_a_planner_error():
-    with pytest.raises(PlannerError, match=r"planner Broken raised SystemExit: 0 \(test_validation.py:"):
-        request_plan(Broken(SystemExit(0)), QUERY, RNG(0))
+class Unprintable(Exception):
+    """An exception that cannot be formatted, and whose class is hidden."""
+
+    def __str__(self):
+        raise GeneratorExit
+
+    __repr__ = __str__
+    __class__ = property(__str__)
+
+
+class Halting(BaseException):
+    """An exception that no `except Exception` catches."""
+
+
+RAISED = {
+    "SystemExit: 0": SystemExit(0),
+    "GeneratorExit": GeneratorExit(),
+    "StopIteration: 3": StopIteration(3),
+    "KeyboardInterrupt": KeyboardInterrupt(),
+    "MemoryError": MemoryError(),
+    "Halting: mine": Halting("mine"),
+    "Unprintable": Unprintable("no text"),
+    "ValueError: a\\nb\\x1b[31m": ValueError("a\nb\x1b[31m"),
+    f"ValueError: {'x' * 197}...": ValueError("x" * 100_000),
+}
+
+
+@pytest.mark.parametrize("said", RAISED)
+def test_anything_that_a_planner_raises_is_a_planner_error_of_one_line(said):
+    with pytest.raises(PlannerError) as error:
+        request_plan(Broken(RAISED[said]), QUERY, RNG(0))
+    line = Broken.plan.__code__.co_firstlineno + 2
+    assert str(error.value) == f"planner Broken raised {said} (test_validation.py:{line})"
+
+
+def test_endless_recursion_is_a_planner_error():
+    class Recursing(Broken):
+        def plan(self, query, rng):
+            return self.plan(query, rng)
+
+    with pytest.raises(PlannerError, match="planner Recursing raised RecursionError: maximum"):
+        request_plan(Recursing(None), QUERY, RNG(0))
+
+
+class Hidden:
+    """An object that claims to be a plan and has no text."""
+
+    __class__ = PlanResult
+
+    def __repr__(self):
+        raise ValueError
+
+
+class Lazy(PlanResult):
+    """A plan whose path raises an exception."""
+
+    @property
+    def cells(self):
+        raise KeyError("cells")
+
+
+def test_an_answer_that_only_looks_like_a_plan_is_a_planner_error():
+    with pytest.raises(PlannerError, match=r"returned a Hidden instead of a PlanResult \(test_validation.py:"):
+        request_plan(Broken(Hidden()), QUERY, RNG(0))
+    lazy = object.__new__(Lazy)
+    vars(lazy).update({key: value for key, value in vars(RIGHT).items() if key != "cells"})
+    with pytest.raises(PlannerError, match=r"planner Broken raised KeyError: 'cells' \(test_validation.py:"):
+        request_plan(Broken(lazy), QUERY, RNG(0))
+    with pytest.raises(PlannerError, match=r"planner Broken raised ValueError \(test_validation.py:"):
+        request_plan(Broken(dataclasses.replace(RIGHT, options={"x": Hidden()})), QUERY, RNG(0))
+
+
+@pytest.mark.parametrize(
+    "key", ["status", "cells", "waypoints", "cost", "work", "reason", "options", "history", "field"]
+)
+def test_a_field_without_a_text_is_named_by_its_type(key):
+    problem = checked(QUERY, dataclasses.replace(RIGHT, **{key: Hidden()})).reason
+    assert problem.startswith(f"{key}: must be")
+    assert problem.endswith("got a Hidden")
+
+
+def test_the_reason_of_a_plan_is_one_line():
+    no_path = PlanResult(status=PlanStatus.NO_PATH, reason="a\nb\x1b[31m" + "x" * 999)
+    reason = checked(QUERY, no_path).reason
+    assert reason.startswith("a\\nb\\x1b[31mxxx")
+    assert len(reason) < 250
+
+
+def test_capabilities_that_raise_are_a_planner_error():
+    class Secretive(Broken):
+        @property
+        def capabilities(self):
+            raise RuntimeError("secret")
+
+    with pytest.raises(PlannerError, match=r"planner Secretive raised RuntimeError: secret \(test_validation.py:"):
+        capabilities_of(Secretive(None))
+
+
+def test_a_planner_that_only_declares_iterations_is_named():
+    planner = Broken(RIGHT)
+    planner.capabilities = Capabilities(iterative=True)
+    with pytest.raises(PlannerError, match="planner Broken declares itself iterative, but lacks iterate, iterations"):
+        as_iterative(planner)
+
+
+@pytest.mark.parametrize(("method", "wanted"), [("replanner", "Replanner"), ("agent", "OnlineAgent")])
+def test_a_replanner_or_agent_of_the_wrong_kind_is_named_with_what_it_lacks(method, wanted):
+    planner = Broken(RIGHT)
+    planner.capabilities = Capabilities(own_replanner=method == "replanner", cell_by_cell=method == "agent")
+    setattr(planner, method, lambda query, rng: None)
+    make = replanner_for if method == "replanner" else agent_for
+    with pytest.raises(PlannerError, match=f"planner Broken returned None instead of a {wanted}; it lacks .*move"):
+        make(planner, QUERY, RNG(0))
+
+
+def test_a_grid_planner_whose_search_returns_nothing_is_named():
+    class Empty(GridPlanner):
+        def _plan(self, query, rng):
+            return None
+
+    with pytest.raises(
+        PlannerError, match=r"planner Empty returned None instead of a PlanResult \(test_validation.py:"
+    ):
+        request_plan(Empty(), QUERY, RNG(0))
 
 
 def test_a_planner_error_can_be_pickled():
@@ -256,7 +384,16 @@ def test_a_planner_error_can_be_pickled():
     assert (str(copy), copy.planner, copy.problem) == (str(error.value), "mine", error.value.problem)
 
 
-def test_input_errors_and_ctrl_c_pass_through():
-    for error in (InputError("query: has no task"), KeyboardInterrupt(), Terminated(143)):
+def test_input_errors_sigterm_and_ctrl_c_pass_through():
+    for error in (InputError("query: has no task"), Terminated(143)):
         with pytest.raises(type(error)):
             request_plan(Broken(error), QUERY, RNG(0))
+
+    class Interrupted(Broken):
+        def plan(self, query, rng):
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        request_plan(Interrupted(None), QUERY, RNG(0))
+    assert signal.getsignal(signal.SIGINT) is before

@@ -13,6 +13,8 @@ from .colonies.merging_ants import WarmStartedColony as WarmStartedColony
 from .colonies.mmas_dstar import MaxMinDStar as MaxMinDStar
 from .colonies.mmas_dstar import PheromoneAgent as PheromoneAgent
 from .colonies.pfaco import PotentialFieldAnts as PotentialFieldAnts
+from .errors import PlannerError as PlannerError
+from .errors import planner_errors as planner_errors
 from .graph.apf import PotentialField as PotentialField
 from .graph.incremental import DStar as DStar
 from .graph.incremental import DStarLite as DStarLite
@@ -35,7 +37,6 @@ from .plan import Cells as Cells
 from .plan import GridPlanner as GridPlanner
 from .plan import History as History
 from .plan import Planner as Planner
-from .plan import PlannerError as PlannerError
 from .plan import PlanResult as PlanResult
 from .plan import PlanStatus as PlanStatus
 from .plan import Query as Query
@@ -61,6 +62,5 @@ from .user_code import record_name as record_name
 from .validation import check_plan as check_plan
 from .validation import check_step as check_step
 from .validation import checked as checked
-from .validation import planner_errors as planner_errors
 from .validation import request_plan as request_plan
 from .validation import require_result as require_result

@@ -17,6 +17,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import require
+from antdrive.planners.errors import PlannerError, planner_errors
 from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import (
     Capabilities,
@@ -218,5 +219,15 @@ class IterativePlanner(GridPlanner):
 
 
 def as_iterative(planner: Planner) -> IterativePlanner | None:
-    """Return the planner if it declares itself iterative, else None."""
-    return cast(IterativePlanner, planner) if capabilities_of(planner).iterative else None
+    """Return the planner if it declares itself iterative, else None.
+
+    Raises:
+        PlannerError: the planner declares itself iterative, but has no iterations.
+    """
+    if not capabilities_of(planner).iterative:
+        return None
+    with planner_errors(planner):
+        missing = [name for name in ("iterate", "iterations", "time_budget") if not hasattr(planner, name)]
+    if missing:
+        raise PlannerError(type(planner).__name__, f"declares itself iterative, but lacks {', '.join(missing)}")
+    return cast(IterativePlanner, planner)

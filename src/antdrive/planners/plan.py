@@ -9,13 +9,15 @@ import math
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, cast, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Point
-from antdrive.base.errors import FieldError, input_error
+from antdrive.base.errors import FieldError
+from antdrive.base.guarded import value_text
+from antdrive.planners.errors import PlannerError, planner_errors
 from antdrive.planners.warmup import kernels_loaded
 from antdrive.worlds import MoverMotion, Task
 from antdrive.worlds.route import cells_beside
@@ -296,23 +298,6 @@ class Capabilities:
     cell_by_cell: bool = False
 
 
-class PlannerError(RuntimeError):
-    """An exception raised by a planner, or a return value of an invalid type; the message is one line.
-
-    Attributes:
-        planner: the planner's name
-        problem: the exception or the value, and its place
-    """
-
-    def __init__(self, planner: str, problem: str) -> None:
-        super().__init__(str(input_error(f"planner {planner} {problem}")))
-        self.planner, self.problem = planner, problem
-
-    def __reduce__(self) -> tuple[type[PlannerError], tuple[str, str]]:
-        """Return the parts from which another process rebuilds the error."""
-        return type(self), (self.planner, self.problem)
-
-
 @runtime_checkable
 class Planner(Protocol):
     """A path planner. All randomness comes from `rng`: the same seed gives the same plan.
@@ -329,12 +314,13 @@ def capabilities_of(planner: Planner) -> Capabilities:
     """Return the declared capabilities of a planner; the defaults if it declares none.
 
     Raises:
-        PlannerError: its attribute `capabilities` has another type.
+        PlannerError: its attribute `capabilities` has another type, or raises an exception.
     """
-    declared: Any = getattr(planner, "capabilities", Capabilities())
-    if not isinstance(declared, Capabilities):
-        raise PlannerError(type(planner).__name__, f"declares {declared!r:.40} instead of Capabilities")
-    return declared
+    with planner_errors(planner):
+        declared: Any = getattr(planner, "capabilities", Capabilities())
+    if not issubclass(type(declared), Capabilities):
+        raise PlannerError(type(planner).__name__, f"declares {value_text(declared)} instead of Capabilities")
+    return cast(Capabilities, declared)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -353,8 +339,10 @@ class GridPlanner(abc.ABC):
         """Find a path from the start cell to the goal cell."""
         with kernels_loaded(self, query):
             started = time.perf_counter()
-            result = self._answer(query, rng)
+            result: Any = self._answer(query, rng)
             spent = time.perf_counter() - started
+        if not isinstance(result, PlanResult):  # a user's `_plan`; `request_plan` refuses it
+            return cast(PlanResult, result)
         options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return dataclasses.replace(result, options=options, wall_s=spent)
 

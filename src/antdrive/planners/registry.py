@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import importlib.metadata
+import inspect
 import math
 import numbers
 import types
@@ -15,6 +16,8 @@ from types import MappingProxyType
 from typing import Any, Literal, Union
 
 from antdrive.base import FieldError, InputError
+from antdrive.base.errors import input_error
+from antdrive.base.guarded import UserCode, error_text, one_line, place
 from antdrive.planners.anyangle.ga_han import GaHan
 from antdrive.planners.anyangle.hybrid import Hybrid
 from antdrive.planners.anyangle.tangent import Tangent
@@ -56,7 +59,7 @@ def load_planner(name: str, /, **options: Any) -> Planner:
     Raises:
         InputError: the planner or option is unknown, or the value is invalid; lists the valid choices.
     """
-    if is_user_code(name):
+    if is_user_code(name) or name.endswith(".py"):
         return make_planner(user_object(name), name, **options)
     planner = PLANNERS.get(name)
     if planner is None:
@@ -184,18 +187,20 @@ def _with_options(name: str, planner: Planner, options: Mapping[str, Any]) -> Pl
     if not options:
         return planner
     known = {f.name for f in _fields(planner)}
-    hints = typing.get_type_hints(type(planner)) if known else {}
+    with _loading(f"planner {name!r}", ""):
+        hints = typing.get_type_hints(type(planner)) if known else {}
     values: dict[str, Any] = {}
     for key, value in options.items():
         if key not in known:
             raise InputError(f"planner.{key}: {_unknown(key, known, f'option of {name}')}")
         values[key] = parse(f"planner.{key}", hints[key], value)
     try:
-        return typing.cast(Planner, dataclasses.replace(typing.cast(Any, planner), **values))
+        with _loading(f"planner {name!r}", "", (ValueError,)):
+            return typing.cast(Planner, dataclasses.replace(typing.cast(Any, planner), **values))
     except FieldError as error:
         raise InputError(str(error.under("planner"))) from None
     except ValueError as error:  # from a third-party planner
-        raise InputError(f"planner: {error}") from None
+        raise InputError(f"planner: {one_line(str(error))}") from None
 
 
 def _fields(planner: Planner) -> tuple[dataclasses.Field[Any], ...]:
@@ -227,22 +232,47 @@ def _plugins() -> dict[str, importlib.metadata.EntryPoint]:
 
 def _load(entry: importlib.metadata.EntryPoint) -> Planner:
     who = f"planner {entry.name!r} of {_maker(entry)}"
-    try:
+    with _loading(who, f" ({entry.value})"):
         made = entry.load()
-    except Exception as error:  # a third-party import may raise anything
-        raise InputError(f"{who} cannot be loaded ({entry.value}): {type(error).__name__}: {error}") from error
     return _instance(made, who, f" ({entry.value})")
 
 
 def _instance(made: Any, who: str, source: str = "") -> Planner:
     """Return a third-party object or class as a planner; `who` and `source` are for messages."""
-    try:
-        planner = made() if isinstance(made, type) else made
-    except Exception as error:  # a third-party constructor may raise anything
-        raise InputError(f"{who} cannot be loaded{source}: {type(error).__name__}: {error}") from error
-    if not isinstance(planner, Planner):
-        raise InputError(f"{who} is not a planner{source}: it has no method `plan(query, rng)`")
+    with _loading(who, source):
+        if issubclass(type(made), type) and (lacking := _mismatch(made)):
+            raise InputError(f"{who} cannot be created{source}: give all its options default values ({lacking})")
+        planner = made() if issubclass(type(made), type) else made
+        if not isinstance(planner, Planner) or not callable(planner.plan):
+            raise InputError(
+                f"{who} is not a planner{source}: it has no method plan(query, rng); write one, "
+                "or inherit antdrive.planners.GridPlanner and write _plan(query, rng)"
+            )
+        if wrong := _mismatch(planner.plan, None, None):
+            raise InputError(f"{who} is not a planner{source}: its method must be plan(query, rng) ({wrong})")
     return planner
+
+
+def _loading(who: str, source: str, passing: tuple[type[Exception], ...] = ()) -> UserCode:
+    """Return a block for the user's code that makes a planner; `who` and `source` are for messages."""
+
+    def error_of(error: BaseException) -> InputError:
+        return input_error(f"{who} cannot be loaded{source}: {error_text(error)} ({place(error, None)})")
+
+    return UserCode(error_of, passing)
+
+
+def _mismatch(function: Any, *arguments: Any) -> str:
+    """Return why a function cannot be called with these arguments; empty if it can, or if its signature is unknown."""
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # compiled
+        return ""
+    try:
+        signature.bind(*arguments)
+    except TypeError as error:
+        return str(error)
+    return ""
 
 
 def _maker(entry: importlib.metadata.EntryPoint) -> str:

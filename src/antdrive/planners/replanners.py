@@ -6,15 +6,19 @@ import abc
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Protocol, cast, runtime_checkable
+from typing import Any, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
+from antdrive.base.guarded import value_text
+from antdrive.planners.errors import PlannerError, planner_errors
 from antdrive.planners.graph.incremental import CachedReplanner, Replanner, ReplanningPlanner
 from antdrive.planners.plan import Cell, Planner, PlanResult, Query, capabilities_of
-from antdrive.planners.validation import planner_errors, request_plan
+from antdrive.planners.validation import request_plan
+
+Made = TypeVar("Made")
 
 
 def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> Replanner:
@@ -35,8 +39,18 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
             )
     if can.own_replanner:
         with planner_errors(planner):
-            return cast(ReplanningPlanner, planner).replanner(query, rng)
+            return _of_kind(Replanner, planner, cast(ReplanningPlanner, planner).replanner(query, rng))
     return ReplanFromScratch(planner, query, rng)
+
+
+def _of_kind(protocol: Any, planner: Planner, made: Made) -> Made:
+    """Return the planner's replanner or agent if it has all methods of the protocol."""
+    if isinstance(made, protocol):
+        return made
+    names = (*protocol.__annotations__, *(name for name in vars(protocol) if not name.startswith("_")))
+    missing = [name for name in names if not hasattr(made, name)]
+    name, kind = type(planner).__name__, protocol.__name__
+    raise PlannerError(name, f"returned {value_text(made)} instead of a {kind}; it lacks {', '.join(missing)}")
 
 
 class ReplanFromScratch(CachedReplanner):
@@ -130,7 +144,7 @@ def agent_for(planner: Planner, query: Query, rng: np.random.Generator) -> Onlin
     """
     if capabilities_of(planner).cell_by_cell:
         with planner_errors(planner):
-            return cast(CellByCellPlanner, planner).agent(query, rng)
+            return _of_kind(OnlineAgent, planner, cast(CellByCellPlanner, planner).agent(query, rng))
     return ReplanningAgent(replanner_for(planner, query, rng))
 
 

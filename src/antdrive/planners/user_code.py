@@ -11,13 +11,18 @@ import importlib.machinery
 import importlib.util
 import inspect
 import sys
+import traceback
 from collections.abc import Iterator
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from antdrive.base.errors import InputError, Terminated, input_error
+from antdrive.base.document import MAX_BYTES
+from antdrive.base.errors import InputError, input_error
+from antdrive.base.files import read_bytes
+from antdrive.base.guarded import UserCode, error_text, place, value_text
 
+FROZEN_BASE = "cannot inherit non-frozen dataclass"  # message of Python about a dataclass without frozen=True
 DIGITS = 8  # hexadecimal digits of a file's hash
 FROM_FILE = "_antdrive_user_"  # name prefix of modules loaded from files
 
@@ -59,7 +64,7 @@ class UserCodeError(InputError):
 
 def user_object(name: str) -> Any:
     """Return the object of a user's file or module that the part after the last colon names."""
-    source, _, word = name.rpartition(":")
+    source, _, word = (f"{name}:" if name.endswith(".py") else name).rpartition(":")
     return load_object(source, word, is_file=source.endswith(".py"))
 
 
@@ -68,18 +73,27 @@ def load_object(source: str, word: str, folder: Path | None = None, *, is_file: 
 
     A file is read again after its content changes. Different folders may contain modules of the same name.
     """
-    try:
+    with UserCode(functools.partial(_import_error, source)):
         module = _from_file(source, folder) if is_file else _from_module(source, folder)
-    except (InputError, Terminated):
-        raise
-    except SystemExit as error:
-        problem = f"{source}: calls exit on import (exit code {error.code}); guard its script code"
-        raise UserCodeError(f'{problem} with if __name__ == "__main__"') from error
-    except Exception as error:  # user code may raise anything on import
-        raise UserCodeError(f"{source}: cannot be imported ({type(error).__name__}: {error})") from error
-    if not word or not hasattr(module, word):
+    if not word:
+        raise UserCodeError(f"{source} names no class; write {source}:CLASS; {_choices(module, word)}", of_class=True)
+    if not hasattr(module, word):
         raise UserCodeError(f"{source} has no {word!r}; {_choices(module, word)}", of_class=True)
     return getattr(module, word)
+
+
+def _import_error(source: str, error: BaseException) -> UserCodeError:
+    """Return the error of a file or module that cannot be imported."""
+    at = place(error, getattr(error, "filename", None) or str(Path(source).resolve()))
+    if issubclass(type(error), SystemExit):
+        problem = f"{source}: calls exit on import (exit code {value_text(error.args[0] if error.args else 0)}, {at})"
+        return UserCodeError(f'{problem}; guard its script code with if __name__ == "__main__"')
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        declared = frame.f_locals.get("cls")
+        if frame.f_code.co_name == "_process_class" and FROZEN_BASE in error_text(error):
+            name = getattr(declared, "__name__", "the class")
+            return UserCodeError(f"{source}: {name} needs @dataclass(frozen=True), as its base class has ({at})")
+    return UserCodeError(f"{source}: cannot be imported ({', '.join(filter(None, (error_text(error), at)))})")
 
 
 def is_importable_elsewhere(planner: object) -> bool:
@@ -108,17 +122,16 @@ def _hash(content: bytes) -> str:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise UserCodeError(f"{path}: no such file") from None
-    except OSError as error:
-        raise UserCodeError(f"{path}: cannot be read ({error.strerror})") from None
+        return read_bytes(path, MAX_BYTES, "a Python file")
+    except InputError as error:
+        raise UserCodeError(str(error)) from None
 
 
 def _choices(module: ModuleType, word: str) -> str:
     """Return a hint for an unknown name: the closest match, the module's planners, or all its names."""
     known = {name: value for name, value in vars(module).items() if not name.startswith("_")}
-    planners = [name for name, value in known.items() if inspect.getattr_static(value, "plan", None) is not None]
+    own = {name: value for name, value in known.items() if getattr(value, "__module__", None) == module.__name__}
+    planners = [name for name, value in own.items() if inspect.getattr_static(value, "plan", None) is not None]
     close = difflib.get_close_matches(word, planners or known, n=1)
     return f"did you mean {close[0]}?" if close else f"it has {', '.join(planners or known) or 'nothing'}"
 

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 import numbers
-import sys
-import traceback
-from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, cast
 
 import numpy as np
 
 from antdrive.base import Floats
-from antdrive.base.errors import InputError, Terminated
+from antdrive.base.guarded import one_line, value_text
 from antdrive.base.plane import polyline_length, segment_lengths, wrap_angle
+from antdrive.planners.errors import PlannerError, place_of, planner_errors
 from antdrive.planners.plan import (
     Cell,
     History,
     Planner,
-    PlannerError,
     PlanResult,
     PlanStatus,
     Query,
@@ -52,26 +48,6 @@ def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name:
     return require_result(planner, answer, name)
 
 
-@contextlib.contextmanager
-def planner_errors(planner: Planner, name: str = "") -> Iterator[None]:
-    """Turn exceptions raised in this block into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
-
-    Args:
-        planner: the planner whose code runs in the block
-        name: the planner's name in errors; empty: its class
-
-    Raises:
-        PlannerError: the block raised an exception; names its class and line.
-    """
-    try:
-        yield
-    except (InputError, PlannerError, Terminated):
-        raise
-    except (Exception, SystemExit) as error:  # a third-party planner may raise anything, and call exit()
-        says = f"{type(error).__name__}: {error}".strip().removesuffix(":")
-        raise PlannerError(name or type(planner).__name__, f"raised {says} ({_place(planner, error)})") from error
-
-
 def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
     """Return the answer of a planner or its replanner if it is a `PlanResult`.
 
@@ -81,23 +57,17 @@ def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
         name: the planner's name in errors; empty: its class
 
     Raises:
-        PlannerError: the answer has another type.
+        PlannerError: the answer has another type, or a field that raises an exception.
     """
-    if isinstance(answer, PlanResult):
-        return answer
     called = name or type(planner).__name__
-    raise PlannerError(called, f"returned {answer!r:.60} instead of a PlanResult ({_place(planner)})")
-
-
-def _place(planner: Planner, error: BaseException | None = None) -> str:
-    """Return the file and line of the planner's module that raised the error; without an error, of its `plan`."""
-    home = getattr(sys.modules.get(type(planner).__module__), "__file__", None)
-    frames = traceback.extract_tb(error.__traceback__) if error is not None else []
-    frames = [frame for frame in frames if frame.filename != __file__]
-    for frame in [*(f for f in reversed(frames) if f.filename == home), *reversed(frames)]:
-        return f"{Path(frame.filename).name}:{frame.lineno}"
-    code = getattr(getattr(planner, "plan", None), "__code__", None)
-    return f"{Path(code.co_filename).name}:{code.co_firstlineno}" if code else type(planner).__module__
+    if not issubclass(type(answer), PlanResult):  # `isinstance` would believe the `__class__` of user code
+        raise PlannerError(called, f"returned {value_text(answer, 60)} instead of a PlanResult ({place_of(planner)})")
+    with planner_errors(planner, name):  # a subclass may compute its fields, and options may be any object
+        if type(answer) not in (PlanResult, TimedPlan):
+            kind = TimedPlan if issubclass(type(answer), TimedPlan) else PlanResult
+            answer = kind(**{field.name: getattr(answer, field.name) for field in dataclasses.fields(kind)})
+        str(answer.options)
+    return cast(PlanResult, answer)
 
 
 def checked(query: Query, answer: PlanResult) -> PlanResult:
@@ -110,8 +80,9 @@ def checked(query: Query, answer: PlanResult) -> PlanResult:
     problem = check_plan(query, answer)
     if not problem:
         if len(answer.cells) and answer.cells.dtype != np.int32:
-            return dataclasses.replace(answer, cells=np.ascontiguousarray(answer.cells, dtype=np.int32))
-        return answer
+            answer = dataclasses.replace(answer, cells=np.ascontiguousarray(answer.cells, dtype=np.int32))
+        reason = one_line(answer.reason)
+        return answer if reason == answer.reason else dataclasses.replace(answer, reason=reason)
     sane = isinstance(answer.wall_s, float) and 0 <= answer.wall_s < math.inf
     return PlanResult(status=PlanStatus.INVALID, reason=problem, wall_s=answer.wall_s if sane else 0.0)
 
@@ -155,10 +126,10 @@ def check_plan(query: Query, result: PlanResult) -> str:
 
 def _types(result: PlanResult) -> str:
     """Return the first field of a plan with an invalid type, shape or value; or empty."""
-    if result.status not in (PlanStatus.SOLVED, PlanStatus.NO_PATH, PlanStatus.STOPPED):
-        return f"status: must be SOLVED, NO_PATH or STOPPED, got {result.status!r:.40}"
+    if not any(result.status is status for status in (PlanStatus.SOLVED, PlanStatus.NO_PATH, PlanStatus.STOPPED)):
+        return f"status: must be SOLVED, NO_PATH or STOPPED, got {value_text(result.status)}"
     cells, waypoints = result.cells, result.waypoints
-    if not (isinstance(cells, np.ndarray) and cells.dtype.kind in "iu" and cells.ndim == 2 and cells.shape[1] == 2):
+    if not (_is_array(cells) and cells.dtype.kind in "iu" and cells.ndim == 2 and cells.shape[1] == 2):
         return f"cells: must be an array of whole numbers (N, 2), got {_kind(cells)}"
     if waypoints is not None:
         if not (_floats(waypoints) and waypoints.ndim == 2 and waypoints.shape[1] == 2 and len(waypoints)):
@@ -173,17 +144,17 @@ def _types(result: PlanResult) -> str:
         wanted = numbers.Integral if whole else numbers.Real
         if key == "length" and value is None:
             continue
-        if isinstance(value, bool) or not isinstance(value, wanted):
-            return f"{key}: must be a {'whole ' if whole else ''}number, got {value!r:.40}"
+        if isinstance(value, bool) or not issubclass(type(value), wanted):
+            return f"{key}: must be a {'whole ' if whole else ''}number, got {value_text(value)}"
         infinite = key == "cost" and (waypoints is not None or not len(cells))
         if not (0 <= float(value) < math.inf or (infinite and value == math.inf)):
             return f"{key}: must be finite and at least 0, got {value}"
     for key in ("reason", "work_unit"):
-        if not isinstance(getattr(result, key), str):
-            return f"{key}: must be text, got {getattr(result, key)!r:.40}"
+        if not issubclass(type(getattr(result, key)), str):
+            return f"{key}: must be text, got {value_text(getattr(result, key))}"
     options: Any = result.options
-    if not isinstance(options, Mapping):
-        return f"options: must be a mapping, got {options!r:.40}"
+    if not issubclass(type(options), Mapping):
+        return f"options: must be a mapping, got {value_text(options)}"
     return ""
 
 
@@ -193,8 +164,8 @@ def _figure_data(query: Query, result: PlanResult) -> str:
     made: Any = history  # by third-party code
     if field is not None and not (_floats(field) and field.shape == query.grid.shape):
         return f"field: must be an array of numbers {query.grid.shape}, got {_kind(field)}"
-    if not isinstance(made, History):
-        return f"history: must be a History, got {made!r:.40}"
+    if not issubclass(type(made), History):
+        return f"history: must be a History, got {value_text(made)}"
     count = len(history.best) if _floats(history.best) and history.best.ndim == 1 else 0
     for key in ("best", "iteration_best", "iteration_mean", "arrived"):
         values = getattr(history, key)
@@ -204,11 +175,15 @@ def _figure_data(query: Query, result: PlanResult) -> str:
 
 
 def _floats(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype.kind in "fiu"
+    return _is_array(value) and value.dtype.kind in "fiu"
+
+
+def _is_array(value: Any) -> bool:
+    return issubclass(type(value), np.ndarray)
 
 
 def _kind(value: Any) -> str:
-    return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.40}"
+    return f"{value.dtype} {value.shape}" if _is_array(value) else f"{value_text(value)}"
 
 
 def _same(one: float, other: float) -> bool:
@@ -249,15 +224,22 @@ def check_step(query: Query, cell: Cell, to: Any) -> str:
         cell: the robot's cell
         to: the next cell, or None to wait
     """
+    for key, value in (("cell", cell), ("step", to)):
+        if not (_is_cell(value) or (key == "step" and to is None)):
+            return f"{key}: must be a cell (row, col){' or None' * (key == 'step')}, got {value_text(value)}"
+    if not all(0 <= k < size for k, size in zip(cell, query.grid.shape, strict=True)):
+        return f"cell: {_cell(cell)} is outside the grid"
     if to is None:
         return ""
-    if not (isinstance(to, tuple) and len(to) == 2 and all(isinstance(k, numbers.Integral) for k in to)):
-        return f"step: must be a cell (row, col) or None, got {to!r:.40}"
     grid, step = query.grid, (int(to[0]) - cell[0], int(to[1]) - cell[1])
     bit = 8 if max(map(abs, step)) > 1 else int(_bits()[step[0] + 1, step[1] + 1])
     if bit == 8 or not int(grid.moves[cell]) >> bit & 1:
         return f"step: from {_cell(cell)} to {_cell(to)} is no allowed move"
     return ""
+
+
+def _is_cell(value: Any) -> bool:
+    return type(value) is tuple and len(value) == 2 and all(issubclass(type(k), numbers.Integral) for k in value)
 
 
 def _bits() -> Any:

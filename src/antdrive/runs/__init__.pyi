@@ -6,6 +6,5 @@ from .failures.handover import write_suite as write_suite
 from .failures.hunt import Finding as Finding
 from .failures.hunt import Hunt as Hunt
 from .failures.hunt import find_failures as find_failures
-from .failures.rebuild import rebuilt as rebuilt
 from .failures.shrinker import Shrunk as Shrunk
 from .failures.shrinker import shrink as shrink

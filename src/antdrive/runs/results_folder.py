@@ -10,16 +10,16 @@ from typing import Any
 
 from antdrive.base.atomic import LOCK, folder_lock
 from antdrive.base.errors import input_error
-from antdrive.base.files import write_json
+from antdrive.base.files import MAX_JSON_BYTES, read_bytes, write_json
 
 
 def free_folder(folder: Path, manifest: str, own: str) -> Path:
     """Return the folder, or one named with our fingerprint if the folder's manifest has another."""
-    try:
-        data = json.loads((folder / manifest).read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not (folder / manifest).exists():
         return folder
-    except (OSError, ValueError, RecursionError):
+    try:
+        data = json.loads(read_bytes(folder / manifest, MAX_JSON_BYTES))
+    except (ValueError, RecursionError):
         data = None
     same = isinstance(data, dict) and data.get("fingerprint") == own
     return folder if same else folder.with_name(f"{folder.name}-{own}")

@@ -20,7 +20,7 @@ from antdrive.sim.log.sights import passed
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import rollout_of
 from antdrive.sim.recording import versions as versions
-from antdrive.sim.scenario import Scenario, picture_of
+from antdrive.sim.scenario import Scenario, picture_of, usual_time_limit
 from antdrive.worlds import Grid
 from antdrive.worlds.svg import LINE, card
 
@@ -153,12 +153,20 @@ def run(
     Raises:
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
     """
+    grid, answer, rollout = driven(s, planned, progress)
+    return Run(s, grid, answer, rollout, None if rollout is None else certify(rollout))
+
+
+def driven(
+    s: Scenario, planned: tuple[Grid, PlanResult] | None = None, progress: Progress = ignore_progress
+) -> tuple[Grid, PlanResult, Rollout | None]:
+    """Plan and drive as `run` does; return the grid, the plan, and the log if there is a path."""
     parts = compose(s)
     grid, answer = parts.guide.first() if planned is None else parts.guide.accept(*planned)
     if not answer.solved:
-        return Run(s, grid, answer)
+        return grid, answer, None
     route, path = parts.guide.route(grid, answer)
-    limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
+    limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot)
     warm_up_replanning(s)
     started = time.perf_counter()
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)
@@ -166,5 +174,4 @@ def run(
         plant = Bullet(engine, s.task.start, s.control_hz)
         ending = drive(plant, driver, parts.localiser, parts.scan, hz=s.control_hz, limit=limit, progress=progress)
         log = plant.finish(ending)
-    rollout = rollout_of(s, parts, grid, answer, route, log, limit, time.perf_counter() - started)
-    return Run(s, grid, answer, rollout, certify(rollout))
+    return grid, answer, rollout_of(s, parts, grid, answer, route, log, limit, time.perf_counter() - started)

@@ -11,6 +11,7 @@ from antdrive.planners import AStar, Query
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible, widest_passage
 from antdrive.planners.graph.search import reachable
 from antdrive.robots.clearance import obstacle_name
+from antdrive.robots.default_margin import LEAST
 from antdrive.worlds import Grid, Task, point_clearance, rasterise
 
 if TYPE_CHECKING:
@@ -25,10 +26,10 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
     """Explain why a planner found no path: its reason, the disc that does not fit, and a remedy."""
     robot = s.robot
     disc = f"a disc of {s.inflate:.3g} m (radius {robot.radius:.3g} + margin {s.margin:.3g})"
-    says = f": {said}" if said else ""
     if reachable(Query.between(grid, s.task)):
+        says = f": {said}" if said else ""
         return f"{s.planner_label} found no path for {disc}{says}; astar finds one on these cells of {grid.cell:g} m"
-    start = f"no path for {disc} on cells of {grid.cell:g} m{says}"
+    start = f"no path for {disc} on cells of {grid.cell:g} m"
     if len(s.task.world.obstacles) > MOST_OBSTACLES:
         return f"{start}; {_narrowest_cell(s, grid)}"
     if feasible(s.task, s.inflate):
@@ -57,16 +58,17 @@ def _what_it_takes(s: RoutePlanner, passes: float) -> str:
     """Describe the room that the robot needs where only discs of radius `passes` [m] fit, and a remedy."""
     robot, foot = s.robot, s.robot.footprint
     fits = passes - robot.radius
-    helps = f"a margin below {fits:.3g} m leaves a way, on cells that are fine enough" if fits > 0 else ""
+    helps = f"a margin below {fits:.3g} m leaves a way on fine cells" if fits > 0 else ""
+    if helps and LEAST < s.usual_margin <= s.margin:
+        helps += ", but noise may then cause contacts; --margin auto measures its effect"
     if foot.is_disc:
         return helps or "this robot does not fit through"
     xmin, ymin, xmax, ymax = foot.bounds
     shape = f"its {'rectangle' if foot.box else 'outline'} of {xmax - xmin:.3g} x {ymax - ymin:.3g} m"
     needs = ymax - ymin + 2 * s.margin
-    does = "would need" if needs <= 2 * passes else "would not fit either: it needs"
     return (
-        f"the place is {2 * passes:.3g} m wide, and plans are made for the disc around {robot.name}, which needs "
-        f"{2 * s.inflate:.3g} m; {shape} {does} {needs:.3g} m straight ahead{'; ' * bool(helps)}{helps}"
+        f"plans use the disc of {robot.name}; {shape} needs {needs:.3g} m of the {2 * passes:.3g} m straight ahead"
+        f"{'; ' * bool(helps)}{helps}"
     )
 
 

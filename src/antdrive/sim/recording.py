@@ -41,7 +41,7 @@ def rollout_of(
         unseen=s.unseen,
         seed=s.seed,
         planner=ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
-        plan=_plan_record(s, grid, answer, parts.mapped),
+        plan=_plan_record(s, grid, answer),
         robot=s.robot,
         controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
@@ -53,7 +53,7 @@ def rollout_of(
         replans=tuple(parts.guide.log),
         limiters=parts.limiters,
         noise=s.noise,
-        margin=s.margin,
+        margin=s.planned_margin,
         margin_choice=s.chosen.record if s.chosen is not None else None,
         sensing=s.sensing,
         settings=s.other_settings,
@@ -74,10 +74,8 @@ def rollout_of(
     return Rollout(**arrays, record=record)
 
 
-def _plan_record(s: Scenario, grid: Grid, answer: PlanResult, mapped: bool) -> PlanRecord:
-    if not mapped:  # the optima are those of the true world
-        grid = grid_of(by_geometry(s.task.world), grid.cell, s.inflate)
-    grid_optimum, euclidean_optimum = _optima(by_contents(grid, s.task))
+def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
+    grid_optimum, euclidean_optimum = optima_of(s.task, grid.cell, s.inflate)
     return PlanRecord(
         cost_m=finite_or_none(answer.cost),
         length_m=answer.line_length,
@@ -86,6 +84,17 @@ def _plan_record(s: Scenario, grid: Grid, answer: PlanResult, mapped: bool) -> P
         work=answer.work,
         work_unit=answer.work_unit,
     )
+
+
+def optima_of(task: Task, cell: float, inflate: float) -> tuple[float | None, float | None]:
+    """Return the lengths of the shortest path on a task's grid and among its inflated discs [m]; None without one.
+
+    Args:
+        task: the true world, with start and goal
+        cell: side of the grid cells [m]
+        inflate: distance kept between the robot's centre and every surface [m]
+    """
+    return _optima(by_contents(grid_of(by_geometry(task.world), cell, inflate), task))
 
 
 @cached(64)

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.errors import input_error
-from antdrive.base.files import parse_json
+from antdrive.base.files import parse_json, read_bytes
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.certificate import certify
-from antdrive.sim.log.record import differences, hashes_of, plain_value
+from antdrive.sim.log.record import DriveRecord, differences, hashes_of, plain_value
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Task
 
@@ -21,13 +21,10 @@ SAME = 1e-9  # relative tolerance of numbers that are written twice
 
 def read_result(path: Path) -> Mapping[str, Any]:
     """Read a `result.json`; return an empty mapping if it is not a JSON object."""
-    if not path.is_file():
-        raise input_error(str(path), "cannot be read (no regular file)")
-    if path.stat().st_size > MAX_RESULT_BYTES:
-        raise input_error(str(path), f"cannot be read (larger than {MAX_RESULT_BYTES // 1_000_000} MB)")
+    text = read_bytes(path, MAX_RESULT_BYTES, "a run's result")
     try:
-        content = parse_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        content = parse_json(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise input_error(str(path), f"cannot be read ({error})") from None
     return content if isinstance(content, dict) else {}
 
@@ -83,22 +80,58 @@ def _short(value: Any) -> str:
     return text if len(text) <= 100 else f"{text[:100]}…"
 
 
+def wrong_optima(record: DriveRecord) -> Iterator[str]:
+    """Yield the shortest paths in a record that its world does not have."""
+    from antdrive.sim.recording import optima_of
+
+    try:
+        computed = optima_of(record.task, record.cell, record.inflate)
+    except ValueError as error:  # the grid has too many cells
+        yield f"record.cell: {error}"
+        return
+    for key, right in zip(("grid_optimum_m", "euclidean_optimum_m"), computed, strict=True):
+        logged = getattr(record.plan, key)
+        if logged != right and not (logged and right and math.isclose(logged, right, rel_tol=SAME)):
+            yield f"record.plan.{key}: {_length(logged)} in the log, {_length(right)} in its world"
+
+
+def _length(metres: float | None) -> str:
+    return "null" if metres is None else f"{metres:.6g} m"
+
+
 def verify_log(
-    log: Path, task: Task | None, robot: RobotSpec | None, result: Path | None, *, replay: bool
+    log: Path,
+    task: Task | None,
+    robot: RobotSpec | None,
+    result: Path | None,
+    *,
+    replay: bool,
+    planner: str | None = None,
 ) -> dict[str, Any]:
-    """Certify a log; compare it with a world, a robot, its `result.json` and, with `replay`, its replay."""
+    """Certify a log; compare it with a world, a robot and its `result.json`; with `replay`, drive it again.
+
+    Args:
+        log: the log's file
+        task: the world that the log must have; None: any
+        robot: the robot that the log must have; None: any
+        result: the `result.json` beside the log; None: none
+        replay: whether to drive the log again
+        planner: FILE.py:CLASS or MODULE:CLASS of a planner that is not registered, for the replay
+    """
     rollout = Rollout.load(log)
     certificate = certify(rollout)
     results = certificate.as_dict()
     problems = [*certificate.problems, *differences(rollout.record, task=task, robot=robot)]
+    if task is not None:
+        problems += wrong_optima(rollout.record)
     if result is not None and result.exists():
         problems += false_claims(read_result(result), rollout, rollout.digest)
     sentence = certificate.sentence
     if replay:
-        from antdrive.sim.driving.replay import replay as replayed
+        from antdrive.sim.rerun import replayed
 
         try:
-            check = replayed(rollout)
+            check = replayed(rollout, planner)
         except ValueError as error:  # the record cannot describe a drive
             problems.append(f"replay: {error}")
         else:

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.sim import Scenario, run
 from antdrive.worlds import save_task
+from tests.records import changed
 
 
 @pytest.fixture
@@ -109,3 +111,39 @@ def test_a_log_that_cannot_be_read_hides_no_other_verdict(antdrive, log, tmp_pat
         "rollout.npz": True,
         "broken.npz": False,
     }
+
+
+MINE = '''
+from dataclasses import dataclass
+from antdrive.planners import AStar
+
+@dataclass(frozen=True, kw_only=True)
+class Mine(AStar):
+    """A planner of a user."""
+'''
+
+
+def test_a_planner_of_a_user_is_given_or_the_replay_is_refused(small_scenario, tmp_path, antdrive):
+    (tmp_path / "mine.py").write_text(MINE)
+    words = f"{tmp_path / 'mine.py'}:Mine"
+    path = run(Scenario.of(small_scenario.task, words, small_scenario.robot)).rollout.save(tmp_path / "rollout.npz")
+    code, out, _ = antdrive("verify", path, "--replay", "--planner", words)
+    assert code == 0
+    assert "replayed bit for bit" in out
+    code, out, _ = antdrive("verify", path, "--replay")
+    assert code == 1
+    assert "  replay: record.planner.name: 'Mine' is not registered" in out
+    assert "--planner FILE.py:CLASS" in out
+
+
+def test_a_planner_without_a_replay_is_refused(refused, small_run, tmp_path):
+    path = small_run.rollout.save(tmp_path / "rollout.npz")
+    assert "--planner: only the replay plans; add --replay" in refused("verify", path, "--planner", "mine.py:Mine")
+
+
+def test_a_forged_optimum_needs_the_world_or_the_replay(antdrive, small_run, small, tmp_path):
+    forged = replace(small_run.rollout, record=changed(small_run.rollout.record, "plan", euclidean_optimum_m=3.3))
+    path = forged.save(tmp_path / "forged.npz")
+    assert antdrive("verify", path)[0] == 0
+    assert "  record.plan.euclidean_optimum_m: 3.3 m in the log, " in antdrive("verify", path, "--world", small)[1]
+    assert "  replay: record.plan.euclidean_optimum_m: 3.3 in the log, " in antdrive("verify", path, "--replay")[1]

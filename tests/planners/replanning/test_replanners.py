@@ -1,5 +1,6 @@
 """Properties of every planner's replanner, and agents that decide cell by cell among movers."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -43,6 +44,24 @@ MAY_MISS = {name for name in ON_CELLS if not capabilities_of(PLANNERS[name]).com
 
 def made(name, query, seed=0):
     return replanner_for(quick(name, ants=30, iterations=8), query, np.random.default_rng(seed))
+
+
+def test_an_unreachable_end_is_forgotten_after_an_edit_or_a_move():
+    query = dataclasses.replace(catalogue()["empty"], unreachable="no free cell near the start can be reached from it")
+    edits = (
+        lambda one: one.block([(3, 3)]),
+        lambda one: one.change(dataclasses.replace(query.grid, moves=query.grid.moves & 1)),
+        lambda one: one.move((5, 5)),
+    )
+    for edit in edits:
+        replanner = made("astar", query)
+        assert replanner.result().reason == query.unreachable
+        edit(replanner)
+        assert "no free cell near" not in replanner.result().reason
+        assert replanner.query.unreachable == ""
+    replanner = made("astar", query)
+    assert replanner.clear([(3, 3)]) == 0
+    assert replanner.query.unreachable == query.unreachable, "nothing has changed"
 
 
 @pytest.mark.parametrize("name", ON_CELLS)

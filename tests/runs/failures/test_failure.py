@@ -9,11 +9,11 @@ from antdrive.base import InputError
 from antdrive.planners import PLANNERS, GridPlanner
 from antdrive.robots import Avoidance, PurePursuit
 from antdrive.runs.failures.failure import Failure, bound_broken_in, failure_of, parse_bound, without_numbers
-from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.runs.suites import Baseline, Demands, load_suite
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim import METRICS, Certificate, DriveRecord, Outcome, Perception, ReplanPolicy, Scenario, run
 from antdrive.sim.log.record import ComponentRecord, settings_of
+from antdrive.sim.rebuild import rebuilt
 from antdrive.worlds import Cruising, Disc, Task, World
 from tests.records import made_up_record
 

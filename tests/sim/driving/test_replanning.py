@@ -19,10 +19,10 @@ from antdrive.planners import (
     load_planner,
 )
 from antdrive.robots import Twist
-from antdrive.sim import Outcome, ReplanPolicy, Rollout, Scenario, certify, run
+from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.replanning import CellByCell
-from antdrive.sim.driving.rules import MAX_LAG, Schedule, slow_down
+from antdrive.sim.driving.rules import MAX_LAG, KeepToSchedule, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from tests.records import changed
@@ -256,6 +256,16 @@ def test_a_late_robot_plans_in_time_again_from_where_it_is(turtlebot):
     assert made.schedule.t[0] == pytest.approx(20.0)
 
 
+def test_a_plan_in_time_has_a_schedule_among_movers_alone_with_or_without_replanning(jackal):
+    moving = changed(TASK, "world", movers=(GATEKEEPER,))
+    for task, scheduled in ((moving, True), (TASK, False)):
+        for settings in ({"replanning": None}, {}, {"perception": Perception(kind="lidar")}):
+            parts = compose(Scenario.of(task, "sipp", jackal, margin=0.1, **settings))
+            parts.guide.route(*parts.guide.first())
+            assert (parts.guide.schedule is not None) is scheduled
+            assert any(isinstance(rule, KeepToSchedule) for rule in parts.rules) is scheduled
+
+
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
 def test_a_schedule_is_late_only_when_behind(t, arc):
     route = Route(np.array([[0.0, 0.0], [4.0, 0.0]]))
@@ -331,13 +341,14 @@ class Deciding:
         return self
 
     replanner = agent
+    query = None
 
     def step(self, blocked):
         if isinstance(self.what, BaseException):
             raise self.what
         return self.what
 
-    result = block = clear = move = lambda self, cells=None: self.step(cells)
+    result = block = clear = move = change = lambda self, cells=None: self.step(cells)
 
 
 @pytest.mark.parametrize("step", [(0, 0), (3, 999), 5, ("a", 1)], ids=str)
@@ -356,6 +367,15 @@ def test_what_a_planners_own_replanner_raises_is_its_error(error, cell_by_cell):
 def test_an_answer_of_its_own_replanner_that_is_none_is_its_error():
     with pytest.raises(PlannerError, match="planner Deciding returned 5 instead of a PlanResult"):
         run(Scenario.of(MOVING, Deciding(5, cell_by_cell=False), time_limit=10.0))
+
+
+def test_an_error_of_antdrive_around_a_replanner_is_not_the_planners(monkeypatch):
+    def broken(*_):
+        raise KeyError("ours")
+
+    monkeypatch.setattr("antdrive.sim.driving.routes.closed_cells", broken)
+    with pytest.raises(KeyError, match="ours"):
+        run(Scenario.of(MOVING, "dstar-lite", time_limit=10.0))
 
 
 def test_capabilities_of_another_type_are_the_planners_error():

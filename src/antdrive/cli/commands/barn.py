@@ -59,12 +59,14 @@ def barn(
     folder = challenge.unpacked(source, out / "worlds")
     if map == "given" and given["localisation"] == "matching":
         given["localisation"] = "fixes"
+        print_error("localisation: fixes, because matching needs --map none")
     data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
+    fastest = challenge.reference_times(folder)
     compile_once()
     with campaign_bar("driving") as progress:
         results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress, notify=print_error)
-    runs, fastest = challenge.by_map(results.table), challenge.reference_times(folder)
+    runs = challenge.by_map(results.table)
     rows = list(challenge.lines(runs[map], fastest))
     known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
     (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)

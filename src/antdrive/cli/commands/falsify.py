@@ -22,11 +22,10 @@ if TYPE_CHECKING:
 MARKER = "falsify.json"  # identifies the search in its folder
 
 
-@options.with_settings(("smoothing", "noise", "margin", "cell"))
+@options.with_settings(("smoothing", "noise", "margin", "cell", "seed"))
 def falsify(
     *,
     budget: Annotated[int, option("NUMBER", "Maximum number of runs.", min=1, max=1_000_000)] = 100,
-    seed: Annotated[int, option("NUMBER", "Seed of the search.", "--seed", min=0, max=2**63 - 1)] = 0,
     method: Annotated[
         str, option("NAME", "World selection: guided (by rehearsals without physics) or random.")
     ] = "guided",
@@ -55,6 +54,7 @@ def falsify(
             f"--planner {setup.planner}: must be registered, because failures are repeated in other processes; "
             "register the class under the entry point antdrive.planners"
         )
+    seed = given.pop("seed")
     scenario = setup.scenario("empty", given)
     mark = fingerprint(scenario, budget, seed, method, obstacles, seconds)
     usual = Path("out") / file_name(f"falsify-{setup.planner}-{scenario.robot.name}-{seed}")

@@ -110,9 +110,9 @@ def _broken_bound(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | No
 def _of_a_log(words: str, planner: str | None) -> "Scenario":
     """Rebuild the scenario of a log from its record."""
     from antdrive.base.errors import input_error
-    from antdrive.runs.failures.rebuild import rebuilt
     from antdrive.runs.suites.suite import SUFFIX
     from antdrive.sim.log.rollout import read_record
+    from antdrive.sim.rebuild import rebuilt
 
     if words.endswith(SUFFIX):
         raise InputError(f"{words}: is a suite; name one of its tests: {words}::SCENARIO")

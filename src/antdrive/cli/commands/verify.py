@@ -15,7 +15,10 @@ def verify(
     rollouts: Annotated[list[Path], argument("ROLLOUT", "Logs of drives, or folders of runs.")],
     world: Annotated[str | None, option("WORLD", "Require this world (name or file) in the logs.")] = None,
     robot: Annotated[str | None, option("NAME", "Require this robot (name or file) in the logs.")] = None,
-    replay: Annotated[bool, flag("Re-execute the logged commands and compare the logs.", "--replay")] = False,
+    replay: Annotated[bool, flag("Drive the logs again and compare every value.", "--replay")] = False,
+    planner: Annotated[
+        str | None, option("FILE.py:CLASS", "Class of the logs' planner, if not registered; with --replay.")
+    ] = None,
     json: options.Json = False,
 ) -> bool | int:
     """Re-certify drives from their logs alone.
@@ -27,6 +30,8 @@ def verify(
     from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 
+    if planner is not None and not replay:
+        raise InputError("--planner: only the replay plans; add --replay")
     task = None if world is None else load_task(world)
     spec = None if robot is None else load_robot(robot)
     about = " and ".join(name for name in (world, robot) if name is not None)
@@ -36,7 +41,7 @@ def verify(
         try:
             path = str(log_at(given))
             result = given / "result.json" if given.is_dir() else None
-            report = checked[path] = verify_log(Path(path), task, spec, result, replay=replay)
+            report = checked[path] = verify_log(Path(path), task, spec, result, replay=replay, planner=planner)
         except InputError as error:
             print_error(str(error))
             checked[path] = {"certified": False, "problems": [str(error)], "readable": False}

@@ -112,7 +112,8 @@ class CachedReplanner(abc.ABC):
 
     def move(self, start: Cell) -> None:
         """Set the robot's cell `start`, which need not be on the path."""
-        self._query = dataclasses.replace(self._query, start=start)
+        if start != self._query.start:
+            self._query = dataclasses.replace(self._query, start=start, unreachable="")
 
     def block(self, cells: npt.ArrayLike) -> int:
         """Mark cells (N, 2) as blocked; returns the number of cells whose moves changed."""
@@ -182,6 +183,7 @@ class CachedReplanner(abc.ABC):
     def _record(self, count: int) -> int:
         if count:
             self._edits.append(self._edited[:count].copy())
+            self._query = dataclasses.replace(self._query, unreachable="")  # it was said of the grid before
         return count
 
     def _take_edits(self) -> npt.NDArray[np.int64]:

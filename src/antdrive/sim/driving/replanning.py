@@ -25,9 +25,7 @@ from antdrive.planners import (
     AStar,
     PlanResult,
     Query,
-    TimedPlan,
     agent_for,
-    capabilities_of,
     check_step,
     planner_errors,
     smooth,
@@ -37,7 +35,6 @@ from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs
 from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.rules import Schedule
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.policy import LATE, MISSED, STRAYED, WAITED, ReplanPolicy
 from antdrive.worlds import Grid, Route, segment_clearance
@@ -60,7 +57,7 @@ class Replanning(OneRoute):
         self._hz = planner.hz
         self._predictor, self._keeps = movers, keeps
         self._task = dataclasses.replace(planner.task, world=dataclasses.replace(planner.task.world, movers=()))
-        self._timed = capabilities_of(planner.planner).needs_motions
+        self._timed = bool(planner.motions)
         self._replanned_at = -math.inf
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
@@ -71,9 +68,7 @@ class Replanning(OneRoute):
         learns = policy.around_movers and movers.uncertain and not self._timed
         traffic = Traffic(movers, robot.radius, task.world.bounds, self._hz) if learns else None
         self._ahead = MoversAhead(movers, policy, task.goal, grid, self._hz, traffic, self.blockage)
-        route, path = super().route(grid, plan)
-        self._track(plan, route)
-        return route, path
+        return super().route(grid, plan)
 
     @property
     def blocked(self) -> str:
@@ -87,10 +82,6 @@ class Replanning(OneRoute):
     def clearance_reduction(self, tick: int, position: Point) -> Floats:
         """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""
         return self.blockage.clearance_reduction(tick, position)
-
-    def _track(self, plan: PlanResult, route: Route) -> None:
-        """Set the schedule of a new route."""
-        self.schedule = Schedule.of(plan, route) if self._timed and isinstance(plan, TimedPlan) else None
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Return why a new route is due; empty if none is."""
@@ -170,6 +161,8 @@ class CellByCell(Replanning):
         """Return the route of the whole plan, which the first decision replaces."""
         self._query = Query.between(grid, self._task)
         self._online = agent_for(self._routes.planner, self._query, self._routes.rng)
+        with planner_errors(self._routes.planner):
+            self._arrived = bool(self._online.arrived)
         self._goal = self._query.goal
         self._noted_at = -math.inf
         return super().route(grid, plan)
@@ -177,14 +170,14 @@ class CellByCell(Replanning):
     @property
     def may_wait(self) -> bool:
         """Whether a robot at the end of its route may wait for a new one."""
-        return not self._online.arrived
+        return not self._arrived
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Return `DECISION` shortly before the robot reaches its cell, and repeatedly while it waits; else empty."""
         if tick == 0:
             return DECISION
         since = tick / self._hz - self._replanned_at
-        if self._online.arrived or since < DECISION_PAUSE:
+        if self._arrived or since < DECISION_PAUSE:
             return ""
         if since >= self.policy.max_wait:  # movers keep the robot from its cell
             self._note_no_path(tick, pose)
@@ -195,13 +188,15 @@ class CellByCell(Replanning):
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return the path to the next cell; None if the robot waits."""
         if trigger == MISSED:  # before arrival the next decision is due soon
-            return super().replan(tick, pose, trigger) if self._online.arrived else None
+            return super().replan(tick, pose, trigger) if self._arrived else None
         now, started = tick / self._hz, time.perf_counter()
         self._replanned_at = now
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
         with planner_errors(self._routes.planner):
             here, propagated = self._online.cell, self._online.stats.propagated
             to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
+            work = int(self._online.stats.propagated - propagated)
+            self._arrived = bool(self._online.arrived)
         self._routes.plan_error = self._routes.plan_error or check_step(self._query, here, to)
         if self._routes.plan_error:
             self.note(now, trigger)
@@ -212,7 +207,6 @@ class CellByCell(Replanning):
         else:
             self._note_no_path(tick, pose)
         if to is not None and bool(np.ptp(xy, axis=0).any()):
-            work = self._online.stats.propagated - propagated
             self.note(now, trigger, time.perf_counter() - started, work, polyline_length(xy), xy)
             return self._prepare(Route(xy))
         if tick == 0:  # the robot waits in place and must not follow the plan's whole route

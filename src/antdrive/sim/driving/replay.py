@@ -40,11 +40,12 @@ SAME_NOISE = 1e-6
 class ReplayCheck:
     """Differences between a replay and its log."""
 
-    exact: bool  # whether pose, twist and contacts agree bit for bit
+    exact: bool  # whether everything compared agrees bit for bit
     position: float  # largest distance between replayed and logged positions [m]
     turn: float  # largest difference of headings [rad]
     twist: float  # largest difference of speeds [m/s] or yaw rates [rad/s]
     problems: tuple[str, ...]  # why the log cannot come from a drive, one sentence each
+    rounded: tuple[str, ...] = ()  # arrays and keys of the record that agree within rounding only
 
     @property
     def sentence(self) -> str:
@@ -52,11 +53,19 @@ class ReplayCheck:
         if self.exact:
             return "replayed bit for bit"
         same = "differs" if self.problems else "replayed within rounding"
+        same += f" ({', '.join(self.rounded)})" if self.rounded and not self.problems else ""
         return f"{same}: at most {self.position:.3g} m, {self.turn:.3g} rad and {self.twist:.3g} m/s or rad/s off"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as plain values, for JSON."""
         return {"exact": self.exact, "position_m": self.position, "turn_rad": self.turn, "twist": self.twist}
+
+
+def offsets(pose: Floats, twist: Floats, rollout: Rollout) -> tuple[float, float, float]:
+    """Return the largest differences of positions [m], headings [rad] and speeds [m/s, rad/s] from a log."""
+    moved = pose - rollout.pose
+    position, turn = _most(np.hypot(moved[:, 0], moved[:, 1])), _most(np.abs(wrap_angle(moved[:, 2])))
+    return position, turn, _most(np.abs(twist - rollout.twist))
 
 
 def replay(rollout: Rollout) -> ReplayCheck:
@@ -69,9 +78,7 @@ def replay(rollout: Rollout) -> ReplayCheck:
     movers = rollout.trajectories()
     with Engine(record.world, record.robot, physics_hz=record.physics_hz, trajectories=movers) as engine:
         again = Bullet(engine, record.task.start, record.control_hz).play(targets[1:])
-    moved = again.pose - rollout.pose
-    position = _most(np.hypot(moved[:, 0], moved[:, 1]))
-    turn, twist = _most(np.abs(wrap_angle(moved[:, 2]))), _most(np.abs(again.twist - rollout.twist))
+    position, turn, twist = offsets(again.pose, again.twist, rollout)
     same = np.array_equal(again.pose, rollout.pose) and np.array_equal(again.twist, rollout.twist)
     exact = same and np.array_equal(again.contacts, rollout.contacts)
     problems = []

@@ -29,7 +29,7 @@ class Outcome(enum.Enum):
     STUCK = "stopped making progress"
     NO_PATH = "no path on this grid"
     STOPPED = "planning stopped early"
-    INVALID_PLAN = "the planner gave a wrong plan"
+    INVALID_PLAN = "the planner's plan is invalid"
 
     @property
     def key(self) -> str:

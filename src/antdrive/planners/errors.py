@@ -1,0 +1,59 @@
+"""Errors of planners, which may raise anything."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from antdrive.base.errors import input_error
+from antdrive.base.guarded import UserCode, error_text, place
+
+if TYPE_CHECKING:
+    from antdrive.planners.plan import Planner
+
+
+class PlannerError(RuntimeError):
+    """An exception raised by a planner, or a return value of an invalid type; the message is one line.
+
+    Attributes:
+        planner: the planner's name
+        problem: the exception or the value, and its place
+    """
+
+    def __init__(self, planner: str, problem: str) -> None:
+        super().__init__(str(input_error(f"planner {planner} {problem}")))
+        self.planner, self.problem = planner, problem
+
+    def __reduce__(self) -> tuple[type[PlannerError], tuple[str, str]]:
+        """Return the parts from which another process rebuilds the error."""
+        return type(self), (self.planner, self.problem)
+
+
+def planner_errors(planner: Planner, name: str = "") -> UserCode:
+    """Return a block that turns exceptions into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
+
+    Args:
+        planner: the planner whose code runs in the block
+        name: the planner's name in errors; empty: its class
+    """
+
+    def error_of(error: BaseException) -> PlannerError:
+        return PlannerError(name or type(planner).__name__, f"raised {error_text(error)} ({place_of(planner, error)})")
+
+    return UserCode(error_of, (PlannerError,))
+
+
+def place_of(planner: Planner, error: BaseException | None = None) -> str:
+    """Return the file and line of the planner's module that raised the error; without an error, of its `plan`.
+
+    Args:
+        planner: the planner
+        error: what it raised
+    """
+    kind = type(planner)
+    home = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    codes = [getattr(getattr(kind, name, None), "__code__", None) for name in ("plan", "_plan")]
+    code = next((code for code in codes if code and code.co_filename == home), None)
+    own = f"{Path(home).name}:{code.co_firstlineno}" if home and code else kind.__module__
+    return (place(error, home) if error is not None else "") or own

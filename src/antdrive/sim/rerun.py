@@ -1,0 +1,187 @@
+"""Rerun: the scenario of a log driven again, and compared with the log value by value.
+
+The open loop of `antdrive.sim.driving.replay` needs no planner; the rerun plans, perceives and decides again. It compares
+every array, and every key of the record that does not declare itself a claim.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.errors import FieldError
+from antdrive.base.plane import wrap_angle
+from antdrive.planners import Planner, PlannerError
+from antdrive.sim.driving.replay import ROUNDING, ReplayCheck, offsets, replay
+from antdrive.sim.log.record import PROOFS, Proof, plain_value
+from antdrive.sim.log.rollout import FORMS, NOISY, ROWS, Rollout
+from antdrive.sim.pipeline import driven
+from antdrive.sim.rebuild import rebuilt
+from antdrive.sim.recording import versions
+
+LONGER = 1.0  # a rerun may outlast its log by this time [s]
+LONGEST = 60  # characters of a value in a message
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """Value that differs between log and rerun."""
+
+    name: str  # the array, or the dotted key of the record
+    text: str  # the values of a key, or where an array differs first
+    row: float = math.inf  # the first row of an array that differs; infinite for keys and for arrays without rows
+    rounded: bool = False  # whether the difference is within `ROUNDING`
+
+
+def replayed(rollout: Rollout, planner: Planner | str | None = None) -> ReplayCheck:
+    """Replay a log's commands, then drive its scenario again, and compare both with the log.
+
+    Args:
+        rollout: the log
+        planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the registered
+            planner of the record's name
+
+    Raises:
+        FieldError: the record's rates of physics and control do not fit.
+    """
+    check = replay(rollout)
+    try:
+        again = rerun(rollout, planner)
+    except (PlannerError, ValueError) as error:
+        return dataclasses.replace(check, exact=False, problems=(*check.problems, f"replay: {error}"))
+    found = sorted(mismatches(rollout, again), key=lambda one: one.row)
+    wrong = [one for one in found if not one.rounded]
+    problems = [*check.problems, *_sentences(wrong)]
+    other = {name: version for name, version in versions().items() if rollout.record.versions.get(name) != version}
+    if problems and other:
+        logged = ", ".join(f"{name} {rollout.record.versions.get(name, 'of no version')}" for name in other)
+        problems.append(f"replay: the log says {logged}, here {_words(other)}; other versions may drive differently")
+    if len(again.t) == len(rollout.t):
+        position, turn, twist = offsets(again.pose, again.twist, rollout)
+        most = max(check.position, position), max(check.turn, turn), max(check.twist, twist)
+        check = dataclasses.replace(check, position=most[0], turn=most[1], twist=most[2])
+    rounded = tuple(one.name for one in found if one.rounded)
+    return dataclasses.replace(check, exact=check.exact and not found, rounded=rounded, problems=tuple(problems))
+
+
+def rerun(rollout: Rollout, planner: Planner | str | None = None) -> Rollout:
+    """Drive the scenario of a log again, for little longer than the log.
+
+    Args:
+        rollout: the log
+        planner: as in `rebuilt`
+
+    Raises:
+        InputError: the planner or the controller cannot be found by its name.
+        FieldError: the record is no scenario, or its plan fails.
+        PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
+    """
+    record = rollout.record
+    s = rebuilt(record, planner)
+    limit = min(record.time_limit, float(rollout.t[-1]) + LONGER)
+    s = dataclasses.replace(s, planner_name=record.planner.name, time_limit=limit)
+    _, answer, again = driven(s)
+    if again is None:
+        raise FieldError("cells", f"planning again ends with {answer.status.name.lower()}: {answer.reason}")
+    # The digest covers claims as well, and the shorter time limit is not the record's.
+    kept = dataclasses.replace(again.record, digest=record.digest, time_limit=record.time_limit)
+    return dataclasses.replace(again, record=kept)
+
+
+def mismatches(rollout: Rollout, again: Rollout) -> Iterator[Mismatch]:
+    """Yield every array and every key of the record that differs, claims excepted."""
+    for name in FORMS:
+        yield from _of_array(name, rollout, again)
+    logged, computed = plain_value(rollout.record), plain_value(again.record)
+    for key, proof in PROOFS.items():
+        if proof is not Proof.CLAIM:
+            yield from _of_key(key, logged, computed)
+
+
+def _sentences(wrong: Sequence[Mismatch]) -> Iterator[str]:
+    """Yield a sentence for the arrays that first differ in one place, and for each key."""
+    for text, some in itertools.groupby(wrong, key=lambda one: one.text):
+        names = ", ".join(one.name for one in some)
+        yield (
+            f"replay: {names}: {text}" if names.startswith("record.") else f"replay: the rerun differs in {names}{text}"
+        )
+
+
+def _of_array(name: str, rollout: Rollout, again: Rollout) -> Iterator[Mismatch]:
+    """Yield the difference of an array, with the time of its first row beyond rounding."""
+    logged, computed = getattr(rollout, name), getattr(again, name)
+    if logged.shape == computed.shape and logged.tobytes() == computed.tobytes():
+        return
+    both = min(len(logged), len(computed))
+    if logged.shape[1:] != computed.shape[1:]:
+        yield Mismatch(name, f": {_shape(computed)} in place of {_shape(logged)}")
+        return
+    off = np.abs(logged[:both].astype(np.float64) - computed[:both])
+    if name in ("pose", "estimate"):
+        off[:, 2] = np.abs(wrap_angle(off[:, 2]))
+    allowed = ROUNDING if logged.dtype.kind == "f" else 0.0
+    wrong = (off > allowed).any(axis=tuple(range(1, off.ndim)))
+    first = int(wrong.argmax()) if wrong.any() else both
+    if first == len(logged) == len(computed):
+        yield Mismatch(name, "", rounded=True)
+    elif name in ("route", "cells"):
+        yield Mismatch(name, f", from point {first + 1}")
+    else:
+        row = _row(name, first, rollout if first < len(logged) else again)
+        yield Mismatch(name, f", from t = {row / rollout.record.physics_hz:.3f} s", row)
+
+
+def _row(name: str, entry: int, rollout: Rollout) -> int:
+    """Return the row of an array's entry."""
+    if FORMS[name].shape[0] in (ROWS, NOISY):
+        return entry
+    return int(rollout.scan_rows[entry] if name.startswith("scan") else getattr(rollout, name)[entry, 0])
+
+
+def _shape(array: npt.NDArray[Any]) -> str:
+    return " × ".join(map(str, array.shape))
+
+
+def _of_key(key: str, logged: Any, computed: Any) -> Iterator[Mismatch]:
+    """Yield the difference of a key of the record."""
+    first, second = (_at(value, key) for value in (logged, computed))
+    if first == second:
+        return
+    text = f"{_short(first)} in the log, {_short(second)} in the rerun"
+    yield Mismatch(f"record.{key}", text, rounded=_within_rounding(first, second))
+
+
+def _at(value: Any, key: str) -> Any:
+    """Return the value at a dotted key, a list for `[]`; None if there is none."""
+    name, _, rest = key.partition(".")
+    inner = value.get(name.removesuffix("[]")) if isinstance(value, dict) else None
+    if not rest:
+        return inner
+    return [_at(one, rest) for one in inner or ()] if name.endswith("[]") else _at(inner, rest)
+
+
+def _within_rounding(a: Any, b: Any) -> bool:
+    """Return whether two plain values differ by rounding alone."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_within_rounding(a[key], b[key]) for key in a)
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(map(_within_rounding, a, b))
+    if isinstance(a, float) and isinstance(b, float):
+        return math.isclose(a, b, rel_tol=0.0, abs_tol=ROUNDING)
+    return type(a) is type(b) and bool(a == b)
+
+
+def _short(value: Any) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
+
+
+def _words(named: dict[str, str]) -> str:
+    return ", ".join(f"{name} {version}" for name, version in named.items())

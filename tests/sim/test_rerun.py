@@ -1,0 +1,220 @@
+"""The scenario of a log drives the same log again; a forged value does not follow from any scenario."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from antdrive.base import InputError
+from antdrive.sim import Perception, Scenario, run
+from antdrive.sim.driving.replay import ROUNDING
+from antdrive.sim.log.record import PROOFS, Proof
+from antdrive.sim.log.rollout import FORMS
+from antdrive.sim.recording import optima_of
+from antdrive.sim.rerun import mismatches, replayed, rerun
+from antdrive.sim.verifying import wrong_optima
+from tests.records import changed
+
+KINDS = {
+    "noise": {"noise": 1.0, "seed": 4},
+    "odometry": {"localisation": "odometry", "time_limit": 4.0},
+    "plain": {},
+}
+AMONG_MOVERS = {
+    "positions": ("turtlebot", {"perception": Perception(kind="positions", range=3.0)}),
+    "lidar": ("jackal", {"perception": Perception(kind="lidar"), "noise": 1.0}),
+    "mapless": ("jackal", {"map": "none", "localisation": "matching"}),
+    "no avoidance": ("turtlebot", {"avoidance": None, "replanning": None}),
+}
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """A noisy drive among movers that are seen by lidar, with every array but none of a contact."""
+    settings = {"noise": 1.0, "map": "none", "time_limit": 7.0}
+    return run(Scenario.of("plaza-moving", "astar", "jackal", **settings)).rollout
+
+
+def rewritten(record, key, value):
+    """A record with another value at a dotted key; `[]` is the first entry."""
+    name, _, rest = key.partition(".")
+    inner = getattr(record, name.removesuffix("[]"))
+    if not rest:
+        return replace(record, **{name: value})
+    if name.endswith("[]"):
+        return replace(record, **{name[:-2]: (rewritten(inner[0], rest, value), *inner[1:])})
+    return replace(record, **{name: rewritten(inner, rest, value)})
+
+
+def other(value):
+    """Another value of the same type, valid where numbers are bounded."""
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, int | float):
+        return value + 1
+    if isinstance(value, tuple):
+        return value[:-1]
+    return "" if value else "another"
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_genuine_log_is_driven_again_bit_for_bit(name, small_scenario):
+    check = replayed(run(replace(small_scenario, **KINDS[name])).rollout)
+    assert (check.exact, check.problems, check.rounded) == (True, (), ())
+    assert check.sentence == "replayed bit for bit"
+
+
+def test_a_collided_log_is_driven_again_bit_for_bit(collided_run):
+    assert replayed(collided_run.rollout).exact
+
+
+@pytest.mark.parametrize("name", AMONG_MOVERS)
+def test_a_genuine_log_among_movers_is_driven_again_bit_for_bit(name):
+    robot, settings = AMONG_MOVERS[name]
+    check = replayed(run(Scenario.of("plaza-moving", "astar", robot, time_limit=5.0, **settings)).rollout)
+    assert (check.exact, check.problems) == (True, ())
+
+
+def test_every_array_is_compared(seen, collided_run):
+    filled = {name: log for log in (collided_run.rollout, seen) for name in FORMS if getattr(log, name).size}
+    assert set(filled) == set(FORMS)
+    again = {id(log): rerun(log) for log in (collided_run.rollout, seen)}
+    for name, log in filled.items():
+        array = getattr(log, name)
+        least = 2 * ROUNDING if array.dtype.kind == "f" else 1
+        middle = array.copy()
+        middle[len(middle) // 2] += array.dtype.type(least)
+        for forged in (middle, array[:-1], array[:0]):
+            (found,) = mismatches(replace(log, **{name: forged}), again[id(log)])
+            assert (found.name, found.rounded) == (name, False)
+
+
+def test_the_first_row_that_differs_is_named(seen):
+    estimate, tracks = seen.estimate.copy(), seen.tracks.copy()
+    estimate[481:, 0] += 0.01
+    tracks[-1, 4] += 0.1
+    problems = replayed(replace(seen, estimate=estimate, tracks=tracks)).problems
+    assert "replay: the rerun differs in estimate, from t = 2.004 s" in problems
+    assert f"replay: the rerun differs in tracks, from t = {tracks[-1, 0] / 240:.3f} s" in problems
+    problems = replayed(replace(seen, route=seen.route[:-1])).problems
+    assert problems == (f"replay: the rerun differs in route, from point {len(seen.route)}",)
+
+
+def test_headings_are_compared_on_the_circle(seen):
+    turned = seen.estimate.copy()
+    turned[:, 2] += 2 * np.pi
+    (found,) = mismatches(replace(seen, estimate=turned), rerun(seen))
+    assert found.rounded
+
+
+DERIVED = [key for key, proof in PROOFS.items() if proof in (Proof.REPLAY, Proof.WORLD) and key != "task"]
+
+
+@pytest.mark.parametrize("key", DERIVED)
+def test_every_derived_key_of_the_record_is_compared(key, seen):
+    logged = seen.record
+    for name in key.replace("[]", "").split("."):
+        logged = logged[0] if isinstance(logged, tuple) else logged
+        logged = getattr(logged, name)
+    if key == "replans[].solved":
+        with_other = replace(seen.record.replans[0], solved=False, route=())
+        record = replace(seen.record, replans=(with_other, *seen.record.replans[1:]))
+    else:
+        value = type(logged).STUCK if key == "outcome" else other(logged)
+        record = rewritten(seen.record, key, value)
+    again = replace(seen, record=record)
+    assert f"record.{key}" in [found.name for found in mismatches(again, seen) if not found.rounded]
+
+
+def test_searches_that_the_log_omits_are_missed(seen):
+    emptied = replace(seen, record=replace(seen.record, replans=()))
+    assert "record.replans[].route" in [found.name for found in mismatches(emptied, seen)]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("noise", 0.5), ("seed", 5), ("margin", 0.2), ("cell", 0.1), ("control_hz", 80), ("smoothing.asked", "none"),
+        ("planner.name", "dijkstra"), ("controller.settings", {"lookahead_time": 2.0}), ("unseen", ()),
+    ],
+)  # fmt: skip
+def test_another_input_drives_another_log(key, value, small_scenario):
+    log = run(replace(small_scenario, noise=1.0, seed=4)).rollout
+    record = rewritten(log.record, key, value)
+    check = replayed(replace(log, record=replace(record, inflate=record.robot.radius + record.margin)))
+    assert bool(check.problems) == (key != "unseen")
+
+
+def test_an_input_without_influence_describes_a_genuine_drive(small_run):
+    """Other seeds of a perfect robot with A* drive the same log."""
+    record = replace(small_run.rollout.record, seed=7)
+    assert replayed(replace(small_run.rollout, record=record)).exact
+
+
+def test_claims_are_not_compared(small_run):
+    log = small_run.rollout
+    times = replace(log.record.times, plan_s=99.0)
+    record = changed(replace(log.record, times=times, versions={"antdrive": "9"}), "task.world", name="other")
+    assert replayed(replace(log, record=record)).exact
+
+
+def test_values_within_rounding_are_named_and_not_bit_for_bit(small_run):
+    log = small_run.rollout
+    pose = log.pose.copy()
+    pose[5, 0] += 1e-5
+    plan = replace(log.record.plan, length_m=log.record.plan.length_m + 1e-6)
+    check = replayed(replace(log, pose=pose, record=replace(log.record, plan=plan)))
+    assert (check.exact, check.problems, check.rounded) == (False, (), ("pose", "record.plan.length_m"))
+    assert check.sentence.startswith("replayed within rounding (pose, record.plan.length_m): at most 1e-05 m")
+
+
+def test_other_versions_are_named_with_a_difference(small_run):
+    log = small_run.rollout
+    record = replace(log.record, versions={**log.record.versions, "numpy": "1.0"}, reason="made up")
+    problems = replayed(replace(log, record=record)).problems
+    assert "record.reason: 'made up' in the log, '' in the rerun" in problems[0]
+    assert problems[1].startswith("replay: the log says numpy 1.0, here numpy ")
+
+
+def test_a_rerun_ends_soon_after_its_log(small_run):
+    """A log may promise a drive of days."""
+    log = small_run.rollout
+    half = len(log.t) // 2
+    record = replace(log.record, time_limit=1e6)
+    cut = {
+        name: getattr(log, name)[:half] for name in ("t", "pose", "twist", "command", "clearance", "limiter", "movers")
+    }
+    again = rerun(replace(log, record=record, **cut))
+    assert len(again.t) <= half + 241
+    assert again.record.time_limit == 1e6
+
+
+def test_a_plan_that_fails_is_a_problem(small_run):
+    record = replace(small_run.rollout.record, margin=1.4, inflate=small_run.rollout.record.robot.radius + 1.4)
+    (problem,) = [one for one in replayed(replace(small_run.rollout, record=record)).problems if "planning" in one]
+    assert problem.startswith("replay: cells: planning again ends with no_path")
+
+
+def test_a_controller_of_a_user_cannot_be_rebuilt(small_run):
+    record = changed(small_run.rollout.record, "controller", name="Mine")
+    with pytest.raises(InputError, match="'Mine' cannot be rebuilt"):
+        rerun(replace(small_run.rollout, record=record))
+
+
+@pytest.mark.parametrize("key", ["grid_optimum_m", "euclidean_optimum_m"])
+@pytest.mark.parametrize("value", [60.0, 3.0, None])
+def test_the_world_refuses_another_optimum(key, value, small_run):
+    record = small_run.rollout.record
+    assert list(wrong_optima(record)) == []
+    (problem,) = wrong_optima(changed(record, "plan", **{key: value}))
+    right = getattr(record.plan, key)
+    assert problem.startswith(f"record.plan.{key}: ")
+    assert problem.endswith(f"in the log, {right:.6g} m in its world")
+
+
+def test_optima_are_those_of_the_recorded_world(seen):
+    record = seen.record
+    assert optima_of(record.task, record.cell, record.inflate) == (
+        record.plan.grid_optimum_m,
+        record.plan.euclidean_optimum_m,
+    )
