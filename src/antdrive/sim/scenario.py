@@ -116,6 +116,10 @@ class Scenario(Settings):
 
     def _check_sensing(self) -> None:
         """Raise FieldError for invalid combinations of map, localisation, perception, planner and robot."""
+        if self.map == "none" and self.replanning is None:
+            raise FieldError(
+                "replan", "none: a mapless robot finds its way by replanning; false replans around no movers"
+            )
         if self.map == "none" and self.robot.lidar is None:
             raise FieldError("map", f"none: {self.robot.name} {NO_LIDAR}")
         kind = self.known_perception.kind
@@ -325,6 +329,16 @@ class Scenario(Settings):
         if self.driven_world.movers:
             facts["movers"] = len(self.driven_world.movers)
         return card(picture_of(self), task.world.name, facts)
+
+
+def usual_time_limit(length: float, robot: RobotSpec) -> float:
+    """Return the time limit of a drive for which neither scenario nor world names one [s].
+
+    Args:
+        length: length of the route [m]
+        robot: the robot
+    """
+    return 30.0 + 10.0 * length / robot.max_speed
 
 
 def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:
