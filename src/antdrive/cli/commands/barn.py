@@ -42,6 +42,8 @@ def barn(
     Repeat the command to resume it. Exit code 0: all runs are done, whatever their outcomes.
     """
     from antdrive.base.optional import parquet_library
+    from antdrive.planners import load_planner
+    from antdrive.robots import load_robot
     from antdrive.runs import barn_challenge as challenge
     from antdrive.runs.campaigns.campaign import make_campaign
     from antdrive.runs.campaigns.sweeping import sweep
@@ -52,6 +54,8 @@ def barn(
     if with_map and map != "none":
         raise InputError("--with-map: needs --map none")
     parquet_library()
+    load_planner(planner)  # an invalid one leaves no folder
+    load_robot(robot)
     folder = challenge.unpacked(source, out / "worlds")
     if map == "given" and given["localisation"] == "matching":
         given["localisation"] = "fixes"
