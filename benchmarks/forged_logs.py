@@ -677,7 +677,7 @@ def _(log: Log) -> None:
     log.record["seed"] += 1
 
 
-@forgery("a route of one point", "verify")
+@forgery("a route of one point", "load")
 def _(log: Log) -> None:
     log.arrays["route"] = log["route"][:1]
 
