@@ -43,6 +43,7 @@ from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
 from benchmarks.markdown import command_line, print_table
 
 CRASHED = "crash"  # in place of a level: the check raised an exception
+BY_HAND = 8  # drives of `genuine_drives`
 GENERATED = 0.6  # share of draws from the generated entries alone
 SMALLEST = ("rows noise --count 3 --few",)
 
@@ -271,7 +272,11 @@ def drawn(
     """Write a forgery by a random amount; return what and whose it is, or None if it makes no sense for the drawn drive."""
     generated = [name for name in names if name in ENTRIES]
     some = generated if generated and (len(generated) == len(names) or rng.random() < GENERATED) else names
-    name, drive = some[rng.integers(len(some))], list(drives)[rng.integers(len(drives))]
+    name = some[rng.integers(len(some))]
+    whose = list(drives)[
+        : None if name in ENTRIES else BY_HAND
+    ]  # forgeries by hand know the worlds of the first drives
+    drive = whose[rng.integers(len(whose))]
     if name not in ENTRIES:
         return (name, drive) if forged(KINDS[name], drives[drive], path) else None
     log = Log.of(drives[drive])
