@@ -57,15 +57,16 @@ SLOW = {
     "Stubborn": OVER,
     "Exits": EXITS,
     "Crashes": "(mine.py:7) ended the process by SIGSEGV",
-    "EndlessLater": f"{OVER} (mine.py:32)",
+    "EndlessLater": f"{OVER} (mine.py:34)",
     "ExitsLater": EXITS,
 }
 ENDS = {"Compiled": f"(mine.py:7) {OVER}", **SLOW}
 MOVING = """
-size: [0, 0, 8, 4]
+schema: 1
+bounds: [0, 0, 8, 4]
 start: [1, 2, 0]
 goal: [7, 2]
-movers: [{radius: 0.3, patrol: {points: [[3, 2], [3, 2.2]], speed: 0.1}}]
+movers: [{radius: 0.3, position: [4, 2], velocity: [0.01, 0]}]
 """
 
 
@@ -95,7 +96,7 @@ def said_in_one_line(done, name, words):
 )
 def test_a_planner_that_ends_its_process_or_never_ends_is_named(folder, name):
     world = "moving.yaml" if name.endswith("Later") else "empty"
-    done = process("run", world, "--planner", f"mine.py:{name}", "--no-figures", "-o", "out", "--unseen", "4,2,0.2")
+    done = process("run", world, "--planner", f"mine.py:{name}", "--no-figures", "-o", "out")
     assert said_in_one_line(done, name, ENDS[name])
 
 
