@@ -99,7 +99,7 @@ def barn(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
         ("aco-han", "clearance", 0.0),
         ("astar", "clearance", 1.0),
     ):  # fmt: skip
-        given = {"smoothing": smoothing, "noise": noise}
+        given = {"smoothing": smoothing, "noise": noise, "margin": 0.03}
         got = call_all((partial(drive, name, task, planner, "jackal", **given) for name, task in tasks.items()), jobs)
         driven = [r for r in got if r.metrics]
         ratios = [r.metrics["arrival_s"] / (r.optimum / 2.0) for r in driven if r.succeeded]
@@ -133,7 +133,7 @@ def forests(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
         for kind in ("forest", "barn")
     }
     for noise, (kind, tasks), robot in itertools.product((0.0, 1.0), kinds.items(), ("turtlebot", "jackal")):
-        given = {"planner": "astar", "robot": robot, "noise": noise}
+        given = {"planner": "astar", "robot": robot, "noise": noise, "margin": 0.03}
         got = call_all((partial(drive, t.world.name, t, seed=n, **given) for n, t in enumerate(tasks)), jobs)
         paths = [r for r in got if r.outcome != "NO_PATH"]
         good = sum(r.succeeded for r in paths)

@@ -7,6 +7,10 @@ recomputes the minimum clearance.
 Worlds: forests by han2007's rule; thickets of 20 to 60 thinner cylinders; fields by BARN's cellular automaton; halls with
 columns and 1 to 10 movers. Results are lines of a JSONL file, from which an interrupted run resumes. `--only N` repeats one
 drive and prints its details.
+
+`--margins default` drives with default settings at noise 1 instead, and draws the rest: every planner, kind of smoothing and
+robot of the catalogue; without a map in a tenth of the drives of robots with a lidar; worlds without movers, scaled to the
+robot. Colonies have few ants and iterations.
 """
 
 from __future__ import annotations
@@ -25,10 +29,12 @@ import numpy as np
 import yaml
 from rich.progress import Progress
 
-from antdrive.planners import PLANNERS
+from antdrive.planners import PLANNERS, capabilities_of, load_planner
+from antdrive.robots import list_robots, load_robot
 from antdrive.runs.pool import Pool, processes_for
 from antdrive.sim import Certificate, Rollout, Scenario, run
-from antdrive.worlds import Task, generate
+from antdrive.sim.settings import SMOOTHINGS
+from antdrive.worlds import Disc, Task, World, generate
 from antdrive.worlds.files.world_file import save_task
 from benchmarks.dynamic import random_task
 from benchmarks.markdown import command_line, table
@@ -44,19 +50,59 @@ SAME = 2e-4  # the certificate's and the second audit's minimum clearance at the
 KINDS = ("forest", "thicket", "barn", "forest", "thicket", "barn", "forest", "thicket", "barn", "hall")
 SETTINGS = tuple(itertools.product(("turtlebot", "jackal"), (0.0, 1.0), ("none", "taut", "clearance")))
 MARGINS = {"fixed": {0.0: 0.03, 1.0: 0.06}, "auto": {0.0: "auto", 1.0: "auto"}}  # [m], by noise
+DEFAULT = "default"  # drives with default settings
+MAPLESS = 0.1  # share of their drives without a map, for robots with a lidar
+CROSSABLE = 0.363  # radius of a disc that can cross every world before scaling [m]
+ROOM = (0.03, 0.15)  # radius that can cross a scaled world, beyond the robot's [m]
+QUICK = {"iterations": 12, "ants": 20, "population": 20, "ant_runs": 1, "ant_iterations": 4, "ranks": 10}
 
 
-def world_of(kind: str, rng: np.random.Generator) -> Task:
-    """Generate a random world of a kind."""
+def world_of(kind: str, rng: np.random.Generator, radius: float = 0.4) -> Task:
+    """Generate a random world of a kind; a disc of a radius [m] can cross forests and thickets."""
     if kind == "hall":
         return random_task(int(rng.integers(1_000_000, 2**31)))[0]
     options = {
-        "forest": lambda: {"count": rng.integers(4, 11)},
-        "thicket": lambda: {"count": rng.integers(20, 61), "radius": "0.05,0.4", "clearance": "0.7"},
+        "forest": lambda: {"count": rng.integers(4, 11), "robot_radius": radius},
+        "thicket": lambda: {
+            "count": rng.integers(20, 61),
+            "radius": "0.05,0.4",
+            "clearance": "0.7",
+            "robot_radius": radius,
+        },
         "barn": lambda: {"fill": rng.choice((0.15, 0.20, 0.25)), "rounds": rng.integers(2, 5)},
     }[kind]()
     generator = "barn" if kind == "barn" else "forest"
     return generate(generator, rng, {key: str(value) for key, value in options.items()}, name=kind)
+
+
+def scaled(task: Task, factor: float) -> Task:
+    """Return a task with all lengths multiplied by a factor, without movers."""
+    world, (x, y, yaw) = task.world, task.start
+    xmin, ymin, xmax, ymax = (factor * end for end in world.bounds)
+    discs = tuple(Disc(factor * d.x, factor * d.y, factor * d.radius, d.height) for d in world.obstacles)
+    start, goal = (factor * x, factor * y, yaw), (factor * task.goal[0], factor * task.goal[1])
+    return Task(World(world.name, (xmin, ymin, xmax, ymax), discs), start, goal, cell=factor * task.cell)
+
+
+def quick(planner: str) -> dict[str, int]:
+    """Return the options for a small colony or population of a planner."""
+    made = load_planner(planner)
+    return {name: few for name, few in QUICK.items() if getattr(made, name, None)}
+
+
+def default_case(n: int, seed: int) -> dict[str, Any]:
+    """Draw robot, planner and the rest of drive n with default settings."""
+    rng = np.random.default_rng([STREAM, seed, n, 1])
+    robot, planner = str(rng.choice(list(list_robots()))), str(rng.choice(list(PLANNERS)))
+    seeing = load_robot(robot).lidar is not None and not capabilities_of(load_planner(planner)).needs_motions
+    return {
+        "kind": str(rng.choice(KINDS)),
+        "robot": robot,
+        "noise": 1.0,
+        "smoothing": str(rng.choice(SMOOTHINGS)),
+        "planner": planner,
+        "map": "none" if rng.random() < MAPLESS and seeing else "given",
+    }
 
 
 def case(n: int) -> dict[str, Any]:
@@ -71,7 +117,8 @@ def case(n: int) -> dict[str, Any]:
 def drive(n: int, seed: int, margins: str) -> dict[str, Any]:
     """Drive n: what it was, how it ended, and what both audits say."""
     started = time.perf_counter()
-    found: dict[str, Any] = {"n": n, "seed": seed, "margins": margins, **case(n)}
+    what = default_case(n, seed) if margins == DEFAULT else case(n)
+    found: dict[str, Any] = {"n": n, "seed": seed, "margins": margins, **what}
     try:
         found |= audited(scenario(n, seed, margins))
     except Exception as error:  # a fault of the program is a result, too
@@ -81,8 +128,11 @@ def drive(n: int, seed: int, margins: str) -> dict[str, Any]:
 
 def scenario(n: int, seed: int, margins: str) -> Scenario:
     """Return the scenario of drive n."""
+    rng = np.random.default_rng([STREAM, seed, n])
+    if margins == DEFAULT:
+        return default_scenario(n, seed, rng)
     what = case(n)
-    task = world_of(what["kind"], np.random.default_rng([STREAM, seed, n]))
+    task = world_of(what["kind"], rng)
     return Scenario.of(
         task,
         what["planner"],
@@ -92,6 +142,15 @@ def scenario(n: int, seed: int, margins: str) -> Scenario:
         margin=MARGINS[margins][what["noise"]],
         seed=n,
     )
+
+
+def default_scenario(n: int, seed: int, rng: np.random.Generator) -> Scenario:
+    """Return the scenario of drive n with default settings."""
+    what = default_case(n, seed)
+    robot = load_robot(what["robot"])
+    task = scaled(world_of(what["kind"], rng, CROSSABLE), (robot.radius + float(rng.uniform(*ROOM))) / CROSSABLE)
+    settings = {key: what[key] for key in ("noise", "smoothing", "map")}
+    return Scenario.of(task, what["planner"], robot, options=quick(what["planner"]), seed=n, **settings)
 
 
 def audited(s: Scenario) -> dict[str, Any]:
@@ -224,7 +283,7 @@ def main() -> None:
         first=(0, "number of the first drive"),
         jobs=(2, "processes"),
         seed=(2026, "another seed gives other worlds"),
-        margins=("auto", "fixed: 0.03 m, with noise 0.06 m; or auto"),
+        margins=("auto", "fixed: 0.03 m, with noise 0.06 m; auto; or default, with default settings at noise 1"),
         only=(int, "number of a drive: drive it again and print all about it"),
         results=(Path, "JSONL file; the default is below out/held_out"),
     )
@@ -247,7 +306,12 @@ def main() -> None:
                 file.flush()
                 bar.advance(task)
     chosen = [results[n] for n in wanted]
-    for keys in (("kind", "robot", "noise", "smoothing"), ("planner",)):
+    rows = (
+        (("robot", "map", "smoothing"), ("kind",))
+        if given.margins == DEFAULT
+        else (("kind", "robot", "noise", "smoothing"),)
+    )
+    for keys in (*rows, ("planner",)):
         print("\n".join(counted(keys, chosen)))
     print("Drives that are not certified successes:\n")
     print("\n".join(failures(chosen)) or "none")

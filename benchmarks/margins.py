@@ -1,7 +1,7 @@
 """Predicted and measured margin losses: `python -m benchmarks.margins [--worlds N] [--jobs N]`.
 
 Every combination of robot, noise and smoothing drives random worlds, half of them forests and half of them like BARN's, with
-`--margin auto`. The worlds' seeds differ from the calibration's.
+`--margin auto`. The worlds' seeds differ from the calibration's. `--default` drives calibration courses with the default margin.
 """
 
 from __future__ import annotations
@@ -14,13 +14,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.runs.margins.choice import Calibration, choose_margin, with_chosen_margin
+from antdrive.runs.margins.choice import RESERVE, Calibration, choose_margin, predicted_loss, with_chosen_margin
+from antdrive.runs.margins.loss import loss_on_course
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import generate
 from benchmarks.markdown import command_line, print_table
 
-SMALLEST = ("--worlds 2 --robots turtlebot --smoothings taut --noises 0 --jobs 1",)
+SMALLEST = (
+    "--worlds 2 --robots turtlebot --smoothings taut --noises 0 --jobs 1",
+    "--default --worlds 18 --robots turtlebot --smoothings taut --noises 1 --jobs 1",
+)
 FIRST_SEED = 50_000
 
 
@@ -73,6 +77,14 @@ def row(calibration: Calibration, drives: list[Driven]) -> list[str]:
     ]  # fmt: skip
 
 
+def default_row(made: Scenario, courses: int, jobs: int | None) -> list[str]:
+    """Return the default margin, the loss predicted at it with the reserve, and the largest loss on courses."""
+    calls = [partial(loss_on_course, made.loss_factors, made.usual_margin, n) for n in range(courses)]
+    footprint, disc = zip(*call_all(calls, jobs), strict=True)
+    loss = min(predicted_loss(footprint), predicted_loss(disc)) + RESERVE
+    return [f"{1000 * value:.0f}" for value in (made.usual_margin, loss, max(footprint))]
+
+
 def main() -> None:
     arguments = command_line(
         __doc__,
@@ -82,11 +94,23 @@ def main() -> None:
         noises=("0,1", "levels of noise, separated by commas"),
         jobs=(int, "processes; by default one per core"),
         fixed=(float, "drive with this margin instead [m]; predictions are those of auto"),
+        default=(False, "compare the default margins with as many calibration courses"),
     )
     rows, wrong = [], []
     robots, smoothings = arguments.robots.split(","), arguments.smoothings.split(",")
     noises = map(float, arguments.noises.split(","))
-    for robot, noise, smoothing in itertools.product(robots, noises, smoothings):
+    rest = list(itertools.product(robots, noises, smoothings))
+    if arguments.default:
+        made = (scenario("forest", FIRST_SEED, *each) for each in rest)
+        print_table(
+            ["robot", "noise", "smoothing", "default, mm", "predicted and reserve", "largest loss"],
+            (
+                [s.robot.name, f"{s.noise:g}", s.smoothing, *default_row(s, arguments.worlds, arguments.jobs)]
+                for s in made
+            ),
+        )
+        return
+    for robot, noise, smoothing in rest:
         calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).loss_factors)
         worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]
         calls = [partial(drive, *world, robot, noise, smoothing, arguments.fixed) for world in worlds]

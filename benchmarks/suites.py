@@ -39,7 +39,7 @@ def suite(scenarios: int) -> str:
     for k in range(max(1, scenarios // 10)):
         entries[f"forest-{k}"] = {"world": {"generate": "forest", "seed": k}, "robot": "turtlebot"}
         entries[f"barn-{k}"] = {"world": {"generate": "barn", "seed": k}, "robot": "jackal"}
-    defaults = {"planner": "astar", "noise": 1, "seeds": "0-4"}
+    defaults = {"planner": "astar", "noise": 1, "margin": 0.03, "seeds": "0-4"}
     return yaml.safe_dump({"schema": 1, "defaults": defaults, "scenarios": entries}, sort_keys=False)
 
 

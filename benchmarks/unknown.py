@@ -151,6 +151,7 @@ def contacts(given: argparse.Namespace) -> Iterator[str]:
         "planners": ["astar"],
         "robots": ["jackal", "turtlebot"],
         "noise": [1.0],
+        "margin": [0.03],
         "settings": {"map": "none", "localisation": "matching"},
     }
     runs = filmed(sweep(data, given.results, jobs=given.jobs, keep="failed"), given.films).table.to_pylist()

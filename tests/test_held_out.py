@@ -8,10 +8,22 @@ import numpy as np
 import pytest
 
 from antdrive.planners import PLANNERS
+from antdrive.robots import list_robots
 from antdrive.sim import Scenario, certify, run
 from antdrive.worlds import Cruising, Keyframed, Task, Trajectories, World
 from antdrive.worlds.files.world_file import task_to_dict
-from benchmarks.held_out import KINDS, SETTINGS, case, contradictions, counted, drive, failures, results_of
+from benchmarks.held_out import (
+    KINDS,
+    SETTINGS,
+    case,
+    contradictions,
+    counted,
+    default_case,
+    drive,
+    failures,
+    results_of,
+    scenario,
+)  # fmt: skip
 from benchmarks.second_audit import Least, least_clearance, track
 
 GOOD = {
@@ -36,6 +48,17 @@ def test_a_drive_is_the_same_each_time_and_both_audits_agree():
     assert once["certified"]
     assert once["wrong"] == []
     assert once["bound"] < once["second"] <= once["second_rows"]
+
+
+def test_drives_with_default_settings_cover_everything_and_give_no_margin():
+    cases = [default_case(n, 3) for n in range(600)]
+    assert cases == [default_case(n, 3) for n in range(600)] != [default_case(n, 4) for n in range(600)]
+    assert {c["planner"] for c in cases} == set(PLANNERS)
+    assert len({(c["robot"], c["smoothing"]) for c in cases}) == 3 * len(list_robots())
+    assert {c["map"] for c in cases if c["robot"] == "turtlebot"} == {"given", "none"}
+    made = scenario(0, 3, "default")
+    assert made.margin is None
+    assert (made.robot.name, made.noise, made.map) == (cases[0]["robot"], 1.0, cases[0]["map"])
 
 
 @pytest.mark.parametrize(

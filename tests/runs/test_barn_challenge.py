@@ -1,16 +1,26 @@
 """BARN's worlds, driven by the jackal, and the challenge's table: its score, its worlds, its lines."""
 
+import bz2
+import contextlib
+import gzip
+import io
 import itertools
+import lzma
 import math
 import random
 import tarfile
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pyarrow
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from antdrive.base.errors import InputError
 from antdrive.planners import load_planner
+from antdrive.runs import barn_challenge
 from antdrive.runs.barn_challenge import by_map, campaign_data, lines, reference_times, score, unpacked
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
@@ -96,10 +106,79 @@ def test_reference_paths_are_measured_in_the_challenges_cells(tmp_path):
 
 def test_a_folder_without_worlds_is_refused(tmp_path):
     (tmp_path / "broken.tar.xz").write_bytes(b"nothing")
-    with pytest.raises(InputError, match=r"not a readable archive \(.+\)$") as caught:
+    with pytest.raises(InputError, match=r"not a readable .tar archive \(.+\)$") as caught:
         unpacked(tmp_path, tmp_path / "out")
     assert "\n" not in str(caught.value)
     assert "\\n" not in str(caught.value)
+
+
+def archive(*files):
+    """A tar file of members with some bytes each."""
+    content = io.BytesIO()
+    with tarfile.open(fileobj=content, mode="w") as tar:
+        for name, inside in files:
+            member = tarfile.TarInfo(name)
+            member.size = len(inside)
+            tar.addfile(member, io.BytesIO(inside))
+    return content.getvalue()
+
+
+@pytest.mark.parametrize("compress", [bz2.compress, gzip.compress, lzma.compress, bytes])
+@given(flips=st.lists(st.tuples(st.integers(0, 10**6), st.integers(1, 255)), max_size=3), cut=st.integers(0, 10**6))
+@example(flips=[], cut=0)
+def test_an_archive_is_unpacked_whole_or_not_at_all(compress, flips, cut):
+    worlds = [(f"worlds/world_{i}.world", random.Random(i).randbytes(700)) for i in range(4)]
+    content = bytearray(compress(archive(*worlds, ("worlds/other.txt", b"x"))))
+    for place, mask in flips:
+        content[place % len(content)] ^= mask
+    del content[len(content) - cut % len(content) :]
+    with tempfile.TemporaryDirectory() as folder:
+        source, out = Path(folder) / "worlds.tar.any", Path(folder) / "out"
+        source.write_bytes(content)
+        with contextlib.suppress(InputError):
+            unpacked(source, out)
+        if out.exists():
+            found = {path.name: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+            names = {Path(name).name: inside for name, inside in worlds}
+            assert compress is bytes or found == names  # a plain archive has no checksum of its contents
+            assert len(found) <= len(names)
+
+
+def test_an_archive_is_refused_while_it_is_decompressed(tmp_path, monkeypatch):
+    monkeypatch.setattr(barn_challenge, "MAX_BYTES", 100_000)
+    files = [(f"{i}/world_{i}.world", bytes(9000)) for i in range(12)]
+    for kind, content in {
+        "sum": archive(*files),
+        "end": archive(files[0]) + bytes(200_000),
+        "member": archive(("world_1.world", bytes(200_000)))[:1024],
+    }.items():
+        path = tmp_path / f"{kind}.tar.bz2"
+        path.write_bytes(bz2.compress(content))
+        with pytest.raises(InputError, match="larger than an archive of the challenge's worlds; the limits are 2000"):
+            unpacked(path, tmp_path / "out")
+    monkeypatch.setattr(barn_challenge, "MAX_MEMBERS", 11)
+    (tmp_path / "many.tar.bz2").write_bytes(bz2.compress(archive(*((name, b"") for name, _ in files))))
+    with pytest.raises(InputError, match="the limits are 11 files"):
+        unpacked(tmp_path / "many.tar.bz2", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_links_and_other_files_of_an_archive_stay_in_it(tmp_path):
+    content = io.BytesIO()
+    with tarfile.open(fileobj=content, mode="w") as tar:
+        for name, kind in (
+            ("world_1.world", tarfile.SYMTYPE),
+            ("world_2.world", tarfile.LNKTYPE),
+            ("../world_3.world", tarfile.REGTYPE),
+        ):
+            member = tarfile.TarInfo(name)
+            member.type, member.linkname = kind, "/etc/passwd"
+            tar.addfile(member)
+    path = tmp_path / "links.tar.gz"
+    path.write_bytes(gzip.compress(content.getvalue()))
+    with pytest.raises(InputError, match=r"no world_\*.world here|outside the destination"):
+        unpacked(path, tmp_path / "out")
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["links.tar.gz"]
 
 
 @pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")

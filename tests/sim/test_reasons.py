@@ -37,6 +37,16 @@ def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_wo
     assert run(replace(tight, margin=0.035, cell=0.0125)).succeeded, "the advice is right"
 
 
+def test_less_than_the_default_is_said_to_be_a_risk(turtlebot):
+    tight = gate(turtlebot, 0.45, noise=1.0, smoothing="none")
+    reason = run(tight).reason
+    assert reason.startswith("no path for a disc of 0.256 m (radius 0.18 + margin 0.076)")
+    assert reason.endswith(
+        "a margin below 0.045 m leaves a way on fine cells, but noise may then cause contacts; --margin auto measures its effect"
+    )
+    assert "noise" not in run(replace(tight, margin=0.06)).reason, "the user has chosen"
+
+
 def test_the_reason_names_a_robot_wider_than_the_gate(turtlebot):
     assert run(gate(turtlebot, 0.3)).reason.endswith("this robot does not fit through")
 

@@ -29,7 +29,7 @@ def test_a_run_ends_at_the_goal_certified(small_run):
     log = small_run.rollout
     assert math.dist(log.pose[-1, :2], small_run.scenario.task.goal) < 0.05
     assert len(log.contacts) == 0
-    assert log.clearance.min() > 0.3 * small_run.scenario.margin
+    assert log.clearance.min() > 0.3 * small_run.scenario.planned_margin
     assert log.t[1] == pytest.approx(1 / 240)
     assert log.outcome.key == "succeeded"
     assert json.dumps(small_run.as_dict())
@@ -142,9 +142,12 @@ def test_a_planner_that_ends_without_a_path_has_stopped(small_scenario):
     assert result.plan.reason
 
 
-def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario):
-    grid, right = plan(small_scenario)
-    wrong = run(small_scenario, planned=(grid, replace(right, cost=right.cost + 0.01)))
+@pytest.mark.parametrize("known", ["given", "none"])
+def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario, jackal, known):
+    scenario = replace(small_scenario, robot=jackal, map=known)
+    grid, right = plan(scenario)
+    assert run(scenario, planned=(grid, right)).rollout.drive_digest == run(scenario).rollout.drive_digest
+    wrong = run(scenario, planned=(grid, replace(right, cost=right.cost + 0.01)))
     assert (wrong.outcome, wrong.rollout) == (Outcome.INVALID_PLAN, None)
     assert wrong.reason.startswith("cost: ")
     assert wrong.as_dict()["outcome"] == "invalid_plan"
@@ -201,7 +204,7 @@ def test_a_robot_that_starts_at_the_goal_need_not_drive(turtlebot):
     task = Task(World("w", (0, 0, 1, 1)), (0.5, 0.5, 0.0), (0.5, 0.3), 0.25, 1.0)
     result = run(Scenario.of(task, "astar", turtlebot, margin=0.15))
     assert result.succeeded
-    assert len(result.rollout.t) == 1
+    assert len(result.rollout.t) == 1 + 4  # a control period with a command of 0
 
 
 def test_no_obstacle_is_too_low_to_be_touched(small_scenario, collided_run):

@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import math
 import os
+import stat
 from collections.abc import Collection, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError, input_error
+
+MAX_BYTES = 500_000_000  # of any file that is read; most readers have lower limits
+MAX_JSON_BYTES = 20_000_000  # of manifests and other JSON files that antdrive writes for itself
 
 
 def file_name(name: str, keep: str = "-_.", *, ascii_only: bool = False) -> str:
@@ -72,21 +76,51 @@ def _json_value(value: Any) -> Any:
     return value
 
 
-def read_bytes(path: str | os.PathLike[str], max_bytes: int, kind: str = "a file") -> bytes:
-    """Return a file's content; raise InputError if it is unreadable or larger than `max_bytes`."""
-    source = os.fspath(path)
+def open_regular(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES, kind: str = "a file") -> BinaryIO:
+    """Open a regular file for reading; raise InputError for anything else, and for a file larger than `max_bytes`."""
     try:
-        with Path(path).open("rb") as stream:
+        found = os.stat(path)
+        if not stat.S_ISREG(found.st_mode):
+            problem = f"is {_SPECIAL.get(stat.S_IFMT(found.st_mode), 'a device')}; give {kind}"
+            raise input_error(os.fspath(path), problem)
+        if found.st_size > max_bytes:
+            raise _too_large(path, max_bytes)
+        return open(path, "rb", opener=_without_waiting)
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error) from None
+
+
+def read_bytes(path: str | os.PathLike[str], max_bytes: int, kind: str = "a file") -> bytes:
+    """Return a regular file's content; raise InputError if it is unreadable or larger than `max_bytes`."""
+    with open_regular(path, max_bytes, kind) as stream:
+        try:
             content = stream.read(max_bytes + 1)
-    except FileNotFoundError:
-        raise input_error(source, "no such file") from None
-    except IsADirectoryError:
-        raise input_error(source, f"is a directory; give {kind}") from None
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        raise input_error(source, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(content) > max_bytes:
-        raise input_error(source, f"is too large; the limit is {max_bytes // 1_000_000} MB")
+        except OSError as error:
+            raise unreadable(path, error) from None
+    if len(content) > max_bytes:  # files below /proc have no size
+        raise _too_large(path, max_bytes)
     return content
+
+
+def _too_large(path: str | os.PathLike[str], max_bytes: int) -> InputError:
+    return input_error(os.fspath(path), f"is too large; the limit is {max_bytes // 1_000_000} MB")
+
+
+def unreadable(path: str | os.PathLike[str], error: OSError | ValueError) -> InputError:
+    """Return the error for a file that cannot be opened or read. ValueError: a null character in the path."""
+    if isinstance(error, FileNotFoundError):
+        return input_error(os.fspath(path), "no such file")
+    return input_error(os.fspath(path), f"cannot be read: {getattr(error, 'strerror', None) or error}")
+
+
+_SPECIAL = {stat.S_IFDIR: "a directory", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file without waiting for the writer of a pipe."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def require_new(files: Iterable[Path], *, replace: bool) -> None:

@@ -117,7 +117,7 @@ def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> in
     if setting.form in ("avoidance", "replanning"):
         kind, default, flags, text = bool, True, f"{flags}/--no-{flags[2:]}", text.partition(": ")[0]
     elif setting.form == "margin":
-        kind, default = str, str(one.default)
+        kind = str
     elif setting.form == "plain":
         default = defaults.get(one.name, one.default)
     else:
@@ -137,7 +137,7 @@ def _value(one: DeclaredSetting, value: Any, many: bool) -> Any:
         return [disc(text) for text in value or ()]
     values = value if many else [value]
     if one.setting.form == "margin":
-        values = [_margin(text) for text in values or ()]
+        values = [None if text is None else _margin(text) for text in values or ()]
     for each in values or ():
         try:
             if each not in (None, "auto"):

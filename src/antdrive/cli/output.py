@@ -15,7 +15,7 @@ from antdrive.views.run_folder import check_folder
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.pipeline import Run
-    from antdrive.sim.scenario import MarginChoice
+    from antdrive.sim.scenario import Scenario
 
 
 @contextmanager
@@ -48,8 +48,7 @@ def run_lines(run: Run, files: Mapping[str, str]) -> Iterator[str]:
     yield f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}{in_brackets(run.reason)}"
     if s.noise and not s.robot.noise.nonzero and s.map == "given" and s.known_perception.kind != "lidar":
         yield f"  --noise {s.noise:g} has no effect: the robot file of {s.robot.name} has no noise section"
-    if s.chosen is not None:
-        yield f"  {chosen_margin(s.chosen)}"
+    yield from margin_lines(s)
     if run.rollout is not None and run.certificate is not None:
         result = run.as_dict()
         facts = result["metrics"]
@@ -81,13 +80,18 @@ def _discovery(sight: dict[str, Any]) -> str:
     return f"unseen obstacle {sight['obstacle']}: {detected}; {nearest}"
 
 
-def chosen_margin(chosen: MarginChoice) -> str:
-    """Return a line about a calibrated margin and its evidence."""
-    record = chosen.record
-    return (
-        f"calibrated margin {chosen.margin:.3f} m: predicted loss {record.loss_m:.3f} m from {record.drives} drives, "
-        f"reserve at least {record.reserve_m:.3f} m"
-    )
+def margin_lines(s: Scenario) -> Iterator[str]:
+    """Yield a line about a calibrated margin and its evidence, or about a default that noise has increased."""
+    from antdrive.robots.default_margin import LEAST
+
+    if s.chosen is not None:
+        record = s.chosen.record
+        yield (
+            f"  calibrated margin {s.chosen.margin:.3f} m: predicted loss {record.loss_m:.3f} m from {record.drives} "
+            f"drives, reserve at least {record.reserve_m:.3f} m"
+        )
+    elif s.margin is None and s.planned_margin > LEAST:
+        yield f"  margin {s.planned_margin:.3f} m: default for {s.robot.name}, noise {s.noise:g}, smoothing {s.smoothing}"
 
 
 def in_brackets(reason: str) -> str:

@@ -17,7 +17,9 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
+from antdrive.base.document import MAX_BYTES
 from antdrive.base.errors import InputError, input_error
+from antdrive.base.files import read_bytes
 from antdrive.base.guarded import OverLimit, UserCode, error_text, place, value_text
 from antdrive.planners.errors import PlannerError
 
@@ -123,11 +125,9 @@ def _hash(content: bytes) -> str:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise UserCodeError(f"{path}: no such file") from None
-    except OSError as error:
-        raise UserCodeError(f"{path}: cannot be read ({error.strerror})") from None
+        return read_bytes(path, MAX_BYTES, "a Python file")
+    except InputError as error:
+        raise UserCodeError(str(error)) from None
 
 
 def _choices(module: ModuleType, word: str) -> str:

@@ -44,10 +44,7 @@ class NoiseModel:
         self._ticks_per_fix = max(1, round(1 / (noise.pose_rate * period)))
         self._tick = 0
         self.estimate = start
-        # Variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over fixes.
-        correlated = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
-        drift = (noise.encoder**2 + correlated * noise.slip**2) / noise.pose_rate**2
-        self._gain = _steady_gain(drift / 2, noise.pose_xy**2), _steady_gain(2 * drift / track**2, noise.pose_yaw**2)
+        self._gain = _gains(noise, track)
 
     def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
         """Return the estimated pose for a true `pose` and a true velocity `twist`.
@@ -104,6 +101,25 @@ def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
         y + twist.speed * math.sin(middle) * time,
         yaw + twist.yaw_rate * time,
     )
+
+
+def steady_errors(noise: Noise, track: float) -> tuple[float, float]:
+    """Return the standard deviations of the estimate in x or y [m] and in heading [rad] at 1 m/s.
+
+    Args:
+        noise: the levels
+        track: distance between the wheels [m]
+    """
+    gain_xy, gain_yaw = _gains(noise, track)
+    return math.sqrt(gain_xy) * noise.pose_xy, math.sqrt(gain_yaw) * noise.pose_yaw
+
+
+def _gains(noise: Noise, track: float) -> tuple[float, float]:
+    """Return the gains of pose fixes for the position and the heading."""
+    # Variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over fixes.
+    correlated = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
+    drift = (noise.encoder**2 + correlated * noise.slip**2) / noise.pose_rate**2
+    return _steady_gain(drift / 2, noise.pose_xy**2), _steady_gain(2 * drift / track**2, noise.pose_yaw**2)
 
 
 def _steady_gain(drift: float, error: float) -> float:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
+import io
+import lzma
 import math
+import shutil
 import statistics
 import tarfile
+import tempfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from pathlib import Path, PurePath
+from types import MappingProxyType
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from antdrive.base.errors import InputError, input_error
+from antdrive.base.files import open_regular
 from antdrive.base.plane import polyline_length
 from antdrive.sim.log.metrics import BARN_SPEED
 from antdrive.worlds.formats.barn import BARN_CELL, BARN_GOAL, BARN_START
@@ -20,9 +29,14 @@ from antdrive.worlds.formats.barn import BARN_CELL, BARN_GOAL, BARN_START
 if TYPE_CHECKING:
     import pyarrow
 
-WORLDS = "world_*.world"
+WORLDS, PATHS = "world_*.world", "path_*.npy"
 FIELD = (-4.425, 5.175)  # cell (0, 0) of a reference path [m]
-MAX_MEMBERS, MAX_BYTES = 2000, 500_000_000  # of an archive of worlds
+MAX_MEMBERS, MAX_BYTES = 2000, 300_000_000  # of an archive of worlds; the set's 300 worlds have 210 MB
+MAX_PATH_BYTES = 1_000_000
+#: Decompressors by the first bytes of a file.
+DECOMPRESS: Mapping[bytes, Any] = MappingProxyType(
+    {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ\x00": lzma.open}
+)
 HEADS = ("world", "runs", "certified", "mean time [s]", "mean score")
 PUBLISHED_HEADS = ("published", "success [%]", "mean time [s]", "mean score", "where")
 #: Disclaimer of the table.
@@ -81,22 +95,59 @@ class BarnLine:
 
 def unpacked(source: Path, folder: Path) -> Path:
     """Return the folder with the worlds of a folder or archive; unpack an archive."""
-    archives = [source] if source.is_file() else sorted(source.glob("*.tar.*")) if source.is_dir() else []
-    if not archives or (source.is_dir() and any(source.rglob(WORLDS))):
-        worlds = source
-    else:
+    archives = sorted(source.glob("*.tar.*")) if source.is_dir() else [source]
+    worlds = source
+    if archives and not (source.is_dir() and any(source.rglob(WORLDS))):
         worlds = folder
-        try:
-            with tarfile.open(archives[0]) as archive:
-                members = archive.getmembers()
-                if len(members) > MAX_MEMBERS or sum(member.size for member in members) > MAX_BYTES:
-                    raise input_error(str(archives[0]), "larger than an archive of the challenge's worlds")
-                archive.extractall(folder, members, filter="data")
-        except (tarfile.TarError, OSError, EOFError) as error:
-            raise input_error(str(archives[0]), f"not a readable archive ({' '.join(str(error).split())})") from None
+        with tempfile.TemporaryDirectory() as temporary:  # nothing of a damaged archive stays
+            _unpack(archives[0], Path(temporary))
+            shutil.copytree(temporary, folder, dirs_exist_ok=True)
     if not any(worlds.rglob(WORLDS)):
         raise input_error(str(source), f"no {WORLDS} here; name the folder of the challenge's worlds, or their archive")
     return worlds
+
+
+def _unpack(source: Path, folder: Path) -> None:
+    """Unpack the worlds and reference paths of an archive; its limits hold for each byte as it is decompressed."""
+    with open_regular(source, MAX_BYTES, "an archive of worlds") as raw:
+        start = raw.read(6)
+        raw.seek(0)
+        decompress = next((opened for magic, opened in DECOMPRESS.items() if start.startswith(magic)), None)
+        stream: Any = _Bounded(raw if decompress is None else decompress(raw), source)
+        try:
+            with tarfile.open(fileobj=stream, mode="r|") as archive:
+                for number, member in enumerate(archive):
+                    if number >= MAX_MEMBERS or member.size > MAX_BYTES:
+                        raise _too_large(source)
+                    if member.isreg() and any(PurePath(member.name).match(kind) for kind in (WORLDS, PATHS)):
+                        archive.extract(member, folder, filter="data")
+                rest: Any = archive.fileobj  # tarfile takes a damaged header for the end, and never sees a checksum
+                while block := rest.read(1 << 20):
+                    if block.strip(b"\0"):
+                        raise tarfile.ReadError("damaged header")
+        except (tarfile.TarError, lzma.LZMAError, zlib.error, OSError, EOFError, MemoryError) as error:
+            problem = " ".join(str(error).split()) or type(error).__name__
+            raise input_error(str(source), f"not a readable .tar archive ({problem})") from None
+
+
+class _Bounded:
+    """A decompressed stream of an archive, refused beyond `MAX_BYTES`."""
+
+    def __init__(self, stream: IO[bytes], source: Path) -> None:
+        self._stream, self._source, self._left = stream, source, MAX_BYTES
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes."""
+        content = self._stream.read(size)
+        self._left -= len(content)
+        if self._left < 0:
+            raise _too_large(self._source)
+        return content
+
+
+def _too_large(source: Path) -> InputError:
+    limits = f"{MAX_MEMBERS} files and {MAX_BYTES // 1_000_000} MB when unpacked"
+    return input_error(str(source), f"larger than an archive of the challenge's worlds; the limits are {limits}")
 
 
 def campaign_data(
@@ -129,11 +180,13 @@ def reference_times(folder: Path) -> dict[str, float]:
     The path leads from the start along the cells of the file to the goal.
     """
     times = {}
-    for path in folder.rglob("path_*.npy"):
+    for path in folder.rglob(PATHS):
+        with open_regular(path, MAX_PATH_BYTES, "a reference path") as file:
+            content = file.read()
         try:
-            cells = np.load(path, allow_pickle=False)
+            cells = np.load(io.BytesIO(content), allow_pickle=False)
             way = np.vstack([BARN_START[:2], BARN_CELL * cells + FIELD, BARN_GOAL])
-        except (ValueError, OSError, EOFError, TypeError) as error:
+        except (ValueError, OSError, EOFError, TypeError, MemoryError) as error:
             raise InputError(f"{path}: not a reference path of a BARN world ({error})") from None
         length = polyline_length(way)
         times[path.stem.replace("path_", "world_")] = length / BARN_SPEED

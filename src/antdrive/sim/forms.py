@@ -28,8 +28,8 @@ def _text_or_mapping(value: Any) -> Any:
 
 
 def _margin(value: Any) -> Any:
-    if value != "auto" and (isinstance(value, bool) or not isinstance(value, int | float)):
-        raise ValueError(f"must be a number of metres, or auto, got {show(value)}")
+    if value not in (None, "auto") and (isinstance(value, bool) or not isinstance(value, int | float)):
+        raise ValueError(f"must be a number of metres, auto, or null for the default, got {show(value)}")
     return value
 
 
@@ -56,7 +56,7 @@ def seed_list(value: Any) -> list[int]:
 
 
 _SWITCH_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "boolean"}, {"const": "none"}, {"type": "object"}]}
-_MARGIN_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, {"const": "auto"}]}
+_MARGIN_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, {"const": "auto"}, {"type": "null"}]}
 _NAME_OR_MAPPING: dict[str, Any] = {"anyOf": [{"type": "string"}, {"type": "object"}]}
 SEEDS_SCHEMA: dict[str, Any] = {
     "anyOf": [
@@ -96,7 +96,7 @@ class Form:
 
 class _Margin(Form):
     def column(self, value: Any) -> Any:
-        return value if value == "auto" else str(float(value))
+        return "default" if value is None else value if value == "auto" else str(float(value))
 
 
 class _Sees(Form):

@@ -11,6 +11,7 @@ from antdrive.planners import AStar, Query
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible, widest_passage
 from antdrive.planners.graph.search import reachable
 from antdrive.robots.clearance import obstacle_name
+from antdrive.robots.default_margin import LEAST
 from antdrive.worlds import Grid, Task, point_clearance, rasterise
 
 if TYPE_CHECKING:
@@ -58,6 +59,8 @@ def _what_it_takes(s: RoutePlanner, passes: float) -> str:
     robot, foot = s.robot, s.robot.footprint
     fits = passes - robot.radius
     helps = f"a margin below {fits:.3g} m leaves a way on fine cells" if fits > 0 else ""
+    if helps and LEAST < s.usual_margin <= s.margin:
+        helps += ", but noise may then cause contacts; --margin auto measures its effect"
     if foot.is_disc:
         return helps or "this robot does not fit through"
     xmin, ymin, xmax, ymax = foot.bounds

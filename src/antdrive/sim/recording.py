@@ -53,7 +53,7 @@ def rollout_of(
         replans=tuple(parts.guide.log),
         limiters=parts.limiters,
         noise=s.noise,
-        margin=s.margin,
+        margin=s.planned_margin,
         margin_choice=s.chosen.record if s.chosen is not None else None,
         sensing=s.sensing,
         settings=s.other_settings,

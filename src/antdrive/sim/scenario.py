@@ -18,6 +18,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_position
 from antdrive.planners import Planner, capabilities_of
 from antdrive.robots import RobotSpec, overlap_at
+from antdrive.robots.default_margin import default_margin
 from antdrive.robots.spec import Odometry
 from antdrive.sim.log.record import DriveRecord, MarginRecord, SensingRecord, canonical_hash, changes, settings_of
 from antdrive.sim.log.streams import random_stream
@@ -117,6 +118,10 @@ class Scenario(Settings):
             raise FieldError(
                 "odometry", f"{self.odometry:g} times the documented errors is too much: {error}"
             ) from None
+        if self.map == "none" and self.replanning is None:
+            raise FieldError(
+                "replan", "none: a mapless robot finds its way by replanning; false replans around no movers"
+            )
         if self.map == "none" and self.robot.lidar is None:
             raise FieldError("map", f"none: {self.robot.name} {NO_LIDAR}")
         kind = self.known_perception.kind
@@ -185,7 +190,7 @@ class Scenario(Settings):
             more: further inputs of the result
             without: fields to omit
         """
-        fields = {name: getattr(self, name) for name in SETTINGS}
+        fields = {**{name: getattr(self, name) for name in SETTINGS}, "margin": self.planned_margin}
         text = identity_text(
             canonical_hash(self.task), self.planner_label, self.planner, canonical_hash(self.robot), fields, without
         )
@@ -234,7 +239,7 @@ class Scenario(Settings):
             "options": settings_of(planner) if dataclasses.is_dataclass(planner) else {},
             "smoothing": self.smoothing,
             "noise": self.noise,
-            "margin_m": self.margin,
+            "margin_m": self.planned_margin,
             "margin_auto": self.chosen is not None,
             "cell_m": self.planning_cell,
             "physics_hz": self.physics_hz,
@@ -253,7 +258,18 @@ class Scenario(Settings):
     @property
     def inflate(self) -> float:
         """Distance that plans keep between the robot's centre and every surface [m]."""
-        return self.robot.radius + self.margin
+        return self.robot.radius + self.planned_margin
+
+    @property
+    def planned_margin(self) -> float:
+        """Clearance of plans on top of the robot's radius [m]: the margin as set, else the default."""
+        return self.usual_margin if self.margin is None else self.margin
+
+    @property
+    def usual_margin(self) -> float:
+        """Default margin for robot, controller, noise and smoothing [m]."""
+        factors = self.loss_factors
+        return default_margin(factors.robot, factors.controller, factors.noise, factors.smoothing)
 
     @property
     def driven_world(self) -> World:
@@ -308,13 +324,23 @@ class Scenario(Settings):
             "planner": self.planner_label,
             "robot": self.robot.name,
             "smoothing": self.smoothing,
-            "margin": f"{self.margin:g} m",
+            "margin": f"{self.planned_margin:g} m",
             "noise": f"{self.noise:g}",
             "seed": self.seed,
         }
         if self.driven_world.movers:
             facts["movers"] = len(self.driven_world.movers)
         return card(picture_of(self), task.world.name, facts)
+
+
+def usual_time_limit(length: float, robot: RobotSpec) -> float:
+    """Return the time limit of a drive for which neither scenario nor world names one [s].
+
+    Args:
+        length: length of the route [m]
+        robot: the robot
+    """
+    return 30.0 + 10.0 * length / robot.max_speed
 
 
 def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:

@@ -84,7 +84,7 @@ class Settings:
         Setting("factor on the robot's documented noise; 0 is a perfect robot", "Robot", "FACTOR", axis=True),
     ] = 0.0
     margin: Annotated[
-        float,
+        float | None,
         Ge(0),
         Setting(
             "clearance of plans on top of the robot's radius [m], or auto: the smallest margin predicted to suffice for robot, "
@@ -94,8 +94,9 @@ class Settings:
             form="margin",
             axis=True,
             column="margin_asked",
+            usual="0.03; with noise more, by robot, noise and smoothing",
         ),
-    ] = 0.03
+    ] = None
     cell: Annotated[
         float | None,
         Gt(0),

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.errors import input_error
-from antdrive.base.files import parse_json
+from antdrive.base.files import parse_json, read_bytes
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.record import DriveRecord, differences, hashes_of, plain_value
@@ -21,13 +21,10 @@ SAME = 1e-9  # relative tolerance of numbers that are written twice
 
 def read_result(path: Path) -> Mapping[str, Any]:
     """Read a `result.json`; return an empty mapping if it is not a JSON object."""
-    if not path.is_file():
-        raise input_error(str(path), "cannot be read (no regular file)")
-    if path.stat().st_size > MAX_RESULT_BYTES:
-        raise input_error(str(path), f"cannot be read (larger than {MAX_RESULT_BYTES // 1_000_000} MB)")
+    text = read_bytes(path, MAX_RESULT_BYTES, "a run's result")
     try:
-        content = parse_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        content = parse_json(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise input_error(str(path), f"cannot be read ({error})") from None
     return content if isinstance(content, dict) else {}
 

@@ -1,6 +1,7 @@
 """`antdrive check` and `antdrive accept`: what they print, write and return."""
 
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -44,6 +45,10 @@ def test_a_suite_is_accepted_and_then_passes(antdrive, suite):
     code, out, _ = antdrive("check", ".", "--jobs", "1", "--only", "clear")
     assert (code, out.splitlines()[-1]) == (0, "2 of 2 passed")
     assert {path: path.read_bytes() for path in files} == files
+    older = suite.parent / "baselines" / "a" / "clear-0.json"
+    older.write_text(re.sub(r' *"spl": [\d.]+,\n', "", older.read_text()))
+    code, out, _ = antdrive("check", ".", "--jobs", "1", "--only", "clear")
+    assert (code, out.splitlines()[1]) == (0, "  not compared: spl; missing in the baseline: renew it")
 
 
 def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive, suite):

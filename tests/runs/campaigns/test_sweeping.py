@@ -240,6 +240,26 @@ def test_an_auto_margin_is_chosen_once_for_each_robot_and_its_settings(monkeypat
     assert {sweeping.grid_table([one])["margin"][0].as_py() for one in auto} == {0.07}
 
 
+def test_a_default_margin_is_the_run_with_its_number_and_is_asked_for_as_the_default():
+    campaign = {**BASE, "worlds": ["empty"], "robots": ["turtlebot", "jackal"], "noise": [0, 1], "smoothing": ["none"]}
+    jobs = expand(make_campaign(campaign)).jobs
+    rows = [(one.case.robot.name, one.case.settings.fields["noise"], *_margins(one)) for one in jobs]
+    assert sorted(rows) == [
+        ("jackal", 0, "default", 0.03), ("jackal", 1, "default", 0.057),
+        ("turtlebot", 0, "default", 0.03), ("turtlebot", 1, "default", 0.076),
+    ]  # fmt: skip
+    same = [(robot, noise, number) for robot, noise, _, number in rows]
+    for one, (robot, noise, number) in zip(jobs, same, strict=True):
+        given = {**campaign, "robots": [robot], "noise": [noise], "margin": [number]}
+        assert {other.key for other in expand(make_campaign(given)).jobs} >= {one.key}
+    assert len(expand(make_campaign({**campaign, "noise": [0], "margin": [None, 0.03]})).jobs) == 2
+
+
+def _margins(job):
+    row = sweeping.grid_table([job])
+    return row["margin_asked"][0].as_py(), row["margin"][0].as_py()
+
+
 def test_a_robot_of_ones_own_comes_along_with_the_folder(tmp_path):
     source = tmp_path / "mine.yaml"
     catalogue = Path(job.__file__).parents[2] / "robots" / "catalog" / "turtlebot.yaml"

@@ -118,6 +118,18 @@ def test_wall_clock_times_and_counts_without_a_direction_are_not_compared(small_
     assert evaluate(small_run, PLAIN, changed(baseline, replans=9.0, avoiding_s=9.0)).passed
 
 
+def test_a_baseline_from_before_a_metric_compares_the_others_and_says_so(small_run, baseline, tmp_path):
+    older = {name: value for name, value in baseline.metrics.items() if name not in ("barn", "avoiding_s")}
+    path = tmp_path / "small-0.json"
+    dataclasses.replace(baseline, metrics=older).save(path)
+    evaluation = evaluate(small_run, PLAIN, Baseline.load(path))
+    assert evaluation.passed
+    assert evaluation.notes == ("not compared: barn; missing in the baseline: renew it",)
+    assert evaluate(small_run, PLAIN, baseline).notes == ()
+    slow = dataclasses.replace(baseline, metrics={**older, "duration_s": 1.0})
+    assert [fault.split(":")[0] for fault in evaluate(small_run, PLAIN, slow).faults] == ["duration_s"]
+
+
 def test_the_verdict_counts_whatever_the_metrics_say(small_run, collided_run, baseline, small_scenario):
     faults = evaluate(collided_run, PLAIN, baseline).faults
     assert faults == ("outcome: collided, expected succeeded",), "once, as the baseline says nothing else"

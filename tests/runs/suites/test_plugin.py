@@ -169,6 +169,14 @@ def test_a_better_drive_passes_and_says_that_the_baseline_can_be_renewed(accepte
     accepted.runpytest(*PLUGIN, "-k", "clear").stdout.no_fnmatch_line("better*")
 
 
+def test_a_metric_that_the_baseline_lacks_is_said_not_to_be_compared(accepted):
+    path = accepted.path / "baselines" / "a" / "clear-0.json"
+    path.write_text(re.sub(r' *"jerk_rms": [\d.]+,\n', "", path.read_text()))
+    found = accepted.runpytest(*PLUGIN, "-k", "clear")
+    found.assert_outcomes(passed=1, deselected=1)
+    found.stdout.fnmatch_lines(["a.drive.yaml::clear[[]0]: not compared: jerk_rms; missing in the baseline: renew it"])
+
+
 def test_unused_baselines_are_told_and_fail_if_asked_to(accepted):
     folder = accepted.path / "baselines"
     (folder / "a" / "gone-0.json").write_text((folder / "a" / "clear-0.json").read_text())

@@ -231,7 +231,7 @@ def test_words_select_tests(tmp_path):
     for words, pattern, message in (
         ([f"{path}::d"], None, "no test 'd'; choose from"),
         ([str(path)], "x*", "no test of"),
-        ([str(tmp_path / "none.drive.yaml")], None, "cannot be read (No such file"),
+        ([str(tmp_path / "none.drive.yaml")], None, "no such file"),
         ([__file__], None, "not a suite; its name must end in .drive.yaml"),
         ([str(Path(__file__).parent)], None, "contains no suites"),
     ):

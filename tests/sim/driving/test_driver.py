@@ -17,11 +17,11 @@ from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, Pu
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
-from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, follow, full_turn
-from antdrive.sim.driving.localising import TruePose
-from antdrive.sim.driving.parts import Ending, Guide, Moment, Step
+from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, drive, follow, full_turn
+from antdrive.sim.driving.localising import Exact, TruePose
+from antdrive.sim.driving.parts import Decider, Ending, Guide, Moment, Step
 from antdrive.sim.driving.perceived_movers import GroundTruth
-from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.driving.plants import Bullet, Kinematic
 from antdrive.sim.driving.rules import AVOIDING, SIGHT_LIMIT, WAITING_SPEED, Avoid, Pursuit, braked, stopping_time
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.physics.engine import Engine, State
@@ -44,6 +44,11 @@ def driver(robot, guide=None, *rules):
     tracked = controller.prepare(smooth(plan, grid, TASK), HALL, robot, 0.03, 1 / 60)
     pursuit = Pursuit(controller, full_turn(robot, 60))
     return Driver(guide or OnePath(), (pursuit, *rules), tracked, TASK, robot, 60)
+
+
+def end_of(robot, tick, pose, state):
+    """How a control period ends the drive of a robot at an estimated pose; None if it goes on."""
+    return robot.arrives(tick, pose, state) or robot.decide(tick, pose, state)
 
 
 def at(driving, arc):
@@ -100,7 +105,7 @@ def test_a_robot_that_stops_just_outside_the_tolerance_has_not_arrived(turtlebot
     away = TASK.goal_tolerance + outside
     at_end = driver(turtlebot)
     at(at_end, at_end.path.length)
-    endings = [at_end.decide(tick, (x, y, 0.0), State(x - away, y, 0.0, 0.0, 0.0)) for tick in range(9)]
+    endings = [end_of(at_end, tick, (x, y, 0.0), State(x - away, y, 0.0, 0.0, 0.0)) for tick in range(9)]
     assert {ending.outcome for ending in endings if ending is not None} == {outcome}
 
 
@@ -125,7 +130,7 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
         at(at_end, at_end.path.length)
         ending = None
         for tick in range(9):  # the command comes to rest first
-            ending = ending or at_end.decide(tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
+            ending = ending or end_of(at_end, tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
         assert ending.outcome is outcome
         lost = (
             "the robot believed that it was at the goal, 0.00 m from it, but was 0.300 m from it "
@@ -152,7 +157,7 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), sight)
     at_goal = (*TASK.goal, 0.0)
     at(robot, robot.path.length - 0.5)
-    endings = [robot.decide(tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
+    endings = [end_of(robot, tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
     assert robot.step.pursuit.limiter != LIMITERS.index("avoid")
     assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
 
@@ -337,6 +342,28 @@ def test_a_robot_waits_if_it_stands_to_give_way(turtlebot, avoids, speed, waits)
     assert monitor.waiting == [waits]
 
 
+class EndsAt(Decider):
+    """Decides in one control period that it is stuck, and notes for which period the reason is asked."""
+
+    def __init__(self, tick):
+        self.step, self._tick, self.asked = Step(), tick, []
+
+    def decide(self, tick, pose, state):
+        return Ending(Outcome.STUCK) if tick == self._tick else None
+
+    def with_reason(self, ending, tick):
+        self.asked.append((ending.outcome, tick))
+        return ending
+
+
+def test_the_reason_is_that_of_the_period_in_which_the_drive_ends():
+    for last, outcome, asked in ((3, Outcome.STUCK, 3), (0, Outcome.STUCK, 0), (99, Outcome.TIMED_OUT, 30)):
+        plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
+        decider = EndsAt(last)
+        assert drive(plant, decider, Exact(), hz=60, limit=0.5).outcome is outcome
+        assert decider.asked == [(outcome, asked)]
+
+
 @pytest.mark.parametrize(("true", "outcome"), [(0.4, Outcome.STUCK), (0.1, Outcome.SUCCEEDED)])
 @pytest.mark.parametrize(("off", "knows"), [(0.0, False), (0.25, False), (0.26, True), (0.4, True)])
 def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, true, outcome):
@@ -346,7 +373,7 @@ def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, 
     endings = []
     for tick in range(9):  # the command comes to rest first
         robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.path.length))
-        endings.append(robot.decide(tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
+        endings.append(end_of(robot, tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
     assert bool(monitor.misses) is knows
     assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antdrive.robots import PursuitState, Twist
-from antdrive.sim import Outcome, Rollout, Scenario, run
+from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, hit_within, point_at
 from antdrive.sim.driving.drive import Driver
@@ -129,7 +129,7 @@ def test_a_forged_estimate_that_scans_corrected_is_refused(log):
 
 def test_a_forged_scan_is_refused(log):
     scans = log.scans.copy()
-    scans[50, 300] += 10
+    scans[50, 300] += 1
     (problem,) = replay(replace(log, scans=scans)).problems
     assert problem.startswith("replay: scans differ")
     assert f"t = {log.t[log.scan_rows[50]]:.3f} s" in problem
@@ -143,6 +143,12 @@ def test_a_forged_scan_is_refused(log):
     assert replay(fewer).problems == (problem,)
     none = replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
     assert "must have scans" in replay(none).problems[0]
+
+
+def test_the_optima_of_a_mapless_drive_are_no_shorter_than_the_straight_line(log):
+    for key in ("euclidean_optimum_m", "grid_optimum_m"):
+        forged = changed(log, "record.plan", **{key: 0.3 * getattr(log.record.plan, key)})
+        assert any(f"record.plan.{key}: " in problem for problem in certify(forged).problems)
 
 
 def test_the_map_is_reset_after_failed_plans(log):
@@ -389,7 +395,7 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     exploration.replan = lambda tick, pose, trigger: asked.append(trigger)
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
-    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0))
+    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0), Twist(0.0, 0.0))
     assert (ending is None) == lost
     assert asked == ([] if lost else ["missed the goal"])
 

@@ -191,13 +191,17 @@ def test_the_scans_of_a_robot_with_a_map_are_in_its_log(log, jackal):
 def test_replays_take_the_scans_of_a_robot_with_a_map_again(log):
     assert replay(log).problems == ()
     scans = log.scans.copy()
-    scans[40, 300] += 10
+    scans[40, 300] += 1
     (problem,) = replay(replace(log, scans=scans)).problems
     assert problem == (
         f"replay: scans differ from the lidar at the logged poses, from t = {log.t[log.scan_rows[40]]:.3f} s"
     )
     fewer = replace(log, scans=np.delete(log.scans, 40, axis=0), scan_rows=np.delete(log.scan_rows, 40))
     assert replay(fewer).problems == (problem,)
+    row = (log.scan_rows[40] + log.scan_rows[41]) // 2
+    invented = np.insert(log.scans, 41, log.scans[40], axis=0), np.insert(log.scan_rows, 41, row)
+    (problem,) = replay(replace(log, scans=invented[0], scan_rows=invented[1])).problems
+    assert f"from t = {log.t[row]:.3f} s" in problem
     none = replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])  # as older logs are
     assert replay(none).problems == ()
     told = replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))

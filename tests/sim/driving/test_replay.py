@@ -63,3 +63,18 @@ def test_a_pose_that_is_off_by_more_than_rounding_differs(small_run):
     near = replay(replace(log, pose=pose))
     assert not near.problems
     assert not near.exact
+
+
+@pytest.mark.parametrize(("name", "rows"), [("estimate", slice(400, 401)), ("actuated", slice(401, 405))])
+def test_noise_is_that_of_the_seed_to_a_millionth(small_scenario, name, rows):
+    log = driven(run(replace(small_scenario, noise=1.0, seed=4)))
+    for off, wrong in ((0.5e-6, False), (2e-6, True)):
+        array = getattr(log, name).copy()
+        array[rows, 1] += off
+        problems = replay(replace(log, **{name: array})).problems
+        assert any(f"{name} differs from the noise of seed 4, from t = " in problem for problem in problems) == wrong
+
+
+def test_headings_of_estimates_are_compared_on_the_circle(small_scenario):
+    log = driven(run(replace(small_scenario, noise=1.0, seed=4)))
+    assert replay(replace(log, estimate=log.estimate + [0.0, 0.0, 2 * np.pi])).problems == ()

@@ -126,7 +126,8 @@ def test_verify_needs_neither_physics_nor_compiler(log, tmp_path):
 
 def test_a_robot_that_stays_where_it_is_gets_a_verdict_of_its_own(log):
     x, y, _ = log.record.task.start
-    stays = with_task(replace(log, **{k: getattr(log, k)[:1] for k in ROWS}), goal=(x + 0.1, y))
+    still = {k: np.repeat(getattr(log, k)[:1], 5, axis=0) for k in ROWS} | {"t": np.arange(5) / 240}
+    stays = with_task(replace(log, **still), goal=(x + 0.1, y))
     stays = replace(stays, route=np.array([[x, y], [x + 0.1, y]]), cells=log.cells[:1])
     plan = replace(log.record.plan, cost_m=0.0, length_m=0.1, grid_optimum_m=0.0, euclidean_optimum_m=0.1)
     stays = changed(stays, "record", plan=plan)

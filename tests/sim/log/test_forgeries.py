@@ -29,9 +29,9 @@ SENTENCES = {
     "a replan that leads elsewhere": ("turtlebot, movers", "m from the robot"),
     "replans in a world without movers": ("turtlebot", "record.replanning is null"),
     "a success that was stuck": ("turtlebot", "outcome: stuck, but"),
-    "a collision cut off before the contact, stuck": ("turtlebot, collided", "8 s without progress"),
-    "an invalid plan, with rows": ("turtlebot", "invalid_plan ends a run before the robot drives"),
-    "a contact that happens at the start": ("turtlebot, collided", "but the log goes on for"),
+    "a collision cut off before the contact, stuck": ("turtlebot, collided", "8 s of driving without progress"),
+    "an invalid plan, with rows": ("turtlebot", "does not end with a search that found no route"),
+    "a contact that happens at the start": ("turtlebot, collided", "but the log ends after"),
     "a contact with another obstacle": ("turtlebot, collided", "a contact with obstacle 0"),
     "a contact of impossible depth and force": ("turtlebot, collided", "no farther apart than"),
 }

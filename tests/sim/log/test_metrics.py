@@ -32,7 +32,8 @@ def straight(**changes):
         physics_hz=hz,
     )
     speed, clearance = np.tile([0.5, 0.0], (81, 1)), np.linspace(0.2, 1.0, 81)
-    log = made_up_log(pose, hz, record, twist=speed, clearance=clearance, route=np.array([(0.0, 0.0), (4.0, 0.0)]))
+    arrays = {"route": np.array([(0.0, 0.0), (4.0, 0.0)]), "cells": np.array([(4, 4), (4, 26)], np.int32)}
+    log = made_up_log(pose, hz, record, twist=speed, clearance=clearance, **arrays)
     return replace(log, **changes)
 
 
@@ -114,11 +115,37 @@ def test_the_clock_starts_a_decimetre_from_the_start_and_ends_at_the_tolerance()
     assert METRICS["arrival_s"](log) == pytest.approx(6.8)
     far = with_record(log, task=replace(log.record.task, goal=(5.5, 0.1)))
     assert METRICS["arrival_s"](far) == math.inf
-    assert METRICS["barn"](far) == pytest.approx(1 / 8)
+    assert METRICS["barn"](far) == 0.0
     at_once = with_record(log, task=replace(log.record.task, goal=(0.02, 0.1)))
-    assert METRICS["arrival_s"](at_once) == 0.0
+    assert METRICS["arrival_s"](at_once) == math.inf  # it drives on
+    begun = replace(
+        at_once, **{name: getattr(at_once, name)[:3] for name in ("t", "pose", "twist", "clearance", "limiter")}
+    )
+    assert METRICS["arrival_s"](begun) == 0.0
     stands = replace(log, pose=log.pose * 0 + (1.0, 1.0, 0.0))
     assert METRICS["turning_rad_per_m"](stands) == 0.0
+
+
+def test_a_robot_that_drives_through_the_goal_arrives_when_it_comes_back():
+    """It is at the goal from 1 s to 3 s, and again from 13 s, so success and time are those of the second arrival."""
+    log = straight()
+    there, back = log.pose, log.pose[::-1]
+    passing = replace(log, pose=np.concatenate([there, back]), t=np.arange(162) / 10)
+    passing = with_record(passing, task=replace(log.record.task, goal=(1.0, 0.1)))
+    assert METRICS["arrival_s"](passing) == math.inf
+    stays = replace(passing, pose=passing.pose[:152], t=passing.t[:152])
+    assert METRICS["arrival_s"](stays) == pytest.approx(13.1 - 0.2)
+    assert METRICS["barn"](stays) == pytest.approx(1.6 / 12.8)
+
+
+def test_the_first_plan_is_as_long_as_its_cells_or_as_an_any_angle_line():
+    log = straight()
+    assert METRICS["path_length_m"](replace(log, cells=np.array([(4, 4), (5, 5), (5, 8)]))) == pytest.approx(
+        0.25 * (math.sqrt(2) + 3)
+    )
+    assert METRICS["path_length_m"](replace(log, cells=np.empty((0, 2)))) == 5.5  # as without a map
+    line = with_record(log, plan=replace(log.record.plan, length_m=5.1))
+    assert METRICS["path_length_m"](line) == 5.1
 
 
 def test_jerk_needs_three_windows():

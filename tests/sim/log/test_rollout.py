@@ -280,12 +280,10 @@ def test_other_bytes_for_the_same_values_are_refused(saved, tmp_path):
     }  # fmt: skip
     repacked()
     assert path.read_bytes() == raw, "what is written unchanged is the log itself"
-    for name, (change, words) in changes.items():
+    for change, words in changes.values():
         change()
         with pytest.raises(InputError, match=words):
             Rollout.load(path)
-            pytest.fail(name)
-    assert path.exists()
 
 
 def test_no_log_whatever_ends_in_anything_but_one_line(saved, tmp_path):

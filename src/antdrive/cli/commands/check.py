@@ -112,7 +112,7 @@ def drive_suites(
 def _print(result: "CheckResult") -> None:
     """Print the result of one test."""
     print_line(f"{result.address}: {(result.accepted or 'passed') if result.passed else 'FAILED'}")
-    for line in result.gains if result.passed else result.message.splitlines():
+    for line in (*result.gains, *result.notes) if result.passed else result.message.splitlines():
         print_line(f"  {line}")
 
 

@@ -64,6 +64,7 @@ def find_margin(
     smallest = min((trial.margin for trial in trials if trial.safe), default=None)
     facts = {
         "margin_m": smallest,
+        "default_m": base.usual_margin,
         "reserve_m": reserve,
         "world": world or kind,
         "planner": setup.planner,
@@ -98,3 +99,4 @@ def _lines(base: "Scenario", trials: "Sequence[MarginResult]", smallest: float |
         closed = f"; {trial.impassable} more worlds have no path with this margin" if trial.impassable else ""
         result += f", from {trial.drives} drive{'' if trial.drives == 1 else 's'}{closed}"
     yield f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {result}"
+    yield f"default for noise {base.noise:g}, smoothing {base.smoothing}: {base.usual_margin:.3f} m"

@@ -16,12 +16,12 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
 
     Plans keep the margin free around the robot. The table shows how much of it the drive used, where, and why: rounding,
     corner cutting, tracking, slip or localisation. For a margin of --margin auto, it also compares the predicted loss with
-    the actual loss.
+    the actual loss; a margin that is the default is called so.
 
     "Used at most" is the maximum that a cause used anywhere in the drive. "At the tightest place" splits the loss at the
     smallest remaining clearance by cause: positive towards the obstacle, negative away from it.
     """
-    from antdrive.sim.log.margin import budget
+    from antdrive.sim.log.margin import budget, has_default
     from antdrive.sim.log.rollout import Rollout
 
     log = Rollout.load(log_at(rollout))
@@ -43,6 +43,9 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
         if spent.largest.metres
         else "no loss: the robot never came closer to an obstacle than the margin",
     ]
+    if has_default(log.record):
+        record = log.record
+        lines.append(f"the margin is the default for noise {record.noise:g}, smoothing {record.smoothing.asked}")
     if prediction is not None:
         loss = prediction["footprint_loss_m"]
         drive = "not measured (movers or unseen obstacles)" if loss is None else f"{loss:.4f} m for the footprint"

@@ -9,7 +9,7 @@ from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, planning, show
 from antdrive.cli.options import option
-from antdrive.cli.output import chosen_margin, in_brackets, plain
+from antdrive.cli.output import in_brackets, margin_lines, plain
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.views.run_folder import suffixes
 
@@ -57,7 +57,7 @@ def plan(
         "status": answer.status.name.lower(),
         "sentence": answer.status.value,
         "reason": answer.reason,
-        "margin_m": scenario.margin,
+        "margin_m": scenario.planned_margin,
         "cost_m": answer.cost,
         "length_m": answer.line_length,
         "work": answer.work,
@@ -79,8 +79,7 @@ def _lines(
     if len(answer.cells):
         length, count = answer.line_length, len(answer.cells)
         yield f"  length {length:.3f} m over {count} cells, {answer.work} {answer.work_unit}"
-    if scenario.chosen is not None:
-        yield f"  {chosen_margin(scenario.chosen)}"
+    yield from margin_lines(scenario)
     rows, columns = grid.shape
     yield f"  planned in {answer.wall_s * 1000:.1f} ms on {rows} x {columns} cells of {grid.cell:g} m"
     yield from file_lines(files)

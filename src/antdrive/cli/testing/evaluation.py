@@ -44,6 +44,7 @@ class CheckResult:
         certified: whether the drive is certified collision-free
         faults: reasons for failing, one sentence each
         gains: improvements over the baseline, one sentence each
+        notes: what could not be compared, one sentence each
         details: explanations of the faults, one sentence each
         accepted: change to the baseline: written, renewed, unchanged, or empty
         commands: commands that repeat the test
@@ -61,6 +62,7 @@ class CheckResult:
     case: str = ""
     faults: tuple[str, ...] = ()
     gains: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     details: tuple[str, ...] = ()
     accepted: str = ""
     commands: tuple[str, ...] = ()
@@ -73,7 +75,7 @@ class CheckResult:
     @property
     def message(self) -> str:
         """Faults, details, commands and files of a failed test, one per line."""
-        lines = [*self.faults, *self.details]
+        lines = [*self.faults, *self.notes, *self.details]
         lines += [f"{'repeat:' if k == 0 else '       '} {command}" for k, command in enumerate(self.commands)]
         lines += [f"{name}: {path}" for name, path in self.files.items()]
         if self.unfilmed:
@@ -125,6 +127,7 @@ class Check:
             case="" if path is None else self.name,
             faults=evaluation.faults,
             gains=evaluation.gains,
+            notes=evaluation.notes,
             details=tuple(details),
             accepted=accepted,
             commands=self.commands,

@@ -27,6 +27,7 @@ def properties(result: CheckResult) -> list[tuple[str, str]]:
         "digest": result.digest,
         "fault": result.faults[0] if result.faults else "",
         "gains": "; ".join(result.gains),
+        "notes": "; ".join(result.notes),
         "baseline": result.accepted,
         "results": str(Path(next(iter(result.files.values()))).parent) if result.files else "",
         "command": result.commands[0] if result.commands else "",
@@ -59,6 +60,8 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
             yield f"baseline {drive['baseline']}: {drive['test']}"
         if drive.get("gains") and drive["passed"] == "true":
             yield f"better than its baseline: {drive['test']} ({drive['gains']}); --drive-update renews it"
+        if drive.get("notes"):
+            yield f"{drive['test']}: {drive['notes']}"
         if drive.get("results") and drive["passed"] == "false":
             yield f"results: {drive['results']}"
     unfilmed = sum(drive.get("film") == "none" for drive in drives)

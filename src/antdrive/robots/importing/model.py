@@ -18,10 +18,11 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from antdrive.base.errors import InputError, input_error
+from antdrive.base.files import read_bytes
 from antdrive.base.optional import optional
 from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
-from antdrive.worlds.formats.xml import parse_xml
+from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml
 
 MAX_PACKAGES = 100  # referenced by one file
 
@@ -36,8 +37,7 @@ def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Pat
 
 def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> str:
     """Expand a xacro file to URDF text."""
-    if not path.is_file():
-        raise input_error(str(path), "no such file")
+    read_bytes(path, MAX_BYTES, "a xacro file")
     xacrodoc = optional("xacrodoc", "urdf", "xacro files need it")
     known = dict(packages)
     for _ in range(MAX_PACKAGES):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -129,9 +130,14 @@ class SweepCase:
         planner = self.planner
         # Custom planners change more often than antdrive.
         own = {} if planner.name in PLANNERS else {"planner_version": planner.version}
-        return identity_text(
-            self.world_hash, planner.name, planner.options, self.robot.content, self.settings.fields, **own
-        )
+        fields = {**self.settings.fields, "margin": self.margin}
+        return identity_text(self.world_hash, planner.name, planner.options, self.robot.content, fields, **own)
+
+    @functools.cached_property
+    def margin(self) -> float | str:
+        """The margin as set, which may be auto, else the default [m]."""
+        asked: float | str | None = self.settings.fields["margin"]
+        return self.scenario(0).planned_margin if asked is None else asked
 
 
 class Job(NamedTuple):

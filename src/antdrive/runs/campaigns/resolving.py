@@ -17,7 +17,8 @@ from antdrive.base.checks import show, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PLANNERS, Query, load_planner, planner_version
-from antdrive.robots import RobotSpec, overlap_at
+from antdrive.robots import PurePursuit, RobotSpec, overlap_at
+from antdrive.robots.default_margin import LEAST, default_margin
 from antdrive.runs.campaigns.campaign import Campaign, RandomTasks, seeds_of
 from antdrive.runs.campaigns.job import NamedTask, PlannerVariant
 from antdrive.sim.forms import option_text, seed_list
@@ -216,14 +217,12 @@ def values_of(campaign: Campaign, place: Location, value: Any) -> list[Any]:
 
 NAMED = "named"  # value of the key tasks: those of the world files
 TRIES = 1000  # most random pairs of start and goal drawn for one task
-ROOM = 0.03  # margin of random tasks if the campaign's margin is auto [m]
 
 
 def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequence[RobotSpec]) -> Iterator[NamedTask]:
     """Yield the tasks of a campaign: each world with each of its starts and goals."""
     if isinstance(campaign.tasks, RandomTasks):
-        margins = [ROOM if margin == "auto" else float(margin) for margin in campaign.values("margin")]
-        inflate = max(robot.radius for robot in robots) + max(margins)
+        inflate = max(robot.radius for robot in robots) + max(_margins(campaign, robots))
         for world in _each_once(worlds):
             yield from _drawn(campaign, campaign.tasks, world, robots, inflate)
     elif campaign.entry.tasks == NAMED:
@@ -239,6 +238,16 @@ def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequ
             yield from _listed(campaign, world)
     else:
         yield from worlds
+
+
+def _margins(campaign: Campaign, robots: Sequence[RobotSpec]) -> Iterator[float]:
+    """Yield the margins of a campaign [m]: `LEAST` for auto, and for the default those of the usual controller."""
+    for margin in campaign.values("margin"):
+        if margin is not None:
+            yield LEAST if margin == "auto" else float(margin)
+            continue
+        for robot, noise, kind in itertools.product(robots, campaign.values("noise"), campaign.values("smoothing")):
+            yield default_margin(robot, PurePursuit(), noise, kind)
 
 
 def _each_once(worlds: Sequence[NamedTask]) -> Iterable[NamedTask]:

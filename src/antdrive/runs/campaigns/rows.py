@@ -69,7 +69,7 @@ def grid_row(job: Job) -> dict[str, Any]:
     """Return the grid columns of a run."""
     case, planner, robot, fields = job.case, job.case.planner, job.case.robot, job.case.settings.fields
     x0, y0, x1, y1 = case.place.task.world.bounds
-    margin = case.calibration.margin if case.calibration else fields["margin"]
+    margin = case.calibration.margin if case.calibration else case.margin
     return {
         "key": job.key,
         "world": case.place.world,

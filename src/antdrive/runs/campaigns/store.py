@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError, input_error
+from antdrive.base.files import MAX_JSON_BYTES, open_regular, read_bytes
 from antdrive.base.optional import parquet_library
 from antdrive.runs import results_folder
 from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, result_schema, result_table
@@ -36,6 +37,7 @@ MANIFEST, GRID_FILE, PARTS, TABLE = "manifest.json", "grid.parquet", "parts", "r
 FLUSH_EVERY = 2.0  # finished runs are written at least this often [s]
 TRIES = 100  # attempts to read parts while another process merges them
 MOST_PARTS = 200  # more are merged into one
+MAX_TABLE_VALUES = 200_000_000
 UNFINISHED = ".new-"  # prefix of temporary files
 
 
@@ -143,11 +145,12 @@ def former_grid(folder: Path) -> pyarrow.Table | None:
 def read_manifest(folder: str | Path) -> dict[str, Any]:
     """Read the manifest of a campaign's folder."""
     path = Path(folder) / MANIFEST
+    if not path.exists():
+        raise input_error(str(folder), f"no {MANIFEST} here; antdrive sweep writes it")
+    text = read_bytes(path, MAX_JSON_BYTES, "a campaign's manifest")
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise input_error(str(folder), f"no {MANIFEST} here; antdrive sweep writes it") from None
-    except (OSError, ValueError) as error:
+        data = json.loads(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise input_error(str(path), f"cannot be read ({error})") from None
     if not isinstance(data, dict) or type(data.get("size")) is not int:
         raise input_error(str(path), "not a campaign's manifest; antdrive sweep writes a new one")
@@ -250,10 +253,18 @@ def _cast(table: pyarrow.Table, schema: pyarrow.Schema) -> pyarrow.Table:
 
 def _read(path: Path) -> pyarrow.Table:
     arrow = parquet_library()
+    if not path.exists():
+        raise input_error(str(path), "no such file; antdrive sweep writes it")
     try:
-        return arrow.parquet.read_table(path)
-    except FileNotFoundError:
-        raise input_error(str(path), "no such file; antdrive sweep writes it") from None
+        with open_regular(path, kind="a Parquet table") as stream:
+            size = arrow.parquet.read_metadata(stream)
+            if size.num_rows * size.num_columns > MAX_TABLE_VALUES:
+                raise input_error(
+                    str(path), f"has {size.num_rows} rows of {size.num_columns} columns, too many to read"
+                )
+            return arrow.parquet.read_table(stream)
     except (OSError, arrow.ArrowException) as error:
         remedy = "; delete the file to repeat its runs" if path.parent.name == PARTS else ""
-        raise input_error(str(path), f"cannot be read as Parquet ({error}){remedy}") from None
+        raise input_error(
+            str(path), f"cannot be read as Parquet ({getattr(error, 'strerror', None) or error}){remedy}"
+        ) from None

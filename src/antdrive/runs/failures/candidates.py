@@ -14,6 +14,7 @@ from typing import Any
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import MAX_JSON_BYTES, read_bytes
 from antdrive.planners import Planner, PlannerError
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible
 from antdrive.planners.user_code import is_importable_elsewhere
@@ -195,8 +196,8 @@ def _digest(value: Any) -> str:
 def _read(journal: Path | None, header: str) -> dict[str, bool]:
     """Read an earlier session's answers about the same failure; empty without such a session."""
     try:
-        data = json.loads(journal.read_text(encoding="utf-8")) if journal is not None else {}
+        data = json.loads(read_bytes(journal, MAX_JSON_BYTES)) if journal is not None else {}
         answers = data["answers"] if data.get("header") == header else {}
-    except (OSError, ValueError, AttributeError, KeyError):
+    except (ValueError, AttributeError, KeyError, RecursionError):
         return {}
     return {str(key): value is True for key, value in answers.items()} if isinstance(answers, dict) else {}

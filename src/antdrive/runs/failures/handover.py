@@ -34,7 +34,7 @@ from antdrive.sim.scenario import Scenario
 from antdrive.worlds import save_task
 
 #: Settings written even at their defaults, so that the test survives a change of defaults.
-PINNED = ("smoothing", "margin", "noise")
+PINNED = ("smoothing", "noise")
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +98,7 @@ def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
         "robot": robot,
         "planner": planner_words(scenario),
         **{key: getattr(scenario, key) for key in PINNED},
+        "margin": scenario.planned_margin,
         **{key: value for key, value in written(lambda name: getattr(scenario, name)).items() if key != "seed"},
         "seeds": [int(scenario.seed)],
     }

@@ -17,7 +17,9 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from antdrive.base.atomic import atomic_write
+from antdrive.base.document import MAX_BYTES
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import read_bytes
 from antdrive.base.kernel_cache import cache_folder
 from antdrive.base.records import STRICT
 from antdrive.runs.margins.loss import Loss, calibration_key, loss_on_course
@@ -186,8 +188,8 @@ def known_margin(conditions: LossFactors) -> Calibration | None:
     if path is None:
         return None
     try:
-        calibration = _adapter().validate_json(path.read_bytes())
-    except (OSError, ValueError):
+        calibration = _adapter().validate_json(read_bytes(path, MAX_BYTES))
+    except ValueError:  # InputError is one
         return None
     return calibration if calibration.key == calibration_key(conditions) else None
 

@@ -29,6 +29,7 @@ import antdrive.runs.papers
 import antdrive.worlds
 from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError
+from antdrive.base.files import open_regular
 from antdrive.planners import History, PlanResult, PlanStatus
 from antdrive.runs.papers.claims import (
     CLAIMS,
@@ -108,7 +109,7 @@ def save_runs(runs: Sequence[PaperRun], path: Path, key: str) -> None:
 def load_runs(path: Path, key: str) -> list[PaperRun] | None:
     """Load the runs of a file; None if it is missing, unreadable or has another key."""
     try:
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
+        with open_regular(path) as opened, np.load(opened, allow_pickle=False) as file:
             if str(file["key"]) != key:
                 return None
             arrays = {name: file[name] for name in file.files}

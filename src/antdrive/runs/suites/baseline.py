@@ -211,15 +211,18 @@ class Baseline:
             raise input_error(shown_path(path), "case", problem)
         return baseline
 
+    @property
+    def later_metrics(self) -> tuple[str, ...]:
+        """The names of metrics to compare that the baseline lacks, because they were added later."""
+        compared = (name for name in METRICS if name not in WALL_CLOCK and METRICS[name].better != "neither")
+        return tuple(name for name in compared if name not in self.metrics)
+
     def gaps(self) -> Iterator[tuple[str, str]]:
         """Yield missing and surplus parts, as key and problem; a comparison needs complete baselines."""
         parts = {name: getattr(self, name) for name in ("metrics", "nearest", "hashes", "drive_digest", "line")}
         if self.outcome in ENDED_BY.values() and not any(parts.values()):
             return
         known = [name for name in METRICS if name not in WALL_CLOCK]
-        missing = [name for name in known if name not in self.metrics and METRICS[name].better != "neither"]
-        if missing:
-            yield "metrics", f"{', '.join(missing[:3])}{' and others' if len(missing) > 3 else ''} missing"
         for name in self.metrics:
             if name not in known:
                 yield f"metrics.{name}", "unknown metric"

@@ -168,10 +168,12 @@ class Evaluation:
     Attributes:
         faults: why the test fails, a sentence each
         gains: improvements over the baseline, a sentence each
+        notes: what could not be compared, a sentence each
     """
 
     faults: tuple[str, ...] = ()
     gains: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -189,6 +191,7 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
     """
     faults = list(unmet_demands(run, demands))
     gains: list[str] = []
+    notes: list[str] = []
     if baseline is not None:
         outcome_changes = _outcome_changes(run, baseline)
         if run.succeeded:
@@ -202,7 +205,9 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
             for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
                 _compare(name, run.rollout, baseline, demands, faults, gains)
             faults += _line_faults(run.rollout, baseline, demands)
-    return Evaluation(tuple(faults), tuple(gains))
+            if baseline.later_metrics:
+                notes.append(f"not compared: {', '.join(baseline.later_metrics)}; missing in the baseline: renew it")
+    return Evaluation(tuple(faults), tuple(gains), tuple(notes))
 
 
 def _certified(run: Run) -> bool:

@@ -14,7 +14,8 @@ from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema, create_mo
 
 from antdrive.base.checks import SchemaVersion, check
 from antdrive.base.document import Document, Location, read_document
-from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import unreadable
 from antdrive.base.records import STRICT
 from antdrive.runs.suites.demands import END, KINDS, Demands, causes
 from antdrive.sim.forms import SeedList, TextOrMapping, file_fields, given_settings
@@ -180,7 +181,7 @@ def load_suite(path: str | os.PathLike[str]) -> tuple[SuiteCase, ...]:
     try:
         state = target.stat()
     except OSError as error:
-        raise input_error(os.fspath(path), f"cannot be read ({error.strerror})") from None
+        raise unreadable(path, error) from None
     return _load(target.resolve(), os.fspath(path), state.st_mtime_ns, state.st_size)
 
 

@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from antdrive.base import Pose
-from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath
+from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Decider, Ending, Guide, Localiser, Moment, Plant, Rule, Scanning, Step
 from antdrive.sim.driving.plants import Bullet, Drive
-from antdrive.sim.driving.rules import SIGHT_LIMIT, WAITING_SPEED, Pursuit, standing
+from antdrive.sim.driving.rules import SIGHT_LIMIT, WAITING_SPEED, Pursuit
+from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME, arrived, control_periods, outcome_at, stopped
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import Task
@@ -41,31 +42,29 @@ def drive(
     progress: Progress = ignore_progress,
 ) -> Ending:
     """Drive until the decider ends the drive, the robot touches something, or the time limit passes."""
-    ending = Ending(Outcome.COLLIDED) if plant.touched else None
-    tick = 0
-    for tick in range(round(limit * hz)):
-        if ending:
-            break
+    if plant.touched:
+        return Ending(Outcome.COLLIDED)
+    periods = control_periods(limit, hz)
+    for tick in range(periods):
         ending = _control_period(tick, plant, decider, localiser, scan)
         if tick % (hz // PROGRESS_HZ or 1) == 0:
             progress(decider.fraction)
-    return decider.with_reason(ending or Ending(Outcome.TIMED_OUT), tick)
+        if ending:
+            return decider.with_reason(ending, tick)
+    return decider.with_reason(Ending(Outcome.TIMED_OUT), periods)
 
 
 def _control_period(tick: int, plant: Plant, decider: Decider, localiser: Localiser, scan: Scanning) -> Ending | None:
     """Run one control period: sense, decide, act. Return the ending, or None while the drive continues."""
     state = plant.state
     estimate = scan(tick, state.pose, localiser.sense(state))
-    ending = decider.decide(tick, localiser.settle(estimate), state)
+    pose = localiser.settle(estimate)
+    ending = decider.arrives(tick, estimate, state) or decider.decide(tick, pose, state)
     if ending:
         return ending
     step = decider.step
     plant.advance(step, localiser.actuate(step.command))
     return Ending(Outcome.COLLIDED) if plant.touched else decider.gives_up(plant.state)
-
-
-STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
-STUCK_PROGRESS = 0.02  # least progress along the route that counts [m]
 
 
 class StuckClock(NamedTuple):
@@ -118,6 +117,12 @@ class Driver(Decider):
         """Completed fraction of the route."""
         return self.step.pursuit.arc / self.path.length
 
+    def arrives(self, tick: int, estimate: Pose, state: State) -> Ending | None:
+        """End the drive of a robot that stands at the goal, once it has had a command."""
+        twist, task = (state.speed, state.yaw_rate), self._task
+        at_goal = tick > 0 and arrived(estimate, twist, self.step.command, task.goal, task.goal_tolerance)
+        return self._arrival(estimate, state) if at_goal else None
+
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
         """Choose the step of one control period, or end the drive."""
         guide, before = self._guide, self.step
@@ -134,9 +139,7 @@ class Driver(Decider):
         for rule in self._rules:
             step = rule.apply(now, step)
         self.step = step
-        if step.arrived:
-            return self._arrival(pose, state)
-        ending = self._end_of_route(tick, pose, state)
+        ending = self._end_of_route(tick, pose, state, before.command)
         self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
         return ending
 
@@ -162,15 +165,14 @@ class Driver(Decider):
         self._clock = self._clock._replace(farthest=0.0)
         return True
 
-    def _end_of_route(self, tick: int, pose: Pose, state: State) -> Ending | None:
+    def _end_of_route(self, tick: int, pose: Pose, state: State, last: Twist) -> Ending | None:
         """End the drive of a robot that stands at the end of its route, unless it can still reach the goal."""
-        left = self.path.length - self.step.pursuit.arc
-        if left > self.path.goal_distance or not standing(state) or any(self.step.command):
+        left, still = self.path.length - self.step.pursuit.arc, stopped((state.speed, state.yaw_rate), last)
+        if left > self.path.goal_distance or not still or any(self.step.command):
             return None
         ending, guide, task = self._arrival(pose, state), self._guide, self._task
-        # The estimate decides: the robot stays if the estimate is at the goal, else it continues.
         if math.dist(pose[:2], task.goal) <= task.goal_tolerance:
-            return ending
+            return None  # the robot stays, and has arrived in the next control period
         if self._follow(guide.missed(tick, pose)) or guide.may_wait:
             return None
         return self._invalid_plan(tick) if guide.plan_error else ending
@@ -183,15 +185,16 @@ class Driver(Decider):
         """Return the ending of a robot that stops at an estimated pose without contact."""
         task, true = self._task, (state.x, state.y)
         left, believed = math.dist(true, task.goal), math.dist(pose[:2], task.goal)
-        if left <= task.goal_tolerance:
-            return Ending(Outcome.SUCCEEDED)
+        outcome = outcome_at(true, task.goal, task.goal_tolerance)
+        if outcome is Outcome.SUCCEEDED:
+            return Ending(outcome)
         why = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
         if believed <= task.goal_tolerance:
             why = (
                 f"the robot believed that it was at the goal, {believed:.2f} m from it, but was {left:.3f} m from it "
                 f"(the tolerance is {task.goal_tolerance:g} m): its estimate was wrong by {math.dist(pose[:2], true):.2f} m"
             )
-        return Ending(Outcome.STUCK, why)
+        return Ending(outcome, why)
 
 
 def full_turn(robot: RobotSpec, hz: int) -> int:

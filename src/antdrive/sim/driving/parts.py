@@ -43,7 +43,6 @@ class Step(NamedTuple):
     speed_limit: float = math.inf  # speed limit of the schedule [m/s]
     avoids: bool = False  # whether avoidance chose the command, even if a later rule slowed it
     waits: bool = False  # whether the robot waits on purpose, which does not count as being stuck
-    arrived: bool = False  # whether the robot stands at the goal while it gives way to a mover
 
 
 class Moment(NamedTuple):
@@ -206,8 +205,12 @@ class Decider(Protocol):
         """Completed fraction of the route."""
         return 0.0
 
+    def arrives(self, tick: int, estimate: Pose, state: State) -> Ending | None:
+        """End the drive of a robot that stands at the goal by its estimate."""
+        return None
+
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """Choose the step of one control period, or end the drive."""
+        """Choose the step of one control period for the pose at which it takes effect, or end the drive."""
 
     def gives_up(self, state: State) -> Ending | None:
         """End the drive after a control period that led to a state."""

@@ -15,11 +15,10 @@ from antdrive.robots.clearance import kernel_shape
 from antdrive.sim.driving import _kernels_movers
 from antdrive.sim.driving.parts import Ending, Step
 from antdrive.sim.log.contacts import Attribution
+from antdrive.sim.log.ending import rows_after_contact
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Contact, Engine, State
 from antdrive.worlds import Trajectories
-
-AFTER_CONTACT = 0.5  # logged time of braking after a collision [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +90,7 @@ class Bullet:
         """Return the whole log. After a contact the robot brakes first, and the contact is attributed to it or to the mover."""
         if self.touched:
             self._engine.command(0.0, 0.0)
-            self._log(round(AFTER_CONTACT * self._engine.physics_hz), (0.0, 0.0, self._rows[-1][7], 0.0, 0.0))
+            self._log(rows_after_contact(self._engine.physics_hz), (0.0, 0.0, self._rows[-1][7], 0.0, 0.0))
         return self._drive(ending)
 
     def _drive(self, ending: Ending) -> Drive:

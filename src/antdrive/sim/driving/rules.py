@@ -14,7 +14,6 @@ from antdrive.planners import TimedPlan
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, Twist
 from antdrive.sim.driving.parts import Guide, Moment, Step
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
-from antdrive.sim.physics.engine import State
 from antdrive.worlds import Route, Task
 
 if TYPE_CHECKING:
@@ -61,7 +60,6 @@ def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> T
     return Twist(v, command.yaw_rate * v / command.speed)
 
 
-STOPPED_SPEED = 0.01  # a robot slower than this has stopped [m/s], [rad/s]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop within this fraction of the goal's tolerance
 AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
@@ -146,10 +144,8 @@ class Avoid:
         last, ahead = before.command, avoidance.prediction_times
         stopping = before.avoids and self._stops_at_goal(pose, last)
         if stopping:
-            if standing(now.state):
-                return step._replace(arrived=True)
             step = step._replace(command=braked(last, self._robot, self._hz))
-            # The robot arrives when it stands, so only the stopping time matters.
+            # The drive ends when the robot stands, so only the stopping time matters.
             ahead = ahead[: 2 + math.ceil(stopping_time(last, self._robot) / avoidance.step)]
         movers, radii = self._movers.predict(tick, pose[:2], ahead)
         command, avoids, self._state = avoidance.avoid(
@@ -177,11 +173,6 @@ class Avoid:
         distance = command.speed * abs(command.speed) / (2 * self._robot.max_acceleration)
         end = (x + distance * math.cos(yaw), y + distance * math.sin(yaw))
         return max(math.dist((x, y), goal), math.dist(end, goal)) < self._goal_share * self._task.goal_tolerance
-
-
-def standing(state: State) -> bool:
-    """Return whether the robot has stopped."""
-    return abs(state.speed) < STOPPED_SPEED and abs(state.yaw_rate) < STOPPED_SPEED
 
 
 def stopping_time(command: Twist, robot: RobotSpec) -> float:

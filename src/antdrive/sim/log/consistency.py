@@ -15,7 +15,7 @@ import numpy as np
 from antdrive.base.plane import arc_lengths, polyline_length, wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
-from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.ending import false_endings
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.route import end_reach, longest_line
@@ -30,6 +30,7 @@ POINT_SPACING = 0.05  # spacing of the route points whose clearance is checked [
 
 def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
     """Yield every contradiction of the plan with the world, itself or the rows."""
+    yield from _check_optima(rollout)
     if rollout.record.exploring:  # its plans refer to the occupancy map, in the frame of its odometry
         yield from _check_movers_known(rollout)
         yield from _check_replans(rollout)
@@ -81,9 +82,7 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
     A replan begins anywhere, even beside a mover, so its first leg may pass closer to other obstacles.
     """
     record = rollout.record
-    arc = arc_lengths(route)
-    along = np.linspace(0.0, arc[-1], min(100_000, 2 + math.ceil(float(arc[-1]) / POINT_SPACING)))
-    points = np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
+    points = _spaced(route)
     own = min(record.inflate, float(_room(rollout, route[:1])[0])) if name == "route" else -math.inf
     leaving = np.hypot(*(points - route[0]).T) <= end_reach(record.inflate, record.cell)
     needed = np.where(leaving, own, record.inflate)
@@ -94,6 +93,13 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
         yield (
             f"{name}: leads {room[worst]:.3g} m past an obstacle; the plan's inflation is {record.inflate:.3g} m{start}"
         )
+
+
+def _spaced(route: Floats) -> Floats:
+    """Return points (N, 2) along a route, `POINT_SPACING` apart or closer [m]."""
+    arc = arc_lengths(route)
+    along = np.linspace(0.0, arc[-1], min(100_000, 2 + math.ceil(float(arc[-1]) / POINT_SPACING)))
+    return np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
 
 
 def _room(rollout: Rollout, points: Floats) -> Floats:
@@ -127,17 +133,20 @@ def _check_cells(rollout: Rollout) -> Iterator[str]:
 
 def _leads(rollout: Rollout) -> tuple[float, float]:
     """Return the distances of the first cell from the start and of the last from the goal [m]; 0 without cells."""
-    record, cells = rollout.record, rollout.cells
-    if not len(cells):
+    if not len(rollout.cells):
         return 0.0, 0.0
-    xmin, ymin, _, _ = record.world.bounds
-    first, last = (cells[[0, -1], ::-1] + 0.5) * record.cell + (xmin, ymin)
-    return math.dist(first, record.task.start[:2]), math.dist(last, record.task.goal)
+    task, (first, last) = rollout.record.task, _centres(rollout)[[0, -1]]
+    return math.dist(first, task.start[:2]), math.dist(last, task.goal)
+
+
+def _centres(rollout: Rollout) -> Floats:
+    """Return the centres of the planned cells (P, 2) [m]."""
+    return np.asarray((rollout.cells[:, ::-1] + 0.5) * rollout.record.cell + rollout.record.world.bounds[:2])
 
 
 def _check_lengths(rollout: Rollout) -> Iterator[str]:
     """Check that the plan's length is that of its cells, and not below the optimum."""
-    plan, cell, task = rollout.record.plan, rollout.record.cell, rollout.record.task
+    plan, cell = rollout.record.plan, rollout.record.cell
     length = polyline_length(rollout.cells) * cell
     slack = SAME_LENGTH * max(1.0, length)
     if plan.cost_m is None:
@@ -148,13 +157,39 @@ def _check_lengths(rollout: Rollout) -> Iterator[str]:
     elif plan.grid_optimum_m is not None and plan.grid_optimum_m > plan.cost_m + slack:
         yield f"record.plan.grid_optimum_m: {plan.grid_optimum_m:.6g} m is longer than the plan's {plan.cost_m:.6g} m"
     leads = sum(_leads(rollout))
-    straight = math.dist(task.start[:2], task.goal) - max(leads, 2 * NEAR * cell)
-    for key in ("length_m", "euclidean_optimum_m", "grid_optimum_m"):
-        value = getattr(plan, key)
-        if value is not None and not _by_cells(rollout) and value < straight:
-            yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
+    if not _by_cells(rollout) and plan.length_m < _straight(rollout, leads):
+        yield f"record.plan.length_m: {plan.length_m:.6g} m, but start and goal are farther apart"
+    free = plan.euclidean_optimum_m
+    if plan.cost_m is not None and free is not None and free > plan.cost_m + leads + slack and _is_clear(rollout):
+        yield f"record.plan.euclidean_optimum_m: {free:.6g} m is longer than the plan's {plan.cost_m + leads:.6g} m"
     if plan.cost_m is not None and plan.length_m > longest_line(plan.cost_m, leads, cell) + slack:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
+
+
+def _straight(rollout: Rollout, leads: float) -> float:
+    """Return a lower bound of every path's length [m]; ends may lead away by `leads` [m]."""
+    task = rollout.record.task
+    return math.dist(task.start[:2], task.goal) - max(leads, 2 * NEAR * rollout.record.cell)
+
+
+def _is_clear(rollout: Rollout) -> bool:
+    """Return whether the cells lead from start to goal with more room than the inflation; contact closes a free path."""
+    record = rollout.record
+    if _by_cells(rollout):
+        return False
+    between = POINT_SPACING**2 / (8 * record.inflate) + JUST_ROOM  # the largest room lost between two points
+    return bool(_room(rollout, _spaced(_centres(rollout))).min() > record.inflate + between)
+
+
+def _check_optima(rollout: Rollout) -> Iterator[str]:
+    """Check that the shortest paths are no shorter than the straight line. `verify --world` computes them."""
+    record = rollout.record
+    elsewhere = record.exploring or _by_cells(rollout)  # the cells end elsewhere
+    leads = 2 * end_reach(record.inflate, record.cell) if elsewhere else sum(_leads(rollout))
+    for key in ("euclidean_optimum_m", "grid_optimum_m"):
+        value = getattr(record.plan, key)
+        if value is not None and value < _straight(rollout, leads):
+            yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
 
 
 def _check_movers_known(rollout: Rollout) -> Iterator[str]:
@@ -223,10 +258,6 @@ FOLLOW_WINDOWS = (0.25, 1.0, 4.0)  # [s]
 FOLLOW, FOLLOW_TURN, FOLLOW_SHARE = 0.01, 0.05, 0.02  # [m], [rad], fraction of the distance
 LATE = 2.0  # largest lag of the motors, in periods of control and of physics
 GRIP = 0.8  # wheels with less friction slide
-AFTER_CONTACT = 0.5  # a drive ends this long after the first contact [s]
-STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
-STUCK_SHARE = 0.25  # a stuck robot covers at most this fraction of its possible travel in that time
-STOPPED = 0.02  # a robot that stands is slower than this [m/s], [rad/s]
 
 
 def inconsistencies(rollout: Rollout) -> Iterator[str]:
@@ -241,7 +272,7 @@ def inconsistencies(rollout: Rollout) -> Iterator[str]:
     yield from _check_estimate(rollout)
     yield from _check_targets(rollout, end)
     yield from contradictions(rollout, end)
-    yield from _check_end(rollout)
+    yield from false_endings(rollout)
 
 
 def _check_record(rollout: Rollout) -> Iterator[str]:
@@ -303,8 +334,8 @@ def _check_commands(rollout: Rollout, end: int) -> Iterator[str]:
             yield f"{name}: changes within a control period, at row {int(changed[(changed % period) > 0][0]) + 1}"
     steps = np.abs(np.diff(np.concatenate([np.zeros((1, 2)), command[1:end:period]]), axis=0))
     most = HARDER * np.array([robot.max_acceleration, robot.max_yaw_acceleration]) / record.control_hz
-    # Avoidance and the stopping constraint slow down on the same arc: the yaw rate falls with the speed at once.
-    if record.task.world.movers or record.exploring:
+    # Avoidance, schedules and the stopping constraint slow down on the same arc: the yaw rate falls with the speed at once.
+    if record.perception is not None or record.exploring:
         most[1] = np.inf
     if not (steps <= most + EXACT).all():
         row = int((steps > most + EXACT).any(axis=1).argmax()) * period + 1
@@ -406,41 +437,6 @@ def _check_unfixed_estimate(rollout: Rollout) -> Iterator[str]:
     wrong = (turned > heading + twist + STILL) | (apart > far + shift + STILL)
     if wrong.any():
         yield f"estimate: farther off the pose than odometry drifts, from t = {rollout.t[int(wrong.argmax())]:.3f} s"
-
-
-def _check_end(rollout: Rollout) -> Iterator[str]:
-    """Check that the drive ends as its outcome says."""
-    record, end = rollout.record, float(rollout.t[-1])
-    period = 1 / record.control_hz
-    # An invalid replan ends the drive as well.
-    wrong_replan = bool(record.replans) and not record.replans[-1].solved and rollout.outcome is Outcome.INVALID_PLAN
-    if rollout.outcome in (Outcome.NO_PATH, Outcome.STOPPED, Outcome.INVALID_PLAN) and not wrong_replan:
-        yield f"outcome: {rollout.outcome.key} ends a run before the robot drives, but the log has rows"
-    if rollout.outcome is Outcome.TIMED_OUT and end < record.time_limit - period:
-        yield f"outcome: timed_out, but the drive ends after {end:.3f} s of {record.time_limit:g} s"
-    if not len(rollout.contacts) and end > record.time_limit + period:
-        yield f"record.time_limit: {record.time_limit:g} s, but the drive lasts {end:.3f} s"
-    if len(rollout.contacts):
-        after = end - float(rollout.contacts[0, 0]) / record.physics_hz
-        if after > AFTER_CONTACT + 2 * period:
-            yield f"contacts: the first contact ends a drive, but the log goes on for {after:.3f} s"
-    if rollout.outcome is Outcome.STUCK:
-        yield from _check_stuck(rollout)
-
-
-def _check_stuck(rollout: Rollout) -> Iterator[str]:
-    """Check that a stuck robot stands off the goal at the end of its route, or has made no progress for some time."""
-    record, task, last = rollout.record, rollout.record.task, rollout.pose[-1, :2]
-    left = math.dist(last, task.goal)
-    stands = bool((np.abs(rollout.twist[-1]) <= STOPPED).all())
-    if stands and left > task.goal_tolerance:
-        return
-    if rollout.t[-1] < STUCK_TIME:
-        yield f"outcome: stuck, but the drive ends after {rollout.t[-1]:.3f} s; that takes {STUCK_TIME:g} s without progress"
-        return
-    before = rollout.pose[-1 - round(STUCK_TIME * record.physics_hz), :2]
-    if math.dist(before, last) > STUCK_SHARE * STUCK_TIME * record.robot.max_speed:
-        yield f"outcome: stuck, but the robot got {math.dist(before, last):.3g} m farther in the last {STUCK_TIME:g} s"
 
 
 def _wheels(twist: Floats, track: float) -> Floats:

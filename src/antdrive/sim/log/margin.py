@@ -14,7 +14,10 @@ import numpy.typing as npt
 
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
+from antdrive.robots import PurePursuit
+from antdrive.robots.default_margin import default_margin
 from antdrive.sim.log.metrics import nearest_on_route
+from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds import point_clearance
 
@@ -63,6 +66,18 @@ class Budget:
     def as_dict(self) -> dict[str, Any]:
         """Return the budget as plain values, for JSON."""
         return {**dataclasses.asdict(self), "largest": self.largest.cause}
+
+
+def has_default(record: DriveRecord) -> bool:
+    """Return whether a drive with noise had the default margin of its robot, controller, noise and route."""
+    if not record.noise or record.controller.name != PurePursuit.__name__ or record.margin_choice is not None:
+        return False
+    route = record.smoothing.asked if record.smoothing.note else record.smoothing.made
+    try:
+        controller = PurePursuit(**record.controller.settings)
+        return record.margin == default_margin(record.robot, controller, record.noise, route)
+    except (KeyError, TypeError, ValueError):  # settings or noise that no drive has
+        return False
 
 
 def budget(rollout: Rollout) -> Budget:

@@ -1,6 +1,8 @@
 """Metrics of a drive, computed from its log alone. Names end in the unit.
 
-To add a metric, write a function and a row of the table `METRICS` at the end.
+A function's docstring is the metric's definition in `docs/reference/metrics.md`; it must suffice to recompute the metric.
+To add a metric, write a function, a row of the table `METRICS` at the end, and its oracle in
+`tests/sim/log/metrics_oracle.py`.
 """
 
 from __future__ import annotations
@@ -75,24 +77,29 @@ def _driven(rollout: Rollout | None) -> Rollout:
 
 
 def path_length_m(rollout: Rollout) -> float:
-    """Length of the planned path: of its cells, or of an any-angle planner's line."""
-    return rollout.record.plan.length_m
+    """Length of the first plan. If there are `cells` and `plan.length_m` equals `plan.cost_m`, the plan is `cells`, of length
+    `cell` times the sum of |`cells[i + 1] - cells[i]`|. Else it is `plan.length_m`: an any-angle planner drew its own line, or a
+    mapless robot planned on the occupancy map of its first scan, whose cells are not logged; `verify --replay` recomputes it.
+    """
+    plan, cells = rollout.record.plan, rollout.cells
+    if len(cells) and plan.length_m == plan.cost_m:
+        return polyline_length(cells) * rollout.record.cell
+    return plan.length_m
 
 
 def route_length_m(rollout: Rollout) -> float:
-    """Length of the first route."""
+    """Length of the polyline `route`, the first route."""
     return polyline_length(rollout.route)
 
 
 def driven_length_m(rollout: Rollout) -> float:
-    """Distance travelled by the axle's centre."""
+    """Length of the polyline `pose[:, :2]`, the line of the axle's centre."""
     return polyline_length(rollout.pose[:, :2])
 
 
 def gap_to_grid_optimum(rollout: Rollout) -> float:
-    """Planned length over the shortest path on the same grid, minus 1; below 0 where an any-angle line is shorter.
-
-    NaN for a mapless robot, whose first plan precedes its knowledge of the world.
+    """`path_length_m` / `plan.grid_optimum_m` - 1; below 0 where an any-angle line is shorter. NaN if the optimum is null or
+    0, and for a mapless robot, whose first plan precedes its knowledge of the world.
     """
     if rollout.record.exploring:
         return math.nan
@@ -100,123 +107,149 @@ def gap_to_grid_optimum(rollout: Rollout) -> float:
 
 
 def gap_to_euclidean_optimum(rollout: Rollout) -> float:
-    """Length of the route over the exact shortest path among the inflated discs, minus 1; NaN without a map."""
+    """`route_length_m` / `plan.euclidean_optimum_m` - 1. NaN if the optimum is null or 0, and for a mapless robot."""
     if rollout.record.exploring:
         return math.nan
     return _over(route_length_m(rollout), rollout.record.plan.euclidean_optimum_m)
 
 
 def spl(rollout: Rollout) -> float:
-    """Success weighted by path length (Anderson et al. 2018): optimum / max(driven, optimum), 0 without success."""
+    """Success weighted by path length (Anderson et al. 2018): L / max(`driven_length_m`, L) with L =
+    `plan.euclidean_optimum_m`. 0 without success, and if L is null or 0.
+    """
     optimum = rollout.record.plan.euclidean_optimum_m
-    if not succeeded(rollout) or optimum is None:
+    if not succeeded(rollout) or not optimum:
         return 0.0
     return optimum / max(driven_length_m(rollout), optimum)
 
 
 def barn(rollout: Rollout) -> float:
-    """BARN challenge score: OT / clip(arrival, 2 OT, 8 OT), where OT = optimum / 2 m/s; at most 0.5.
-
-    A drive without success scores 0.
+    """Score of the BARN challenge: OT / min(max(`arrival_s`, 2 OT), 8 OT), at most 0.5, where OT = L / (2 m/s) and L =
+    `plan.euclidean_optimum_m`; in the table of `antdrive barn`, L is the length of the challenge's reference path if its folder
+    holds one. 0 without success, if `arrival_s` is infinite, and if L is null or 0.
     """
-    optimum = rollout.record.plan.euclidean_optimum_m
-    if not succeeded(rollout) or optimum is None:
+    optimum, arrival = rollout.record.plan.euclidean_optimum_m, arrival_s(rollout)
+    if not succeeded(rollout) or not optimum or math.isinf(arrival):
         return 0.0
     fastest = optimum / BARN_SPEED
-    return fastest / min(max(arrival_s(rollout), 2 * fastest), 8 * fastest)
+    return fastest / min(max(arrival, 2 * fastest), 8 * fastest)
 
 
 def min_clearance_m(rollout: Rollout) -> float:
-    """Least distance between the surfaces of the robot and an obstacle or wall."""
+    """Minimum of `clearance`, the distance between the surfaces of the robot and the nearest cylinder, mover or wall."""
     return float(rollout.clearance.min())
 
 
 def mean_clearance_m(rollout: Rollout) -> float:
-    """Time average of the distance between the robot's surface and the nearest obstacle or wall."""
+    """Mean of `clearance` over the rows."""
     return float(rollout.clearance.mean())
 
 
 def tracking_error_max_m(rollout: Rollout) -> float:
-    """Largest distance of the axle's centre from the current route."""
+    """Maximum tracking error. The tracking error of a row is the distance of `pose[:, :2]` from the nearest point of the
+    polyline that the robot followed: `route` from row 0, and each solved replan's route from the first row with `t` >=
+    `replans[].t` - 1e-9 s.
+    """
     return float(tracking_error(rollout).max())
 
 
 def tracking_error_p95_m(rollout: Rollout) -> float:
-    """95th percentile over time of the distance of the axle's centre from the current route."""
+    """95th percentile of the rows' tracking errors, interpolated between the two nearest ranks."""
     return float(np.percentile(tracking_error(rollout), 95))
 
 
 def duration_s(rollout: Rollout) -> float:
-    """Duration of the drive in simulated time."""
+    """Duration of the drive in simulated time: `t` of the last row."""
     return float(rollout.t[-1])
 
 
 def arrival_s(rollout: Rollout) -> float:
-    """Arrival by the BARN challenge's clock: simulated time from 0.1 m of travel to first entering the goal's tolerance.
-
-    Infinite if the robot never gets there.
+    """Arrival by the BARN challenge's clock: max(0, `t[b] - t[a]`). Row a is the first at least 0.1 m from `pose[0]`, or row 0
+    if there is none. Row b is the first of the last unbroken series of rows within `task.goal_tolerance` of `task.goal`.
+    Infinite if the last row is not within it. The challenge ends a run at the first entry; a robot that leaves the
+    goal again has not succeeded yet, so its return counts.
     """
     task = rollout.record.task
     xy = rollout.pose[:, :2]
     gone = np.hypot(*(xy - xy[0]).T) >= BARN_CLOCK
-    there = np.hypot(*(xy - task.goal).T) <= task.goal_tolerance
-    if not there.any():
+    outside = np.flatnonzero(np.hypot(*(xy - task.goal).T) > task.goal_tolerance)
+    entry = outside[-1] + 1 if len(outside) else 0
+    if entry == len(xy):
         return math.inf
-    return max(0.0, float(rollout.t[there.argmax()] - rollout.t[gone.argmax()]))
+    return max(0.0, float(rollout.t[entry] - rollout.t[gone.argmax()]))
 
 
 def plan_s(rollout: Rollout) -> float:
-    """Wall-clock time of planning before the drive."""
+    """Wall-clock time of planning before the drive: `times.plan_s`."""
     return rollout.record.times.plan_s
 
 
 def drive_wall_s(rollout: Rollout) -> float:
-    """Wall-clock time of driving, with physics and replanning."""
+    """Wall-clock time of driving, with physics and replanning: `times.drive_wall_s`."""
     return rollout.record.times.drive_wall_s
 
 
 def turning_rad_per_m(rollout: Rollout) -> float:
-    """Total absolute change of heading divided by the distance driven."""
+    """Sum of the absolute differences of successive `pose[:, 2]`, each wrapped into ±π, over `driven_length_m`; 0 if that is
+    0.
+    """
     turned = np.abs(wrap_angle(np.diff(rollout.pose[:, 2]))).sum()
     length = driven_length_m(rollout)
     return float(turned / length) if length > 0 else 0.0
 
 
 def jerk_rms(rollout: Rollout) -> float:
-    """Root mean square of the second derivative of the measured speed, smoothed over 0.1 s."""
+    """Root mean square of (v[i - 1] - 2 v[i] + v[i + 1]) / h². v[i] is the mean of `twist[:, 0]` over the rows i w to (i + 1) w -
+    1, w = max(1, round(0.1 s `physics_hz`)) and h = w / `physics_hz`; the rows after the last whole block do not count.
+    0 with fewer than three blocks.
+    """
     hz = rollout.record.physics_hz
     window = max(1, round(JERK_WINDOW * hz))
-    if len(rollout.t) < 3 * window:
+    blocks = len(rollout.t) // window
+    if blocks < 3:
         return 0.0
-    speed = np.convolve(rollout.twist[:, 0], np.ones(window) / window, mode="valid")[::window]
-    if len(speed) < 3:
-        return 0.0
+    speed = rollout.twist[: blocks * window, 0].reshape(blocks, window).mean(axis=1)
     jerk = np.diff(speed, 2) * (hz / window) ** 2
     return float(np.sqrt(np.mean(jerk**2)))
 
 
 def contacts_driving(rollout: Rollout) -> float:
-    """Count of touches caused by the driving robot."""
+    """Count of touches that the driving robot caused. Points of `contacts` whose row is at most `physics_hz` / 2 rows after that
+    of the previous point belong to one touch; its first point has the row k and the obstacle. The cylinders are those of
+    `task.obstacles`, then those of `unseen`. The driving robot caused every touch of a cylinder or wall, and each of a mover
+    that the next two metrics do not count.
+    """
     return _touches(rollout, Outcome.COLLIDED)
 
 
 def contacts_standing(rollout: Rollout) -> float:
-    """Count of hits by a mover while the robot stood still."""
+    """Count of touches of a mover m at a standing robot: k = 0, or v + r ω is at most 0.02 m/s and at most
+    |`movers[k, m] - movers[k - 1, m]`| `physics_hz`, with (v, ω) the absolute values of `twist[k - 1]` and r the distance of the
+    footprint's farthest point from the axle's centre. The footprint is the rectangle of `half_length` and `half_width`, or the
+    polygon of `corners`, offset outwards by `rounding`. `contacts_teleported` takes precedence.
+    """
     return _touches(rollout, Outcome.HIT_WHILE_STANDING)
 
 
 def contacts_teleported(rollout: Rollout) -> float:
-    """Count of teleports of a mover onto the robot, or within its braking distance."""
+    """Count of touches of a mover m that teleported to where the robot could not avoid it. Row j <= k is the last in which m,
+    with `loop: teleport` and different first and last keyframes, began a new lap: floor((`t` + `phase` - t0) / (tn - t0)), at
+    least 0, exceeds that of row j - 1, where t0 and tn are the times of its first and last keyframes. With v = |`twist[j - 1,
+    0]`| and a = `robot.max_acceleration`: k - j <= v / a `physics_hz` + 2, and the gap between the footprint at `pose[j]`
+    and m at `movers[j, m]` is at most v² / (2 a) + 0.01 m.
+    """
     return _touches(rollout, Outcome.HIT_BY_TELEPORT)
 
 
 def replans(rollout: Rollout) -> float:
-    """Count of searches for a new route during the drive."""
+    """Count of `replans`, the searches for a new route during the drive, with those that found none."""
     return float(len(rollout.record.replans))
 
 
 def avoiding_s(rollout: Rollout) -> float:
-    """Time in simulation during which the robot avoided movers."""
+    """Time of avoiding movers in simulation: the number of rows whose `limiter` is the index of `avoid` in `limiters`, over
+    `physics_hz`; 0 if `limiters` has no `avoid`.
+    """
 
     limiters = rollout.record.limiters
     if AVOIDING not in limiters:
@@ -225,10 +258,14 @@ def avoiding_s(rollout: Rollout) -> float:
 
 
 def explored_m2(rollout: Rollout) -> float:
-    """Ground within the walls that a mapless robot's lidar observed from the true poses, in cells of 0.1 m.
-
-    A cell counts if the beam nearest to its centre in direction reached beyond it, at any range. The occupancy map
-    covers less: it uses beams only up to the range at which they are one cell apart. NaN for a robot with a map.
+    """Area c² of each cell of the world that a mapless robot's lidar observed from the true poses. Scans 0, n, 2 n, … and the
+    last count, n = max(1, round(`robot.lidar.rate` / 10 Hz)). Cells have the side c = max(0.1 m, sqrt(A / 4 000 000)), where A
+    is the area of `task.bounds`, and begin at its lower left corner: ceil(width / c - 1e-9) columns and ceil(height / c
+    - 1e-9) rows. A scan observes a cell whose centre is nearer to the lidar's position at `pose[scan_rows[k]]` than the end of
+    the beam nearest in direction, if that is within half the angle between beams. From the lidar's heading, beam k of B points
+    -F / 2 + k F / (B - 1) with F = `field_of_view`, and -π + 2 π k / B in a full circle, F >= 2 π - 1e-4. A beam ends at its
+    range, at the lidar's `max_range` for the code 0, and at 0 for the code 1. The occupancy map covers less: it uses beams only
+    up to the range at which they are one cell apart. NaN for a robot with a map or without scans.
     """
     if not (rollout.record.exploring and len(rollout.scans)):
         return math.nan

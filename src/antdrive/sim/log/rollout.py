@@ -12,8 +12,6 @@ import hashlib
 import io
 import itertools
 import math
-import os
-import stat
 import struct
 import zipfile
 import zlib
@@ -29,6 +27,7 @@ import numpy.typing as npt
 
 from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.files import open_regular
 from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord, Proof
@@ -49,17 +48,9 @@ LONGEST_PROBLEM = 300  # characters of a message
 def guarded_log(path: str | Path) -> Iterator[Archive]:
     """Open the archive of a log; every error inside becomes one line that names the file."""
     try:
-        with open(path, "rb", opener=_without_waiting) as raw:
-            kind = os.fstat(raw.fileno())
-            if not stat.S_ISREG(kind.st_mode):
-                raise input_error(str(path), "not a rollout (no regular file)")
-            if kind.st_size > MAX_BYTES:
-                raise input_error(str(path), f"not a rollout (larger than {MAX_BYTES >> 20} MB)")
-            with zipfile.ZipFile(raw) as archive:
-                _check_members(archive)
-                yield archive
-    except FileNotFoundError:
-        raise input_error(str(path), "no such file") from None
+        with open_regular(path, MAX_BYTES, "a rollout") as raw, zipfile.ZipFile(raw) as archive:
+            _check_members(archive)
+            yield archive
     except InputError as error:
         text = str(error)
         raise (error if text.startswith(f"{path}: ") else _problem(path, text)) from None
@@ -117,11 +108,6 @@ def _as_numpy_writes(info: zipfile.ZipInfo) -> zipfile.ZipInfo:
     usual.compress_type, usual.external_attr = zipfile.ZIP_DEFLATED, 0o600 << 16
     usual.CRC, usual.compress_size, usual.file_size = info.CRC, info.compress_size, info.file_size
     return usual
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file without waiting for the writer of a pipe."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _check_members(archive: Archive) -> None:

@@ -22,7 +22,7 @@ from antdrive.sim.log.rollout import Rollout, ranges_of
 PASSED = 0.5  # the robot passes objects within this distance of its surface [m]
 CELL = 0.1  # side of the cells of observed ground [m]
 MOST_CELLS = 4_000_000  # cell limit; larger worlds get larger cells
-COUNTED_RATE = 10.0  # scans per second that count for observed ground [Hz]
+COUNTED_RATE = 10.0  # rate to which scans for observed ground are thinned, by a whole number [Hz]
 ROUNDING = 0.0015  # rounding of logged ranges, with a reserve [m]
 
 
@@ -179,8 +179,8 @@ def passed(rollout: Rollout) -> list[Sighting]:
 def seen_ground(rollout: Rollout) -> tuple[npt.NDArray[np.bool_], float]:
     """Return the cells within the walls that the lidar observed (rows, cols), from the lower left, and their side [m].
 
-    A cell is observed if the beam nearest to its centre in direction reached beyond the centre. Ten scans per second and the
-    last scan count.
+    A cell is observed if the beam nearest to its centre in direction reached beyond the centre. The metric `explored_m2` defines
+    the cells and the scans that count.
     """
     lidar = lidar_of(rollout)
     x0, y0, x1, y1 = rollout.record.world.bounds

@@ -18,7 +18,7 @@ from typing import Any
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import InputError
-from antdrive.base.files import known_suffix
+from antdrive.base.files import known_suffix, open_regular
 from antdrive.sim.pipeline import Run
 from antdrive.views.pages.rendering import json_column, link_to, page_data, rendered, shown
 from antdrive.views.pages.reported_runs import (
@@ -246,7 +246,7 @@ def _embedded(path: Path, caption: str) -> Attachment:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path) as picture:
+            with open_regular(path) as file, Image.open(file) as picture:
                 if picture.width * picture.height > MAX_PIXELS:
                     raise InputError(f"{path}: more than {MAX_PIXELS:,} pixels")
                 small = picture.convert("RGB")

@@ -24,8 +24,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.checks import OneLine, check, yaml_number
 from antdrive.base.document import read_document
-from antdrive.base.errors import FieldError, input_error
-from antdrive.base.files import require_new
+from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.files import open_regular, require_new
 from antdrive.base.plane import map_to_world, world_to_map
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats, Point, Pose
@@ -195,7 +195,7 @@ def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # MAX_CELLS is lower
-            with Image.open(path, formats=FORMATS) as stored:
+            with open_regular(path, kind="an image") as file, Image.open(file, formats=FORMATS) as stored:
                 width, height = stored.size
                 if width * height > MAX_CELLS:
                     raise ValueError(f"has {height} x {width} pixels; the limit is {MAX_CELLS}")
@@ -205,8 +205,8 @@ def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
                 pixels = np.asarray(image, dtype=np.float64) / (257 if image.mode.startswith("I") else 1)
     except UnidentifiedImageError:
         raise ValueError(f"{path} is not a PGM, PNG or BMP image") from None
-    except FileNotFoundError:
-        raise ValueError(f"{path}: no such file") from None
+    except InputError:
+        raise
     except (OSError, ValueError, SyntaxError, OverflowError, Image.DecompressionBombError) as error:
         problem = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ValueError(f"{path} cannot be read: {problem}") from None

@@ -1,0 +1,63 @@
+"""Default margin: the clearance of plans that noise, route and robot require, in closed form.
+
+Calibration (`antdrive.runs.margins.choice`) measures the same loss by drives. The constants below are fitted to it, see
+`docs/notebook/margins.md`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from antdrive.robots.control.pursuit import PurePursuit
+from antdrive.robots.noise import SLIP_TIME, steady_errors
+from antdrive.robots.spec import RobotSpec
+
+LEAST = 0.03  # of perfect robots, and the least of all [m]
+RESERVE = 0.01  # part of the margin beyond the predicted loss, as for calibrated margins [m]
+#: Loss by noise that one drive in a thousand exceeds, in standard deviations: on routes with corners, and on smooth routes,
+#: whose curvature the controller knows.
+DEVIATIONS = {"none": 2.5, "taut": 1.2, "clearance": 1.2}
+STEP = 0.001  # margins are multiples of this [m]
+
+
+def default_margin(robot: RobotSpec, controller: PurePursuit, noise: float, smoothing: str) -> float:
+    """Return the margin of plans that a scenario has unless it gives one [m].
+
+    The controller spends up to a fraction `1 - lookahead_margin` of the margin on cutting corners, as far as the robot's
+    width reaches its circumscribed circle. The rest must hold the loss by noise and a reserve.
+
+    Args:
+        robot: the robot
+        controller: its controller
+        noise: factor on the robot's documented noise
+        smoothing: how plans become routes
+    """
+    if not (noise and robot.noise.nonzero):
+        return LEAST
+    loss = DEVIATIONS[smoothing] * deviation(robot, controller, noise, raw=smoothing == "none")
+    _, right, _, left = robot.footprint.bounds
+    cut = (1 - controller.lookahead_margin) * min(1.0, max(left, -right) / robot.radius)
+    steps = math.ceil((RESERVE + loss) / (1 - cut) / STEP - 1e-9)
+    return max(LEAST, round(steps * STEP, 3))
+
+
+def deviation(robot: RobotSpec, controller: PurePursuit, noise: float, *, raw: bool) -> float:
+    """Return the standard deviation of a robot from its route beside an obstacle, by noise [m].
+
+    Three independent parts add up: the estimated position; the estimated heading, over the lookahead; and wheel slip, whose
+    yaw rate moves the robot off the route until the lookahead or the slip's correlation time has passed.
+
+    Args:
+        robot: the robot
+        controller: its controller
+        noise: factor on the robot's documented noise
+        raw: whether the route has corners
+    """
+    levels, c = robot.noise.scaled(noise), controller
+    speed = min(robot.max_speed, c.min_speed_near_obstacles + LEAST / c.clearance_time)
+    time = c.corner_lookahead_time if raw else c.lookahead_time
+    lookahead = min(c.lookahead_max, max(time * speed, c.preferred_lookahead_min))
+    position, heading = steady_errors(levels, robot.track)
+    slipping = min(lookahead, SLIP_TIME * speed)
+    slip = math.sqrt(2) * levels.slip / robot.track * slipping**2 / 2
+    return math.hypot(position, heading * lookahead, slip)
