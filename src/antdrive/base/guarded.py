@@ -91,8 +91,8 @@ class UserCode:
     """A block that runs user code. Every exception that it raises becomes one of the caller's choice.
 
     `InputError`, errors of the caller's choice, Ctrl-C and SIGTERM pass unchanged. A `KeyboardInterrupt` that user
-    code raises without Ctrl-C is an error like any other, and so is `OverLimit`, which an alarm raises after the limit on planning
-    time. Blocks within a block of the main thread belong to it.
+    code raises without Ctrl-C is an error like any other, and so is `OverLimit`, which an alarm raises after the limit on
+    planning time. Blocks within a block of the main thread belong to it.
 
     Args:
         who: the code's name in messages about the end of the process
