@@ -6,7 +6,7 @@ import importlib
 import shlex
 import sys
 import traceback
-from collections import UserDict
+from collections import Counter, UserDict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
@@ -18,6 +18,7 @@ from antdrive.base.errors import FieldError, InputError, Terminated, input_error
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INTERRUPTED, INVALID_INPUT, SUCCEEDED
+from antdrive.cli.options import with_plan_limit
 from antdrive.sim.settings import PANELS
 
 SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
@@ -99,7 +100,8 @@ class _Commands(UserDict[str, Any]):
         if isinstance(command, Command):
             module = importlib.import_module(f"antdrive.cli.commands.{command.module}")
             alone = typer.Typer(**SETTINGS)
-            alone.command(name, cls=_Panelled)(getattr(module, command.function))
+            function = getattr(module, command.function)
+            alone.command(name, cls=_Panelled)(with_plan_limit(function) if command.plans else function)
             command = self.data[name] = typer.main.get_command(alone)
             for one in command.params:
                 if one.param_type_name == "option" and one.name in SHORT:
@@ -108,7 +110,17 @@ class _Commands(UserDict[str, Any]):
 
 
 class _Panelled(typer.core.TyperCommand):
-    """A command whose `--help` groups options in panels."""
+    """A command that refuses options given twice and whose `--help` groups options in panels."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words; raise InputError for a repeated option that is not repeatable."""
+        given = Counter(one for one in self.make_parser(ctx).parse_args(args=list(args))[2] if _is_single(one))
+        twice = next((one for one, times in given.items() if times > 1), None)
+        if twice is not None:
+            raise InputError(
+                f"{'/'.join((*twice.opts[:1], *twice.secondary_opts))}: given {given[twice]} times; keep one"
+            )
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the arguments, then the options of each panel."""
@@ -121,6 +133,11 @@ class _Panelled(typer.core.TyperCommand):
             if records:
                 with formatter.section(name):
                     formatter.write_dl(records)
+
+
+def _is_single(one: Any) -> bool:
+    """Return whether a parameter is an option of which the last value would win."""
+    return one.param_type_name == "option" and not one.multiple and (not one.is_flag or bool(one.secondary_opts))
 
 
 class _Group(typer.core.TyperGroup):

@@ -142,10 +142,20 @@ def test_the_estimate_ends_a_drive_and_the_pose_decides_its_outcome():
     assert says(off, "neither at the goal nor at the end of its route")
     at_end = replace(off, route=np.array([(0.7, 1.0), (0.9, 1.0)]))
     assert list(false_endings(at_end)) == []
-    assert says(replace(off, route=np.array([(0.7, 1.0), (0.84, 1.0)])), "neither at the goal")
+    assert says(replace(off, route=np.array([(0.7, 1.0), (0.96, 1.0)])), "neither at the goal")
     believed = moving_until(1196, goal=(1.3, 1.0), outcome=Outcome.STUCK)
     assert says(believed, "stuck, but the drive ends after 5.000 s")
     assert list(false_endings(replace(believed, estimate=believed.pose + (0.1, 0.0, 0.0)))) == []
+
+
+def test_avoidance_may_take_a_robot_off_the_end_of_its_route():
+    """It has got there, and stands 0.3 m beside it."""
+    log = moving_until(1196, goal=(2.0, 1.0), outcome=Outcome.STUCK, replans=())
+    for got, beside, fits in ((2.0, 0.3, True), (1.9, 0.3, False), (2.0, 1.1, False)):
+        pose = log.pose.copy()
+        pose[1:, 0] = np.linspace(1.0, got, 1200)
+        pose[1:, 1] += np.linspace(0.0, beside, 1200)
+        assert (list(false_endings(replace(log, pose=pose))) == []) is fits
 
 
 def creeping(metres, *, rows=1921, **of):
@@ -157,15 +167,21 @@ def creeping(metres, *, rows=1921, **of):
 
 
 def test_a_stuck_robot_made_no_progress_for_eight_seconds_of_driving():
-    assert list(false_endings(creeping(0.29))) == []
-    assert says(creeping(0.31), "stuck, but the robot got 0.309 m farther in the last 8 s")
-    assert says(creeping(0.1, rows=1917), "stuck, but the drive ends after 7.983 s")
-    aside = creeping(0.29)
+    assert list(false_endings(creeping(0.099))) == []
+    assert says(creeping(0.105), "stuck, but the robot got 0.105 m farther in the last 8 s")
+    assert says(creeping(0.05, rows=1917), "stuck, but the drive ends after 7.983 s")
+    aside = creeping(0.09)
     aside.pose[:, 1] += aside.t / 10.0  # across its route
     assert list(false_endings(aside)) == []
-    avoiding = creeping(0.1)
-    avoiding.limiter[1:5] = 1
-    assert says(avoiding, "takes 8 s of driving without progress")
+    for limiter, more, fits in ((1, 0, False), (1, 1, True), (2, 0, False), (2, 1, True)):
+        waits = creeping(0.05, rows=1921 + 4 * more)
+        waits.limiter[1:5] = limiter
+        assert bool(says(waits, "takes 8 s of driving without progress")) is not fits
+    whole_turn = round(2 * np.pi / still().record.robot.max_yaw_rate * 60)
+    for periods, fits in ((480 + whole_turn - 1, False), (480 + whole_turn, True)):
+        turns = creeping(0.05, rows=4 * periods + 1)
+        turns.limiter[1:] = 2
+        assert (list(false_endings(turns)) == []) is fits
 
 
 def test_the_limit_ends_a_drive_after_its_last_period():

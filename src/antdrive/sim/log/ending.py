@@ -27,10 +27,11 @@ STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # least progress along the route that counts [m]
 
 ROUNDING = 1e-9  # estimates are logged as errors of the poses [m]
-AT_ROUTE_END = 0.05  # a robot this close to its route's end is at it [m]
-STAYED = 0.3  # a stuck robot gets at most this much farther in `STUCK_TIME`, straight or along its route [m]
+AT_ROUTE_END = 0.05  # a robot with at most this much of its route left is at its end [m]
+BESIDE_END = 1.0  # avoidance may take a robot at most this far off the end of its route [m]
+STAYED = 0.1  # a stuck robot gets at most this much farther in `STUCK_TIME`, straight or along its route [m]
 NEAR_GOAL = 1.5  # a route that ends farther from the goal leads elsewhere, unless within the tolerance [cells]
-AVOID = "avoid"  # name of the avoidance rule in `record.limiters`
+AVOID, ROTATE, SIGHT = "avoid", "rotate", "sight"  # names of rules in `record.limiters`
 BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good moves less [m]
 
 
@@ -181,23 +182,44 @@ def _ends_by_itself(rollout: Rollout) -> bool:
     if len(rollout.t) == 1:
         return False
     record, here = rollout.record, _estimates(rollout)[-1]
-    goal, tolerance = record.task.goal, record.task.goal_tolerance
-    end = rollout.legs()[-1][1][-1]
-    leads_there = math.dist(end, goal) <= max(tolerance, NEAR_GOAL * record.cell) and not record.exploring
-    return math.dist(here[:2], goal) <= tolerance + ROUNDING or (
-        leads_there and math.dist(here[:2], end) <= AT_ROUTE_END
-    )
+    if math.dist(here[:2], record.task.goal) <= record.task.goal_tolerance + ROUNDING:
+        return True
+    return not record.exploring and _at_route_end(rollout)
+
+
+def _at_route_end(rollout: Rollout) -> bool:
+    """Return whether the robot got to the end of its last route, which leads to the goal, and stands nearby."""
+    task, cell, places = rollout.record.task, rollout.record.cell, _estimates(rollout)[:, :2]
+    rows, route = rollout.legs()[-1]
+    near = places[rows][np.hypot(*(places[rows] - route[-1]).T) <= BESIDE_END]
+    if math.dist(route[-1], task.goal) > max(task.goal_tolerance, NEAR_GOAL * cell) or not len(near):
+        return False
+    got = float(_arcs(route, near).max())
+    return math.dist(places[-1], route[-1]) <= BESIDE_END and got >= float(arc_lengths(route)[-1]) - AT_ROUTE_END
 
 
 def _counted_rows(rollout: Rollout) -> Rows:
-    """Return the ends of the last control periods that add up to `STUCK_TIME`; avoidance does not count. Empty if too few."""
-    record = rollout.record
-    period = _rows_per_period(rollout)
+    """Return the ends of the last control periods that add up to `STUCK_TIME`, empty if too few.
+
+    Avoidance does not count. If only turns on the spot add up, the time is that of a full turn more.
+    """
+    record, period = rollout.record, _rows_per_period(rollout)
     ends = np.arange(period, len(rollout.t), period)
-    if AVOID in record.limiters:
-        ends = ends[rollout.limiter[ends] != record.limiters.index(AVOID)]
-    needed = round(STUCK_TIME * record.control_hz)
-    return ends[-needed:] if len(ends) >= needed else ends[:0]
+
+    def by(*rules: str) -> npt.NDArray[np.bool_]:
+        return np.isin(rollout.limiter[ends], [i for i, name in enumerate(record.limiters) if name in rules])
+
+    driving = round(STUCK_TIME * record.control_hz)
+    turning = driving + round(2 * math.pi / record.robot.max_yaw_rate * record.control_hz)
+    avoids = by(AVOID)
+    enough = (_sums_to_end(~avoids & ~by(ROTATE)) >= driving) | (_sums_to_end(by(ROTATE, SIGHT)) >= turning)
+    first = int(np.flatnonzero(enough)[-1]) if enough.any() else len(ends)
+    return np.asarray(ends[first:][~avoids[first:]])
+
+
+def _sums_to_end(values: npt.NDArray[np.bool_]) -> Rows:
+    """Return the number of true values from each place to the end (N,)."""
+    return np.asarray(np.cumsum(values[::-1])[::-1])
 
 
 def _progress(rollout: Rollout, rows: Rows) -> float:
