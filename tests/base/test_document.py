@@ -56,7 +56,9 @@ def test_a_usual_world_is_read_by_libyaml(monkeypatch):
 
 @pytest.mark.parametrize("opening", ["[", "{a: ", "- ", "[\n"])
 def test_a_deep_text_is_refused_and_not_followed(opening):
-    with pytest.raises(InputError, match=f"nested deeper than {MAX_DEPTH} levels|cannot be parsed|not YAML"):
+    with pytest.raises(
+        InputError, match=f"nested deeper than {MAX_DEPTH} levels|cannot be parsed|not YAML|has more than"
+    ):
         parse_document(opening * 300_000, "file")
 
 
@@ -103,3 +105,20 @@ def test_no_parser_sees_the_rows_of_a_table(monkeypatch):
     assert (found.lines["posts", 299, "y"], found.lines["posts", 0], found.lines["b",]) == (302, 3, 303)
     assert [text.count("{") for text in seen] == [0]
     assert "file:302: posts[299].y: wrong" in str(found.error(("posts", 299, "y"), "wrong"))
+
+
+@pytest.mark.parametrize(
+    "row", ["- {x: 1, y: 2, radius: 1}\n", "- x: 1\n  y: 2\n  radius: 1\n", "- {x: 1, y: 2, radius: 1.0e+1}\n"]
+)
+def test_too_many_values_are_refused_before_they_are_parsed(row, monkeypatch):
+    text = "schema: 1\nobstacles:\n" + row * 50_001
+    monkeypatch.setattr("antdrive.base.document._compose", lambda text: pytest.fail("parsed"))
+    with pytest.raises(InputError, match=r"^w.yaml: has more than 200000 values; a file holds up to 40000 cylinders"):
+        parse_document(text, "w.yaml")
+
+
+def test_too_many_values_are_blamed_on_aliases_only_where_there_are_some():
+    with pytest.raises(InputError, match="has more than 200000 values"):
+        parse_document(f"a: [{'1,' * 200_001}]", "w.yaml")
+    with pytest.raises(InputError, match="its aliases expand to too many values"):
+        parse_document(f"a: &a [{'1,' * 2000}]\nb: &b [{'*a,' * 20}]\nc: [{'*b,' * 20}]", "w.yaml")

@@ -57,3 +57,22 @@ def test_the_words_that_repeat_settings_give_them_again(given):
 def test_a_repeated_option_lists_values_and_what_is_not_given_is_left_out():
     words = ("--noise", "0", "--noise", "1", "--margin", "auto", "--margin", "0.1", "--map", "none")
     assert parsed(*words, many=True) == {"noise": [0.0, 1.0], "margin": ["auto", 0.1], "map": ["none"]}
+
+
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        ("run empty -r jackal --robot husky", "--robot"),
+        ("run empty --replan --no-replan", "--replan/--no-replan"),
+        ("worlds import a.sdf -o b.yaml -o c.yaml", "--out"),
+        ("robots import a.urdf --left a --right b --left c", "--left"),
+        ("worlds show empty --task a --task=b", "--task"),
+    ],
+)
+def test_an_option_that_takes_one_value_is_given_once(refused, words, option):
+    assert refused(*words.split()) == f"antdrive: {option}: given 2 times; keep one\n"
+
+
+def test_repeatable_options_and_plain_flags_may_be_repeated(antdrive):
+    words = "plan empty -p ants -s planner.ants=3 -s planner.iterations=2 --json --json --seed 2"
+    assert antdrive(*words.split())[0] == 0

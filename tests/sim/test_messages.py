@@ -129,6 +129,7 @@ def test_wrong_drives_settings_and_logs_are_refused_in_one_line(
             "options of a planner": lambda: Scenario.of("empty", small_scenario.planner, options={"ants": 3}),
             "a plan in time": lambda: Scenario.of("empty", "sipp", map="none"),
             "no lidar": lambda: replace(mapless, robot=unsensing),
+            "no replanning": lambda: replace(mapless, replanning=None),
             "no lidar for movers": lambda: Scenario.of(seeing.task, "astar", unsensing, perception=Perception(kind="lidar")),
             "a drifting pose": lambda: replace(
                 seeing, localisation="odometry", perception=Perception()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from antdrive.base import InputError
-from antdrive.sim import Perception, Scenario, run
+from antdrive.planners import load_planner
+from antdrive.sim import Perception, Scenario, plan, run
 from antdrive.sim.driving.replay import ROUNDING
 from antdrive.sim.log.record import PROOFS, Proof
 from antdrive.sim.log.rollout import FORMS
@@ -176,6 +177,12 @@ def test_other_versions_are_named_with_a_difference(small_run):
     assert problems[1].startswith("replay: the log says numpy 1.0, here numpy ")
 
 
+def test_long_values_are_cut(small_run):
+    log = small_run.rollout
+    (problem,) = replayed(replace(log, record=replace(log.record, reason="x" * 200))).problems
+    assert problem == f"replay: record.reason: '{'x' * 59}… in the log, '' in the rerun"
+
+
 def test_a_rerun_ends_soon_after_its_log(small_run):
     """A log may promise a drive of days."""
     log = small_run.rollout
@@ -193,6 +200,14 @@ def test_a_plan_that_fails_is_a_problem(small_run):
     record = replace(small_run.rollout.record, margin=1.4, inflate=small_run.rollout.record.robot.radius + 1.4)
     (problem,) = [one for one in replayed(replace(small_run.rollout, record=record)).problems if "planning" in one]
     assert problem.startswith("replay: cells: planning again ends with no_path")
+
+
+def test_a_plan_of_a_user_is_refused(small_scenario):
+    other = plan(replace(small_scenario, planner=load_planner("dijkstra"), planner_name="dijkstra", margin=0.3))
+    grid = plan(small_scenario)[0]
+    problems = replayed(run(small_scenario, planned=(grid, other[1])).rollout).problems
+    assert any("a plan of your own cannot be replayed" in problem for problem in problems)
+    assert replayed(run(small_scenario, planned=plan(small_scenario)).rollout).exact
 
 
 def test_a_controller_of_a_user_cannot_be_rebuilt(small_run):

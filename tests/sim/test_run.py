@@ -142,9 +142,12 @@ def test_a_planner_that_ends_without_a_path_has_stopped(small_scenario):
     assert result.plan.reason
 
 
-def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario):
-    grid, right = plan(small_scenario)
-    wrong = run(small_scenario, planned=(grid, replace(right, cost=right.cost + 0.01)))
+@pytest.mark.parametrize("known", ["given", "none"])
+def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario, jackal, known):
+    scenario = replace(small_scenario, robot=jackal, map=known)
+    grid, right = plan(scenario)
+    assert run(scenario, planned=(grid, right)).rollout.drive_digest == run(scenario).rollout.drive_digest
+    wrong = run(scenario, planned=(grid, replace(right, cost=right.cost + 0.01)))
     assert (wrong.outcome, wrong.rollout) == (Outcome.INVALID_PLAN, None)
     assert wrong.reason.startswith("cost: ")
     assert wrong.as_dict()["outcome"] == "invalid_plan"

@@ -10,13 +10,26 @@ import shutil
 import tempfile
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from antdrive.base.errors import InputError
 
 LOCK = ".antdrive.lock"
 LONGEST_STEM = 100  # characters of the target's name in a temporary file's name
+
+
+@contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """Create a folder and its parents; at the end, remove those that it created and that are empty."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # not empty
+            for one in missing:
+                one.rmdir()
 
 
 @contextmanager
@@ -27,25 +40,26 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     killed processes for the same target are removed.
     """
     target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if target.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-        _sweep(target)
-        prefix = f"{_prefix(target)}{os.getpid()}-"
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=target.suffix)
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o666 & ~_umask())
-        temporary.replace(target)
-    except OSError as error:
-        raise _not_written(target, temporary, error) from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    with ExitStack() as made:
+        try:
+            made.enter_context(made_folder(target.parent))
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            _sweep(target)
+            prefix = f"{_prefix(target)}{os.getpid()}-"
+            handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=target.suffix)
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            yield temporary
+            temporary.chmod(0o666 & ~_umask())
+            temporary.replace(target)
+        except OSError as error:
+            raise _not_written(target, temporary, error) from None
+        finally:
+            temporary.unlink(missing_ok=True)
 
 
 def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
@@ -59,21 +73,22 @@ def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
 def atomic_folder(path: str | Path) -> Iterator[Path]:
     """Yield a temporary folder that becomes `path` on success and is removed on failure."""
     target = Path(path)
-    try:
-        if target.is_file() or (target.is_dir() and any(target.iterdir())):
-            raise InputError(f"{target}: exists; name a new folder")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:LONGEST_STEM]}-"))
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
-    try:
-        yield temporary
-        temporary.chmod(0o777 & ~_umask())
-        temporary.replace(target)
-    except OSError as error:
-        raise _not_written(target, temporary, error) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    with ExitStack() as made:
+        try:
+            if target.is_file() or (target.is_dir() and any(target.iterdir())):
+                raise InputError(f"{target}: exists; name a new folder")
+            made.enter_context(made_folder(target.parent))
+            temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:LONGEST_STEM]}-"))
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+        try:
+            yield temporary
+            temporary.chmod(0o777 & ~_umask())
+            temporary.replace(target)
+        except OSError as error:
+            raise _not_written(target, temporary, error) from None
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _not_written(target: Path, temporary: Path, error: OSError) -> Exception:
@@ -99,30 +114,31 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
         yield
         return
     path = Path(folder) / LOCK
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        while True:
-            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                holder = os.read(handle, 20).decode(errors="replace").strip() or "unknown"
-                os.close(handle)
-                raise InputError(
-                    f"{folder}: another run (process {holder}) is writing to this folder; wait for it or choose another folder"
-                ) from None
-            if _is_still(path, handle):
-                break
-            os.close(handle)  # the previous owner removed the file before we locked it
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
-    try:
-        os.ftruncate(handle, 0)
-        os.write(handle, f"{os.getpid()}\n".encode())
-        yield
-    finally:
-        path.unlink(missing_ok=True)
-        os.close(handle)
+    with ExitStack() as made:
+        try:
+            made.enter_context(made_folder(path.parent))
+            while True:
+                handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+                try:
+                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    holder = os.read(handle, 20).decode(errors="replace").strip() or "unknown"
+                    os.close(handle)
+                    said = f"another run (process {holder}) is writing to this folder"
+                    raise InputError(f"{folder}: {said}; wait for it or choose another folder") from None
+                if _is_still(path, handle):
+                    break
+                os.close(handle)  # the previous owner removed the file before we locked it
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
+        try:
+            with suppress(OSError):  # of a full disk; the lock holds without our number
+                os.ftruncate(handle, 0)
+                os.write(handle, f"{os.getpid()}\n".encode())
+            yield
+        finally:
+            path.unlink(missing_ok=True)
+            os.close(handle)
 
 
 def _is_still(path: Path, handle: int) -> bool:

@@ -28,6 +28,7 @@ _TAG = "tag:yaml.org,2002:"
 _PLAIN_NUMBER = r"-?(?:0|[1-9]\d{0,17})(?:\.\d+(?:e[-+]\d+)?)?"  # a number in YAML 1.1 as well
 _ROWS_BEGIN = re.compile(r"^([a-z]+):\n(  - \{[a-z]+: [^\n]*\}\n)", re.MULTILINE)
 TOO_MUCH = "its aliases expand to too many values; write the values without aliases"
+TOO_MANY = f"has more than {MAX_VALUES} values; a file holds up to {MAX_VALUES // 5} cylinders of four values"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,8 @@ def _read_text(path: str | os.PathLike[str], kind: str) -> str:
 
 def parse_document(text: str, source: str) -> Document:
     """Parse YAML restricted to mappings, lists, decimal numbers, text, true, false and null."""
+    if text.count(": ") + text.count("- ") > MAX_VALUES:  # before PyYAML makes a node of each
+        raise input_error(source, TOO_MANY)
     try:
         node, table = _compose_around(text)
     except yaml.MarkedYAMLError as error:
@@ -105,7 +108,7 @@ def parse_document(text: str, source: str) -> Document:
         raise input_error(f"{source}:{line}", f"not YAML: a special character {chr(error.character)!r}") from None
     if node is None:
         raise input_error(source, "is empty")
-    builder = _Builder(Document(source, None, {}), table=table)
+    builder = _Builder(Document(source, None, {}), TOO_MUCH if "*" in text else TOO_MANY, table=table)
     data = builder.build(node, ())
     return Document(source, data, builder.lines if table is None else _RowLines(table, builder.lines))
 
@@ -256,6 +259,7 @@ class _Builder:
     """A converter from YAML nodes to plain data that records line numbers."""
 
     document: Document  # provides errors and line numbers
+    beyond: str  # the problem of more than MAX_VALUES values
     count: int = 0
     table: _Table | None = None  # replaces an empty list of the document
 
@@ -268,7 +272,7 @@ class _Builder:
         self.lines.setdefault(location, node.start_mark.line + 1)
         self.count += 1
         if self.count > MAX_VALUES or len(location) > MAX_DEPTH:
-            raise self.document.error(location[:1], TOO_MUCH)
+            raise self.document.error(location[:1], self.beyond)
         if isinstance(node, yaml.ScalarNode):
             return self.scalar(node, location)
         if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
@@ -282,7 +286,7 @@ class _Builder:
     def rows(self, table: _Table) -> list[dict[str, float | int]]:
         self.count += sum(1 + len(row) for row in table.rows)
         if self.count > MAX_VALUES:
-            raise self.document.error((table.key,), TOO_MUCH)
+            raise self.document.error((table.key,), self.beyond)
         return table.rows
 
     def mapping(self, node: yaml.MappingNode, location: Location) -> dict[str, Any]:

@@ -41,7 +41,17 @@ class FieldError(ValueError):
 
 def input_error(*parts: str) -> InputError:
     """Return an InputError whose message is one line of printable characters."""
-    return InputError("".join(c if c.isprintable() else repr(c)[1:-1] for c in ": ".join(parts)))
+    return InputError(visible(": ".join(parts)))
+
+
+def visible(text: str, kept: str = "") -> str:
+    """Return a text in which escape codes show instead of acting: other characters than printable ones are spelled out.
+
+    Args:
+        text: the text, from anyone
+        kept: characters to keep, such as line breaks
+    """
+    return "".join(c if c.isprintable() or c in kept else repr(c)[1:-1] for c in text)
 
 
 def require_positive(key: str, value: float) -> None:

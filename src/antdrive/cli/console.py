@@ -13,7 +13,10 @@ from typing import Any
 
 import typer
 
+from antdrive.base.errors import visible
 from antdrive.base.files import as_json
+
+LAYOUT = "\n\t"  # control characters that lines may hold
 
 
 @contextmanager
@@ -107,13 +110,13 @@ def duration(seconds: float) -> str:
 def print_error(message: str) -> None:
     """Print one line on stderr; a stderr that cannot take it costs no results."""
     with suppress(OSError):
-        typer.echo(f"antdrive: {message}", err=True)
+        typer.echo(f"antdrive: {visible(message, LAYOUT)}", err=True)
 
 
 def print_line(text: str = "") -> None:
     """Print one line on stdout; an error names it."""
     try:
-        typer.echo(text)
+        typer.echo(visible(text, LAYOUT))
     except BrokenPipeError:
         raise
     except OSError as error:

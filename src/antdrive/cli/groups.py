@@ -6,7 +6,7 @@ import importlib
 import shlex
 import sys
 import traceback
-from collections import UserDict
+from collections import Counter, UserDict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
@@ -108,7 +108,17 @@ class _Commands(UserDict[str, Any]):
 
 
 class _Panelled(typer.core.TyperCommand):
-    """A command whose `--help` groups options in panels."""
+    """A command that refuses options given twice and whose `--help` groups options in panels."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words; raise InputError for a repeated option that is not repeatable."""
+        given = Counter(one for one in self.make_parser(ctx).parse_args(args=list(args))[2] if _is_single(one))
+        twice = next((one for one, times in given.items() if times > 1), None)
+        if twice is not None:
+            raise InputError(
+                f"{'/'.join((*twice.opts[:1], *twice.secondary_opts))}: given {given[twice]} times; keep one"
+            )
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the arguments, then the options of each panel."""
@@ -121,6 +131,11 @@ class _Panelled(typer.core.TyperCommand):
             if records:
                 with formatter.section(name):
                     formatter.write_dl(records)
+
+
+def _is_single(one: Any) -> bool:
+    """Return whether a parameter is an option of which the last value would win."""
+    return one.param_type_name == "option" and not one.multiple and (not one.is_flag or bool(one.secondary_opts))
 
 
 class _Group(typer.core.TyperGroup):

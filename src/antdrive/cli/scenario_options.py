@@ -61,8 +61,8 @@ class Ends:
 
         ends = {"start": numbers("--start", self.start, 3, "X,Y,YAW"), "goal": numbers("--goal", self.goal, 2, "X,Y")}
         given: dict[str, Any] = {key: value for key, value in ends.items() if value is not None}
+        task = load_task(world, self.task)
         try:
-            task = load_task(world, self.task)
             if self.frame == MAP_FRAME:
                 given = {key: tuple(map_to_world(task.frame, [value])[0].tolist()) for key, value in given.items()}
             return dataclasses.replace(task, **given)

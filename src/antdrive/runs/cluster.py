@@ -126,14 +126,19 @@ def _killed(future: Any) -> bool:
     return future.status == "error" and type(future.exception()).__name__ == "KilledWorker"
 
 
-@contextmanager
-def _client(distributed: Any, address: str) -> Iterator[Any]:
-    """Open a client of the cluster at an address."""
-    match = _LOCAL.fullmatch(address)
-    if match is None and not re.match(r"(tcp|tls|ucx|ws|wss)://.", address):
+def check_address(address: str) -> None:
+    """Raise `InputError` unless a text is an address of a cluster."""
+    if not _LOCAL.fullmatch(address) and not re.match(r"(tcp|tls|ucx|ws|wss)://.", address):
         raise input_error(
             "--dask", address, "write local:N with N processes, at least 1, or tcp://HOST:PORT of a scheduler"
         )
+
+
+@contextmanager
+def _client(distributed: Any, address: str) -> Iterator[Any]:
+    """Open a client of the cluster at an address."""
+    check_address(address)
+    match = _LOCAL.fullmatch(address)
     with contextlib.ExitStack() as stack:
         target: Any = address
         if match:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from antdrive.base.atomic import folder_lock
+from antdrive.base.atomic import LOCK, folder_lock
 from antdrive.base.errors import input_error
 from antdrive.base.files import MAX_JSON_BYTES, read_bytes, write_json
 
@@ -43,6 +43,12 @@ def opened(folder: Path, manifest: str, facts: Mapping[str, Any] | None = None, 
     ):
         raise input_error(str(folder), f"contains other files but no {manifest}; use a new folder or one of {kind}")
     with folder_lock(folder):
+        new = not (folder / manifest).exists()
         if facts is not None:
             write_json(folder / manifest, facts)
-        yield folder
+        try:
+            yield folder
+        except BaseException:
+            if new and {path.name for path in folder.iterdir()} == {manifest, LOCK}:  # nothing was done
+                (folder / manifest).unlink()
+            raise

@@ -71,7 +71,7 @@ def compose(s: Scenario) -> Parts:
         rules.append(TurnToScan(exploration, s.robot, hz))
     else:
         guide = _guide(s, movers, moving)
-    if capabilities_of(s.planner).needs_motions:
+    if s.timed:
         rules.append(KeepToSchedule(guide, s.robot, hz))
     if moving and avoidance is not None:
         drifts = survey is not None and tracks_movers
@@ -151,8 +151,9 @@ def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
 
 def _exploration(s: Scenario, survey: Survey) -> Exploration:
     """Create the guide of a mapless robot; it plans around tracked movers if the policy says so."""
-    policy, ahead = s.replanning or ReplanPolicy(), None
-    if survey.tracking is not None and s.replanning is not None and policy.around_movers:
+    policy, ahead = s.replanning, None
+    assert policy is not None  # `Scenario` checks that a mapless robot replans
+    if survey.tracking is not None and policy.around_movers:
         tracked = Tracked(survey.tracking, perception_of(s), s.control_hz)
         ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, s.control_hz)
     return Exploration(route_planner(s), survey, policy, ahead)
@@ -187,7 +188,7 @@ def warm_up_replanning(s: Scenario) -> None:
     if not s.driven_world.movers or s.replanning is None or not isinstance(s.planner, GridPlanner):
         return
     planner = s.planner.for_warmup()
-    key = f"{type(planner).__module__}.{planner!r} {s.smoothing} {s.known_perception.kind} {s.replanning}"
+    key = f"{type(planner).__module__}.{planner!r} {s.map} {s.smoothing} {s.known_perception.kind} {s.replanning}"
     if key in _rehearsed:
         return
     _rehearsed.add(key)

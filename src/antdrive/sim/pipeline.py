@@ -20,7 +20,7 @@ from antdrive.sim.log.sights import passed
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import rollout_of
 from antdrive.sim.recording import versions as versions
-from antdrive.sim.scenario import Scenario, picture_of
+from antdrive.sim.scenario import Scenario, picture_of, usual_time_limit
 from antdrive.worlds import Grid
 from antdrive.worlds.svg import LINE, card
 
@@ -166,7 +166,7 @@ def driven(
     if not answer.solved:
         return grid, answer, None
     route, path = parts.guide.route(grid, answer)
-    limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
+    limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot)
     warm_up_replanning(s)
     started = time.perf_counter()
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)

@@ -41,13 +41,22 @@ def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenar
             f"record.controller.name: {record.controller.name!r:.60} cannot be rebuilt; only PurePursuit can"
         )
     try:
-        return Scenario(task=record.task, planner=planner, planner_name=name, robot=record.robot, **_fields(record))
+        return Scenario(
+            task=record.task, planner=planner, planner_name=name, robot=record.robot, **scenario_values(record)
+        )
     except FieldError as error:
         raise InputError(str(error.under("record"))) from None
 
 
-def _fields(record: DriveRecord) -> dict[str, Any]:
-    """Return a record's settings, by field."""
+def scenario_values(record: DriveRecord) -> dict[str, Any]:
+    """Return the settings of a record's scenario, by field.
+
+    Args:
+        record: the record of a log
+
+    Raises:
+        FieldError: a setting is unknown or invalid.
+    """
     fields = {name: getattr(record, name) for name in SETTINGS if hasattr(record, name)}
     fields |= record.settings or {}
     if record.sensing is not None:

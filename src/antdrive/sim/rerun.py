@@ -131,7 +131,9 @@ def _of_array(name: str, rollout: Rollout, again: Rollout) -> Iterator[Mismatch]
     first = int(wrong.argmax()) if wrong.any() else both
     if first == len(logged) == len(computed):
         yield Mismatch(name, "", rounded=True)
-    elif name in ("route", "cells"):
+    elif name == "cells":  # `run` does not record that it was given a plan
+        yield Mismatch(name, f", from cell {first + 1}; a plan of your own cannot be replayed")
+    elif name == "route":
         yield Mismatch(name, f", from point {first + 1}")
     else:
         row = _row(name, first, rollout if first < len(logged) else again)

@@ -19,8 +19,15 @@ from antdrive.base.plane import format_position
 from antdrive.planners import Planner, capabilities_of
 from antdrive.robots import RobotSpec, overlap_at
 from antdrive.robots.default_margin import default_margin
-from antdrive.robots.spec import Odometry
-from antdrive.sim.log.record import DriveRecord, MarginRecord, SensingRecord, canonical_hash, changes, settings_of
+from antdrive.sim.log.record import (
+    DriveRecord,
+    MarginRecord,
+    SensingRecord,
+    canonical_hash,
+    changes,
+    require_factors,
+    settings_of,
+)
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import Perception, usual_perception
 from antdrive.sim.settings import SETTINGS, SLOWEST_CONTROL, Settings, part_of_key
@@ -83,10 +90,7 @@ class Scenario(Settings):
     def __post_init__(self) -> None:
         self._check_kinds()
         super().__post_init__()
-        try:
-            self.robot.noise.scaled(self.noise)
-        except ValueError as error:
-            raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
+        require_factors(self.robot, self.noise, self.odometry)
         self._check_sensing()
         if not self.control_hz <= self.physics_hz or self.physics_hz % self.control_hz:
             rates = (hz for hz in range(SLOWEST_CONTROL, self.physics_hz + 1) if not self.physics_hz % hz)
@@ -112,12 +116,10 @@ class Scenario(Settings):
 
     def _check_sensing(self) -> None:
         """Raise FieldError for invalid combinations of map, localisation, perception, planner and robot."""
-        try:
-            Odometry().scaled(self.odometry)
-        except FieldError as error:
+        if self.map == "none" and self.replanning is None:
             raise FieldError(
-                "odometry", f"{self.odometry:g} times the documented errors is too much: {error}"
-            ) from None
+                "replan", "none: a mapless robot finds its way by replanning; false replans around no movers"
+            )
         if self.map == "none" and self.robot.lidar is None:
             raise FieldError("map", f"none: {self.robot.name} {NO_LIDAR}")
         kind = self.known_perception.kind
@@ -327,6 +329,16 @@ class Scenario(Settings):
         if self.driven_world.movers:
             facts["movers"] = len(self.driven_world.movers)
         return card(picture_of(self), task.world.name, facts)
+
+
+def usual_time_limit(length: float, robot: RobotSpec) -> float:
+    """Return the time limit of a drive for which neither scenario nor world names one [s].
+
+    Args:
+        length: length of the route [m]
+        robot: the robot
+    """
+    return 30.0 + 10.0 * length / robot.max_speed
 
 
 def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:

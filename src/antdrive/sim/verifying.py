@@ -87,7 +87,7 @@ def wrong_optima(record: DriveRecord) -> Iterator[str]:
     try:
         computed = optima_of(record.task, record.cell, record.inflate)
     except ValueError as error:  # the grid has too many cells
-        yield f"record.cell: {error}"
+        yield f"record.{error}"
         return
     for key, right in zip(("grid_optimum_m", "euclidean_optimum_m"), computed, strict=True):
         logged = getattr(record.plan, key)

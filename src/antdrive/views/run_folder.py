@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,16 +22,13 @@ RUN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES f
 
 
 def check_folder(folder: Path) -> None:
-    """Create a folder and raise `InputError` unless it is writable."""
-    from antdrive.base.atomic import atomic_write
-
-    probe = folder / ".antdrive"
+    """Raise `InputError` unless files can be written into a folder, or into the nearest folder above it if it is missing."""
     try:
-        with atomic_write(probe) as temporary:
-            temporary.touch()
-    except InputError as error:
-        raise InputError(str(error).replace(str(probe), str(folder), 1)) from None
-    probe.unlink(missing_ok=True)
+        there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
 
 
 def check_film(path: Path) -> None:
@@ -63,33 +61,35 @@ def suffixes(vector: bool) -> tuple[str, ...]:
     return (".png", ".pdf") if vector else (".png",)
 
 
-def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
-    """Write a run's log and figures into a folder; return the files by name, including `result.json`, written later.
+def write_run(run: Run, folder: Path, command: str, *, vector: bool = False, figures: bool = True) -> dict[str, Any]:
+    """Write a run's log, `result.json` and figures into a folder, and return the content of `result.json`.
 
-    Files of an earlier run in that folder are removed first.
+    Each is kept if the next cannot be written. The files of an earlier run in that folder are removed.
     """
-    for name in RUN_FILES:
-        (folder / name).unlink(missing_ok=True)
     files = {"result": str(folder / "result.json")}
     if run.rollout is not None:
-        log = str(run.rollout.save(folder / "rollout.npz"))
-        files |= _write_figures(run, folder, log, suffixes(vector)) if figures else {"rollout": log}
-    elif figures:
+        files["rollout"] = str(run.rollout.save(folder / "rollout.npz"))
+    for name in RUN_FILES:
+        if name != "rollout.npz" or run.rollout is None:
+            (folder / name).unlink(missing_ok=True)
+    result = write_result(run, files, command)
+    if not figures:
+        return result
+    return write_result(run, files | _write_figures(run, folder, suffixes(vector)), command)
+
+
+def _write_figures(run: Run, folder: Path, kinds: Sequence[str]) -> dict[str, str]:
+    if run.rollout is None:
         from antdrive.views.figures.run_figures import draw_run
 
-        files["figure"] = str(folder / "overview.png")
-        draw_run(run, files["figure"])
-    return files
-
-
-def _write_figures(run: Run, folder: Path, log: str, kinds: Sequence[str]) -> dict[str, str]:
+        draw_run(run, str(folder / "overview.png"))
+        return {"figure": str(folder / "overview.png")}
     from antdrive.views.figures.canvas import endings
     from antdrive.views.figures.plan_figures import plan_figures
     from antdrive.views.figures.run_figures import certificate_figure, overview
     from antdrive.views.figures.sight_figure import sight_figure
 
-    assert run.rollout is not None
-    s, files = run.scenario, {"rollout": log}
+    s, files = run.scenario, dict[str, str]()
     for suffix, end in endings(kinds):
         files["figure" + end] = str(folder / f"overview{suffix}")
         overview(run.rollout, files["figure" + end])

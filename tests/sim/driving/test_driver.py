@@ -17,11 +17,11 @@ from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, Pu
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
-from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, follow, full_turn
-from antdrive.sim.driving.localising import TruePose
-from antdrive.sim.driving.parts import Ending, Guide, Moment, Step
+from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, drive, follow, full_turn
+from antdrive.sim.driving.localising import Exact, TruePose
+from antdrive.sim.driving.parts import Decider, Ending, Guide, Moment, Step
 from antdrive.sim.driving.perceived_movers import GroundTruth
-from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.driving.plants import Bullet, Kinematic
 from antdrive.sim.driving.rules import AVOIDING, SIGHT_LIMIT, WAITING_SPEED, Avoid, Pursuit, braked, stopping_time
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.physics.engine import Engine, State
@@ -363,6 +363,28 @@ def test_a_robot_waits_if_it_stands_to_give_way(turtlebot, avoids, speed, waits)
     robot.step = Step(avoids=avoids)
     robot.decide(0, TASK.start, State(*TASK.start, speed, 0.0))
     assert monitor.waiting == [waits]
+
+
+class EndsAt(Decider):
+    """Decides in one control period that it is stuck, and notes for which period the reason is asked."""
+
+    def __init__(self, tick):
+        self.step, self._tick, self.asked = Step(), tick, []
+
+    def decide(self, tick, pose, state):
+        return Ending(Outcome.STUCK) if tick == self._tick else None
+
+    def with_reason(self, ending, tick):
+        self.asked.append((ending.outcome, tick))
+        return ending
+
+
+def test_the_reason_is_that_of_the_period_in_which_the_drive_ends():
+    for last, outcome, asked in ((3, Outcome.STUCK, 3), (0, Outcome.STUCK, 0), (99, Outcome.TIMED_OUT, 30)):
+        plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
+        decider = EndsAt(last)
+        assert drive(plant, decider, Exact(), hz=60, limit=0.5).outcome is outcome
+        assert decider.asked == [(outcome, asked)]
 
 
 @pytest.mark.parametrize(("true", "outcome"), [(0.4, Outcome.STUCK), (0.1, Outcome.SUCCEEDED)])

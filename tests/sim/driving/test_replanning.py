@@ -19,10 +19,10 @@ from antdrive.planners import (
     load_planner,
 )
 from antdrive.robots import Twist
-from antdrive.sim import Outcome, ReplanPolicy, Rollout, Scenario, certify, run
+from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.replanning import CellByCell
-from antdrive.sim.driving.rules import MAX_LAG, Schedule, slow_down
+from antdrive.sim.driving.rules import MAX_LAG, KeepToSchedule, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from tests.records import changed
@@ -254,6 +254,16 @@ def test_a_late_robot_plans_in_time_again_from_where_it_is(turtlebot):
     assert made.trigger(1200, place, False, tracked, on_time - MAX_LAG - 0.01) == "late"
     assert made.replan(1200, TASK.start, "late") is not None
     assert made.schedule.t[0] == pytest.approx(20.0)
+
+
+def test_a_plan_in_time_has_a_schedule_among_movers_alone_with_or_without_replanning(jackal):
+    moving = changed(TASK, "world", movers=(GATEKEEPER,))
+    for task, scheduled in ((moving, True), (TASK, False)):
+        for settings in ({"replanning": None}, {}, {"perception": Perception(kind="lidar")}):
+            parts = compose(Scenario.of(task, "sipp", jackal, margin=0.1, **settings))
+            parts.guide.route(*parts.guide.first())
+            assert (parts.guide.schedule is not None) is scheduled
+            assert any(isinstance(rule, KeepToSchedule) for rule in parts.rules) is scheduled
 
 
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))

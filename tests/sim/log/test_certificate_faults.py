@@ -426,6 +426,13 @@ def test_motors_do_the_delayed_command_but_for_slip():
     assert says(filled(noisy(), "actuated", (1e-5, 0.0), slice(12, 13)), "slip, at row 12")
 
 
+def test_a_robot_that_watches_for_movers_slows_down_on_its_arc_even_where_there_are_none():
+    """Its yaw rate falls with its speed; avoidance may act on what the lidar takes for a mover."""
+    turns = filled(drive(), "command", (0.0, 1.0), slice(5, None))
+    assert says(turns, TOO_FAST)
+    assert not says(with_record(turns, perception=PerceptionRecord(kind="lidar", range_m=None)), TOO_FAST)
+
+
 @pytest.mark.parametrize("name", ["estimate", "actuated"])
 def test_only_noisy_logs_have_estimates_and_targets(name):
     empty = {name: getattr(noisy(), name)[:0]}

@@ -142,10 +142,20 @@ def test_the_estimate_ends_a_drive_and_the_pose_decides_its_outcome():
     assert says(off, "neither at the goal nor at the end of its route")
     at_end = replace(off, route=np.array([(0.7, 1.0), (0.9, 1.0)]))
     assert list(false_endings(at_end)) == []
-    assert says(replace(off, route=np.array([(0.7, 1.0), (0.84, 1.0)])), "neither at the goal")
+    assert says(replace(off, route=np.array([(0.7, 1.0), (0.96, 1.0)])), "neither at the goal")
     believed = moving_until(1196, goal=(1.3, 1.0), outcome=Outcome.STUCK)
     assert says(believed, "stuck, but the drive ends after 5.000 s")
     assert list(false_endings(replace(believed, estimate=believed.pose + (0.1, 0.0, 0.0)))) == []
+
+
+def test_avoidance_may_take_a_robot_off_the_end_of_its_route():
+    """It has got there, and stands 0.3 m beside it."""
+    log = moving_until(1196, goal=(2.0, 1.0), outcome=Outcome.STUCK, replans=())
+    for got, beside, fits in ((2.0, 0.3, True), (1.9, 0.3, False), (2.0, 1.1, False)):
+        pose = log.pose.copy()
+        pose[1:, 0] = np.linspace(1.0, got, 1200)
+        pose[1:, 1] += np.linspace(0.0, beside, 1200)
+        assert (list(false_endings(replace(log, pose=pose))) == []) is fits
 
 
 def creeping(metres, *, rows=1921, **of):

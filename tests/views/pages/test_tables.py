@@ -65,14 +65,30 @@ def test_latex_text_has_no_bare_special_character(text):
 
 def test_markdown_lists_failures_with_their_commands_and_stays_short(tmp_path):
     columns = made_up_columns({f"planner-{k}": Skill(0.5) for k in range(17)}, worlds=20, seeds=5)
-    columns["command"][next(k for k, done in enumerate(columns["succeeded"]) if not done)] = "antdrive run `odd` | x"
+    failures = [k for k, done in enumerate(columns["succeeded"]) if not done]
+    tails = [f" --planner {columns['planner_name'][k]} --seed {columns['seed'][k]}" for k in failures]
+    foreign = (
+        "rm -rf ~ # antdrive run x" + tails[1],
+        "antdrive run x; rm -rf ~" + tails[2],
+        "antdrive run x --planner ants --seed 99",
+        "antdrive run $(x)" + tails[4],
+        "antdrive run 'x" + tails[5],
+        "antdrive run \x1b[31mx" + tails[6],
+        "antdrive accept x" + tails[7],
+        "rm -rf ~ && antdrive run x" + tails[8],
+    )
+    for k, command in zip(failures, ("antdrive run '`odd` | x'" + tails[0], *foreign), strict=False):
+        columns["command"][k] = command
+    columns["reason"][failures[0]] = "\x1b]0;title\x07red"
     summary = summarise(RunTable(columns), title="big", metrics=["duration_s"])
     text = write_campaign_report(summary, tmp_path, tmp_path / "t.md")[0].read_text()
     assert len(text.encode()) < 60_000
     failed = int((~summary.table.success).sum())
     assert f"## Failed runs: {failed}" in text
     assert f"{failed - 25} more are in the page." in text
-    assert "```antdrive run `odd` | x```" in text
+    assert f"``antdrive run '`odd` | x'{tails[0]}``" in text
+    assert not any(word in text for word in ("rm -rf", "--seed 99", "$(x)", "antdrive accept", "\x1b", "\x07"))
+    assert text.count("antdrive run ") == 25 - len(foreign)
     assert "76 more rows are in the page" in text
     tables = [line for line in text.splitlines() if line.startswith("|")]
     assert len(tables) == 4 * 2 + 17 + 17 + 60 + 60

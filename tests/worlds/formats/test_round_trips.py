@@ -103,7 +103,7 @@ def test_without_its_own_element_an_exported_world_has_walls_that_cannot_be_impo
     export_sdf(load_task("slalom"), path)
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(line for line in lines if "antdrive:task" not in line))
-    with pytest.raises(InputError, match=r"antdrive_walls \(box\)"):
+    with pytest.raises(InputError, match=r"antdrive_walls::link::c0 \(box\)"):
         import_sdf(path)
 
 

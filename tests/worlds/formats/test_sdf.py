@@ -151,6 +151,18 @@ def test_models_that_are_not_upright_cylinders_can_be_skipped(case, tmp_path):
     assert discs(path, skip_unsupported=True) == (Disc(5.0, 5.0, 0.5),)
 
 
+def test_the_supported_parts_of_a_model_stay_and_each_skipped_part_is_named(tmp_path):
+    post = "<cylinder><radius>0.05</radius><length>0.7</length></cylinder>"
+    leg = f"<collision name='leg'><pose>0.4 0 0.35 0 0 0</pose><geometry>{post}</geometry></collision>"
+    top = "<collision name='top'><geometry><box><size>1 1 0.04</size></box></geometry></collision>"
+    lamp = f"<model name='lamp'><link name='l'>{top.replace('box', 'sphere')}</link></model>"
+    table = f"<model name='table'><static>1</static><pose>3 2 0 0 0 0</pose><link name='body'>{top}{leg}</link>{lamp}</model>"
+    skipped = []
+    task = import_sdf(world(tmp_path, table), skip_unsupported=True, on_skipped=skipped.extend)
+    assert task.world.obstacles == (Disc(3.4, 2.0, 0.05, 0.7),)
+    assert skipped == ["table::body::top (box)", "table::lamp::l::top (sphere)"]
+
+
 def test_the_usual_includes_are_ignored(tmp_path):
     includes = [f"<include><uri>model://{name}</uri></include>" for name in ("sun", "ground_plane")]
     assert len(discs(world(tmp_path, *includes, cylinder()))) == 1

@@ -42,6 +42,8 @@ def barn(
     Repeat the command to resume it. Exit code 0: all runs are done, whatever their outcomes.
     """
     from antdrive.base.optional import parquet_library
+    from antdrive.planners import load_planner
+    from antdrive.robots import load_robot
     from antdrive.runs import barn_challenge as challenge
     from antdrive.runs.campaigns.campaign import make_campaign
     from antdrive.runs.campaigns.sweeping import sweep
@@ -52,9 +54,12 @@ def barn(
     if with_map and map != "none":
         raise InputError("--with-map: needs --map none")
     parquet_library()
+    load_planner(planner)  # an invalid one leaves no folder
+    load_robot(robot)
     folder = challenge.unpacked(source, out / "worlds")
     if map == "given" and given["localisation"] == "matching":
         given["localisation"] = "fixes"
+        print_error("localisation: fixes, because matching needs --map none")
     data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
     fastest = challenge.reference_times(folder)

@@ -17,7 +17,7 @@ from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.runs.comparing import COMPARED, Compared, difference_cells, differences, mark_of, same_drives
-from antdrive.views.run_folder import check_film, check_folder, write_result, write_run
+from antdrive.views.run_folder import check_film, check_folder, write_run
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
@@ -96,16 +96,16 @@ def compare(
                 result = _drive(scenario, entrant, part / entrant.label)
                 if not runs:  # mark the folder early, so that an interrupted comparison owns its results
                     write_json(folder / MARKER, facts)
-                written = write_run(result, part / entrant.label, figures=figures and is_first)
-                write_result(result, written, repeat_command(scenario, entrant, world, robot, ends.words))
+                command = repeat_command(scenario, entrant, world, robot, ends.words)
+                write_run(result, part / entrant.label, command, figures=figures and is_first)
                 runs.append(Compared.of(entrant.label, result, folder=str(part / entrant.label)))
                 if is_first and result.rollout is not None:
                     logs[entrant.label] = result.rollout
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
-        files |= _views(logs, folder, film, speed, figures)
         comparison = {"differences": differences(runs), "same": same_drives(runs, given["smoothing"])}
         comparison["drives"] = [{"label": run.label, **run.facts} for run in runs]
         write_json(folder / MARKER, {**facts, **comparison})
+        files |= _views(logs, folder, film, speed, figures)
     results = {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **comparison, "files": files}
     show(json, results, _lines(runs, len(cases) > 1, comparison, files))
     if len(logs) < 2:

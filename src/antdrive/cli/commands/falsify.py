@@ -22,11 +22,10 @@ if TYPE_CHECKING:
 MARKER = "falsify.json"  # identifies the search in its folder
 
 
-@options.with_settings(("smoothing", "noise", "margin", "cell"))
+@options.with_settings(("smoothing", "noise", "margin", "cell", "seed"))
 def falsify(
     *,
     budget: Annotated[int, option("NUMBER", "Maximum number of runs.", min=1, max=1_000_000)] = 100,
-    seed: Annotated[int, option("NUMBER", "Seed of the search.", "--seed", min=0, max=2**63 - 1)] = 0,
     method: Annotated[
         str, option("NAME", "World selection: guided (by rehearsals without physics) or random.")
     ] = "guided",
@@ -47,13 +46,15 @@ def falsify(
     Ctrl-C ends the search and keeps the failures found so far. Exit code 0: no failure. Exit code 1: at least one failure.
     """
     from antdrive.planners.user_code import is_user_code
-    from antdrive.runs.failures.hunt import find_failures
+    from antdrive.runs.failures.hunt import check_method, find_failures
 
+    check_method(method)
     if is_user_code(setup.planner):
         raise InputError(
             f"--planner {setup.planner}: must be registered, because failures are repeated in other processes; "
             "register the class under the entry point antdrive.planners"
         )
+    seed = given.pop("seed")
     scenario = setup.scenario("empty", given)
     mark = fingerprint(scenario, budget, seed, method, obstacles, seconds)
     usual = Path("out") / file_name(f"falsify-{setup.planner}-{scenario.robot.name}-{seed}")
@@ -99,10 +100,11 @@ def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Rep
         small = one.small.run
         if small is None:  # planning raised an error; the suite has the world
             continue
-        files = write_run(small, folder / one.name, figures=film)
+        command = shlex.join(["antdrive", "check", f"{folder / SUITE}::{one.name}"])
+        report = write_run(small, folder / one.name, command, figures=film)
         if film and small.rollout is not None:
-            files["film"] = film_drives([small.rollout], folder / one.name / "film.mp4")["file"]
-        write_result(small, files, shlex.join(["antdrive", "check", f"{folder / SUITE}::{one.name}"]))
+            filmed = film_drives([small.rollout], folder / one.name / "film.mp4")["file"]
+            write_result(small, {**report["files"], "film": filmed}, command)
     return reported
 
 

@@ -51,12 +51,11 @@ def run(
             planned = plan(scenario)
         with bar("driving") as progress:
             result = drive(scenario, planned=planned, progress=progress)
-        files = write_run(result, folder, vector=vector, figures=figures)
-        report = write_result(result, files, this_command())
+        report = write_run(result, folder, this_command(), vector=vector, figures=figures)
         if film is not None and result.rollout is not None:
-            files["film"] = film_drives([result.rollout], film, prelude=prelude)["file"]
-            report = write_result(result, files, this_command())
-    show(json, report, run_lines(result, files))
+            filmed = film_drives([result.rollout], film, prelude=prelude)["file"]
+            report = write_result(result, {**report["files"], "film": filmed}, this_command())
+    show(json, report, run_lines(result, report["files"]))
     if gui and result.rollout is not None:
         from antdrive.views.window import show as show_window
 

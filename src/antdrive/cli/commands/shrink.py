@@ -69,7 +69,7 @@ def shrink(
         files = {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
         report: dict[str, Any] = {"files": files}
         if small.run is not None:  # else the planner raises an error
-            files = {**write_run(small.run, folder, figures=figures), **files}
+            files = {**write_run(small.run, folder, this_command(), figures=figures)["files"], **files}
             if film and small.rollout is not None:
                 files["film"] = film_drives([small.rollout], folder / f"{name}.mp4")["file"]
             report = write_result(small.run, files, this_command())

@@ -181,6 +181,7 @@ def import_world(
     from antdrive.worlds.formats.importing import IMPORTS, import_format
     from antdrive.worlds.formats.map_server import kept_tasks
 
+    skipped: list[str] = []
     try:
         file_format = import_format(path, barn=barn)
         with bar("converting") as progress, conversion_progress(progress):
@@ -192,6 +193,7 @@ def import_world(
                 cell=given["cell"],
                 barn=barn,
                 skip_unsupported=skip_unsupported or None,
+                on_skipped=skipped.extend if skip_unsupported else None,
                 unknown=unknown,
                 overhang=overhang,
                 resolution=resolution,
@@ -212,6 +214,10 @@ def import_world(
         lines.append(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")
         if file_format.is_map and len(world.obstacles) > MANY:
             lines.append(f"  planning takes seconds beyond {MANY} obstacles; a larger --overhang needs fewer")
+    if skip_unsupported:
+        imported[0]["skipped"] = skipped
+        lines.append(f"  kept {len(tasks[0].world.obstacles)} cylinders, skipped {len(skipped)} parts")
+        lines += [f"  skipped  {''.join(c if c.isprintable() else '?' for c in part)}" for part in skipped]
     lines += [line for file in files for line in file_lines({"world": file})]
     show(json, {"worlds": imported} if is_set else imported[0], lines)
 

@@ -175,6 +175,10 @@ def _check(campaign: Campaign, jobs: int | None, dask: str | None, keep: str | N
     """Reject invalid arguments before any work."""
     if jobs is not None and (not isinstance(jobs, int) or jobs < 0):
         raise FieldError("jobs", f"must be a number of processes, or 0 for this process, got {jobs!r}")
+    if dask is not None:
+        from antdrive.runs.cluster import check_address
+
+        check_address(dask)
     if keep is not None and keep not in get_args(Keep):
         raise FieldError("keep", f"unknown {keep!r}; choose from {', '.join(get_args(Keep))}")
     if jobs == 0 and dask is None and campaign.entry.run_limit is not None:

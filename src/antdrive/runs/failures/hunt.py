@@ -129,6 +129,12 @@ METHODS: Mapping[str, Callable[[Draw], Scenario | None]] = MappingProxyType(
 )
 
 
+def check_method(name: str) -> None:
+    """Raise FieldError unless a search method has this name."""
+    if name not in METHODS:
+        raise FieldError("method", f"unknown {name!r:.40}; choose from {', '.join(METHODS)}")
+
+
 def rehearsed_clearance(s: Scenario) -> float:
     """Return the minimum clearance of a drive whose wheels execute commands exactly, without movers [m].
 
@@ -279,8 +285,7 @@ def find_failures(
     Raises:
         FieldError: the method is unknown, or a number of cylinders or runs out of range.
     """
-    if method not in METHODS:
-        raise FieldError("method", f"unknown {method!r:.40}; choose from {', '.join(METHODS)}")
+    check_method(method)
     if budget < 1:
         raise FieldError("budget", f"must be at least 1, got {budget}")
     space, rng = WorldSpace(obstacles, setup.robot.radius), np.random.default_rng([seed, obstacles])

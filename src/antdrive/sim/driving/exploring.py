@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.base import Bounds, Floats, Pose
-from antdrive.planners import PlanResult, PlanStatus, smooth
+from antdrive.planners import PlanResult, PlanStatus, Query, smooth
 from antdrive.robots import TrackedPath, Twist
 from antdrive.robots.control.pursuit import unsorted_obstacles
 from antdrive.sim.driving import _kernels_hits
@@ -113,8 +113,10 @@ class Exploration(RouteGuide):
         return first
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
-        """Return an external plan unchanged."""
-        return grid, plan
+        """Check an external plan on the grid of `first`, which has the obstacles of the first scan."""
+        if not plan.solved:
+            return grid, plan
+        return grid, self._routes.checked(Query.between(grid, self._known(self._task.start, bounds_of(grid))), plan)
 
     # ---- plans
 

@@ -25,9 +25,7 @@ from antdrive.planners import (
     AStar,
     PlanResult,
     Query,
-    TimedPlan,
     agent_for,
-    capabilities_of,
     check_step,
     planner_errors,
     smooth,
@@ -37,7 +35,6 @@ from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs
 from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.rules import Schedule
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.policy import LATE, MISSED, STRAYED, WAITED, ReplanPolicy
 from antdrive.worlds import Grid, Route, segment_clearance
@@ -60,7 +57,7 @@ class Replanning(OneRoute):
         self._hz = planner.hz
         self._predictor, self._keeps = movers, keeps
         self._task = dataclasses.replace(planner.task, world=dataclasses.replace(planner.task.world, movers=()))
-        self._timed = capabilities_of(planner.planner).needs_motions
+        self._timed = bool(planner.motions)
         self._replanned_at = -math.inf
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
@@ -71,9 +68,7 @@ class Replanning(OneRoute):
         learns = policy.around_movers and movers.uncertain and not self._timed
         traffic = Traffic(movers, robot.radius, task.world.bounds, self._hz) if learns else None
         self._ahead = MoversAhead(movers, policy, task.goal, grid, self._hz, traffic, self.blockage)
-        route, path = super().route(grid, plan)
-        self._track(plan, route)
-        return route, path
+        return super().route(grid, plan)
 
     @property
     def blocked(self) -> str:
@@ -87,10 +82,6 @@ class Replanning(OneRoute):
     def clearance_reduction(self, tick: int, position: Point) -> Floats:
         """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""
         return self.blockage.clearance_reduction(tick, position)
-
-    def _track(self, plan: PlanResult, route: Route) -> None:
-        """Set the schedule of a new route."""
-        self.schedule = Schedule.of(plan, route) if self._timed and isinstance(plan, TimedPlan) else None
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Return why a new route is due; empty if none is."""

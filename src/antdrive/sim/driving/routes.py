@@ -17,6 +17,7 @@ from antdrive.planners import (
     PlanResult,
     PlanStatus,
     Query,
+    TimedPlan,
     capabilities_of,
     checked,
     planner_errors,
@@ -30,6 +31,7 @@ from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.sim.driving.blockage import closed_cells, with_obstacles
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
 from antdrive.sim.driving.parts import RouteGuide
+from antdrive.sim.driving.rules import Schedule
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.reasons import no_path_reason
 from antdrive.worlds import Disc, Grid, MoverMotion, Route, Task, World, rasterise
@@ -174,7 +176,13 @@ class OneRoute(RouteGuide):
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         """Return the route of a plan, and its path for the controller."""
-        return self._prepared(grid, plan)
+        route, path = self._prepared(grid, plan)
+        self._track(plan, route)
+        return route, path
+
+    def _track(self, plan: PlanResult, route: Route) -> None:
+        """Set the schedule of a new route, among movers of known motions."""
+        self.schedule = Schedule.of(plan, route) if self._routes.motions and isinstance(plan, TimedPlan) else None
 
     def _prepared(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         routes = self._routes

@@ -334,8 +334,8 @@ def _check_commands(rollout: Rollout, end: int) -> Iterator[str]:
             yield f"{name}: changes within a control period, at row {int(changed[(changed % period) > 0][0]) + 1}"
     steps = np.abs(np.diff(np.concatenate([np.zeros((1, 2)), command[1:end:period]]), axis=0))
     most = HARDER * np.array([robot.max_acceleration, robot.max_yaw_acceleration]) / record.control_hz
-    # Avoidance and the stopping constraint slow down on the same arc: the yaw rate falls with the speed at once.
-    if record.task.world.movers or record.exploring:
+    # Avoidance, schedules and the stopping constraint slow down on the same arc: the yaw rate falls with the speed at once.
+    if record.perception is not None or record.exploring:
         most[1] = np.inf
     if not (steps <= most + EXACT).all():
         row = int((steps > most + EXACT).any(axis=1).argmax()) * period + 1

@@ -27,7 +27,8 @@ STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # least progress along the route that counts [m]
 
 ROUNDING = 1e-9  # estimates are logged as errors of the poses [m]
-AT_ROUTE_END = 0.05  # a robot this close to its route's end is at it [m]
+AT_ROUTE_END = 0.05  # a robot with at most this much of its route left is at its end [m]
+BESIDE_END = 1.0  # avoidance may take a robot at most this far off the end of its route [m]
 STAYED = 0.3  # a stuck robot gets at most this much farther in `STUCK_TIME`, straight or along its route [m]
 NEAR_GOAL = 1.5  # a route that ends farther from the goal leads elsewhere, unless within the tolerance [cells]
 AVOID = "avoid"  # name of the avoidance rule in `record.limiters`
@@ -181,12 +182,20 @@ def _ends_by_itself(rollout: Rollout) -> bool:
     if len(rollout.t) == 1:
         return False
     record, here = rollout.record, _estimates(rollout)[-1]
-    goal, tolerance = record.task.goal, record.task.goal_tolerance
-    end = rollout.legs()[-1][1][-1]
-    leads_there = math.dist(end, goal) <= max(tolerance, NEAR_GOAL * record.cell) and not record.exploring
-    return math.dist(here[:2], goal) <= tolerance + ROUNDING or (
-        leads_there and math.dist(here[:2], end) <= AT_ROUTE_END
-    )
+    if math.dist(here[:2], record.task.goal) <= record.task.goal_tolerance + ROUNDING:
+        return True
+    return not record.exploring and _at_route_end(rollout)
+
+
+def _at_route_end(rollout: Rollout) -> bool:
+    """Return whether the robot got to the end of its last route, which leads to the goal, and stands nearby."""
+    task, cell, places = rollout.record.task, rollout.record.cell, _estimates(rollout)[:, :2]
+    rows, route = rollout.legs()[-1]
+    near = places[rows][np.hypot(*(places[rows] - route[-1]).T) <= BESIDE_END]
+    if math.dist(route[-1], task.goal) > max(task.goal_tolerance, NEAR_GOAL * cell) or not len(near):
+        return False
+    got = float(_arcs(route, near).max())
+    return math.dist(places[-1], route[-1]) <= BESIDE_END and got >= float(arc_lengths(route)[-1]) - AT_ROUTE_END
 
 
 def _counted_rows(rollout: Rollout) -> Rows:

@@ -73,8 +73,11 @@ def has_default(record: DriveRecord) -> bool:
     if not record.noise or record.controller.name != PurePursuit.__name__ or record.margin_choice is not None:
         return False
     route = record.smoothing.asked if record.smoothing.note else record.smoothing.made
-    controller = PurePursuit(**record.controller.settings)
-    return record.margin == default_margin(record.robot, controller, record.noise, route)
+    try:
+        controller = PurePursuit(**record.controller.settings)
+        return record.margin == default_margin(record.robot, controller, record.noise, route)
+    except (KeyError, TypeError, ValueError):  # settings or noise that no drive has
+        return False
 
 
 def budget(rollout: Rollout) -> Budget:

@@ -27,7 +27,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.files import parse_json
 from antdrive.base.records import STRICT, attributes_of
 from antdrive.base.types import Point
-from antdrive.robots.spec import RobotSpec
+from antdrive.robots.spec import Odometry, RobotSpec
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
@@ -326,6 +326,7 @@ class DriveRecord:
             if key not in SETTINGS or self.held(key):
                 raise FieldError(f"settings.{key}", "unknown key; a later version of antdrive may have written it")
             SETTINGS[key].check(value)
+        require_factors(self.robot, self.noise, 1.0 if self.sensing is None else self.sensing.odometry)
         choice = self.margin_choice
         if choice is not None and not choice.loss_m + choice.reserve_m <= self.margin + MARGIN_ROUNDING:
             raise FieldError("margin_choice", f"loss_m and reserve_m must not exceed the margin of {self.margin:g} m")
@@ -497,6 +498,18 @@ def _at_least(record: Any, least: float, *keys: str) -> None:
     for key in keys:
         if not least <= getattr(record, key) < math.inf:
             raise FieldError(key, f"must be at least {least:g}, got {getattr(record, key)!r:.40}")
+
+
+def require_factors(robot: RobotSpec, noise: float, odometry: float) -> None:
+    """Raise FieldError if a factor lifts the noise of a robot, or the errors of odometry, out of range."""
+    try:
+        robot.noise.scaled(noise)
+    except FieldError as error:
+        raise FieldError("noise", f"{noise:g} times the robot's own is too much: {error}") from None
+    try:
+        Odometry().scaled(odometry)
+    except FieldError as error:
+        raise FieldError("odometry", f"{odometry:g} times the documented errors is too much: {error}") from None
 
 
 def _refuse_constant(name: str) -> NoReturn:

@@ -70,8 +70,7 @@ def film(
 
     Raises:
         InputError: an unknown camera or suffix; a size, rate or speed out of range; a prelude for a planner without a
-            field.
-        OSError: the encoder could not write the film.
+            field; or the film cannot be written.
     """
     target = Path(path)
     known_suffix(target, ENCODERS)

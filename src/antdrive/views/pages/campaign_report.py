@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -10,6 +12,7 @@ from typing import Any
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.files import known_suffix
+from antdrive.planners.user_code import record_name
 from antdrive.runs.campaigns.results import common_folder, read_runs
 from antdrive.runs.statistics.run_table import HASHES, RunTable
 from antdrive.sim.log.metrics import METRICS
@@ -131,7 +134,8 @@ def check_suffix(out: Path) -> str:
 
 def _write_markdown(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
     failures = [k for k, good in enumerate(summary.table.success) if not good]
-    facts = {name: summary.table.texts(name) for name in ("world", "planner", "seed", "outcome", "reason", "command")}
+    facts = {name: summary.table.texts(name) for name in ("world", "planner", "seed", "outcome", "reason")}
+    facts["command"] = [command or "" for command in _own_commands(summary.table)]
     listed = [{name: texts[k] for name, texts in facts.items()} for k in failures[:MARKDOWN_FAILURES]]
     tables = {"tables": all_cells(summary), "words": WORDS, "most": MARKDOWN_ROWS}
     text = rendered("page.md.j2", **_common(summary), **tables, failures=listed, failed=len(failures))
@@ -187,12 +191,37 @@ def campaign_data(table: RunTable, planners: Sequence[str], base: str) -> str:
 
 def _commands(table: RunTable) -> dict[str, Any]:
     """Return the commands; a common final seed is dropped, so that equal commands are stored once."""
-    commands: list[str | None] = list(table.columns.get("command", [None] * len(table)))
+    commands = _own_commands(table)
     tails = [f" --seed {seed}" for seed in table.texts("seed")]
     if all(command is None or command.endswith(tail) for command, tail in zip(commands, tails, strict=True)):
         short = [None if one is None else one.removesuffix(tail) for one, tail in zip(commands, tails, strict=True)]
         return {**json_texts(short), "seeded": True}
     return json_texts(commands)
+
+
+def _own_commands(table: RunTable) -> list[str | None]:
+    """Return the commands that antdrive wrote for these runs; None for any other text, since readers copy them to a shell."""
+    given = zip(table.texts("command"), table.texts("planner_name"), table.texts("seed"), strict=True)
+    return [text if _is_own(text, planner, seed) else None for text, planner, seed in given]
+
+
+def _is_own(text: str, planner: str, seed: str) -> bool:
+    """Return whether a text is an `antdrive run` command of a planner and a seed, after commands that generate its world."""
+    try:
+        commands = [shlex.split(command) for command in text.split(" && ")]
+    except ValueError:  # a quotation without end
+        return False
+    *before, last = commands
+    known = all(words[:3] == ["antdrive", "worlds", "generate"] for words in before) and last[:2] == ["antdrive", "run"]
+    if (
+        not known
+        or not text.isprintable()
+        or " && ".join(map(shlex.join, commands)) != text
+        or last[-2:] != ["--seed", seed]
+    ):
+        return False
+    named = [after for word, after in itertools.pairwise(last) if word == "--planner"]
+    return [record_name(word) for word in named] == [record_name(planner)]
 
 
 def _title(name: str) -> str:

@@ -17,6 +17,8 @@ from antdrive.runs.statistics.intervals import Interval
 
 NONE = "–"
 LONGEST = 200  # characters per text
+#: Characters that act instead of showing: control codes but tabs and line breaks, and codes for the direction of text.
+ACTING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u202a-\u202e\u2060-\u206f\ufeff\ud800-\udfff]")
 
 
 class TextTable(NamedTuple):
@@ -124,8 +126,9 @@ def json_column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
     return {"name": name, **json_texts([None if value is None else str(value) for value in values])}
 
 
-def json_texts(values: Sequence[str | None]) -> dict[str, Any]:
+def json_texts(given: Sequence[str | None]) -> dict[str, Any]:
     """Return texts, or the distinct texts and each row's index among them."""
+    values = [None if value is None else ACTING.sub(" ", value) for value in given]
     different = {value: k for k, value in enumerate(dict.fromkeys(value for value in values if value is not None))}
     if len(different) == len(values):
         return {"texts": list(values)}
@@ -162,7 +165,8 @@ def rendered(template: str, **content: Any) -> str:
         autoescape=jinja2.select_autoescape(["html.j2"]),
     )
     environment.filters |= {"md": markdown_text, "fence": fence_for}
-    return environment.get_template(template).render(**{**NO_PARTS, **content}, version=metadata.version("antdrive"))
+    text = environment.get_template(template).render(**{**NO_PARTS, **content}, version=metadata.version("antdrive"))
+    return ACTING.sub(" ", text)
 
 
 def link_to(path: Path, base: Path) -> str:

@@ -18,6 +18,7 @@ from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
+from antdrive.sim.repeating import command_of
 from antdrive.sim.verifying import false_claims, logged_settings, read_result
 from antdrive.views.pages.rendering import NONE, TextTable, number, shown
 
@@ -99,6 +100,7 @@ class LogFacts:
     digest: str  # of the log's content
     settings: Mapping[str, Any]  # by the keys of result.json
     contradictions: tuple[str, ...]  # contradictions between result.json and the log, a sentence each
+    command: str  # command that repeats the run; empty if there is none
 
 
 @dataclass
@@ -120,7 +122,7 @@ class ReportedRun:
     robot: str = field(init=False)  # the robot's name
     seed: str = field(init=False)  # the random seed
     reason: str = field(init=False)  # of the outcome
-    command: str = field(init=False)  # command that repeats the run, as claimed by result.json
+    command: str = field(init=False)  # command that repeats the run, from the log's record; empty without a log
 
     def __post_init__(self) -> None:
         names = {key: self.result.get(key) for key in ("world", "planner", "robot", "seed", "reason")}
@@ -130,7 +132,7 @@ class ReportedRun:
             names = dict(zip(names, logged, strict=True))
         self.world, self.planner, self.robot, self.seed = (shown(names[key]) for key in list(names)[:4])
         self.reason = shown(names["reason"] or "")
-        self.command = shown(self.result.get("command") or "", LONGEST_COMMAND)
+        self.command = self.log.command if self.log else ""
 
     @property
     def claimed(self) -> bool:
@@ -266,8 +268,8 @@ def log_facts(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFact
     except ValueError as error:
         raise input_error(name, str(error)) from None
     claims = tuple(shown(claim) for claim in false_claims(result, rollout, digest))
-    scans = len(rollout.scans)
-    return LogFacts(rollout.record, certificate, metrics, sights, scans, digest, logged_settings(rollout), claims)
+    command, settings = shown(command_of(rollout) or "", LONGEST_COMMAND), logged_settings(rollout)
+    return LogFacts(rollout.record, certificate, metrics, sights, len(rollout.scans), digest, settings, claims, command)
 
 
 def reported_run(run: Run) -> ReportedRun:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ class Models:
     """The models of a world."""
 
     discs: list[Disc] = field(default_factory=list)  # the upright cylinders
-    unsupported: list[str] = field(default_factory=list)  # all other models, each as "name (reason)"
+    unsupported: list[str] = field(default_factory=list)  # all other parts, each as "name (reason)"
 
 
 def read_models(world: ET.Element, frame: Pose = (0.0, 0.0, 0.0)) -> Models:
@@ -47,10 +47,7 @@ def read_models(world: ET.Element, frame: Pose = (0.0, 0.0, 0.0)) -> Models:
     states = {s.get("name", ""): s for s in world.findall("state/model")}
     for model in world.findall("model"):
         name = model.get("name", "without a name")
-        try:
-            models.discs.extend(_cylinders(model, wanted, False, states.get(name)))
-        except Unsupported as reason:
-            models.unsupported.append(f"{name} ({reason})")
+        _add_cylinders(models, model, name, wanted, False, states.get(name))
     for include in world.iter("include"):
         uri = (include.findtext("uri") or "").strip()
         if uri.rpartition("/")[2] not in ("sun", "ground_plane"):
@@ -76,29 +73,41 @@ class _Wanted:
         return np.eye(4) if np.array_equal(pose, self._frame) else np.asarray(self._back @ pose)
 
 
-def _cylinders(model: ET.Element, frame: Floats | _Wanted, static: bool, state: ET.Element | None) -> list[Disc]:
-    """Return the cylinders of a model and its nested models; `frame` is the parent's pose (4, 4) or the world's."""
+def _add_cylinders(
+    models: Models, model: ET.Element, name: str, frame: Floats | _Wanted, static: bool, state: ET.Element | None
+) -> None:
+    """Add a model's cylinders and those of its nested models; `frame` is the parent's pose (4, 4) or the world's.
+
+    Each collision stands for itself: an unsupported one is named, and the others stay.
+    """
     static = static or (model.findtext("static") or "").strip().lower() in ("1", "true")
-    if model.get("placement_frame"):
-        raise Unsupported("has a placement_frame")
-    pose = frame @ _pose(model)
-    scale, links = np.ones(3), {}
-    if state is not None:
-        pose = frame @ _pose(state) if state.find("pose") is not None else pose
-        scale = _numbers(state.findtext("scale") or "1 1 1", 3, "scale")
-        links = {
-            link.get("name"): frame @ _pose(link) for link in state.findall("link") if link.find("pose") is not None
-        }
-    discs: list[Disc] = []
+    try:
+        if model.get("placement_frame"):
+            raise Unsupported("has a placement_frame")
+        pose = frame @ _pose(model)
+        scale, links = np.ones(3), {}
+        if state is not None:
+            pose = frame @ _pose(state) if state.find("pose") is not None else pose
+            scale = _numbers(state.findtext("scale") or "1 1 1", 3, "scale")
+            links = {
+                link.get("name"): frame @ _pose(link) for link in state.findall("link") if link.find("pose") is not None
+            }
+    except Unsupported as reason:
+        models.unsupported.append(f"{name} ({reason})")
+        return
     for link in model.findall("link"):
-        link_pose = links.get(link.get("name"), pose @ _pose(link))
         for collision in link.findall("collision"):
-            discs.extend(_shape(collision, link_pose @ _pose(collision), scale))
-    if discs and not static:
-        raise Unsupported("not static")
+            part = "::".join((name, *(element.get("name") or element.tag for element in (link, collision))))
+            try:
+                place = links[link.get("name")] if link.get("name") in links else pose @ _pose(link)
+                found = list(_shape(collision, place @ _pose(collision), scale))
+                if found and not static:
+                    raise Unsupported("not static")
+                models.discs.extend(found)
+            except Unsupported as reason:
+                models.unsupported.append(f"{part} ({reason})")
     for inner in model.findall("model"):
-        discs.extend(_cylinders(inner, pose, static, None))
-    return discs
+        _add_cylinders(models, inner, f"{name}::{inner.get('name', 'without a name')}", pose, static, None)
 
 
 def _shape(collision: ET.Element, pose: Floats, scale: Floats) -> Iterator[Disc]:
@@ -178,6 +187,7 @@ def import_sdf(
     cell: float | None = None,
     goal_tolerance: float | None = None,
     skip_unsupported: bool = False,
+    on_skipped: Callable[[list[str]], None] | None = None,
 ) -> Task:
     """Import the upright cylinders of a Gazebo world as a task.
 
@@ -193,6 +203,7 @@ def import_sdf(
         cell: the task's grid resolution [m]; by default 0.25
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
         skip_unsupported: skip moving and included models and other collision shapes instead of refusing the file
+        on_skipped: called with what is skipped, each part as "model::link::collision (reason)"
 
     Raises:
         InputError: the file is unreadable, or a model in it is not supported.
@@ -204,6 +215,8 @@ def import_sdf(
     models = read_models(world, frame)
     if models.unsupported and not skip_unsupported:
         raise input_error(str(file), _about_unsupported(models))
+    if on_skipped is not None:
+        on_skipped(models.unsupported)
     start = _in_world(frame, start) or kept.numbers("start", 3)
     goal = _in_world(frame, goal) or kept.numbers("goal", 2)
     bounds = bounds or kept.numbers("bounds", 4)
