@@ -401,6 +401,15 @@ def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, 
     assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
 
 
+def test_a_path_is_followed_by_the_estimates_of_the_localiser(turtlebot):
+    """At an estimate 0.5 m to the left of the robot, it turns right."""
+    beside = Exact()
+    beside.settle = lambda pose: (pose[0], pose[1] + 0.5, pose[2])
+    with Engine(TASK.world, turtlebot) as engine:
+        log = follow(engine, PurePursuit(), driver(turtlebot).path, TASK, limit=1.0, localiser=beside)
+    assert log.pose[-1, 2] < -0.1
+
+
 def test_progress_is_reported_ten_times_a_second(turtlebot):
     told = []
     with Engine(TASK.world, turtlebot) as engine:
