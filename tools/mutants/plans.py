@@ -27,7 +27,7 @@ _PLANNERS = "tests/planners/test_kernel_mutants.py"
 PLANS: dict[str, Plan] = {
     "sim/log/certificate.py": Plan(_CERTIFY, 50),
     "sim/log/consistency.py": Plan(_CERTIFY, 50),
-    "sim/log/ending.py": Plan((f"{_LOG}test_ending.py", *_CERTIFY), 40),
+    "sim/log/ending.py": Plan((f"{_LOG}test_ending.py", f"{_DRIVING}test_driver.py"), 40),
     "sim/log/contacts.py": Plan((f"{_LOG}test_contacts.py", f"{_DRIVING}test_moving.py"), 40),
     "sim/log/metrics.py": Plan((f"{_LOG}test_metrics.py",), 40),
     "sim/driving/drive.py": Plan(_DRIVE, 16),
