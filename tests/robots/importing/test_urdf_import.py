@@ -5,6 +5,7 @@ import math
 import re
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from antdrive.base import InputError
 from antdrive.robots import Footprint, load_robot
 from antdrive.robots.importing.hull import convex_hull, fewer_corners, footprint_around
+from antdrive.robots.importing.model import checked_mesh
 from antdrive.robots.importing.urdf_import import import_urdf
 from antdrive.robots.robot_file import footprint_to_dict as written
 from benchmarks.robots import SPECIFICATIONS, values_of
@@ -327,6 +329,44 @@ def test_the_middle_of_the_axle_need_not_be_the_roots(tmp_path):
     import_urdf(changed(tmp_path, "burger.urdf", ("0 -0.080 0.023", "0 -0.120 0.023")))
 
 
+@pytest.mark.parametrize(
+    "plugin",
+    [
+        'name="gz::sim::systems::AckermannSteering" filename="gz-sim-ackermann-steering-system"',
+        'name="drive" filename="libgazebo_ros_tricycle_drive.so"',
+        'name="gz::sim::systems::MecanumDrive" filename="gz-sim-mecanum-drive-system"',
+        'name="base" filename="libgazebo_ros_planar_move.so"',
+    ],
+)
+def test_a_plugin_for_another_drive_is_refused_by_name(tmp_path, plugin):
+    path = changed(tmp_path, "waffle.urdf", ("<gazebo>", f"<gazebo><plugin {plugin}/></gazebo><gazebo>"))
+    name = plugin.replace('name="', "").replace('" file', " ").replace('"', "")
+    with pytest.raises(InputError, match=f"plugin {name}: only differential drives can be simulated"):
+        import_urdf(path)
+
+
+@pytest.mark.parametrize("wheel", ["fixed", "continuous"])
+@pytest.mark.parametrize("ends", ['lower="-0.6" upper="0.6"', 'lower="-3.14159" upper="3.14160"'])
+def test_steered_wheels_that_are_not_driven_are_refused_unless_they_swivel_as_casters(tmp_path, wheel, ends):
+    steered = '<link name="knuckle"/>' + JOINT.format(
+        "steer", "revolute", "knuckle", "0.2 0.1 0.023", f"<limit {ends}/>"
+    )
+    round_ = (
+        '<collision><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.033" length="0.02"/></geometry></collision>'
+    )
+    turning = (
+        f'<link name="front">{round_}</link><joint name="front_joint" type="{wheel}"><parent link="knuckle"/>'
+        '<child link="front"/><axis xyz="0 1 0"/></joint>'
+    )
+    path = changed(tmp_path, "waffle.urdf", ("<gazebo>", steered + turning + "<gazebo>"))
+    if "0.6" in ends:
+        for sides in ({}, {"left": "wheel_left_joint", "right": "wheel_right_joint"}):
+            with pytest.raises(InputError, match="steer steer wheels: only differential drives can be simulated"):
+                import_urdf(path, **sides)
+    else:
+        assert import_urdf(path).spec.track > 0
+
+
 def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path):
     steered = '<link name="knuckle"/>' + JOINT.format(
         "steer", "revolute", "knuckle", "0.2 0.1 0", '<limit lower="-1" upper="1"/>'
@@ -338,7 +378,7 @@ def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path):
         ('<parent link="base_link"/><child link="left"/>', '<parent link="knuckle"/><child link="left"/>'),
         ("<left_joint>wheel_left_joint</left_joint>", ""),
     )
-    with pytest.raises(InputError, match="steer steer wheels: not a differential drive"):
+    with pytest.raises(InputError, match="steer steer wheels: only differential drives can be simulated"):
         import_urdf(path)
     roller = (
         '<link name="roller"/><joint name="roller_joint" type="continuous"><parent link="left"/><child link="roller"/>'
@@ -625,8 +665,34 @@ def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path):
     with pytest.raises(InputError, match="Package not found: parts; give its folder with --package NAME=FOLDER"):
         import_urdf(path, arguments={"name": "two"})
     assert import_urdf(path, arguments={"name": "two"}, packages={"parts": tmp_path / "elsewhere"}).spec == found.spec
-    with pytest.raises(InputError, match=r"--arg name: burger\.urdf is no \.xacro, and has no arguments"):
+    with pytest.raises(InputError, match=r"--arg name: burger\.urdf is not a \.xacro file"):
         imported("burger.urdf", arguments={"name": "two"})
+
+
+def test_an_unknown_argument_is_refused_with_those_that_exist(tmp_path, monkeypatch):
+    class Expanding:
+        """xacro as far as arguments go: it asks for each declared name and writes the defaults into the given mapping."""
+
+        @classmethod
+        def from_file(cls, path, subargs, resolve_packages):
+            for name in ("body_width", "prefix"):
+                if name not in subargs:
+                    subargs[name] = "default"
+            return cls()
+
+        def to_urdf_string(self):
+            return (FIXTURES / "burger.urdf").read_text()
+
+    packages = SimpleNamespace(reset=lambda: None, update_package_cache=lambda known: None)
+    stub = SimpleNamespace(XacroDoc=Expanding, packages=packages)
+    monkeypatch.setattr("antdrive.robots.importing.model.optional", lambda *_: stub)
+    path = tmp_path / "a.xacro"
+    path.write_text("<robot/>")
+    with pytest.raises(InputError, match=r"--arg body_widht: a.xacro has no such argument; did you mean body_width\?"):
+        import_urdf(path, arguments={"body_widht": "2"})
+    with pytest.raises(InputError, match=r"--arg x: a.xacro has no such argument; choose from body_width, prefix"):
+        import_urdf(path, arguments={"x": "2"})
+    assert import_urdf(path, arguments={"body_width": "2"}).spec.track == imported("burger.urdf").spec.track
 
 
 def test_meshes_of_a_package_are_in_its_given_folder(tmp_path):
@@ -639,3 +705,54 @@ def test_meshes_of_a_package_are_in_its_given_folder(tmp_path):
     path = changed(tmp_path, "waffle.urdf", mesh)
     found = import_urdf(path, packages={"waffle": tmp_path / "elsewhere"})
     assert found.spec.footprint.bounds == pytest.approx((-0.264, -0.2, 0.136, 0.2), abs=1e-4)
+
+
+def stl(corners):
+    """A binary STL file of triangles (N, 3, 3)."""
+    layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    triangles = np.zeros(len(corners), layout)
+    triangles["corners"] = corners
+    return bytes(80) + len(corners).to_bytes(4, "little") + triangles.tobytes()
+
+
+def dae(x):
+    return f"<COLLADA><library_geometries><float_array>0 0 0 1 {x} 0 1 1 0</float_array></library_geometries></COLLADA>"
+
+
+@pytest.mark.parametrize("number", ["nan", "-NaN", "inf", "1e400", "-Infinity"])
+def test_a_mesh_with_a_coordinate_that_is_not_finite_is_refused_by_name(tmp_path, number):
+    corners = np.zeros((2, 3, 3))
+    corners[1, 2, 0] = float(number)
+    texts = {
+        "binary.stl": stl(corners),
+        "text.stl": f"solid inf\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\n  vertex 1 {number} 3\nendloop".encode(),
+        "body.obj": f"# nan\nv 0 0 0\nv 1 0 0\nv {number} 0 0\nvn nan 0 0\nf 1 2 3\n".encode(),
+        "body.dae": dae(number).encode(),
+    }
+    for name, content in texts.items():
+        (tmp_path / name).write_bytes(content)
+        path = changed(
+            tmp_path, "waffle.urdf", ('<box size="0.281 0.306 0.119"/>', f'<mesh filename="file://{tmp_path}/{name}"/>')
+        )
+        with pytest.raises(InputError, match=f"{name}: 1 of its coordinates are not finite"):
+            import_urdf(path)
+
+
+def test_meshes_are_refused_before_they_are_read_if_they_are_too_large_or_no_meshes(tmp_path):
+    path = tmp_path / "huge.stl"
+    with path.open("wb") as file:
+        file.write(bytes(80) + (10**7).to_bytes(4, "little"))
+        file.truncate(84 + 50 * 10**7)
+    with pytest.raises(InputError, match=r"huge.stl: is too large; the limit is 20 MB"):
+        checked_mesh(path)
+    wrong = {"a.stl": b"hello", "b.obj": b"v a b c\n", "c.dae": b"<a/>", "d.dae": dae("x").encode(), "e.obj": b""}
+    for name, content in wrong.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match=rf"{name}: (has no vertices|not a mesh)"):
+            checked_mesh(tmp_path / name)
+
+
+@pytest.mark.parametrize("content", [stl(np.ones((2, 3, 3))), b"solid a\n vertex 1 2 3\n"])
+def test_a_mesh_of_finite_numbers_is_handed_on_as_it_is(tmp_path, content):
+    (tmp_path / "a.stl").write_bytes(content)
+    assert checked_mesh(tmp_path / "a.stl") == content

@@ -5,6 +5,7 @@ xacro files are expanded without ROS. Packages not given are searched for beside
 
 from __future__ import annotations
 
+import io
 import math
 import re
 import tempfile
@@ -17,6 +18,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from antdrive.base.checks import suggest
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.files import read_bytes
 from antdrive.base.optional import optional
@@ -43,16 +45,40 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
     for _ in range(MAX_PACKAGES):
         xacrodoc.packages.reset()
         xacrodoc.packages.update_package_cache(known)
+        asked = _Arguments(arguments)
         try:
-            document = xacrodoc.XacroDoc.from_file(str(path), subargs=dict(arguments), resolve_packages=False)
-            return str(document.to_urdf_string())
+            document = xacrodoc.XacroDoc.from_file(str(path), subargs=asked, resolve_packages=False)
+            text = str(document.to_urdf_string())
         except Exception as error:  # xacro's expressions can raise any exception
             missing = _missing_package(error)
             folder = None if missing is None or missing in known else package_folder(path, missing, known)
             if missing is None or folder is None:
                 raise input_error(str(path), f"xacro cannot expand it: {_in_one_line(error)}{_help(error)}") from None
             known[missing] = folder
+            continue
+        unknown = next((name for name in arguments if name not in asked.names), None)
+        if unknown is not None:
+            raise InputError(
+                f"--arg {unknown}: {path.name} has no such argument; {suggest(unknown, sorted(asked.names)) if asked.names else 'it has none'}"
+            )
+        return text
     raise input_error(str(path), f"refers to more than {MAX_PACKAGES} packages")
+
+
+class _Arguments(dict[str, str]):
+    """Arguments for xacro that record which names it asks for; it writes declared defaults among them."""
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        super().__init__(given)
+        self.names: set[str] = set()
+
+    def __contains__(self, name: object) -> bool:
+        self.names.add(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.names.add(name)
+        return super().__getitem__(name)
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
@@ -97,6 +123,13 @@ def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
 # Polygon circumscribed about the unit circle, with the same bounding box.
 CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
 MAX_LINKS = 10_000
+MAX_COORDINATE = 1e6  # [m]
+MAX_MESH_BYTES = 20_000_000  # 400,000 triangles of a binary STL file
+CHECKED = ("stl", "obj", "dae")  # mesh formats whose numbers are checked before trimesh reads them
+_VERTEX = re.compile(rb"^[ \t]*v(?:ertex)?[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.IGNORECASE)
+OTHER_DRIVES = re.compile(
+    r"ackermann|tricycle|bicycle|omni(?!cam)|mecanum|holonomic|swerve|planar_?move", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +172,7 @@ class UrdfModel:
     pieces: tuple[CollisionPiece, ...]  # collision geometry
     masses: dict[str, float]  # of the links with a mass [kg]
     drive: dict[str, str]  # values of Gazebo's drive plugins by tag, without repeated tags
+    other_drive: str  # a Gazebo plugin that drives other than differentially; empty without one
     missing_meshes: tuple[str, ...]
     lidars: tuple[UrdfSensor, ...] = ()  # the lidars that Gazebo simulates
 
@@ -193,7 +227,16 @@ def read_model(
     }
     lidars, missing_meshes = lidar_sensors(root, places), tuple(reader.missing_meshes)
     return UrdfModel(
-        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), missing_meshes, lidars
+        path,
+        root.get("name", path.stem),
+        joints,
+        places,
+        tuple(pieces),
+        masses,
+        _drive(root),
+        _other_drive(root),
+        missing_meshes,
+        lidars,
     )
 
 
@@ -230,6 +273,13 @@ def _drive(root: ET.Element) -> dict[str, str]:
         if any(re.fullmatch(r"left\w*joint", tag, re.IGNORECASE) for tag in tags):
             drive |= {element.tag: (element.text or "").strip() for element in plugin if tags[element.tag] == 1}
     return drive
+
+
+def _other_drive(root: ET.Element) -> str:
+    """Return the name of a plugin for steered or omnidirectional wheels; empty without one."""
+    plugins = (plugin for tag in ("gazebo/plugin", "plugin") for plugin in root.findall(tag))
+    names = ((plugin.get("name", ""), plugin.get("filename", "")) for plugin in plugins)
+    return next((" ".join(filter(None, pair)) for pair in names if any(map(OTHER_DRIVES.search, pair))), "")
 
 
 def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> ET.Element:
@@ -381,6 +431,9 @@ class _Shapes:
             if mesh is None:
                 return
             points = mesh * _numbers(self._path, shape, "scale", (1.0, 1.0, 1.0))
+            if not (np.abs(points) <= MAX_COORDINATE).all():
+                where = f"link {link}", f"mesh {shape.get('filename')}"
+                raise input_error(str(self._path), *where, f"reaches beyond {MAX_COORDINATE:g} m")
         else:
             raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
         placed = points @ place[:3, :3].T + place[:3, 3]
@@ -394,7 +447,7 @@ class _Shapes:
     def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
         """Return a mesh's vertices (N, 3); None if it is missing."""
         name = shape.get("filename", "")
-        file = next((file for file in self._candidates(name) if file.is_file()), None)
+        file = next((file for file in self._candidates(name) if file.exists() and not file.is_dir()), None)
         if file is None:
             if not self._without:
                 raise input_error(
@@ -404,9 +457,11 @@ class _Shapes:
                 )
             self.missing_meshes.append(f"{link}: {name}")
             return None
+        content, kind = checked_mesh(file), file.suffix.lower().removeprefix(".")
         trimesh = optional("trimesh", "urdf", f"mesh {file.name} needs it")
-        try:
-            vertices = np.asarray(trimesh.load(str(file), force="mesh").vertices, dtype=np.float64)
+        try:  # trimesh merges vertices, and with them drops those that are not numbers: checked before
+            loaded = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=kind in CHECKED)
+            vertices = np.asarray(loaded.vertices, dtype=np.float64)
         except Exception as error:  # each format has its own exceptions
             raise input_error(str(file), f"cannot be read as a mesh: {error or type(error).__name__}") from None
         if not len(vertices) or not np.isfinite(vertices).all():
@@ -424,6 +479,29 @@ class _Shapes:
             yield folder / bare
             yield folder / inside
             yield folder / Path(bare).name
+
+
+def checked_mesh(file: Path) -> bytes:
+    """Return a mesh file's content; raise InputError if it is too large, or a coordinate is not a finite number."""
+    content, kind = read_bytes(file, MAX_MESH_BYTES, "a mesh"), file.suffix.lower().removeprefix(".")
+    count = int.from_bytes(content[80:84], "little")
+    try:
+        if kind == "stl" and len(content) == 84 + 50 * count:
+            layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+            numbers = np.frombuffer(content, layout, offset=84)["corners"]
+        elif kind in ("stl", "obj"):
+            numbers = np.array(_VERTEX.findall(content), dtype=np.bytes_).astype(np.float64)
+        elif kind == "dae":
+            lists = (e.text or "" for e in parse_xml(file).iter() if e.tag.rpartition("}")[2] == "float_array")
+            numbers = np.array(" ".join(lists).split(), dtype=np.float64)
+        else:
+            return content
+    except ValueError as error:
+        raise (error if isinstance(error, InputError) else input_error(str(file), f"not a mesh: {error}")) from None
+    if not numbers.size or not np.isfinite(numbers).all():
+        bad = int(numbers.size - np.isfinite(numbers).sum())
+        raise input_error(str(file), f"{bad} of its coordinates are not finite" if bad else "has no vertices")
+    return content
 
 
 def _unit(file: Path) -> float:

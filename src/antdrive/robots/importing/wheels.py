@@ -15,6 +15,8 @@ from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
 
 LEVEL = 0.1  # largest vertical component of a wheel's axis
 SAME = 0.02  # relative tolerance for equal radii and a common axle
+ONLY_DIFFERENTIAL = "only differential drives can be simulated"
+STEERING = math.pi  # largest range of a joint that steers; casters turn further [rad]
 SWIVEL = 0.9  # minimum vertical component of the axis of a caster or a steering joint
 
 
@@ -33,7 +35,11 @@ class DrivenWheel:
 def driven_wheels(
     model: UrdfModel, left: str | None = None, right: str | None = None, radius: float | None = None
 ) -> tuple[DrivenWheel, DrivenWheel]:
-    """Return the left and the right driven wheel."""
+    """Return the left and the right driven wheel; raise InputError for robots that steer otherwise."""
+    if model.other_drive:
+        raise input_error(str(model.source), f"plugin {model.other_drive}", ONLY_DIFFERENTIAL)
+    if steering := [joint.name for joint in model.joints.values() if _steers(model, joint)]:
+        raise input_error(str(model.source), f"{', '.join(steering)} steer wheels", ONLY_DIFFERENTIAL)
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
     if left is not None and right is not None:
@@ -146,6 +152,14 @@ def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWhee
 def _bottom(model: UrdfModel, joint: UrdfJoint) -> float:
     """Return the lowest point of a joint's child link [m]; inf without collision geometry."""
     return min((float(p.points[:, 2].min()) for p in model.pieces if p.link == joint.child), default=math.inf)
+
+
+def _steers(model: UrdfModel, joint: UrdfJoint) -> bool:
+    """Return whether a joint turns something on the floor about an upright axis, by less than a caster."""
+    if joint.kind != "revolute" or joint.range >= STEERING or abs(joint.axis[2]) <= SWIVEL:
+        return False
+    below = {other.child for other in model.joints.values() if joint in model.above(other.child)}
+    return any(_stands(model, other) for other in model.joints.values() if other.child in below)
 
 
 def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
