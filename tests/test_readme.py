@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.cli.app import main
+from antdrive.cli.app import run_command
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
@@ -28,7 +28,7 @@ def home(tmp_path, monkeypatch):
 def exit_code(words, monkeypatch):
     monkeypatch.setattr(sys, "argv", words)
     with pytest.raises(SystemExit) as ended:
-        main()
+        run_command()
     return int(ended.value.code or 0)
 
 

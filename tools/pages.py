@@ -119,12 +119,12 @@ def commands_of(block: Block) -> Iterator[tuple[str, str, int]]:
 
 def run_antdrive(words: list[str]) -> tuple[int, str]:
     """Call the command line in this process. Return its exit code and output."""
-    from antdrive.cli.app import main
+    from antdrive.cli.app import run_command
 
     out, code, before, sys.argv = io.StringIO(), 0, sys.argv, words
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
         try:
-            main()
+            run_command()
         except SystemExit as ended:
             code = int(ended.code or 0)
         finally:

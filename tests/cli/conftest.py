@@ -7,7 +7,7 @@ import sys
 import pyarrow as pa
 import pytest
 
-from antdrive.cli.app import ENDS, main
+from antdrive.cli.app import ENDS, run_command
 from antdrive.runs.campaigns.rows import GRID, RESULT, result_schema
 from antdrive.runs.campaigns.store import write_table
 from antdrive.worlds import save_task
@@ -33,7 +33,7 @@ def antdrive(monkeypatch, capsys, tmp_path, request):
     def call(*words):
         monkeypatch.setattr(sys, "argv", ["antdrive", *map(str, words)])
         with pytest.raises(SystemExit) as ended:
-            main()
+            run_command()
         out, err = capsys.readouterr()
         code = int(ended.value.code or 0)
         request.node.add_report_section("call", f"antdrive {words[0] if words else ''}", f"exit code {code}\n{err}")

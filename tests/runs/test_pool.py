@@ -49,12 +49,12 @@ def test_a_run_whose_process_dies_once_is_tried_again(tmp_path):
 
 
 def test_a_run_that_does_not_end_is_ended_and_not_tried_again():
-    rows = made(Endless((2,)), 2, limit=1.5)
+    rows = made(Endless((2,)), 2, limit=6.0)  # other runs stay below it on a busy machine
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs())
     slow = {row["key"]: row for row in rows if row["outcome"] != "succeeded"}
     assert set(slow) == {job.key for job in jobs() if job.seed == 2}
     assert {(row["outcome"], row["reason"], row["attempts"]) for row in slow.values()} == {
-        ("too_slow", "took longer than the campaign's run_limit of 1.5 s", 1)
+        ("too_slow", "took longer than the campaign's run_limit of 6 s", 1)
     }
 
 

@@ -26,6 +26,7 @@ _PLANNERS = "tests/planners/test_kernel_mutants.py"
 PLANS: dict[str, Plan] = {
     "sim/log/certificate.py": Plan(_CERTIFY, 50),
     "sim/log/consistency.py": Plan(_CERTIFY, 50),
+    "sim/log/ending.py": Plan((f"{_LOG}test_ending.py", f"{_DRIVING}test_driver.py"), 40),
     "sim/log/contacts.py": Plan((f"{_LOG}test_contacts.py", f"{_DRIVING}test_moving.py"), 40),
     "sim/log/metrics.py": Plan((f"{_LOG}test_metrics.py",), 40),
     "sim/driving/drive.py": Plan(_DRIVE, 8),
@@ -35,6 +36,7 @@ PLANS: dict[str, Plan] = {
     "sim/rerun.py": Plan(("tests/sim/test_rerun.py",), 16),
     "sim/rebuild.py": Plan(("tests/runs/failures/test_failure.py",), 6),
     "sim/verifying.py": Plan(("tests/sim/test_rerun.py", "tests/cli/commands/test_verify.py"), 6),
+    "sim/driving/stopping_constraint.py": Plan((f"{_DRIVING}test_stopping_constraint.py",), 10),
     "sim/driving/leaving.py": Plan((f"{_DRIVING}test_leaving.py",), 8),
     "sim/driving/blockage.py": Plan((f"{_DRIVING}test_driver.py",), 0),
     "views/film/playback.py": Plan(("tests/views/film/test_playback.py",), 0),

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from antdrive.base import supervision
 from antdrive.base.errors import InputError, Terminated, input_error
+
+LIMIT = "ANTDRIVE_PLAN_LIMIT"  # variable of the environment with the limit on planning time, seconds or "off"
+USUAL_LIMIT = "600"  # of the command line
+LONGEST_LIMIT = 1e6  # [s]
+AGAIN = 1.0  # the alarm repeats, in case the code catches the exception [s]
 
 PACKAGE, STANDARD = str(Path(__file__).parents[1]), str(Path(traceback.__file__).parent)  # folders of code
 LONGEST = 200  # characters of a text made by user code
@@ -18,6 +26,8 @@ LONGEST = 200  # characters of a text made by user code
 
 def error_text(error: BaseException) -> str:
     """Return an exception's class and message, shortened; without the message if the exception cannot format it."""
+    if issubclass(type(error), OverLimit):
+        return f"took longer than the limit of {plan_limit():g} s"
     message = _text(lambda: str(error), "")
     return f"{type(error).__name__}: {message}" if message else type(error).__name__
 
@@ -55,42 +65,103 @@ def _shortened(text: str, longest: int) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
+class OverLimit(BaseException):
+    """User code took longer than the limit on planning time."""
+
+
+def plan_limit() -> float | None:
+    """Return the limit on planning time of this process and those that it starts [s]; None for no limit.
+
+    Raises:
+        InputError: the variable of the environment is neither a positive number nor "off".
+    """
+    text = os.environ.get(LIMIT, "off")
+    if text == "off":
+        return None
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = 0.0
+    if not 0 < seconds <= LONGEST_LIMIT:
+        raise input_error(LIMIT, f"must be seconds, at most {LONGEST_LIMIT:.0e}, or off; got {text!r:.40}")
+    return seconds
+
+
 class UserCode:
     """A block that runs user code. Every exception that it raises becomes one of the caller's choice.
 
-    `InputError`, errors of the caller's choice, Ctrl-C and SIGTERM pass unchanged. A `KeyboardInterrupt` that the code
-    raises without Ctrl-C is an error like any other.
+    `InputError`, errors of the caller's choice, Ctrl-C and SIGTERM pass unchanged. A `KeyboardInterrupt` that user
+    code raises without Ctrl-C is an error like any other, and so is `OverLimit`, which an alarm raises after the limit on
+    planning time. Blocks within a block of the main thread belong to it.
 
     Args:
+        who: the code's name in messages about the end of the process
         error_of: returns the exception to raise instead
         passing: classes of exceptions that pass unchanged
+        own: whether the code is antdrive's own, which needs no supervision
     """
 
+    _outermost: UserCode | None = None
+
     def __init__(
-        self, error_of: Callable[[BaseException], Exception], passing: tuple[type[BaseException], ...] = ()
+        self,
+        who: str,
+        error_of: Callable[[BaseException], Exception],
+        passing: tuple[type[BaseException], ...] = (),
+        own: bool = False,
     ) -> None:
-        self._error_of = error_of
+        self._who, self._error_of, self._own = who, error_of, own
         self._passing: tuple[type[BaseException], ...] = (InputError, Terminated, *passing)
         self._interrupted = False
-        self._handler: Any = None
+        self._before: Any = None  # the handler of Ctrl-C
 
     def __enter__(self) -> None:
-        if threading.current_thread() is threading.main_thread():  # only this thread receives signals
-            self._handler = signal.getsignal(signal.SIGINT)
-            if callable(self._handler):
-                signal.signal(signal.SIGINT, self._interrupt)
+        # Only the main thread receives signals.
+        if UserCode._outermost is not None or threading.current_thread() is not threading.main_thread():
+            return
+        self.limit = plan_limit()
+        if not self._own:
+            supervision.begin(self._who, self.limit)
+        UserCode._outermost = self
+        self._before = signal.getsignal(signal.SIGINT)
+        if callable(self._before):
+            signal.signal(signal.SIGINT, self._interrupt)
+        if self.limit is not None:
+            self._alarm = signal.signal(signal.SIGALRM, self._ring)
+            self._timer, self._since = signal.setitimer(signal.ITIMER_REAL, self.limit, AGAIN), time.monotonic()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if callable(self._handler) and signal.getsignal(signal.SIGINT) == self._interrupt:
-            signal.signal(signal.SIGINT, self._handler)
+        outermost = UserCode._outermost is self
+        if outermost:
+            self._leave()
         if error is None or issubclass(type(error), self._passing):
             return
-        if self._interrupted and issubclass(type(error), KeyboardInterrupt):
+        if issubclass(type(error), OverLimit) and UserCode._outermost is not None:
+            return
+        if (self._interrupted or self._own) and issubclass(type(error), KeyboardInterrupt):
             return
         raise self._error_of(error) from error
 
+    def _leave(self) -> None:
+        """Restore the handlers of signals."""
+        UserCode._outermost = None
+        if self.limit is not None:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, self._alarm)
+            left, interval = self._timer
+            if left:  # the caller's own timer goes on
+                signal.setitimer(signal.ITIMER_REAL, max(left - time.monotonic() + self._since, 1e-3), interval)
+        if callable(self._before) and signal.getsignal(signal.SIGINT) == self._interrupt:
+            signal.signal(signal.SIGINT, self._before)
+        if not self._own:
+            supervision.end()
+
     def _interrupt(self, *signalled: Any) -> None:
         self._interrupted = True
-        self._handler(*signalled)
+        self._before(*signalled)
+
+    def _ring(self, *_: object) -> None:
+        if UserCode._outermost is self:
+            raise OverLimit

@@ -6,8 +6,9 @@ import os
 import select
 import signal
 import sys
-from typing import TextIO
+from typing import NoReturn, TextIO
 
+from antdrive.base import supervision
 from antdrive.base.errors import Terminated
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS
 from antdrive.cli.exits import BROKEN_PIPE, HUNG_UP, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED, TERMINATED
@@ -22,7 +23,13 @@ ENDS = {signal.SIGTERM: TERMINATED, signal.SIGHUP: HUNG_UP}  # exit codes of the
 
 
 def main() -> None:
-    """Run the command line and exit with its code."""
+    """Run the command line and exit with its code. User code runs in a supervised child of this process."""
+    supervision.arm(_blame)
+    run_command()
+
+
+def run_command() -> None:
+    """Run the command line in this process and exit with its code."""
     _open_streams()
     for one in ENDS:
         if signal.getsignal(one) is not signal.SIG_IGN:  # ignored under nohup
@@ -48,7 +55,15 @@ def main() -> None:
     for stream in (sys.__stdout__, sys.__stderr__):
         if stream is not None:
             _settle(stream)
+    supervision.finish()
     sys.exit(code)
+
+
+def _blame(fault: str) -> NoReturn:
+    """Print what user code did to the process, and exit."""
+    sys.stderr.write(f"antdrive: {fault}\n")
+    sys.stderr.flush()
+    os._exit(INTERNAL_ERROR)
 
 
 def _open_streams() -> None:

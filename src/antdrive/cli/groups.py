@@ -18,6 +18,7 @@ from antdrive.base.errors import FieldError, InputError, Terminated, input_error
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INTERRUPTED, INVALID_INPUT, SUCCEEDED
+from antdrive.cli.options import with_plan_limit
 from antdrive.sim.settings import PANELS
 
 SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
@@ -99,7 +100,8 @@ class _Commands(UserDict[str, Any]):
         if isinstance(command, Command):
             module = importlib.import_module(f"antdrive.cli.commands.{command.module}")
             alone = typer.Typer(**SETTINGS)
-            alone.command(name, cls=_Panelled)(getattr(module, command.function))
+            function = getattr(module, command.function)
+            alone.command(name, cls=_Panelled)(with_plan_limit(function) if command.plans else function)
             command = self.data[name] = typer.main.get_command(alone)
             for one in command.params:
                 if one.param_type_name == "option" and one.name in SHORT:

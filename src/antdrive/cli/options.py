@@ -6,12 +6,14 @@ Help texts state units, and defaults that typer cannot show.
 import dataclasses
 import functools
 import inspect
+import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from antdrive.base import guarded
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli.parse import disc
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
@@ -69,6 +71,31 @@ def with_settings(names: Iterable[str] = (), *, many: bool = False, **defaults: 
         return called
 
     return decorated
+
+
+def with_plan_limit(command: Command) -> Command:
+    """Add `--plan-limit` to a command. The limit holds for this process and the workers that it starts."""
+
+    @functools.wraps(command)
+    def called(*, plan_limit: str, **values: Any) -> Any:
+        os.environ[guarded.LIMIT] = plan_limit
+        try:
+            guarded.plan_limit()
+        except InputError as error:
+            raise InputError(str(error).replace(guarded.LIMIT, "--plan-limit", 1)) from None
+        return command(**values)
+
+    text = "Limit on the time of each plan and replan [s], or off."
+    made = option("SECONDS", text, "--plan-limit", panel="Planner", envvar=guarded.LIMIT, show_envvar=False)
+    own = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in inspect.signature(command).parameters.values()]
+    own.append(
+        inspect.Parameter(
+            "plan_limit", inspect.Parameter.KEYWORD_ONLY, default=guarded.USUAL_LIMIT, annotation=Annotated[str, made]
+        )
+    )
+    called.__signature__ = inspect.Signature(own)  # type: ignore[attr-defined]
+    called.__annotations__ = {one.name: one.annotation for one in own}
+    return called
 
 
 def _fields(record: inspect.Parameter) -> list[inspect.Parameter]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antdrive.base.errors import input_error
-from antdrive.base.guarded import UserCode, error_text, place
+from antdrive.base.guarded import OverLimit, UserCode, error_text, place
 
 if TYPE_CHECKING:
     from antdrive.planners.plan import Planner
@@ -38,10 +38,15 @@ def planner_errors(planner: Planner, name: str = "") -> UserCode:
         name: the planner's name in errors; empty: its class
     """
 
-    def error_of(error: BaseException) -> PlannerError:
-        return PlannerError(name or type(planner).__name__, f"raised {error_text(error)} ({place_of(planner, error)})")
+    called = name or type(planner).__name__
 
-    return UserCode(error_of, (PlannerError,))
+    def error_of(error: BaseException) -> PlannerError:
+        raised = "" if issubclass(type(error), OverLimit) else "raised "
+        return PlannerError(called, f"{raised}{error_text(error)} ({place_of(planner, error)})")
+
+    own = type(planner).__module__.startswith("antdrive.")
+    who = f"planner {called}" if own else f"planner {called} ({place_of(planner)})"
+    return UserCode(who, error_of, (PlannerError,), own)
 
 
 def place_of(planner: Planner, error: BaseException | None = None) -> str:

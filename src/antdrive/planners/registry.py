@@ -17,11 +17,12 @@ from typing import Any, Literal, Union
 
 from antdrive.base import FieldError, InputError
 from antdrive.base.errors import input_error
-from antdrive.base.guarded import UserCode, error_text, one_line, place
+from antdrive.base.guarded import OverLimit, UserCode, error_text, one_line, place
 from antdrive.planners.anyangle.ga_han import GaHan
 from antdrive.planners.anyangle.hybrid import Hybrid
 from antdrive.planners.anyangle.tangent import Tangent
 from antdrive.planners.colonies.catalog import ANT_PLANNERS
+from antdrive.planners.errors import PlannerError
 from antdrive.planners.graph.apf import PotentialField
 from antdrive.planners.graph.incremental import DStar, DStarLite
 from antdrive.planners.graph.search import AStar, Dijkstra
@@ -256,10 +257,13 @@ def _instance(made: Any, who: str, source: str = "") -> Planner:
 def _loading(who: str, source: str, passing: tuple[type[Exception], ...] = ()) -> UserCode:
     """Return a block for the user's code that makes a planner; `who` and `source` are for messages."""
 
-    def error_of(error: BaseException) -> InputError:
-        return input_error(f"{who} cannot be loaded{source}: {error_text(error)} ({place(error, None)})")
+    def error_of(error: BaseException) -> Exception:
+        problem = f"{error_text(error)} ({place(error, None)})"
+        if issubclass(type(error), OverLimit):
+            return PlannerError(who.removeprefix("planner "), problem)
+        return input_error(f"{who} cannot be loaded{source}: {problem}")
 
-    return UserCode(error_of, passing)
+    return UserCode(who, error_of, passing)
 
 
 def _mismatch(function: Any, *arguments: Any) -> str:

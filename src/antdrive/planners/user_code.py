@@ -20,7 +20,8 @@ from typing import Any
 from antdrive.base.document import MAX_BYTES
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.files import read_bytes
-from antdrive.base.guarded import UserCode, error_text, place, value_text
+from antdrive.base.guarded import OverLimit, UserCode, error_text, place, value_text
+from antdrive.planners.errors import PlannerError
 
 FROZEN_BASE = "cannot inherit non-frozen dataclass"  # message of Python about a dataclass without frozen=True
 DIGITS = 8  # hexadecimal digits of a file's hash
@@ -73,7 +74,7 @@ def load_object(source: str, word: str, folder: Path | None = None, *, is_file: 
 
     A file is read again after its content changes. Different folders may contain modules of the same name.
     """
-    with UserCode(functools.partial(_import_error, source)):
+    with UserCode(f"planner {source}:{word}", functools.partial(_import_error, source)):
         module = _from_file(source, folder) if is_file else _from_module(source, folder)
     if not word:
         raise UserCodeError(f"{source} names no class; write {source}:CLASS; {_choices(module, word)}", of_class=True)
@@ -82,9 +83,11 @@ def load_object(source: str, word: str, folder: Path | None = None, *, is_file: 
     return getattr(module, word)
 
 
-def _import_error(source: str, error: BaseException) -> UserCodeError:
+def _import_error(source: str, error: BaseException) -> UserCodeError | PlannerError:
     """Return the error of a file or module that cannot be imported."""
-    at = place(error, getattr(error, "filename", None) or str(Path(source).resolve()))
+    at = place(error, str(Path(source).resolve()))
+    if issubclass(type(error), OverLimit):
+        return PlannerError(source, f"{error_text(error)} on import ({at})")
     if issubclass(type(error), SystemExit):
         problem = f"{source}: calls exit on import (exit code {value_text(error.args[0] if error.args else 0)}, {at})"
         return UserCodeError(f'{problem}; guard its script code with if __name__ == "__main__"')

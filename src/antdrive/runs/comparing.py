@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from antdrive.planners import PlannerError
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
+
+PLANNER_FAULT = "planner_fault"  # outcome of a run whose planner raised an error
 
 COMPARED = {
     "path_length_m": "planned m",
@@ -46,6 +49,13 @@ class Compared:
         drive = hashlib.sha256(b"".join(array.tobytes() for array in driven)).hexdigest() if driven else ""
         facts = {**run.as_dict(), "folder": folder}
         return cls(label, s.task.world.name, s.seed, facts, drive, run.plan.line.tobytes())
+
+    @classmethod
+    def failed(cls, label: str, s: Scenario, error: PlannerError) -> Compared:
+        """Return a run that ended in an error of the planner."""
+        facts = {**s.as_dict(), "outcome": PLANNER_FAULT, "sentence": str(error), "reason": str(error)}
+        facts |= {"succeeded": False, "certificate": None, "metrics": {}, "digest": None, "folder": None}
+        return cls(label, s.task.world.name, s.seed, facts, "", b"")
 
     @property
     def cells(self) -> tuple[str, ...]:

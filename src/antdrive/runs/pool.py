@@ -20,8 +20,9 @@ from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NoReturn, TypeVar
 
+from antdrive.base import supervision
 from antdrive.base.errors import InputError
 
 Item = TypeVar("Item")
@@ -134,6 +135,9 @@ class Done(Generic[Item, Result]):
     result: Result | None = None  # return value of the work; None if the process died
     died: str = ""  # how the process died, in words; empty if it did not
     slow: bool = False  # whether the process was killed because the run exceeded the limit
+    fault: bool = (
+        False  # whether user code ended the process, or was killed because it exceeded the limit on planning time
+    )
     attempts: int = 1  # number of attempts
 
     @property
@@ -169,6 +173,7 @@ class _Worker:
     group: Hashable = None
     since: float = 0.0  # start of the current run
     slow: bool = False  # whether it was killed because that run exceeded the limit
+    fault: str = ""  # what user code did to the process
 
 
 @dataclass(frozen=True)
@@ -176,6 +181,13 @@ class _Raised:
     """An exception of the work, returned by a worker."""
 
     error: Exception
+
+
+@dataclass(frozen=True)
+class _Fault:
+    """A sentence about user code that ended a worker, from the worker's supervisor."""
+
+    sentence: str
 
 
 class Pool:
@@ -227,6 +239,9 @@ class Pool:
                             problem = "worker processes die while starting; check the free memory"
                             raise InputError(f"--jobs: {problem}") from None
                         yield from self._reap(worker, waiting)
+                        continue
+                    if isinstance(answer, _Fault):
+                        worker.fault = answer.sentence
                         continue
                     if isinstance(answer, _Raised):
                         raise answer.error
@@ -306,9 +321,10 @@ class Pool:
             return
         ticket = worker.handed.popleft()
         ticket.attempts += 1
-        if worker.slow or ticket.attempts == ATTEMPTS:
-            died = f"its process ended {_how(worker.process.exitcode)}"
-            yield Done(ticket.item, ticket.number, died=died, slow=worker.slow, attempts=ticket.attempts)
+        if worker.slow or worker.fault or ticket.attempts == ATTEMPTS:
+            died = worker.fault or f"its process ended {_how(worker.process.exitcode)}"
+            tries, fault = ticket.attempts, bool(worker.fault)
+            yield Done(ticket.item, ticket.number, died=died, slow=worker.slow, fault=fault, attempts=tries)
         else:
             worker.handed.appendleft(ticket)
         waiting.put_back(worker.handed)
@@ -380,6 +396,13 @@ def _undisturbed() -> Iterator[None]:
 def serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
     """Execute the runs received through a pipe until the parent closes it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # in case it could not be blocked
+
+    def report(sentence: str) -> NoReturn:
+        with contextlib.suppress(OSError):
+            pipe.send_bytes(_packed(_Fault(sentence)))
+        os._exit(1)
+
+    supervision.arm(report)
     with contextlib.suppress(EOFError, OSError):  # the parent closed the pipe, or died
         pipe.send(None)
         while True:
@@ -387,8 +410,10 @@ def serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
             work = changed or work
             for item in items:
                 if pipe.poll():  # a busy worker receives nothing, so the pipe is closed
+                    supervision.finish()
                     return
                 pipe.send_bytes(_answer(work, item))
+    supervision.finish()
 
 
 def _answer(work: Callable[[Any], Any], item: Any) -> bytes:

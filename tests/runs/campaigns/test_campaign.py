@@ -339,3 +339,8 @@ def test_the_schema_names_every_key():
     assert cells[1] == {"type": "array", "items": cells[0], "minItems": 1}
     assert "$ref" not in json.dumps(schema["properties"]["settings"])
     assert schema["required"] == ["schema", "worlds", "planners"]
+
+
+def test_every_setting_of_the_schema_has_a_meaning():
+    settings = campaign_schema()["properties"]["settings"]["anyOf"][0]["properties"]
+    assert [key for key, one in settings.items() if not one.get("description")] == []

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import hypothesis
 import numpy as np
@@ -56,6 +57,51 @@ def driven(robot, world, start, wanted, hz, held, *, told=None):
         pose = after(pose, last, 1 / hz)
         poses.append(pose)
     return np.array(poses)
+
+
+def limited(last, command, free):
+    """What becomes of a command where `free` metres or radians are observed as free, with 0.1 s to react."""
+    survey = SimpleNamespace(clear_distance=lambda *_: free, clear_turn=lambda *_: free)
+    return StoppingConstraint(survey, ROBOT, 20, 0.1, lambda tick, held: None).limit((0.0, 0.0, 0.0), last, command)
+
+
+def stopping_distance(speed, braking):
+    """The distance, or the angle, of a robot that reacts for 0.1 s and then brakes, with 1 cm or 0.01 rad to spare."""
+    return 0.1 * speed + speed**2 / (2 * braking) + 0.01
+
+
+ROBOT = replace(load_robot("turtlebot"), max_acceleration=1.0, max_yaw_acceleration=8.0)
+ARCS = {
+    "ahead": (Twist(0.6, 0.0), 0.6, 1.0), "back": (Twist(-0.6, 0.0), 0.6, 1.0), "arc": (Twist(0.6, 0.3), 0.6, 1.0),
+    "turn": (Twist(0.0, 2.0), 2.0, 8.0), "turn right": (Twist(0.0, -2.0), 2.0, 8.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("arc", ARCS)
+def test_a_command_passes_only_if_the_whole_stopping_distance_is_free(arc):
+    command, speed, braking = ARCS[arc]
+    whole, still = stopping_distance(speed, braking), Twist(0.0, 0.0)
+    assert limited(still, command, whole) == (command, False)
+    for share in (0.99, 0.91, 0.5, 0.1):
+        slower, slowed = limited(still, command, share * (whole - 0.01) + 0.01)
+        factor = max(map(abs, slower)) / max(map(abs, command))
+        assert slowed
+        assert slower == pytest.approx((command.speed * factor, command.yaw_rate * factor))
+        assert stopping_distance(factor * speed, braking) == pytest.approx(share * (whole - 0.01) + 0.01)
+    assert limited(still, command, 0.0) == (still, True)
+
+
+@pytest.mark.parametrize("arc", ARCS)
+def test_a_robot_brakes_as_hard_as_it_can_only_where_it_must(arc):
+    """In a period of 0.05 s it can lose 0.05 m/s, or 0.4 rad/s; the yaw rate of an arc falls with its speed."""
+    command, speed, braking = ARCS[arc]
+    hardest = 1 - 0.05 * braking / speed
+    kept = Twist(command.speed * hardest, command.yaw_rate * hardest)
+    for share, gentle in ((0.99, True), (1.01 * hardest, True), (0.99 * hardest, False), (0.0, False)):
+        found, slowed = limited(command, command, stopping_distance(share * speed, braking) if share else 0.0)
+        assert slowed
+        expected = (command.speed * share, command.yaw_rate * share) if gentle else kept
+        assert found == pytest.approx(expected), share
 
 
 @pytest.mark.parametrize("hz", [20, 240])

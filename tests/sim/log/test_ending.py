@@ -167,15 +167,21 @@ def creeping(metres, *, rows=1921, **of):
 
 
 def test_a_stuck_robot_made_no_progress_for_eight_seconds_of_driving():
-    assert list(false_endings(creeping(0.29))) == []
-    assert says(creeping(0.31), "stuck, but the robot got 0.309 m farther in the last 8 s")
-    assert says(creeping(0.1, rows=1917), "stuck, but the drive ends after 7.983 s")
-    aside = creeping(0.29)
+    assert list(false_endings(creeping(0.099))) == []
+    assert says(creeping(0.105), "stuck, but the robot got 0.105 m farther in the last 8 s")
+    assert says(creeping(0.05, rows=1917), "stuck, but the drive ends after 7.983 s")
+    aside = creeping(0.09)
     aside.pose[:, 1] += aside.t / 10.0  # across its route
     assert list(false_endings(aside)) == []
-    avoiding = creeping(0.1)
-    avoiding.limiter[1:5] = 1
-    assert says(avoiding, "takes 8 s of driving without progress")
+    for limiter, more, fits in ((1, 0, False), (1, 1, True), (2, 0, False), (2, 1, True)):
+        waits = creeping(0.05, rows=1921 + 4 * more)
+        waits.limiter[1:5] = limiter
+        assert bool(says(waits, "takes 8 s of driving without progress")) is not fits
+    whole_turn = round(2 * np.pi / still().record.robot.max_yaw_rate * 60)
+    for periods, fits in ((480 + whole_turn - 1, False), (480 + whole_turn, True)):
+        turns = creeping(0.05, rows=4 * periods + 1)
+        turns.limiter[1:] = 2
+        assert (list(false_endings(turns)) == []) is fits
 
 
 def test_the_limit_ends_a_drive_after_its_last_period():

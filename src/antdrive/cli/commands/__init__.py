@@ -18,6 +18,7 @@ class Command(NamedTuple):
     function: str  # in the module
     summary: str  # first line of the function's docstring
     resumes: bool = False  # whether the same command resumes an interrupted one
+    plans: bool = False  # whether it plans, and takes --plan-limit
 
 
 ABOUT = """Plan paths, drive them in physics, certify the drives and film them.
@@ -31,23 +32,29 @@ DEBUG = "--debug"  # accepted anywhere, so it can be appended to a failed comman
 #: Commands by name, in the order of `antdrive --help`.
 COMMANDS: Mapping[str, Command] = MappingProxyType(
     {
-        "run": Command("run", "run", "Plan a path, drive it in physics and certify the drive."),
-        "plan": Command("plan", "plan", "Plan a path without driving it."),
-        "compare": Command("compare", "compare", "Compare planners on worlds or from campaign results."),
-        "sweep": Command("sweep", "sweep", "Run a campaign: every combination of its settings.", resumes=True),
-        "barn": Command("barn", "barn", "Drive the BARN Challenge worlds and print the results table.", resumes=True),
+        "run": Command("run", "run", "Plan a path, drive it in physics and certify the drive.", plans=True),
+        "plan": Command("plan", "plan", "Plan a path without driving it.", plans=True),
+        "compare": Command("compare", "compare", "Compare planners on worlds or from campaign results.", plans=True),
+        "sweep": Command(
+            "sweep", "sweep", "Run a campaign: every combination of its settings.", resumes=True, plans=True
+        ),
+        "barn": Command(
+            "barn", "barn", "Drive the BARN Challenge worlds and print the results table.", resumes=True, plans=True
+        ),
         "render": Command("render", "render", "Render films of logged drives from any camera."),
         "report": Command("report", "report", "Write a report on many runs or on a campaign."),
         "export": Command("export", "export_drive", "Export a drive to Foxglove, RViz or CSV."),
         "verify": Command("verify", "verify", "Re-certify drives from their logs alone."),
-        "check": Command("check", "check", "Run suites and compare the drives with their baselines."),
-        "accept": Command("check", "accept", "Run suites and save the drives as baselines."),
+        "check": Command("check", "check", "Run suites and compare the drives with their baselines.", plans=True),
+        "accept": Command("check", "accept", "Run suites and save the drives as baselines.", plans=True),
         "margin": Command("margin", "margin", "Break down a drive's safety margin by cause."),
-        "find-margin": Command("find_margin", "find_margin", "Find the smallest margin at which all drives are safe."),
-        "falsify": Command("falsify", "falsify", "Search for worlds in which a configuration fails."),
-        "shrink": Command("shrink", "shrink", "Reduce a failure to a minimal reproducer.", resumes=True),
+        "find-margin": Command(
+            "find_margin", "find_margin", "Find the smallest margin at which all drives are safe.", plans=True
+        ),
+        "falsify": Command("falsify", "falsify", "Search for worlds in which a configuration fails.", plans=True),
+        "shrink": Command("shrink", "shrink", "Reduce a failure to a minimal reproducer.", resumes=True, plans=True),
         "reproduce": Command(
-            "reproduce", "reproduce", "Repeat a paper's experiments and test its claims.", resumes=True
+            "reproduce", "reproduce", "Repeat a paper's experiments and test its claims.", resumes=True, plans=True
         ),
         "planners": Command("planners", "planners", "List the planners and their options."),
         "schema": Command("schema", "schema", "Print the JSON Schema of a file type."),

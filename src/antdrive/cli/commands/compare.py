@@ -13,13 +13,23 @@ from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
 from antdrive.cli.console import file_lines, planning, print_error, show, table
 from antdrive.cli.entrants import Entrant, check_worlds, entrants_of, repeat_command
+from antdrive.cli.exits import FAILED, INTERNAL_ERROR, SUCCEEDED
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario_options import Ends, Setup
-from antdrive.runs.comparing import COMPARED, Compared, difference_cells, differences, mark_of, same_drives
+from antdrive.runs.comparing import (
+    COMPARED,
+    PLANNER_FAULT,
+    Compared,
+    difference_cells,
+    differences,
+    mark_of,
+    same_drives,
+)
 from antdrive.views.run_folder import check_film, check_folder, write_run
 
 if TYPE_CHECKING:
+    from antdrive.planners import PlannerError
     from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
@@ -59,15 +69,18 @@ def compare(
     query: CampaignQuery,
     json: options.Json = False,
     **given: Any,
-) -> bool:
+) -> int:
     """Compare planners on worlds or from campaign results.
 
     Worlds: pairs the planners by world and seed; figures and film show the first pair. Exit code 0: every run succeeded.
     Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
+    from antdrive.cli.groups import print_exception
+    from antdrive.planners import PlannerError
+
     if campaigns := campaign_folders(worlds, context, query):
         compare_campaigns(campaigns, planner or (), query, json)
-        return True
+        return SUCCEEDED
     check_worlds(worlds)
     entrants = entrants_of(planner, settings)
     tasks = {world: ends.of(world) for world in worlds}
@@ -96,12 +109,20 @@ def compare(
                 result = _drive(scenario, entrant, part / entrant.label)
                 if not runs:  # mark the folder early, so that an interrupted comparison owns its results
                     write_json(folder / MARKER, facts)
+                if isinstance(result, PlannerError):
+                    print_exception(result)
+                    runs.append(Compared.failed(entrant.label, scenario, result))
+                    continue
                 command = repeat_command(scenario, entrant, world, robot, ends.words)
                 write_run(result, part / entrant.label, command, figures=figures and is_first)
                 runs.append(Compared.of(entrant.label, result, folder=str(part / entrant.label)))
                 if is_first and result.rollout is not None:
                     logs[entrant.label] = result.rollout
-        files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
+        files = (
+            {run.label: run.facts["folder"] for run in runs if run.facts["folder"]}
+            if len(cases) == 1
+            else {"folder": str(folder)}
+        )
         comparison = {"differences": differences(runs), "same": same_drives(runs, given["smoothing"])}
         comparison["drives"] = [{"label": run.label, **run.facts} for run in runs]
         write_json(folder / MARKER, {**facts, **comparison})
@@ -111,16 +132,22 @@ def compare(
     if len(logs) < 2:
         planned = "only one planner" if logs else "no planner"
         print_error(f"{planned} found a path: no comparison figure or film")
-    return all(run.facts["succeeded"] for run in runs)
+    if any(run.facts["outcome"] == PLANNER_FAULT for run in runs):
+        return INTERNAL_ERROR
+    return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
 
 
-def _drive(scenario: "Scenario", entrant: Entrant, folder: Path) -> "Run":
-    """Drive with a progress bar, after checking that the results can be written."""
+def _drive(scenario: "Scenario", entrant: Entrant, folder: Path) -> "Run | PlannerError":
+    """Drive with a progress bar, after checking that the results can be written. Return the run, or the planner's error."""
+    from antdrive.planners import PlannerError
     from antdrive.sim.pipeline import run
 
     check_folder(folder)
     with planning(f"{scenario.task.world.name}, seed {scenario.seed}: {entrant.label}"):
-        return run(scenario)
+        try:
+            return run(scenario)
+        except PlannerError as error:
+            return error
 
 
 def _views(logs: "dict[str, Rollout]", folder: Path, film: Path | None, speed: float, figures: bool) -> dict[str, str]:

@@ -271,7 +271,9 @@ def _check_in_turn(
     with Pool(jobs) as pool:
         made = pool.in_order(work, [(str(case.suite), case.id) for case in cases])
         for case, done in zip(cases, made, strict=True):
-            if done.died:
+            if done.fault:
+                yield _check_of(case, update, results).failed_early(RAISED, done.died, WorkerDied(done.died))
+            elif done.died:
                 fault = f"internal error: {done.died}"
                 yield _check_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
             elif isinstance(done.value, str):  # the suite changed after loading

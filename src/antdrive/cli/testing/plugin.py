@@ -6,6 +6,7 @@ It must be cheap to import: a pytest run without suites and drives imports nothi
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 SUFFIX = ".drive.yaml"
 WORKER_KEY = "antdrive_unused"  # key for unused baselines reported by xdist workers
+
+PLAN_LIMIT = "ANTDRIVE_PLAN_LIMIT"
 
 _RESULTS = pytest.StashKey[list[Any]]()  # results of a test's drives
 FILMS_KEY = "antdrive_films"  # key for the film counting folder passed to xdist workers
@@ -47,10 +50,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default="failed",
         help="drives to film (default: failed)",
     )
+    group.addoption(
+        "--drive-plan-limit", metavar="SECONDS", help="limit on the time of a plan or replan (default: 600, or off)"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Initialise the records of this run."""
+    """Initialise the records of this run, and set the limit on planning time for this process and its workers."""
+    given = config.getoption("drive_plan_limit")
+    if given is not None:
+        os.environ[PLAN_LIMIT] = given
+    else:
+        os.environ.setdefault(PLAN_LIMIT, "600")
     config.stash[_UNUSED], config.stash[_LISTENER] = set(), _Listener()
     config.pluginmanager.register(config.stash[_LISTENER], "antdrive-listener")
 

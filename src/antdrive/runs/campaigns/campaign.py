@@ -132,7 +132,11 @@ def _settings_schema() -> dict[str, Any]:
     number = keys["controller"]["additionalProperties"]
     several_numbers = {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
     keys["controller"] = {**keys["controller"], "additionalProperties": several_numbers}
-    several = {key: {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]} for key, one in keys.items()}
+    about = {key: one["description"] for key, one in schema["properties"].items()}
+    several = {
+        key: {"description": about[key], "anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
+        for key, one in keys.items()
+    }
     return _of({**schema, "properties": several})
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.job import Job
+from antdrive.runs.comparing import PLANNER_FAULT as PLANNER_FAULT
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.pipeline import Run, versions
 from antdrive.sim.settings import SETTING_COLUMNS
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     import pyarrow
 
 CRASHED = "crashed"  # outcome of a run whose process died, or in which antdrive raised an error
-PLANNER_FAULT = "planner_fault"  # outcome of a run whose planner raised an error
 TOO_SLOW = "too_slow"  # outcome of a run killed after the campaign's run_limit
 #: Columns that differ between repetitions of a run; the canonical table omits them.
 NOT_CANONICAL = (*WALL_CLOCK, "attempts")

@@ -90,5 +90,5 @@ def finished_of(done: Done[Job, Finished], limit: float | None) -> Finished:
     elif done.slow and limit is not None:
         row, log = too_slow_row(done.item.key, limit), None
     else:
-        row, log = failed_row(done.item.key, CRASHED, done.died), None
+        row, log = failed_row(done.item.key, PLANNER_FAULT if done.fault else CRASHED, done.died), None
     return Finished({**row, "attempts": done.attempts}, log)

@@ -29,9 +29,9 @@ STUCK_PROGRESS = 0.02  # least progress along the route that counts [m]
 ROUNDING = 1e-9  # estimates are logged as errors of the poses [m]
 AT_ROUTE_END = 0.05  # a robot with at most this much of its route left is at its end [m]
 BESIDE_END = 1.0  # avoidance may take a robot at most this far off the end of its route [m]
-STAYED = 0.3  # a stuck robot gets at most this much farther in `STUCK_TIME`, straight or along its route [m]
+STAYED = 0.1  # a stuck robot gets at most this much farther in `STUCK_TIME`, straight or along its route [m]
 NEAR_GOAL = 1.5  # a route that ends farther from the goal leads elsewhere, unless within the tolerance [cells]
-AVOID = "avoid"  # name of the avoidance rule in `record.limiters`
+AVOID, ROTATE, SIGHT = "avoid", "rotate", "sight"  # names of rules in `record.limiters`
 BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good moves less [m]
 
 
@@ -199,14 +199,27 @@ def _at_route_end(rollout: Rollout) -> bool:
 
 
 def _counted_rows(rollout: Rollout) -> Rows:
-    """Return the ends of the last control periods that add up to `STUCK_TIME`; avoidance does not count. Empty if too few."""
-    record = rollout.record
-    period = _rows_per_period(rollout)
+    """Return the ends of the last control periods that add up to `STUCK_TIME`, empty if too few.
+
+    Avoidance does not count. If only turns on the spot add up, the time is that of a full turn more.
+    """
+    record, period = rollout.record, _rows_per_period(rollout)
     ends = np.arange(period, len(rollout.t), period)
-    if AVOID in record.limiters:
-        ends = ends[rollout.limiter[ends] != record.limiters.index(AVOID)]
-    needed = round(STUCK_TIME * record.control_hz)
-    return ends[-needed:] if len(ends) >= needed else ends[:0]
+
+    def by(*rules: str) -> npt.NDArray[np.bool_]:
+        return np.isin(rollout.limiter[ends], [i for i, name in enumerate(record.limiters) if name in rules])
+
+    driving = round(STUCK_TIME * record.control_hz)
+    turning = driving + round(2 * math.pi / record.robot.max_yaw_rate * record.control_hz)
+    avoids = by(AVOID)
+    enough = (_sums_to_end(~avoids & ~by(ROTATE)) >= driving) | (_sums_to_end(by(ROTATE, SIGHT)) >= turning)
+    first = int(np.flatnonzero(enough)[-1]) if enough.any() else len(ends)
+    return np.asarray(ends[first:][~avoids[first:]])
+
+
+def _sums_to_end(values: npt.NDArray[np.bool_]) -> Rows:
+    """Return the number of true values from each place to the end (N,)."""
+    return np.asarray(np.cumsum(values[::-1])[::-1])
 
 
 def _progress(rollout: Rollout, rows: Rows) -> float:

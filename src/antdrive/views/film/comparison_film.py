@@ -47,7 +47,7 @@ def compare_film(
     """
     target = Path(path)
     known_suffix(target, ENCODERS)
-    options = FilmOptions(camera, size or FULL, fps, speed).checked()
+    options = FilmOptions(camera=camera, size=size or FULL, fps=fps, speed=speed).checked()
     if not 2 <= len(rollouts) <= MAX_RUNS:
         raise InputError(f"compare: needs 2 to {MAX_RUNS} runs, got {len(rollouts)}")
     options = replace(options, size=size or fitting_size(rollouts, camera))

@@ -29,7 +29,7 @@ STILLS: dict[str, dict[str, Any]] = {
 }  # Pillow's options by file suffix
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FilmOptions:
     """Options of a film."""
 

@@ -74,7 +74,7 @@ def film(
     """
     target = Path(path)
     known_suffix(target, ENCODERS)
-    options = FilmOptions(camera, size, fps, speed, note).checked()
+    options = FilmOptions(camera=camera, size=size, fps=fps, speed=speed, note=note).checked()
     playback = Playback(rollout)
     times = frame_times(playback.duration, fps, speed, playback.slow_motion(speed))
     before, hold = round(prelude * fps), round(HOLD * fps)
@@ -129,7 +129,7 @@ def still(
     """
     target = Path(path)
     kind = known_suffix(target, STILLS)
-    shot = Shot(rollout, **asdict(FilmOptions(camera, size, note=note).checked()))
+    shot = Shot(rollout, **asdict(FilmOptions(camera=camera, size=size, note=note).checked()))
     picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.playback.duration))
     with atomic_write(target) as temporary:
         Image.fromarray(picture).save(temporary, format=kind[1:], **STILLS[kind])

@@ -1,0 +1,181 @@
+"""User planners that end their process, never end, or answer nonsense: named in one line, and other runs go on."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pyarrow.parquet
+import pytest
+
+ANTDRIVE = Path(sys.executable).with_name("antdrive")
+PLANNERS = """
+import itertools, os, time
+from antdrive.planners import load_planner
+
+class Right:
+    count = 0
+    def plan(self, query, rng):
+        self.count += 1
+        self.before()
+        return load_planner("astar").plan(query, rng)
+    def before(self): ...
+
+class Endless(Right):
+    def before(self):
+        while True: pass
+
+class Stubborn(Right):
+    def before(self):
+        while True:
+            try: time.sleep(99)
+            except BaseException: self.before = lambda: time.sleep(99)
+
+class Compiled(Right):
+    def before(self): any(itertools.repeat(0))
+
+class Exits(Right):
+    def before(self): os._exit(0)
+
+class Crashes(Right):
+    def before(self): os.kill(os.getpid(), 11)
+
+class EndlessLater(Right):
+    def before(self):
+        while self.count > 1: pass
+
+class ExitsLater(Right):
+    def before(self): self.count > 1 and os._exit(0)
+"""
+OVER = "took longer than the limit of 0.3 s"
+EXITS = "(mine.py:7) ended the process with exit code 0"
+#: What the error says of each class of the file, after its name.
+SLOW = {
+    "Endless": f"{OVER} (mine.py:15)",
+    "Stubborn": OVER,
+    "Exits": EXITS,
+    "Crashes": "(mine.py:7) ended the process by SIGSEGV",
+    "EndlessLater": f"{OVER} (mine.py:34)",
+    "ExitsLater": EXITS,
+}
+ENDS = {"Compiled": f"(mine.py:7) {OVER}", **SLOW}
+MOVING = """
+schema: 1
+bounds: [0, 0, 8, 4]
+start: [1, 2, 0]
+goal: [7, 2]
+movers: [{radius: 0.3, position: [4, 2], velocity: [0.01, 0]}]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text(PLANNERS)
+    (tmp_path / "moving.yaml").write_text(MOVING)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def process(*words, limit="0.3"):
+    """The finished process of a command, with a limit on planning time."""
+    return subprocess.run([ANTDRIVE, *words, "--plan-limit", limit], capture_output=True, text=True, timeout=100)
+
+
+def said_in_one_line(done, name, words):
+    """Whether a process failed because of a planner that it names."""
+    assert done.returncode == 3, done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    assert done.stderr.count("\n") == 1
+    return done.stderr.startswith(f"antdrive: planner {name}") and words in done.stderr
+
+
+@pytest.mark.parametrize(
+    "name", ["Compiled", *(pytest.param(name, marks=pytest.mark.slow) for name in ("Endless", "Exits", *SLOW))]
+)
+def test_a_planner_that_ends_its_process_or_never_ends_is_named(folder, name):
+    world = "moving.yaml" if name.endswith("Later") else "empty"
+    done = process("run", world, "--planner", f"mine.py:{name}", "--no-figures", "-o", "out")
+    assert said_in_one_line(done, name, ENDS[name])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("while True: pass", f"{OVER} on import (import.py:1)"),
+        ("import os; os._exit(0)", "ended the process with exit code 0"),
+        ("import itertools; any(itertools.repeat(0))", OVER),
+    ],
+)
+def test_a_file_that_never_ends_or_exits_on_import_is_named(folder, code, words):
+    (folder / "import.py").write_text(code)
+    assert said_in_one_line(process("plan", "empty", "--planner", "import.py:Mine"), "import.py", words)
+
+
+@pytest.mark.parametrize(
+    "names", ["Exits Right", pytest.param("Endless Compiled Crashes Right", marks=pytest.mark.slow)]
+)
+def test_a_sweep_records_each_of_them_and_goes_on(folder, antdrive, monkeypatch, names):
+    monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
+    planners = ", ".join(f"mine.py:{name}" for name in names.split())
+    (folder / "camp.yaml").write_text(f"schema: 1\nworlds: [empty]\nseeds: 1\nplanners: [{planners}]\n")
+    assert antdrive("sweep", "camp.yaml", "-o", "camp", "--jobs", "1", "--plan-limit", "3")[0] == 0
+    rows = pyarrow.parquet.read_table(folder / "camp" / "runs.parquet").to_pylist()
+    found = {row["planner"].removeprefix("mine.py:"): (row["outcome"], row["reason"]) for row in rows}
+    assert found.pop("Right")[0] == "succeeded"
+    for name, (outcome, reason) in found.items():
+        assert outcome == "planner_fault"
+        assert reason == f"planner {name} {ENDS[name].replace('0.3', '3')}"
+
+
+def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypatch):
+    monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
+    planners = "-p", "a=mine.py:Endless", "-p", "b=mine.py:Right"
+    code, out, err = antdrive("compare", "empty", *planners, "--no-figures", "--json", "-o", "out", "--plan-limit", "3")
+    assert code == 3
+    assert err.startswith(f"antdrive: planner Endless {ENDS['Endless'].replace('0.3', '3')}")
+    runs = json.loads(out)["runs"]
+    assert runs["a"]["outcome"] == "planner_fault"
+    assert "limit of 3 s" in runs["a"]["reason"]
+    assert runs["b"]["succeeded"]
+
+
+@pytest.mark.slow
+def test_suites_name_it_and_go_on(folder):
+    names = ("Exits", "Endless", "Right")
+    tests = "\n".join(f"  {n.lower()}: {{world: empty, planner: 'mine.py:{n}', baseline: false}}" for n in names)
+    (folder / "a.drive.yaml").write_text(f"scenarios:\n{tests}\n")
+    done = process("check", "a.drive.yaml", "--jobs", "2", "--film", "never", "--results", "results", limit="3")
+    assert done.returncode == 1
+    assert "planner Exits (mine.py:7) ended the process with exit code 0" in done.stdout
+    assert "planner Endless took longer than the limit of 3 s (mine.py:15)" in done.stdout
+    assert "1 of 3 passed" in done.stdout
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "a.drive.yaml::endless", "a.drive.yaml::right", "--drive-plan-limit", "3"],
+        capture_output=True, text=True, timeout=100,
+    )  # fmt: skip
+    assert "planner Endless took longer than the limit of 3 s (mine.py:15)" in done.stdout
+    assert "1 failed, 1 passed" in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_supervised_command_as_any_other(folder, number, code):
+    words = [ANTDRIVE, "run", "empty", "--planner", "mine.py:Endless", "--no-figures", "--plan-limit", "off"]
+    started = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    time.sleep(5)
+    started.send_signal(number)
+    _, said = started.communicate(timeout=20)
+    assert started.returncode == code
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "nan", "soon"])
+def test_a_limit_that_is_no_time_is_refused(text, monkeypatch, capsys):
+    from antdrive.cli.groups import exit_code_of
+
+    monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
+    assert exit_code_of(["plan", "empty", "--plan-limit", text]) == 2
+    assert capsys.readouterr().err == f"antdrive: --plan-limit: must be seconds, at most 1e+06, or off; got '{text}'\n"
