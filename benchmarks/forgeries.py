@@ -1,36 +1,51 @@
-"""Detection of forged and broken logs by check: `python -m benchmarks.forgeries [WORD ...]`. Prints Markdown.
+"""Detection of forged and broken logs by check: `python -m benchmarks.forgeries [WORD ...] [--count N] [--seed S]`.
 
-A forger changes a genuine log and updates its digest, so the digest detects nothing here. `benchmarks.forged_logs` holds the
-forgeries by name; each is applied to all applicable drives of `genuine_drives`. The checks are those of `antdrive verify`,
-cheapest first:
+A forger changes a genuine log and updates its digest, so the digest detects nothing here. `benchmarks.forged_fields` holds an
+entry for every array and every key of the record, `benchmarks.forged_logs` forgeries written by hand. Draws are forgeries by
+random amounts in random drives of `genuine_drives`. The checks are those of `antdrive verify`, cheapest first:
 
 - load: the file is not a log, or its arrays and record are invalid
 - verify: the log contradicts itself (certificate and consistency)
-- files: world or robot differ from the trusted files (`--world`, `--robot`)
-- replay: re-execution of the logged commands diverges (`--replay`)
-- none: undetected, as documented in docs/explanation/certificate.md
+- files: world or robot differ from the trusted files, or the optima from the world (`--world`, `--robot`)
+- replay: the recorded scenario or its commands lead to another log (`--replay`)
+- none: undetected: a claim, or an input with which the same drive follows
+
+A forgery that passes the level that its declaration names is printed with the command that repeats it.
 """
 
 from __future__ import annotations
 
 import collections
 import dataclasses
+import hashlib
+import json
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+import time
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from antdrive.base.errors import InputError
-from antdrive.planners import load_planner
-from antdrive.robots import load_robot
-from antdrive.sim import Rollout, Scenario, certify, run
+from antdrive.planners import PlannerError, load_planner
+from antdrive.robots import Footprint, RobotSpec, load_robot
+from antdrive.runs.margins.choice import with_chosen_margin
+from antdrive.sim import Perception, Rollout, Scenario, certify, run
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.log.record import differences
+from antdrive.sim.log.record import PROOFS, DriveRecord, Proof, differences, plain_value
+from antdrive.sim.log.rollout import FORMS
+from antdrive.sim.rerun import mismatches, rerun
+from antdrive.sim.verifying import wrong_optima
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
+from benchmarks.forged_fields import ENTRIES, LEVEL_OF, POOL
 from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
 from benchmarks.markdown import command_line, print_table
 
-SMALLEST = ("rows robot",)
+CRASHED = "crash"  # in place of a level: the check raised an exception
+BY_HAND = 8  # drives of `genuine_drives`
+GENERATED = 0.6  # share of draws from the generated entries alone
+SMALLEST = ("rows noise --count 3 --few",)
 
 
 def genuine_drives() -> dict[str, Rollout]:
@@ -65,6 +80,71 @@ def genuine_drives() -> dict[str, Rollout]:
     return drives
 
 
+def more_drives(only: Collection[str] = ()) -> dict[str, Rollout]:
+    """Drives of every kind: planners, robots, footprints, routes, perceptions, localisations, margins and ends.
+
+    Args:
+        only: names of drives; empty for all of them
+    """
+    posts = (Disc(2.0, 1.5, 0.3), Disc(3.4, 2.6, 0.25), Disc(3.6, 0.8, 0.35))
+    task = Task(World("posts", (0.0, 0.0, 6.0, 3.5), posts), (0.6, 1.4, 0.0), (5.3, 1.9), cell=0.1)
+    movers = (
+        Cruising(radius=0.2, position=(3.0, 3.0), velocity=(0.1, -0.3)),
+        Keyframed(radius=0.2, keyframes=((0.0, 4.5, 0.5), (6.0, 4.5, 3.0))),
+    )
+    moving = dataclasses.replace(task, world=dataclasses.replace(task.world, name="moving", movers=movers))
+    off_axle = dataclasses.replace(
+        load_robot("turtlebot"),
+        name="off-axle",
+        footprint=Footprint(0.0, 0.0, 0.0, ((0.25, 0.12), (-0.1, 0.15), (-0.12, -0.15), (0.2, -0.14))),
+    )
+    guard = Keyframed(radius=0.35, keyframes=((0.0, 3.0, 0.6), (1.0, 3.0, 0.6)))
+    corridor = Task(World("corridor", (0.0, 0.0, 6.0, 1.2), movers=(guard,)), (0.8, 0.6, 0.0), (5.3, 0.6), cell=0.1)
+    mapless = {"map": "none", "cell": 0.05}
+
+    def of(
+        where: Task = task, planner: str = "astar", robot: str | RobotSpec = "turtlebot", **given: object
+    ) -> Scenario:
+        options = given.pop("options", None)
+        return Scenario.of(where, planner, robot, options=options, **given)  # type: ignore[arg-type]
+
+    scenarios = {
+        "tangent, taut": of(planner="tangent", smoothing="taut"),
+        "ants, noise": of(planner="aco-han", noise=1.0, seed=7, options={"iterations": 5}),
+        "genetic, raw": of(planner="ga-han", smoothing="none", seed=2),
+        "polygon off the axle": of(robot=off_axle, noise=1.0),
+        "husky": of(robot="husky", noise=1.0, margin=0.05),
+        "burger, own margin": of(robot="turtlebot3-burger", margin=0.12, noise=0.5),
+        "positions within 2 m": of(moving, "dstar-lite", perception=Perception(kind="positions", range=2.0)),
+        "motions": of(moving, "dstar-lite", perception=Perception(kind="motions"), seed=3),
+        "space and time": of(moving, "sipp", perception=Perception(kind="motions")),
+        "lidar, map": of(moving, "dstar-lite", perception=Perception(kind="lidar"), noise=1.0),
+        "no avoidance": of(moving, avoidance=None, replanning=None, seed=4),
+        "mapless, fixes": of(planner="dstar-lite", noise=1.0, **mapless),
+        "mapless, true": of(planner="dstar-lite", localisation="true", **mapless),
+        "mapless, odometry": of(planner="dstar-lite", localisation="odometry", noise=1.0, **mapless),
+        "mapless, matching": of(planner="dstar-lite", localisation="matching", noise=1.0, robot="jackal", **mapless),
+        "mapless, matching, lidar": of(
+            moving,
+            "dstar-lite",
+            "jackal",
+            localisation="matching",
+            noise=1.0,
+            perception=Perception(kind="lidar"),
+            **mapless,
+        ),
+        "unseen beside the way": of(unseen=(Disc(5.0, 3.0, 0.15),)),
+        "timed out": of(time_limit=2.5, noise=1.0),
+        "timed out, mapless": of(time_limit=3.0, planner="dstar-lite", **mapless),
+        "blocked": of(corridor),
+        "another cell and rates": of(cell=0.15, control_hz=30, physics_hz=120, noise=1.0),
+    }
+    if not only:
+        scenarios["chosen margin"] = with_chosen_margin(of(noise=1.0))
+    some = {name: s for name, s in scenarios.items() if name in (only or scenarios)}
+    return {name: log for name, s in some.items() if (log := run(s).rollout) is not None}
+
+
 @dataclass(frozen=True)
 class Finding:
     """What became of one forged log.
@@ -82,23 +162,93 @@ class Finding:
     why: str
 
 
+@dataclass
+class Judge:
+    """The levels of `antdrive verify`, with caches of what many forgeries share.
+
+    Attributes:
+        known: problems of genuine logs, by digest
+        reruns: reruns, or why there is none, by the inputs of the record
+        commands: what the replay of commands found, by arrays and inputs
+        optima: what a comparison of optima found
+    """
+
+    known: dict[str, set[str]] = field(default_factory=dict)
+    reruns: dict[str, Rollout | str] = field(default_factory=dict)
+    commands: dict[str, str] = field(default_factory=dict)
+    optima: dict[str, str] = field(default_factory=dict)
+
+    def found(self, path: Path, genuine: Rollout) -> tuple[str, str]:
+        """Return the first check that detects a forged log, and its message."""
+        try:
+            log = Rollout.load(path)
+        except InputError as error:
+            return "load", str(error).removeprefix(f"{path}: ")
+        seal = genuine.digest
+        if seal not in self.known:
+            self.known[seal] = set(certify(genuine).problems)
+        known = self.known[seal]
+        honest = known and log.outcome is genuine.outcome and len(log.contacts) == len(genuine.contacts)
+        problems = [p for p in certify(log).problems if not honest or p not in known]
+        if problems:
+            return "verify", problems[0]
+        for problem in differences(log.record, task=genuine.record.task, robot=genuine.record.robot):
+            return "files", problem
+        plan = log.record.plan
+        key = f"{seal} {log.record.cell} {log.record.inflate} {plan.grid_optimum_m} {plan.euclidean_optimum_m}"
+        if key not in self.optima:
+            self.optima[key] = next(iter(wrong_optima(log.record)), "")
+        if self.optima[key]:
+            return "files", self.optima[key]
+        problem = self._replayed(log)
+        return ("replay", problem) if problem else ("none", "")
+
+    def _replayed(self, log: Rollout) -> str:
+        """Return what the replay says first; empty if it reproduces the log."""
+        key = inputs_of(log.record) + str(len(log.t))
+        if key not in self.reruns:
+            try:
+                self.reruns[key] = rerun(log)
+            except (PlannerError, ValueError) as error:
+                self.reruns[key] = str(error) or type(error).__name__
+        again = self.reruns[key]
+        if isinstance(again, str):
+            return f"replay: {again}"
+        again = dataclasses.replace(again, record=dataclasses.replace(again.record, digest=log.record.digest))
+        for one in mismatches(log, again):
+            if not one.rounded:
+                return f"replay: {one.name}{one.text}"
+        arrays = hashlib.sha256(
+            b"".join(np.ascontiguousarray(getattr(log, name)).tobytes() for name in FORMS)
+        ).hexdigest()
+        if key + arrays not in self.commands:
+            try:
+                self.commands[key + arrays] = next(iter(replay(log).problems), "")
+            except ValueError as error:
+                self.commands[key + arrays] = f"replay: {error}"
+        return self.commands[key + arrays]
+
+
+def inputs_of(record: DriveRecord) -> str:
+    """Return what a rerun depends on, as JSON: the record without what it computes and without claims."""
+    values = plain_value(record)
+    for key, proof in PROOFS.items():
+        name, _, rest = key.partition(".")
+        if proof in (Proof.INPUT, Proof.ROBOT) or name in ("task", "robot"):
+            continue
+        if rest and not name.endswith("[]"):
+            (values.get(name) or {}).pop(rest, None)
+        else:
+            values.pop(name.removesuffix("[]"), None)
+    return json.dumps(values, sort_keys=True)
+
+
 def found(path: Path, genuine: Rollout) -> tuple[str, str]:
     """Return the first check that detects a forged log, and its message."""
-    try:
-        log = Rollout.load(path)
-    except InputError as error:
-        return "load", str(error).removeprefix(f"{path}: ")
-    certificate = certify(log)
-    known = set(certify(genuine).problems)
-    honest = known and log.outcome is genuine.outcome and len(log.contacts) == len(genuine.contacts)
-    problems = [p for p in certificate.problems if not honest or p not in known]
-    if problems:
-        return "verify", problems[0]
-    for problem in differences(log.record, task=genuine.record.task, robot=genuine.record.robot):
-        return "files", problem
-    for problem in replay(log).problems:
-        return "replay", problem
-    return "none", ""
+    return JUDGE.found(path, genuine)
+
+
+JUDGE = Judge()
 
 
 def forged(kind: Kind, genuine: Rollout, path: Path) -> bool:
@@ -116,8 +266,41 @@ def forged(kind: Kind, genuine: Rollout, path: Path) -> bool:
     return True
 
 
+def drawn(
+    drives: Mapping[str, Rollout], names: list[str], rng: np.random.Generator, path: Path
+) -> tuple[str, str] | None:
+    """Write a forgery by a random amount; return what and whose it is, or None if it makes no sense for the drawn drive."""
+    generated = [name for name in names if name in ENTRIES]
+    some = generated if generated and (len(generated) == len(names) or rng.random() < GENERATED) else names
+    name = some[rng.integers(len(some))]
+    whose = list(drives)[
+        : None if name in ENTRIES else BY_HAND
+    ]  # forgeries by hand know the worlds of the first drives
+    drive = whose[rng.integers(len(whose))]
+    if name not in ENTRIES:
+        return (name, drive) if forged(KINDS[name], drives[drive], path) else None
+    log = Log.of(drives[drive])
+    if not ENTRIES[name].forge(log, rng):
+        return None
+    log.write(path)
+    return name, drive
+
+
+def level_of(name: str) -> str:
+    """Return the last level at which a kind of forgery must be found."""
+    return LEVEL_OF[ENTRIES[name].proof] if name in ENTRIES else KINDS[name].level
+
+
+def accepted(finding: Finding) -> bool:
+    """Return whether a forgery passed the level that must refuse it; an input with which the same drive follows is none."""
+    if finding.level == CRASHED:
+        return True
+    same = finding.level == "none" and finding.kind in ENTRIES and ENTRIES[finding.kind].proof is Proof.INPUT
+    return not same and LEVELS.index(finding.level) > LEVELS.index(level_of(finding.kind))
+
+
 def all_findings(drives: Mapping[str, Rollout], kinds: Mapping[str, Kind] = KINDS) -> list[Finding]:
-    """Every forgery of every drive, checked."""
+    """Every forgery written by hand, in every drive, checked."""
     results = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "forged.npz"
@@ -131,21 +314,52 @@ def all_findings(drives: Mapping[str, Rollout], kinds: Mapping[str, Kind] = KIND
 
 
 def main() -> None:
-    words = command_line(__doc__, kinds=([], "only kinds with one of these words")).kinds or [""]
-    drives = genuine_drives()
-    for name, log in drives.items():
-        print(f"- {name}: {log.outcome.key}, {len(log.t)} rows, {certify(log).sentence}")
-    chosen = {name: kind for name, kind in KINDS.items() if any(word in name for word in words)}
-    results = all_findings(drives, chosen)
+    counted = {"count": (500, "forgeries to draw"), "seed": (0, "seed"), "first": (0, "number of the first draw")}
+    chosen = command_line(  # type: ignore[arg-type]
+        __doc__,
+        kinds=([], "only kinds with one of these words"),
+        few=(False, "only the drives of the tests"),
+        **counted,
+    )
+    begun = time.monotonic()
+    drives = genuine_drives() | ({} if chosen.few else more_drives())
+    POOL.extend(log.record.as_dict() for log in drives.values())
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "forged.npz"
+        for name, log in drives.items():
+            log.save(path)
+            assert found(path, log) == ("none", ""), f"{name}: {found(path, log)}"
+            print(f"- {name}: {log.outcome.key}, {len(log.t)} rows, {certify(log).sentence}", flush=True)
+        names = [name for name in (*ENTRIES, *KINDS) if any(word in name for word in chosen.kinds or [""])]
+        results: list[Finding] = []
+        for number in range(chosen.first, chosen.first + chosen.count):
+            rng = np.random.default_rng([chosen.seed, number])
+            while (one := drawn(drives, names, rng, path)) is None:
+                pass
+            try:
+                finding = Finding(*one, *found(path, drives[one[1]]))
+            except Exception as error:
+                finding = Finding(*one, CRASHED, repr(error))
+            results.append(finding)
+            if accepted(finding):
+                words = " ".join([*map(repr, chosen.kinds), f"--seed {chosen.seed} --first {number} --count 1"])
+                print(
+                    f"- ACCEPTED: {finding.kind} in {finding.drive} {finding.why[:150]}: python -m benchmarks.forgeries {words}",
+                    flush=True,
+                )
+    print()
     rows = []
-    for name in chosen:
+    for name in names:
         levels = collections.Counter(r.level for r in results if r.kind == name)
         why = next((r.why for r in results if r.kind == name and r.why), "")
-        rows.append([name, str(sum(levels.values())), *(str(levels[level] or "") for level in LEVELS), why[:120]])
+        checked = [str(levels[level] or "") for level in LEVELS]
+        past = str(sum(accepted(r) for r in results if r.kind == name) or "")
+        rows.append([name, level_of(name), str(sum(levels.values())), *checked, past, why[:120].replace("|", "/")])
     total = collections.Counter(r.level for r in results)
-    rows.append([f"all {len(chosen)} kinds", str(len(results)), *(str(total[level]) for level in LEVELS), ""])
-    print()
-    print_table(["forgery", "logs", *LEVELS, "for example"], rows)
+    whole = [str(total[level]) for level in LEVELS]
+    rows.append([f"all {len(names)} kinds", "", str(len(results)), *whole, str(sum(map(accepted, results))), ""])
+    print_table(["forgery", "refused by", "logs", *LEVELS, "accepted", "for example"], rows)
+    print(f"{len(drives)} drives, {len(JUDGE.reruns)} reruns, {time.monotonic() - begun:.0f} s")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def test_the_command_of_a_log_repeats_its_drive(antdrive, tmp_path, world):
 
 def test_a_command_names_settings_that_differ_from_the_defaults_alone(small_run):
     log = small_run.rollout
-    assert command_of(log) == "antdrive run small.yaml --planner astar --robot turtlebot --seed 0"
+    assert command_of(log) == "antdrive run small.yaml --planner astar --robot turtlebot --margin 0.03 --seed 0"
     odd = changed(
         log, "record", planner=replace(log.record.planner, name="Own; rm"), controller=replace(log.record.controller)
     )

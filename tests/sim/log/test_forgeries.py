@@ -1,12 +1,17 @@
 """Each kind of forged or broken log with a valid digest fails the check meant for it."""
 
+import zlib
+
+import numpy as np
 import pytest
 
 from antdrive.sim import Rollout, certify
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.log.record import differences
+from antdrive.sim.log.record import PROOFS, MarginRecord, differences
+from antdrive.sim.log.rollout import FORMS
+from benchmarks.forged_fields import ENTRIES, POOL
 from benchmarks.forged_logs import KINDS, LEVELS, Log, digest
-from benchmarks.forgeries import all_findings, forged, found, genuine_drives
+from benchmarks.forgeries import Finding, accepted, all_findings, drawn, forged, found, genuine_drives, more_drives
 from tests.records import changed
 
 #: What is said of a forgery, for the checks that nothing else covers: the drive, and words of the sentence.
@@ -47,6 +52,31 @@ NOISE = {
 @pytest.fixture(scope="module")
 def drives():
     return genuine_drives()
+
+
+@pytest.fixture(scope="module")
+def all_drives(drives):
+    """Drives that have every array and every key between them."""
+    choice = MarginRecord(loss_m=0.0, reserve_m=0.01, probability=0.01, drives=80)
+    chosen = changed(drives["jackal, noise"], "record", margin_choice=choice)
+    found = {**drives, **more_drives(["mapless, matching, lidar", "ants, noise"]), "chosen margin": chosen}
+    POOL[:] = [log.record.as_dict() for log in found.values()]
+    return found
+
+
+def test_the_catalogue_is_made_from_the_declarations():
+    assert set(ENTRIES) == {*FORMS, *(f"record.{key}" for key in PROOFS)}
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_every_array_and_every_key_is_refused_by_the_check_it_declares(name, all_drives, tmp_path):
+    """A new array or key that no drive here has fails: add a drive that has it."""
+    rng, path = np.random.default_rng(zlib.crc32(name.encode())), tmp_path / "forged.npz"
+    draws = (drawn(all_drives, [name], rng, path) for _ in range(60))
+    made = next((one for one in draws if one is not None), None)
+    assert made is not None, f"no drive has {name}"
+    finding = Finding(*made, *found(path, all_drives[made[1]]))
+    assert not accepted(finding), finding
 
 
 def test_genuine_drives_pass_every_check_and_have_the_digest_that_a_forger_computes(drives):

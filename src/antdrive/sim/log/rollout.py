@@ -368,6 +368,8 @@ class Rollout:
                 yield f"{name}: must hold finite numbers, found others"
             elif array.size and float(np.abs(array.astype(np.float64)).max()) > MAX_VALUE:
                 yield f"{name}: must hold numbers within {MAX_VALUE:g}, found others"
+        if len(self.route) < 2:
+            yield f"route: must have two points or more, found {len(self.route)}"
         yield from self._scan_problems(rows)
         if _fits(self.contacts.shape, (None, 4)) and self.contacts.dtype.kind == "f" and len(self.contacts):
             steps = self.contacts[:, 0]
