@@ -162,11 +162,13 @@ def test_claims_are_not_compared(small_run):
 def test_values_within_rounding_are_named_and_not_bit_for_bit(small_run):
     log = small_run.rollout
     pose = log.pose.copy()
-    pose[5, 0] += 1e-5
+    pose[5] += [1e-5, 0.0, 2e-5]
     plan = replace(log.record.plan, length_m=log.record.plan.length_m + 1e-6)
     check = replayed(replace(log, pose=pose, record=replace(log.record, plan=plan)))
     assert (check.exact, check.problems, check.rounded) == (False, (), ("pose", "record.plan.length_m"))
-    assert check.sentence.startswith("replayed within rounding (pose, record.plan.length_m): at most 1e-05 m")
+    assert check.sentence == (
+        "replayed within rounding (pose, record.plan.length_m): at most 1e-05 m, 2e-05 rad and 0 m/s or rad/s off"
+    )
 
 
 def test_other_versions_are_named_with_a_difference(small_run):

@@ -15,6 +15,7 @@ ROOT = HERE.parent.parent
 SEED = 1
 
 _LOG, _DRIVING, _CONTROL = "tests/sim/log/", "tests/sim/driving/", "tests/robots/control/"
+_SENSING = "tests/sim/sensing/test_"
 _COLONIES, _GRAPH, _LINES = "tests/planners/colonies/", "tests/planners/graph/", "tests/planners/anyangle/"
 _CERTIFY = tuple(f"{_LOG}test_certificate{part}.py" for part in ("_faults", ""))
 _PARTS = f"{_CONTROL}test_kernel_mutants.py"
@@ -29,15 +30,26 @@ PLANS: dict[str, Plan] = {
     "sim/log/ending.py": Plan((f"{_LOG}test_ending.py", f"{_DRIVING}test_driver.py"), 40),
     "sim/log/contacts.py": Plan((f"{_LOG}test_contacts.py", f"{_DRIVING}test_moving.py"), 40),
     "sim/log/metrics.py": Plan((f"{_LOG}test_metrics.py",), 40),
-    "sim/driving/drive.py": Plan(_DRIVE, 8),
+    "sim/driving/drive.py": Plan(_DRIVE, 16),
     "sim/driving/rules.py": Plan(_DRIVE, 8),
     "sim/driving/plants.py": Plan(_DRIVE, 8),
     "sim/driving/replay.py": Plan(tuple(f"{_DRIVING}test_{name}.py" for name in ("replay", "mover_tracking")), 12),
     "sim/rerun.py": Plan(("tests/sim/test_rerun.py",), 16),
     "sim/rebuild.py": Plan(("tests/runs/failures/test_failure.py",), 6),
     "sim/verifying.py": Plan(("tests/sim/test_rerun.py", "tests/cli/commands/test_verify.py"), 6),
-    "sim/driving/stopping_constraint.py": Plan((f"{_DRIVING}test_stopping_constraint.py",), 10),
     "sim/driving/leaving.py": Plan((f"{_DRIVING}test_leaving.py",), 8),
+    "sim/driving/stopping_constraint.py": Plan((f"{_DRIVING}test_stopping_constraint.py",), 14),
+    "sim/sensing/dead_reckoning.py": Plan((f"{_SENSING}localising.py",), 6),
+    "sim/sensing/matching.py": Plan((f"{_SENSING}localising.py",), 8),
+    "sim/sensing/scanner.py": Plan((f"{_SENSING}scanner.py",), 6),
+    "sim/sensing/mapping.py": Plan((f"{_SENSING}mapping.py",), 12),
+    "sim/sensing/tracking.py": Plan((f"{_SENSING}tracking.py",), 10),
+    "sim/sensing/_kernels_matching.py": Plan((f"{_SENSING}localising.py",), 5, plain=True),
+    "sim/sensing/_kernels_rays.py": Plan((f"{_SENSING}scanner.py",), 6, plain=True),
+    "sim/sensing/_kernels_sight.py": Plan((f"{_SENSING}mapping.py",), 5, plain=True),
+    "sim/sensing/_kernels_mapping.py": Plan((f"{_SENSING}mapping.py",), 6, plain=True),
+    "sim/sensing/_kernels_tracking.py": Plan((f"{_SENSING}tracking.py",), 5),
+    "runs/suites/evaluation.py": Plan(("tests/runs/suites/test_evaluation.py",), 24),
     "sim/driving/blockage.py": Plan((f"{_DRIVING}test_driver.py",), 0),
     "views/film/playback.py": Plan(("tests/views/film/test_playback.py",), 0),
     "robots/_kernels_footprint.py": Plan((_PARTS, "tests/robots/test_footprint.py"), 4, plain=True),

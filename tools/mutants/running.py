@@ -28,7 +28,7 @@ SOURCE = "src/antdrive"  # the files of plans are named from here
 ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
 LEFT_OUT = (".*", "out", "examples", "benchmarks", "docs")
 LOADED = ("base/*.py", "worlds/*.py", "worlds/files/*.py", "planners/**/*.py", "robots/**/*.py", "sim/log/*.py",
-          "sim/physics/*.py", "sim/driving/*.py", "sim/pipeline.py")  # fmt: skip
+          "sim/physics/*.py", "sim/sensing/*.py", "sim/driving/*.py", "sim/pipeline.py")  # fmt: skip
 LIBRARIES = ["pytest", "numpy", "yaml", "pydantic", "joblib", "pybullet", "numba"]
 PASSED, FAILED, FAULTY, USAGE, NO_TESTS = 0, 1, 3, 4, 5  # pytest's exit codes; 3: pytest itself has failed
 # The limit of a mutant's processor time: at least [s], times the time without a fault, and for compiling kernels [s].

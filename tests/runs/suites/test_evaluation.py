@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from antdrive import METRICS, Outcome, run
 from antdrive.runs.suites import Baseline, Demands, evaluate, evaluation
 from antdrive.runs.suites.baseline import MAX_BYTES
-from antdrive.runs.suites.evaluation import distances, divergence, explain, farthest
+from antdrive.runs.suites.evaluation import Divergence, distances, divergence, explain, farthest, limits
 from antdrive.runs.suites.nearest import first_contact, nearest_of
 from antdrive.sim.log.metrics import Tolerance
 from antdrive.views.artefacts import MOST_FILMS, Results, baseline_rollout, file_name, remove_artefacts
@@ -33,6 +33,75 @@ def changed(baseline, **metrics):
 def moved(baseline, dx, since=0):
     line = tuple((x + dx * (k >= since), y, yaw, rule) for k, (x, y, yaw, rule) in enumerate(baseline.line))
     return dataclasses.replace(baseline, line=line)
+
+
+def test_a_run_without_a_drive_is_held_against_the_demanded_outcome(small_scenario):
+    nowhere = run(dataclasses.replace(small_scenario, margin=1.4))
+    (fault,) = evaluate(nowhere, PLAIN, None).faults
+    assert fault.startswith("outcome: no_path, expected succeeded (")
+    assert evaluate(nowhere, Demands.of({"outcome": "no_path"}), None).passed
+
+
+def test_a_lost_certificate_is_a_fault_where_both_drives_are_as_demanded(collided_run):
+    before = dataclasses.replace(Baseline.of(collided_run, "small[0]"), certified=True)
+    faults = evaluate(collided_run, Demands.of({"outcome": "collided"}), before).faults
+    assert faults == ("certificate: not certified collision-free, in the baseline it was",)
+
+
+def test_another_cause_of_a_contact_than_the_demanded_is_a_fault(collided_run, monkeypatch):
+    monkeypatch.setattr(evaluation, "cause_of_contact", lambda rollout: "slip")
+    for demanded, faults in (("slip", ()), ("noise", ("cause: slip took most of the margin, expected noise",))):
+        demands = dataclasses.replace(Demands.of({"outcome": "collided"}), cause=demanded)
+        assert evaluate(collided_run, demands, None).faults == faults
+    monkeypatch.setattr(evaluation, "cause_of_contact", lambda rollout: None)
+    assert evaluate(collided_run, demands, None).faults == ("cause: none took most of the margin, expected noise",)
+
+
+def test_drives_diverge_at_a_centimetre(small_run, baseline):
+    assert divergence(moved(baseline, 0.0095), small_run.rollout) is None
+    first = divergence(moved(baseline, 0.0105, since=20), small_run.rollout)
+    assert first.t == 2.0
+    assert divergence(moved(baseline, 0.5, since=20), small_run.rollout, apart=0.6) is None
+
+
+@pytest.mark.parametrize(
+    ("rules", "words"),
+    [
+        (("curvature", "curvature"), "the rule 'curvature' limits the speed there"),
+        (("cruise", "cruise"), "no rule limits the speed there"),
+        (("goal", "cruise"), "the rule 'goal' limits the speed there, in the baseline no rule did"),
+    ],
+)
+def test_a_divergence_names_the_rules_that_limit_the_speed(rules, words):
+    place = "the drives diverge at t = 1.5 s, at (1.00, 2.00) instead of (3.00, 4.00); "
+    assert Divergence(1.5, (1.0, 2.0), (3.0, 4.0), *rules).sentence == place + words
+
+
+def test_every_compared_metric_gives_a_limit(baseline):
+    """The first metrics are those of FIRST; a baseline's NaN gives none."""
+    found = list(limits(PLAIN, baseline))
+    names = [bound.metric for bound in found]
+    assert names[:4] == ["contacts_driving", "min_clearance_m", "duration_s", "driven_length_m"]
+    assert set(names) == {name for name, metric in METRICS.items() if metric.tolerance and metric.better != "neither"}
+    assert len(names) == len(set(names))
+    (slow,) = (bound for bound in found if bound.metric == "duration_s")
+    then = baseline.metric("duration_s")
+    assert (slow.sign, slow.value) == ("<=", pytest.approx(then + 0.1 + 0.01 * then, abs=2e-6))
+    (near,) = (bound for bound in found if bound.metric == "min_clearance_m")
+    assert (near.sign, near.value) == (">=", pytest.approx(baseline.metric("min_clearance_m") - 0.005, abs=2e-6))
+
+
+def test_only_the_clearance_is_said_with_its_place(small_run, baseline):
+    far = baseline.metric("min_clearance_m") + 1.0
+    for name, value in (("min_clearance_m", far), ("duration_s", 1.0)):
+        (fault,) = evaluate(small_run, PLAIN, changed(baseline, **{name: value})).faults
+        assert ("; nearest to " in fault) == (name == "min_clearance_m")
+
+
+def test_a_line_that_is_just_as_far_off_as_allowed_passes(small_run, baseline, monkeypatch):
+    monkeypatch.setattr(evaluation, "farthest", lambda *_: 0.25 + 1e-3)
+    assert evaluate(small_run, dataclasses.replace(PLAIN, trajectory=0.25), baseline).passed
+    assert not evaluate(small_run, dataclasses.replace(PLAIN, trajectory=0.249), baseline).passed
 
 
 def test_a_drive_is_as_good_as_its_own_baseline(small_run, baseline):

@@ -97,6 +97,29 @@ def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot):
     assert ticks == pytest.approx(STUCK_TIME * 60, abs=2)
 
 
+def test_progress_is_a_fraction_of_the_route(turtlebot):
+    half = driver(turtlebot)
+    assert at(half, half.path.length / 2).fraction == pytest.approx(0.5)
+
+
+def test_turns_on_the_spot_add_the_time_of_a_full_turn_to_the_stuck_time(turtlebot):
+    turning, rest = driver(turtlebot), State(*TASK.start, 0.0, 0.0)
+    whole = full_turn(turtlebot, 60)
+    assert whole == round(2 * math.pi / 3.14 * 60)
+    for turned, gives_up in ((STUCK_TIME * 60 + whole - 1, False), (STUCK_TIME * 60 + whole, True)):
+        turning._clock = StuckClock(turning=int(turned))
+        assert (turning.gives_up(rest) is not None) == gives_up
+
+
+def test_only_a_robot_that_did_not_get_there_reports_what_its_guide_noted(turtlebot):
+    noting = OnePath()
+    noting.failure_note = "no route at t = {} s".format
+    noted = driver(turtlebot, noting)
+    for outcome in Outcome:
+        note = "; no route at t = 7 s" if outcome in (Outcome.STUCK, Outcome.TIMED_OUT) else ""
+        assert noted.with_reason(Ending(outcome, "why"), 7) == Ending(outcome, f"why{note}")
+
+
 @pytest.mark.parametrize(
     ("outside", "outcome"), [(-0.002, Outcome.SUCCEEDED), (0.0, Outcome.SUCCEEDED), (0.002, Outcome.STUCK)]
 )
@@ -376,6 +399,15 @@ def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, 
         endings.append(end_of(robot, tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
     assert bool(monitor.misses) is knows
     assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
+
+
+def test_a_path_is_followed_by_the_estimates_of_the_localiser(turtlebot):
+    """At an estimate 0.5 m to the left of the robot, it turns right."""
+    beside = Exact()
+    beside.settle = lambda pose: (pose[0], pose[1] + 0.5, pose[2])
+    with Engine(TASK.world, turtlebot) as engine:
+        log = follow(engine, PurePursuit(), driver(turtlebot).path, TASK, limit=1.0, localiser=beside)
+    assert log.pose[-1, 2] < -0.1
 
 
 def test_progress_is_reported_ten_times_a_second(turtlebot):

@@ -120,6 +120,8 @@ def test_the_first_period_in_which_the_robot_stands_at_the_goal_ends_the_drive()
     assert says(moving_until(1192), f"{early}4.983 s")
     assert list(false_endings(still(rows=5))) == []
     assert says(still(rows=1), "neither at the goal")  # without a command yet
+    touched = replace(still(outcome=Outcome.COLLIDED), contacts=np.array([[40.0, 0.0, -0.001, 5.0]]))
+    assert says(touched, f"collided, but {early}0.017 s")
 
 
 @pytest.mark.parametrize(("name", "column"), [("twist", 0), ("twist", 1), ("command", 0), ("command", 1)])
@@ -132,6 +134,11 @@ def test_turning_and_commands_count_as_moving(name, column, sign):
         assert stopped(log.twist[-1], log.command[-1]) is not moves
 
 
+def test_a_robot_at_the_speed_limit_of_standing_moves():
+    assert not stopped((ending.STOPPED_SPEED, 0.0), (0.0, 0.0))
+    assert stopped((np.nextafter(ending.STOPPED_SPEED, 0.0), 0.0), (0.0, 0.0))
+
+
 def test_the_estimate_ends_a_drive_and_the_pose_decides_its_outcome():
     assert arrived((1.0, 1.0), (0.0, 0.0), (0.0, 0.0), GOAL, 0.2 + 1e-12)
     assert not arrived((1.0, 1.0), (0.0, 0.0), (0.0, 0.0), GOAL, 0.19)
@@ -140,8 +147,8 @@ def test_the_estimate_ends_a_drive_and_the_pose_decides_its_outcome():
     log = moving_until(1196)
     off = replace(log, estimate=log.pose - (0.1, 0.0, 0.0))
     assert says(off, "neither at the goal nor at the end of its route")
-    at_end = replace(off, route=np.array([(0.7, 1.0), (0.9, 1.0)]))
-    assert list(false_endings(at_end)) == []
+    for x in (0.9, 0.94):
+        assert list(false_endings(replace(off, route=np.array([(0.7, 1.0), (x, 1.0)])))) == []
     assert says(replace(off, route=np.array([(0.7, 1.0), (0.96, 1.0)])), "neither at the goal")
     believed = moving_until(1196, goal=(1.3, 1.0), outcome=Outcome.STUCK)
     assert says(believed, "stuck, but the drive ends after 5.000 s")
@@ -173,6 +180,10 @@ def test_a_stuck_robot_made_no_progress_for_eight_seconds_of_driving():
     aside = creeping(0.09)
     aside.pose[:, 1] += aside.t / 10.0  # across its route
     assert list(false_endings(aside)) == []
+    hairpin = creeping(0.0)  # from one leg of its route to the other, 8 m along it
+    hairpin.pose[:, 1] += hairpin.t / 80.0
+    route = np.array([(1.0, 1.0), (5.0, 1.0), (5.0, 1.1), (1.0, 1.1)])
+    assert list(false_endings(replace(hairpin, route=route))) == []
     for limiter, more, fits in ((1, 0, False), (1, 1, True), (2, 0, False), (2, 1, True)):
         waits = creeping(0.05, rows=1921 + 4 * more)
         waits.limiter[1:5] = limiter

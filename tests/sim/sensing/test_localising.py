@@ -1,11 +1,13 @@
 """Dead reckoning drifts as its levels say; scan matching takes back drift, and nothing else."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from antdrive.robots import Odometry
+from antdrive.robots.spec import SAMPLE_RATE
 from antdrive.sim.sensing import DeadReckoning, OccupancyMap, Scanner
 from antdrive.sim.sensing.matching import ScanMatcher, without_sliding
 from antdrive.worlds import Disc, World
@@ -31,6 +33,19 @@ def test_it_starts_at_the_pose_given():
 def test_the_same_seed_gives_the_same_bits():
     assert driven(Odometry(), seed=3) == driven(Odometry(), seed=3)
     assert driven(Odometry(), seed=3) != driven(Odometry(), seed=4)
+
+
+def test_a_sample_has_the_errors_of_the_random_stream():
+    """A sample shorter than that of the noise is louder."""
+    level, draws = Odometry(), np.random.default_rng(7).standard_normal(5)
+    reckoning = DeadReckoning(level, np.random.default_rng(7), (1.0, 2.0, 0.5))
+    found = reckoning.advance(1.5, -0.8, 0.01)
+    louder = math.sqrt(1 / (SAMPLE_RATE * 0.01))
+    speed = 1.5 * (1 + level.speed_scale * draws[0] + level.speed_noise * louder * draws[3])
+    rate = -0.8 * (1 + level.yaw_scale * draws[1]) + level.gyro_bias * draws[2] + level.gyro_noise * louder * draws[4]
+    middle = 0.5 + rate * 0.005
+    expected = 1.0 + 0.01 * speed * math.cos(middle), 2.0 + 0.01 * speed * math.sin(middle), 0.5 + 0.01 * rate
+    assert found == reckoning.pose == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("hz", [20, 120])
@@ -126,3 +141,15 @@ def test_a_shift_along_the_only_wall_in_sight_is_dropped():
     posts += 0.02 * np.arange(60)[:, None] % 0.1
     assert without_sliding(before, after, posts) == pytest.approx(after)
     assert without_sliding(before, after, np.full((60, 2), np.nan)) == after
+
+
+def test_hits_across_a_gap_are_no_surface():
+    """Walls that face x, 1.5 m behind each other, with 0.03 m between hits: the jumps between them face nothing."""
+    x = np.repeat([2.0, 3.5, 2.0, 3.5], 60)
+    walls = np.column_stack([x, np.arange(240) / 30])
+    assert without_sliding((0.3, 0.7, 0.1), (0.31, 0.72, 0.103), walls) == pytest.approx((0.31, 0.7, 0.103))
+
+
+@pytest.mark.parametrize(("beams", "every"), [(90, 1), (180, 1), (269, 1), (271, 2), (720, 4)])
+def test_at_most_half_as_many_beams_again_as_wanted_are_matched(beams, every, jackal):
+    assert ScanMatcher(replace(jackal.lidar, beams=beams))._every == every
