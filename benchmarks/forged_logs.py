@@ -332,15 +332,15 @@ for _name, _level, _when, _path, _to in (
     ("settings nested 150 deep", "load", "", ("planner", "settings",), {"deep": _DEEP}),
     ("a higher noise level", "replay", "noisy", ("noise",), 1.1),
     ("an optimum shorter than the straight line", "verify", "", ("plan", "euclidean_optimum_m",), 1.0),
-    ("another planner's name", "none", "", ("planner", "name",), "ants"),
-    ("less work", "none", "", ("plan", "work",), 1),
+    ("another planner's name", "replay", "", ("planner", "name",), "ants"),
+    ("less work", "replay", "", ("plan", "work",), 1),
     ("other versions", "none", "", ("versions",), {"antdrive": "9.9"}),
     ("other settings of the controller", "none", "", ("controller", "settings", "lookahead_max",), 9.0),
     ("a margin of 1 m", "verify", "", ("margin",), 1.0),
     ("an inflation of 1 cm", "verify", "", ("inflate",), 0.01),
     ("a success that was timed out", "verify", "arrived", ("outcome",), "timed_out"),
     ("a success that was stuck", "verify", "arrived still", ("outcome",), "stuck"),
-    ("a success among movers that was stuck", "none", "moving", ("outcome",), "stuck"),
+    ("a success among movers that was stuck", "verify", "moving", ("outcome",), "stuck"),
     ("a success that was blocked", "verify", "arrived", ("outcome",), "blocked"),
     ("a collision that is none", "verify", "arrived", ("outcome",), "collided"),
     ("a collision called a success", "verify", "collided", ("outcome",), "succeeded"),
@@ -349,7 +349,7 @@ for _name, _level, _when, _path, _to in (
     ("a tolerance of 100 m", "files", "arrived", ("task", "goal_tolerance",), 100.0),
     ("nothing perceived among movers", "verify", "moving", ("perception",), None),
     ("movers perceived where there are none", "verify", "still", ("perception",), {"kind": "velocities", "range_m": None}),
-    ("no avoidance", "none", "moving", ("avoidance",), None),
+    ("no avoidance", "replay", "moving", ("avoidance",), None),
     ("other wall-clock times", "none", "", ("times", "plan_s",), 0.0),
 ):  # fmt: skip
     KINDS[_name] = Kind(_name, _level, forge=guarded(edited(*_path, to=_to), _when))
@@ -702,7 +702,7 @@ def _(log: Log) -> Log:
     return _along_the_wall(log)
 
 
-@forgery("a plan along the wall, among movers", "none", "moving")
+@forgery("a plan along the wall, among movers", "replay", "moving")
 def _(log: Log) -> Log:
     """Let the robot leave its route for a mover."""
     return _along_the_wall(log)
@@ -748,7 +748,7 @@ def _(log: Log) -> None:
     log.record["plan"]["grid_optimum_m"] = 2 * log.record["plan"]["cost_m"]
 
 
-@forgery("other rules that limited the speed", "none")
+@forgery("other rules that limited the speed", "replay")
 def _(log: Log) -> None:
     log["limiter"][:] = 0
 

@@ -113,6 +113,7 @@ def more_drives(only: Collection[str] = ()) -> dict[str, Rollout]:
         "ants, noise": of(planner="aco-han", noise=1.0, seed=7, options={"iterations": 5}),
         "genetic, raw": of(planner="ga-han", smoothing="none", seed=2),
         "polygon off the axle": of(robot=off_axle, noise=1.0),
+        "taut, noise": of(smoothing="taut", noise=1.0, seed=9),
         "husky": of(robot="husky", noise=1.0, margin=0.05),
         "burger, own margin": of(robot="turtlebot3-burger", margin=0.12, noise=0.5),
         "positions within 2 m": of(moving, "dstar-lite", perception=Perception(kind="positions", range=2.0)),

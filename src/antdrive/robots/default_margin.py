@@ -16,7 +16,7 @@ LEAST = 0.03  # of perfect robots, and the least of all [m]
 RESERVE = 0.01  # part of the margin beyond the predicted loss, as for calibrated margins [m]
 #: Loss by noise that one drive in a thousand exceeds, in standard deviations: on routes with corners, and on smooth routes,
 #: whose curvature the controller knows.
-DEVIATIONS = {"none": 2.5, "taut": 1.2, "clearance": 1.2}
+DEVIATIONS = {"none": 2.5, "taut": 1.0, "clearance": 1.0}
 STEP = 0.001  # margins are multiples of this [m]
 
 
@@ -24,7 +24,8 @@ def default_margin(robot: RobotSpec, controller: PurePursuit, noise: float, smoo
     """Return the margin of plans that a scenario has unless it gives one [m].
 
     The controller spends up to a fraction `1 - lookahead_margin` of the margin on cutting corners, as far as the robot's
-    width reaches its circumscribed circle. The rest must hold the loss by noise and a reserve.
+    width reaches its circumscribed circle. The rest must hold the loss by noise and a reserve. On smooth routes the robot
+    passes obstacles sideways, so its width also reduces the loss by noise.
 
     Args:
         robot: the robot
@@ -34,9 +35,13 @@ def default_margin(robot: RobotSpec, controller: PurePursuit, noise: float, smoo
     """
     if not (noise and robot.noise.nonzero):
         return LEAST
-    loss = DEVIATIONS[smoothing] * deviation(robot, controller, noise, raw=smoothing == "none")
+    raw = smoothing == "none"
+    loss = DEVIATIONS[smoothing] * deviation(robot, controller, noise, raw=raw)
     _, right, _, left = robot.footprint.bounds
-    cut = (1 - controller.lookahead_margin) * min(1.0, max(left, -right) / robot.radius)
+    width = min(1.0, max(left, -right) / robot.radius)
+    cut = (1 - controller.lookahead_margin) * width
+    if not raw:
+        loss *= width
     steps = math.ceil((RESERVE + loss) / (1 - cut) / STEP - 1e-9)
     return max(LEAST, round(steps * STEP, 3))
 
@@ -45,7 +50,7 @@ def deviation(robot: RobotSpec, controller: PurePursuit, noise: float, *, raw: b
     """Return the standard deviation of a robot from its route beside an obstacle, by noise [m].
 
     Three independent parts add up: the estimated position; the estimated heading, over the lookahead; and wheel slip, whose
-    yaw rate moves the robot off the route until the lookahead or the slip's correlation time has passed.
+    yaw rate moves the robot off the route until the slip's correlation time has passed, or the lookahead of a route with corners.
 
     Args:
         robot: the robot
@@ -58,6 +63,6 @@ def deviation(robot: RobotSpec, controller: PurePursuit, noise: float, *, raw: b
     time = c.corner_lookahead_time if raw else c.lookahead_time
     lookahead = min(c.lookahead_max, max(time * speed, c.preferred_lookahead_min))
     position, heading = steady_errors(levels, robot.track)
-    slipping = min(lookahead, SLIP_TIME * speed)
+    slipping = min(lookahead, SLIP_TIME * speed) if raw else SLIP_TIME * speed
     slip = math.sqrt(2) * levels.slip / robot.track * slipping**2 / 2
     return math.hypot(position, heading * lookahead, slip)

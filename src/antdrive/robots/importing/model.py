@@ -58,9 +58,8 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
             continue
         unknown = next((name for name in arguments if name not in asked.names), None)
         if unknown is not None:
-            raise InputError(
-                f"--arg {unknown}: {path.name} has no such argument; {suggest(unknown, sorted(asked.names)) if asked.names else 'it has none'}"
-            )
+            advice = suggest(unknown, sorted(asked.names)) if asked.names else "it has none"
+            raise InputError(f"--arg {unknown}: {path.name} has no such argument; {advice}")
         return text
     raise input_error(str(path), f"refers to more than {MAX_PACKAGES} packages")
 
