@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,7 +23,19 @@ from antdrive.sim.driving.localising import Exact, TruePose
 from antdrive.sim.driving.parts import Decider, Ending, Guide, Moment, Step
 from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.driving.plants import Bullet, Kinematic
-from antdrive.sim.driving.rules import AVOIDING, SIGHT_LIMIT, WAITING_SPEED, Avoid, Pursuit, braked, stopping_time
+from antdrive.sim.driving.rules import (
+    AVOIDING,
+    SIGHT_LIMIT,
+    WAITING_SPEED,
+    Avoid,
+    KeepToSchedule,
+    Pursuit,
+    Schedule,
+    TurnToScan,
+    braked,
+    slow_down,
+    stopping_time,
+)
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, rasterise
@@ -95,6 +108,32 @@ def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot):
         assert still.decide(ticks, TASK.start, rest) is None
         ticks += 1
     assert ticks == pytest.approx(STUCK_TIME * 60, abs=2)
+
+
+def test_a_schedule_limits_the_speed_to_what_is_due_soon(turtlebot):
+    """At 0.5 m/s for 10 s, looking 0.4 s ahead."""
+    schedule = Schedule(np.array([0.0, 10.0]), np.array([0.0, 5.0]))
+    assert schedule.speed_limit(2.0, 1.0) == pytest.approx(0.5)
+    assert schedule.speed_limit(2.0, 0.9) == pytest.approx(0.75)
+    assert schedule.speed_limit(2.0, 1.3) == 0.0
+    assert [schedule.speed_limit(t, 4.7) < math.inf for t in (9.5, 9.61)] == [True, False]
+    assert [schedule.late(4.0, arc) for arc in (1.49, 1.51)] == [True, False]
+    slower = slow_down(Twist(0.6, 0.3), Twist(0.6, 0.3), 0.0, 0.12)
+    assert slower == pytest.approx((0.48, 0.24))
+    rule = KeepToSchedule(SimpleNamespace(schedule=schedule), replace(turtlebot, max_acceleration=1.2), 60)
+    now = SimpleNamespace(tick=120, before=Step(Twist(0.6, 0.0)))
+    kept = rule.apply(now, Step(Twist(0.6, 0.3), PursuitState(arc=1.0)))
+    assert kept.command == pytest.approx((0.58, 0.29))
+    assert (kept.speed_limit, kept.waits) == (pytest.approx(0.5), False)
+    assert rule.apply(now, Step(Twist(0.6, 0.3), PursuitState(arc=1.17))).waits
+
+
+def test_a_robot_brakes_for_a_scan_turn_and_where_it_is_lost(turtlebot):
+    goes = Step(Twist(0.5, 0.1), PursuitState())
+    now = SimpleNamespace(pose=TASK.start, before=goes)
+    for turn, lost in ((object(), False), (None, True), (None, False)):
+        found = TurnToScan(SimpleNamespace(scan_turn=turn, lost=lost), turtlebot, 60).apply(now, goes)
+        assert found.command == (goes.command if not (turn or lost) else braked(goes.command, turtlebot, 60))
 
 
 def test_progress_is_a_fraction_of_the_route(turtlebot):

@@ -176,6 +176,14 @@ def test_driving_into_a_mover_is_a_collision(turtlebot):
     assert _contacts(log) == (1, 0, 0)
 
 
+def test_a_robot_brakes_after_a_contact(collided_run):
+    log = collided_run.rollout
+    first, target = int(log.contacts[0, 0]), log.command[-1]
+    assert log.command[first, 0] > 0.1
+    assert target.tolist() == [0.0, 0.0]
+    assert np.abs(log.twist[-1]).max() < 0.02
+
+
 def test_being_hit_while_standing_is_an_outcome_of_its_own(standing):
     mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 1.4), (4.0, 0.0, 1.4)))
     result = run(changed(standing, "task.world", movers=(mover,)))

@@ -54,6 +54,14 @@ def test_a_forged_log_is_far_off(small_run):
     assert replay(replace(log, record=through)).exact, "only --world shows that a cylinder is gone"
 
 
+def test_rounding_is_a_millimetre(small_run):
+    for error, fits in ((0.0009, True), (0.0011, False)):
+        log = driven(small_run)
+        pose = log.pose.copy()
+        pose[100, 0] += error
+        assert (replay(replace(log, pose=pose)).problems == ()) is fits
+
+
 def test_a_pose_that_is_off_by_more_than_rounding_differs(small_run):
     log = driven(small_run)
     pose = log.pose.copy()

@@ -17,8 +17,9 @@ from antdrive.robots import load_robot
 from antdrive.robots.spec import Footprint
 from antdrive.sim import Outcome, Rollout, certify
 from antdrive.sim.log.certificate import Certificate, closed_form_clearance
-from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord
+from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord, SensingRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, World
+from antdrive.worlds.route import end_reach
 from tests.records import changed, made_up_log, made_up_record
 
 HZ, ROWS = 240, 1201
@@ -265,8 +266,12 @@ def test_a_mover_is_where_the_task_puts_it():
 
 @pytest.mark.parametrize(
     "foot",
-    [Footprint.disc(0.2), Footprint.rectangle(0.6, 0.3), Footprint(half_length=0.1, half_width=0.3, rounding=0.05)],
-)
+    [
+        Footprint.disc(0.2), Footprint.rectangle(0.6, 0.3), Footprint(half_length=0.1, half_width=0.3, rounding=0.05),
+        Footprint.polygon([(0.35, 0.02), (0.1, 0.2), (-0.2, 0.15), (-0.25, -0.15), (0.1, -0.17)]),
+        Footprint(rounding=0.06, corners=((0.3, -0.3), (0.3, 0.3), (-0.3, 0.0))), Footprint.disc(0.25, (0.03, -0.02)),
+    ],
+)  # fmt: skip
 def test_the_closed_form_is_the_distance_of_a_dense_outline(foot):
     rng = np.random.default_rng(5)
     rows = 120
@@ -294,16 +299,20 @@ def test_a_disc_within_a_rectangle_overlaps_it_by_its_way_out():
 
 
 def outline_clearance(foot, pose, discs, movers, radii):
-    """Whether the footprint is free, and its clearance, from points along the edge of its rectangle."""
+    """Whether the footprint is free, and its clearance, from points along the edge of its rectangle or polygon."""
     s = np.linspace(-1, 1, 301)
     one = np.ones_like(s)
     u, v = np.concatenate([s, s, one, -one]), np.concatenate([one, -one, s, s])
-    edge = (u * foot.half_length + 1j * v * foot.half_width) * np.exp(1j * pose[2]) + pose[0] + 1j * pose[1]
+    edge = u * foot.half_length + 1j * v * foot.half_width
+    if foot.corners:
+        here = np.array([complex(*corner) for corner in foot.corners])
+        edge = (here[:, None] + (1 + s) / 2 * (np.roll(here, -1) - here)[:, None]).ravel()
+    edge = edge * np.exp(1j * pose[2]) + pose[0] + 1j * pose[1]
     walls = min(edge.real.min(), 6.0 - edge.real.max(), edge.imag.min(), 4.0 - edge.imag.max())
     round_ones = [(d.x, d.y, d.radius) for d in discs] + [(*m, r) for m, r in zip(movers.tolist(), radii, strict=True)]
     gaps = [np.abs(edge - complex(x, y)).min() - r for x, y, r in round_ones]
     inside = [abs((complex(x, y) - complex(*pose[:2])) * np.exp(-1j * pose[2])) for x, y, _ in round_ones]
-    free = min([walls, *gaps]) > foot.rounding and min(inside) > max(foot.half_length, foot.half_width)
+    free = min([walls, *gaps]) > foot.rounding and min(inside) > foot.radius
     return free, float(min([walls, *gaps])) - foot.rounding
 
 
@@ -455,6 +464,24 @@ def test_the_estimate_is_as_near_as_fixes_and_odometry_keep_it():
     assert not says(replace(noisy(), estimate=around), "estimate")
 
 
+def test_the_estimate_drifts_no_faster_than_odometry():
+    """At 0.4 m/s for 4 s, while it turns at 0.2 rad/s: biases and scales add up, noise grows with the root of the time."""
+    sensing = SensingRecord(map="given", localisation="odometry", odometry=2.0)
+    log = filled(with_record(noisy(0.4), sensing=sensing), "twist", (0.4, 0.2))
+    row, t = 960, 4.0
+    way, turn = 0.4 * (row + 1) / HZ, 0.2 * (row + 1) / HZ
+    turned = 8 * (0.01 * t + 0.01 * turn + 0.01 * math.sqrt(50 * t) / 50)
+    far = 8 * (0.02 + 0.04 + 0.02 + 0.02) * way + 2 * turned * way
+    for column, limit in ((0, far + 0.02), (1, -far - 0.02), (2, turned + 0.02), (2, -turned - 0.02)):
+
+        def off(error, column=column):
+            estimate = log.pose.copy()
+            estimate[row, column] += error
+            return replace(log, estimate=estimate)
+
+        only_beyond(limit, off, "farther off the pose than odometry drifts")
+
+
 @pytest.mark.parametrize("corner", [(-0.01, 1.0), (6.01, 1.0), (3.0, -0.01), (3.0, 4.01)])
 def test_routes_stay_in_the_world(corner):
     inside = tuple(np.clip(corner, (0.0, 0.0), (6.0, 4.0)).tolist())
@@ -498,6 +525,56 @@ def test_no_path_among_discs_is_longer_than_the_plan():
     by_cells = ReplanRecord(t=1.0, trigger=DECISION, solved=False, cost_m=None, work=1, route=())
     assert not says(with_record(optimum(60.0), replans=(by_cells,)), "is longer than the plan's")
     assert not says(changed(optimum(60.0), "record.plan", cost_m=None), "is longer than the plan's")
+
+
+def test_no_path_is_shorter_than_the_straight_line_between_the_ends():
+    """Either end may lie 1.5 cells away; where the cells end elsewhere, as far as a grid's end may."""
+    by_cells = ReplanRecord(t=1.0, trigger=DECISION, solved=False, cost_m=None, work=1, route=())
+    for key in ("euclidean_optimum_m", "grid_optimum_m"):
+
+        def shorter(metres, key=key):
+            return changed(drive(), "record.plan", **{key: 4.0 - metres})
+
+        text = f"record.plan.{key}: "
+        only_beyond(2 * 1.5 * 0.25, shorter, text)
+        reach = 2 * end_reach(ROBOT.radius + 0.05, 0.25)
+        only_beyond(reach, lambda metres, shorter=shorter: with_record(shorter(metres), replans=(by_cells,)), text)
+
+
+def test_the_plan_is_as_long_as_its_cells():
+    for sign in (1.0, -1.0):
+
+        def longer(metres, sign=sign):
+            cost = 4.0 + sign * metres
+            return changed(drive(), "record.plan", cost_m=cost, grid_optimum_m=None, euclidean_optimum_m=None)
+
+        only_beyond(4e-6, longer, "record.plan.cost_m: ")
+
+
+def test_only_movers_are_avoided():
+    for key in ("avoidance", "replanning"):
+        for kind, fits in ((None, False), ("lidar", True)):
+            perception = None if kind is None else PerceptionRecord(kind=kind, range_m=None)
+            log = with_record(drive(), perception=perception, **{key: {"patience": 4.0}})
+            assert says(log, f"record.{key}: must be null without movers") is not fits
+
+
+def test_a_robot_that_odometry_localises_logs_estimates_without_noise():
+    for kind, fits in (("true", True), ("fixes", True), ("odometry", False), ("matching", False)):
+        sensing = SensingRecord(map="given", localisation=kind, odometry=1.0)
+        assert says(with_record(drive(), sensing=sensing), "estimate: must have") is not fits
+
+
+def test_wheels_with_little_friction_may_slide():
+    warned = shifted(slippery(drive(0.2), 0.1), 1.0, 1)
+    assert says(
+        warned, "the robot may have slid: 1 m/s2 along and 1 m/s2 across are 144 % of what a wheel friction of 0.1"
+    )
+    assert not says(shifted(drive(0.2), 1.0, 1), "the robot may have slid")
+    late = 2 * (1 / 60 + 1 / 240) * 1.4
+    for friction, share in ((0.4, 0.04), (0.8, 0.02), (1.5, 0.02)):
+        limit = (0.01 + late) / (1 - share) / 4.0
+        only_beyond(limit, lambda v, f=friction: slippery(off_target(0, v, 4.0), f), "forward speed does not follow")
 
 
 def test_a_plan_through_a_gap_of_just_its_width_does_not_bound_the_optimum():

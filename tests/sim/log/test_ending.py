@@ -120,6 +120,8 @@ def test_the_first_period_in_which_the_robot_stands_at_the_goal_ends_the_drive()
     assert says(moving_until(1192), f"{early}4.983 s")
     assert list(false_endings(still(rows=5))) == []
     assert says(still(rows=1), "neither at the goal")  # without a command yet
+    for away, arrives in ((0.25, False), (0.25 - 1e-8, True)):  # the tolerance is 0.25 m, within rounding
+        assert bool(says(still(goal=(1.0 + away, 1.0)), early)) is arrives
     touched = replace(still(outcome=Outcome.COLLIDED), contacts=np.array([[40.0, 0.0, -0.001, 5.0]]))
     assert says(touched, f"collided, but {early}0.017 s")
 
@@ -152,6 +154,7 @@ def test_the_estimate_ends_a_drive_and_the_pose_decides_its_outcome():
     assert says(replace(off, route=np.array([(0.7, 1.0), (0.96, 1.0)])), "neither at the goal")
     believed = moving_until(1196, goal=(1.3, 1.0), outcome=Outcome.STUCK)
     assert says(believed, "stuck, but the drive ends after 5.000 s")
+    believed.twist[-2, 0] = 0.5  # it has just stopped
     assert list(false_endings(replace(believed, estimate=believed.pose + (0.1, 0.0, 0.0)))) == []
 
 
@@ -180,6 +183,10 @@ def test_a_stuck_robot_made_no_progress_for_eight_seconds_of_driving():
     aside = creeping(0.09)
     aside.pose[:, 1] += aside.t / 10.0  # across its route
     assert list(false_endings(aside)) == []
+    there = creeping(0.2)  # nearer to the end of the next leg, which comes back
+    assert says(
+        replace(there, route=np.array([(1.0, 1.0), (5.0, 1.0), (1.0, 1.5)])), "stuck, but the robot got 0.2 m farther"
+    )
     hairpin = creeping(0.0)  # from one leg of its route to the other, 8 m along it
     hairpin.pose[:, 1] += hairpin.t / 80.0
     route = np.array([(1.0, 1.0), (5.0, 1.0), (5.0, 1.1), (1.0, 1.1)])
@@ -193,6 +200,12 @@ def test_a_stuck_robot_made_no_progress_for_eight_seconds_of_driving():
         turns = creeping(0.05, rows=4 * periods + 1)
         turns.limiter[1:] = 2
         assert (list(false_endings(turns)) == []) is fits
+
+
+def test_a_control_period_may_be_one_row():
+    log = still(rows=1202, goal=(5.0, 1.0), outcome=Outcome.STUCK)
+    assert says(log, "ends within a control period, at row 1201")
+    assert not says(changed(log, "record", control_hz=240), "within a control period")
 
 
 def test_the_limit_ends_a_drive_after_its_last_period():

@@ -81,11 +81,11 @@ WORLD = World("room", (0.0, 0.0, 6.0, 5.0), (Disc(2.0, 3.5, 0.3), Disc(4.0, 1.5,
 POSE = (2.0, 1.5, 0.4)
 
 
-def looked(robot, world=WORLD):
+def looked(robot, world=WORLD, scans=8):
     """A map of some scans from one place, and another scan from there, with noise."""
     scanner, rng = Scanner.of(robot.lidar, world), np.random.default_rng(0)
     seen = OccupancyMap(robot.lidar, 0.05, POSE[:2])
-    for _ in range(8):
+    for _ in range(scans):
         seen.insert(POSE, scanner.scan(POSE, rng=rng))
     return seen, scanner.scan(POSE, rng=rng)
 
@@ -115,6 +115,12 @@ def test_distant_walls_constrain_a_pose_on_request(jackal):
         pose = ScanMatcher(jackal.lidar, far=15.0).corrected(seen, pose, ranges)
     assert math.dist(pose[:2], here[:2]) < 0.006
     assert abs(pose[2] - here[2]) < 0.001
+
+
+def test_hits_of_a_single_scan_are_no_marks(jackal):
+    seen, ranges = looked(jackal, scans=1)
+    drifted = (POSE[0] + 0.01, POSE[1], POSE[2])
+    assert ScanMatcher(jackal.lidar).corrected(seen, drifted, ranges) == drifted
 
 
 def test_an_empty_map_corrects_nothing(jackal):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Lidar
 from antdrive.sim.sensing import OccupancyMap, Scanner, clear_distance, clear_turn
-from antdrive.sim.sensing._kernels_mapping import SQUARE
+from antdrive.sim.sensing._kernels_mapping import SQUARE, begins
 from antdrive.worlds import Disc, World
 
 EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=10.0, resolution=0.01, sigma=0.003, x=0.1)
@@ -23,6 +23,27 @@ def inside(points, discs):
 
 def cell_of(found, x, y):
     return math.floor((y - found.origin[1]) / found.cell), math.floor((x - found.origin[0]) / found.cell)
+
+
+def test_beams_are_needed_from_where_their_neighbours_miss_a_cell():
+    """Every second, fourth, ... beam is enough nearer by."""
+    out = np.empty(9)
+    begins(9, 0.01, 0.05, out)
+    odd = 0.05 / (2 * 0.01)
+    assert out == pytest.approx([0.0, odd, odd / 2, odd, odd / 4, odd, odd / 2, odd, odd / 8])
+
+
+def test_unknown_ground_stops_a_turn_unless_it_counts_as_free():
+    grid = OccupancyMap(EYE, 0.05)
+    assert clear_turn(grid, (0.0, 0.0, 0.0), 1.0, Footprint.rectangle(0.5, 0.3), 2.0) < 0.01
+    assert clear_turn(grid, (0.0, 0.0, 0.0), 1.0, Footprint.rectangle(0.5, 0.3), 2.0, freespace=True) == 2.0
+
+
+def test_what_a_map_shows_cannot_be_written():
+    grid = OccupancyMap(EYE, 0.05)
+    for mask in (grid.seen_free, grid.occupied):
+        with pytest.raises(ValueError, match="read-only"):
+            mask[0, 0] = True
 
 
 worlds = st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.02, 1.0)), min_size=1, max_size=8)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from antdrive.base import FieldError
 from antdrive.robots import Lidar
 from antdrive.sim.sensing import (
     KnownGround,
@@ -18,6 +19,7 @@ from antdrive.sim.sensing import (
 )
 from antdrive.worlds import Disc, World
 
+CIRCLE = Lidar(beams=360, field_of_view=2 * math.pi, min_range=0.1, max_range=8.0, rate=20.0)
 POSTS = np.array([[2.5, 1.8, 0.2], [2.5, -2.2, 0.3], [-1.0, 2.0, 0.4]])
 BOUNDS = (-4.0, -4.0, 6.0, 4.0)
 
@@ -114,6 +116,53 @@ def test_a_mover_that_beams_pass_through_is_gone_and_a_hidden_one_is_remembered(
         tracker.update(known, (0, 0, 0), ranges, k / 20)
         mine = np.abs(tracker.movers().positions[:, 0] - 2.0) < 0.3
         assert mine.sum() == (2 <= k < 80)  # hidden by a screen from the 20th scan on, and for 3 s remembered
+        assert tracker.movers().met[mine].tolist() == ([k < 20] if mine.any() else [])
+
+
+@pytest.mark.parametrize(("hidden", "tracks"), [(6, 1), (14, 2)])
+def test_an_unconfirmed_mover_is_remembered_for_half_a_second(hidden, tracks):
+    """It is scanned twice, and then hidden by a screen on the map for so many scans at 20 Hz."""
+    lidar, screen, mover = replace(CIRCLE, resolution=0.0), (1.0, 0.0, 0.4), (2.0, 0.0, 0.2)
+    known = KnownGround(lidar, World("hall", BOUNDS, (Disc(*screen),)))
+    tracker = MoverTracker(lidar)
+    for k in range(hidden + 4):
+        discs = [mover] if k < 2 or k >= 2 + hidden else [mover, screen]
+        tracker.update(known, (0, 0, 0), Scanner(lidar, np.array(discs), bounds=BOUNDS).scan((0, 0, 0)), k / 20)
+    assert tracker.tracks_begun == tracks
+
+
+def test_coarse_ranges_of_what_is_on_the_map_are_explained():
+    lidar = replace(CIRCLE, resolution=0.2)
+    known = KnownGround(lidar, World("hall", BOUNDS, tuple(Disc(*row) for row in POSTS.tolist())))
+    hits = known.hits((0, 0, 0), Scanner(lidar, POSTS, bounds=BOUNDS).scan((0, 0, 0)))
+    assert len(hits.beams) > 300
+    assert hits.explained.all()
+
+
+def test_hits_beyond_the_map_s_horizon_do_not_count():
+    ranges = Scanner(CIRCLE, POSTS, bounds=BOUNDS).scan((0, 0, 0))
+    hits = MappedGround(OccupancyMap(CIRCLE, horizon=3.0), 40).hits((0, 0, 0), ranges)
+    assert 2.0 < ranges[hits.beams].max() <= 3.0 < ranges[np.isfinite(ranges)].max()
+
+
+def test_the_errors_of_whole_and_partly_hidden_movers_differ_by_a_factor():
+    rules = MoverTracker(CIRCLE, TrackingPolicy(error=0.03))._rules[True]
+    assert (rules.whole, rules.part) == pytest.approx((0.03**2, 0.09**2))
+
+
+def test_a_policy_is_consistent():
+    with pytest.raises(FieldError, match=r"must be at most largest, 0\.5, got 0\.6"):
+        TrackingPolicy(smallest=0.6, largest=0.5)
+
+
+@pytest.mark.parametrize(("moves", "sure", "owner"), [(True, True, 0), (True, False, -1), (False, True, -1)])
+def test_only_a_confirmed_mover_owns_points_that_the_map_explains(moves, sure, owner):
+    tracks = np.zeros(1, dtype=_kernels_tracking.TRACK)
+    tracks["radius"], tracks["moves"], tracks["sure"] = 0.3, moves, sure
+    for explained, found in ((True, owner), (False, 0)):
+        out = np.empty(1, dtype=np.int64)
+        _kernels_tracking.own(tracks, 1, np.array([[0.32, 0.0]]), np.array([explained]), out)
+        assert out[0] == found
 
 
 def test_a_map_explains_what_stands_on_it_and_nothing_else():

@@ -52,9 +52,6 @@ def _check_routes(rollout: Rollout) -> Iterator[str]:
     """Check that routes lie in the world, avoid static obstacles, and lead from the start to the goal."""
     record, route = rollout.record, rollout.route
     task, near = record.task, NEAR * record.cell
-    if len(route) < 2:
-        yield f"route: must have two points or more, found {len(route)}"
-        return
     if math.dist(route[0], task.start[:2]) > near:
         yield f"route: begins {math.dist(route[0], task.start[:2]):.3g} m from the task's start"
     if not _by_cells(rollout) and math.dist(route[-1], task.goal) > _short_of_goal(rollout):
