@@ -94,10 +94,9 @@ def test_a_snippet_that_its_file_no_longer_holds_is_an_error(tmp_path):
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text((ROOT / SOURCE / mutant.file).read_text())
     assert len(named_mutants(tmp_path)) == len(named_mutants())
-    (tmp_path / SOURCE / "sim/driving/plants.py").write_text("AFTER_CONTACT = 1.0\n")
-    with pytest.raises(
-        StaleTable, match=r"0\.05 s logged after a contact: .* occurs 0 times in sim/driving/plants\.py"
-    ):
+    ending = tmp_path / SOURCE / "sim/log/ending.py"
+    ending.write_text(ending.read_text().replace("AFTER_CONTACT = 0.5", "AFTER_CONTACT = 1.0"))
+    with pytest.raises(StaleTable, match=r"0\.05 s logged after a contact: .* occurs 0 times in sim/log/ending\.py"):
         named_mutants(tmp_path)
 
 

@@ -75,7 +75,7 @@ def plan_limit() -> float | None:
     Raises:
         InputError: the variable of the environment is neither a positive number nor "off".
     """
-    text = os.environ.get(LIMIT, "off")
+    text = os.environ.get("ANTDRIVE_PLAN_LIMIT", "off")
     if text == "off":
         return None
     try:
@@ -128,7 +128,7 @@ class UserCode:
             signal.signal(signal.SIGINT, self._interrupt)
         if self.limit is not None:
             self._alarm = signal.signal(signal.SIGALRM, self._ring)
-            self._timer, self._since = signal.setitimer(signal.ITIMER_REAL, self.limit, AGAIN), time.monotonic()
+            self._timer, self._since = signal.setitimer(signal.ITIMER_REAL, self.limit, AGAIN), time.perf_counter()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -152,7 +152,7 @@ class UserCode:
             signal.signal(signal.SIGALRM, self._alarm)
             left, interval = self._timer
             if left:  # the caller's own timer goes on
-                signal.setitimer(signal.ITIMER_REAL, max(left - time.monotonic() + self._since, 1e-3), interval)
+                signal.setitimer(signal.ITIMER_REAL, max(left - time.perf_counter() + self._since, 1e-3), interval)
         if callable(self._before) and signal.getsignal(signal.SIGINT) == self._interrupt:
             signal.signal(signal.SIGINT, self._before)
         if not self._own:

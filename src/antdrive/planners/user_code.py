@@ -10,6 +10,7 @@ import importlib
 import importlib.machinery
 import importlib.util
 import inspect
+import os
 import sys
 import traceback
 from collections.abc import Iterator
@@ -85,7 +86,7 @@ def load_object(source: str, word: str, folder: Path | None = None, *, is_file: 
 
 def _import_error(source: str, error: BaseException) -> UserCodeError | PlannerError:
     """Return the error of a file or module that cannot be imported."""
-    at = place(error, str(Path(source).resolve()))
+    at = place(error, os.path.realpath(source))
     if issubclass(type(error), OverLimit):
         return PlannerError(source, f"{error_text(error)} on import ({at})")
     if issubclass(type(error), SystemExit):
@@ -156,7 +157,8 @@ def _from_module(name: str, folder: Path | None) -> ModuleType:
 
 def _from_file(source: str, folder: Path | None) -> ModuleType:
     path = (folder or Path()) / source
-    return _loaded(path.resolve(), _hash(_content(path)))
+    content = _hash(_content(path))
+    return _loaded(path.resolve(), content)
 
 
 class _Source(importlib.machinery.SourceFileLoader):

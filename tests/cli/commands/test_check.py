@@ -129,8 +129,8 @@ def test_a_test_that_kills_its_process_is_named(antdrive, suite):
     antdrive("accept", "a.drive.yaml", "--only", "cl*", "--jobs", "1")
     code, out, _ = antdrive("check", "a.drive.yaml", "--jobs", "2", "--json", "--results", "res")
     *others, deadly = json.loads(out)["tests"]
-    assert (code, [test["passed"] for test in others]) == (3, [True] * 3)
-    assert deadly["faults"] == ["internal error: its process ended with exit code 3"]
+    assert (code, [test["passed"] for test in others]) == (1, [True] * 3)
+    assert deadly["faults"] == ["planner Deadly (mine.py:4) ended the process with exit code 3"]
 
 
 def test_a_fault_of_the_program_is_told_with_its_traceback(antdrive, suite, monkeypatch):

@@ -242,7 +242,9 @@ def test_words_select_tests(tmp_path):
 def test_a_file_that_ends_the_program_is_a_wrong_suite(tmp_path):
     (tmp_path / "script.py").write_text("import sys\nsys.exit(0)\n")
     for key, source in (("file", "script.py"), ("module", "script")):
-        with pytest.raises(InputError, match=rf"planner\.{key}: script.*calls exit on import \(exit code 0\); guard"):
+        with pytest.raises(
+            InputError, match=rf"planner\.{key}: script.*calls exit on import \(exit code 0, script.py:2\); guard"
+        ):
             scenario_of(only(tmp_path, f"world: empty, planner: {{{key}: {source}, name: Mine}}"))
 
 

@@ -323,7 +323,7 @@ def test_a_wrong_plan_on_the_way_ends_the_drive():
     assert ends_as_wrong(result, "on the way, at t = ")
     assert "cells: step 1 from" in result.reason
     before = changed(result.rollout, "record", replans=())
-    assert any("ends a run before the robot drives" in problem for problem in certify(before).problems)
+    assert any("does not end with a search that found no route" in problem for problem in certify(before).problems)
 
 
 class Deciding:

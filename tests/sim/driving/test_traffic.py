@@ -374,8 +374,7 @@ def test_plans_lead_round_busy_ground_and_off_movers(jackal, planner):
 
 
 def test_a_policy_may_leave_movers_to_local_avoidance(jackal):
-    for policy in (None, ReplanPolicy(around_movers=False)):
-        assert compose(unknown(jackal, replanning=policy)).guide._movers is None
+    assert compose(unknown(jackal, replanning=ReplanPolicy(around_movers=False))).guide._movers is None
     assert compose(unknown(jackal, localisation="fixes", perception=Perception())).guide._movers is None
 
 

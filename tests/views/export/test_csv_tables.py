@@ -67,7 +67,7 @@ def test_a_failure_leaves_nothing(log, tmp_path, monkeypatch):
 
     before = sorted(tmp_path.iterdir())
     monkeypatch.setattr("antdrive.views.export.exporting.write_tables", fail)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(InputError, match=r"tables: cannot be written \(No space left on device\)"):
         export(log[1], "csv", tmp_path / "tables")
     assert sorted(tmp_path.iterdir()) == before
 

@@ -94,9 +94,9 @@ def _lines(base: "Scenario", trials: "Sequence[MarginResult]", smallest: float |
     from antdrive.runs.margins.choice import MARGIN_HEADS
 
     yield from table(MARGIN_HEADS, (trial.cells for trial in sorted(trials, key=lambda trial: trial.margin)))
+    yield f"default for noise {base.noise:g}, smoothing {base.smoothing}: {base.usual_margin:.3f} m"
     result = "none up to 0.2 m" if smallest is None else f"{smallest:.3f} m"
     if trial := next((trial for trial in trials if trial.margin == smallest), None):
         closed = f"; {trial.impassable} more worlds have no path with this margin" if trial.impassable else ""
         result += f", from {trial.drives} drive{'' if trial.drives == 1 else 's'}{closed}"
     yield f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {result}"
-    yield f"default for noise {base.noise:g}, smoothing {base.smoothing}: {base.usual_margin:.3f} m"

@@ -119,4 +119,4 @@ def import_file(path: str | os.PathLike[str], *, barn: bool = False, **options: 
 
 
 def _listed(options: tuple[str, ...]) -> str:
-    return ", ".join(options)
+    return ", ".join(name for name in options if not name.startswith("on_"))
