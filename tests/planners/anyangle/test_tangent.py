@@ -134,6 +134,57 @@ def test_a_disc_that_overlaps_a_wall_is_passed_on_its_open_side():
     assert path.length > shortest([(5, 0.5, 1.5)], WIDE, 0.0, (1, 0.2), (9, 0.2)).length
 
 
+def uncovered(discs, box, i):
+    """Return the free arcs of disc i from all its neighbours at once: their begins and widths."""
+    x, y, r = discs[i]
+    spans = [
+        (math.atan2(w - y, v - x), math.acos((r * r + d * d - s * s) / (2 * r * d)))
+        for k, (v, w, s) in enumerate(discs)
+        if k != i and (d := math.hypot(v - x, w - y)) <= r + s
+    ]
+    walls = (box[2] - x, box[3] - y, x - box[0], y - box[1])
+    spans += [(k * math.pi / 2, math.acos(d / r)) for k, d in enumerate(walls) if d <= r]
+    covered = sorted(((middle - half) % math.tau, 2 * half) for middle, half in spans)
+    arcs, reach = [], max(low + wide for low, wide in covered)  # one turn, then count the gaps of the next
+    for low, wide in ((low + math.tau, wide) for low, wide in covered):
+        if low > reach + 2e-9:
+            arcs.append((reach % math.tau, low - reach))
+        reach = max(reach, low + wide)
+    return arcs
+
+
+def test_the_free_arcs_of_discs_in_a_heap_are_those_that_no_neighbour_covers():
+    rng, box = np.random.default_rng(3), np.array([0.0, 0.0, 10.0, 10.0])
+    free = 0
+    for radii in ((1.0, 1.0), (0.5, 1.4)):
+        discs = np.column_stack(
+            (rng.uniform(2, 9.5, (160, 1)), rng.uniform(3, 7, (160, 1)), rng.uniform(*radii, (160, 1)))
+        )
+        ring = np.arange(150) * math.tau / 150
+        discs = np.vstack((discs, np.column_stack((2 + np.cos(ring), 8 + np.sin(ring), np.full(150, 1.5)))))
+        discs = discs[_kernels_tangent.keep_outer(discs, box)]
+        rims = _kernels_tangent.free_arcs(discs, box)
+        for i in range(len(discs)):
+            arcs = slice(rims.first[i], rims.first[i + 1])
+            found = np.sort(np.column_stack((rims.begin[arcs], rims.width[arcs])), axis=0)
+            assert found == pytest.approx(np.sort(np.array(uncovered(discs, box, i)).reshape(-1, 2), axis=0), abs=1e-6)
+            free += len(found)
+    assert free > 100
+
+
+def test_a_heap_of_thousands_of_discs_costs_little_more_than_its_rim():
+    """A bin within a disc lists one disc, and rims without free arcs do not matter."""
+    rng, box = np.random.default_rng(5), (0.0, 0.0, 20.0, 20.0)
+    discs = np.column_stack((rng.uniform(8, 12, (3000, 2)), np.full(3000, 3.0)))
+    path = shortest(discs, box, 0.3, (0.5, 0.5), (19, 19))
+    assert path.work < 100
+    assert len(_kernels_tangent.bins(discs, np.array(box)).items) < 5 * len(discs)
+    rims = _kernels_tangent.free_arcs(discs, np.array(box))
+    outer = discs[np.diff(rims.first) > 0]
+    assert len(outer) < 100
+    assert path.pieces == shortest(outer, box, 0.3, (0.5, 0.5), (19, 19)).pieces
+
+
 def test_an_end_without_the_clearance_has_no_path():
     assert shortest([(5, 5, 1)], WIDE, 0.5, (3.6, 5), (0, 0)) is None
     assert shortest([(5, 5, 1)], WIDE, 0.5, (3.5, 5), (0, 0)) is not None

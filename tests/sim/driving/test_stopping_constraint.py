@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from antdrive.robots import Footprint, Lidar, Twist, footprint_clearance, load_robot
+from antdrive.robots import Footprint, Lidar, PursuitState, Twist, footprint_clearance, load_robot
+from antdrive.sim.driving.parts import Step
+from antdrive.sim.driving.rules import SIGHT_LIMIT
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import SimulatedLidar, Survey
 from antdrive.sim.sensing import Scanner
@@ -89,6 +91,22 @@ def test_a_command_passes_only_if_the_whole_stopping_distance_is_free(arc):
         assert slower == pytest.approx((command.speed * factor, command.yaw_rate * factor))
         assert stopping_distance(factor * speed, braking) == pytest.approx(share * (whole - 0.01) + 0.01)
     assert limited(still, command, 0.0) == (still, True)
+
+
+@pytest.mark.parametrize(
+    ("left", "slowed", "stands"),
+    [
+        ((0.0, 0.0), True, True), ((0.0199, -0.0199), True, True), ((0.02, 0.0), True, False), ((0.0, -0.02), True, False),
+        ((0.3, 0.0), True, False), ((0.01, 0.0), False, False),
+    ],
+)  # fmt: skip
+def test_a_command_that_the_constraint_stops_is_noted(left, slowed, stands):
+    noted, wanted = [], Step(Twist(0.3, 0.1), PursuitState())
+    caution = StoppingConstraint(None, ROBOT, 20, 0.1, lambda tick, held: noted.append((tick, held)))
+    caution.limit = lambda pose, last, command: (Twist(*left), slowed)
+    found = caution.apply(SimpleNamespace(tick=7, pose=(0.0, 0.0, 0.0), before=wanted), wanted)
+    assert noted == [(7, wanted.command if stands else None)]
+    assert found == (Step(Twist(*left), PursuitState(limiter=SIGHT_LIMIT)) if slowed else wanted)
 
 
 @pytest.mark.parametrize("arc", ARCS)

@@ -39,6 +39,16 @@ def test_unknown_ground_stops_a_turn_unless_it_counts_as_free():
     assert clear_turn(grid, (0.0, 0.0, 0.0), 1.0, Footprint.rectangle(0.5, 0.3), 2.0, freespace=True) == 2.0
 
 
+def test_a_way_ends_where_the_map_does():
+    grid, foot = OccupancyMap(EYE, 0.05, horizon=3.0, bounds=(-2.0, -1.0, 3.0, 4.0)), Footprint.disc(0.2)
+    (x, y), (rows, cols) = grid.origin, grid.seen_free.shape
+    sides = -x, -y, x + 0.05 * cols, y + 0.05 * rows
+    assert len({round(side, 3) for side in sides}) > 2
+    for yaw, side in zip((math.pi, -math.pi / 2, 0.0, math.pi / 2), sides, strict=True):
+        way = clear_distance(grid, (0.0, 0.0, yaw), 1.0, 0.0, foot, 50.0, freespace=True)
+        assert way == pytest.approx(side - 0.2, abs=0.06)
+
+
 def test_what_a_map_shows_cannot_be_written():
     grid = OccupancyMap(EYE, 0.05)
     for mask in (grid.seen_free, grid.occupied):

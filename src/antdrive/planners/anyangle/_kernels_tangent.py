@@ -19,6 +19,7 @@ TURN = 2.0 * math.pi
 ANGLE = 1e-9  # rad: an angle this close to the end of a free arc is off the arc
 BACK = 1e-7  # rad: smaller backward motion along a rim is rounding and has length 0
 SECTORS = 512  # direction sectors, each with the last blocking disc
+JOIN = 32  # covered angles that gather before they are joined
 SAME = 1e-12  # m: tolerance of equal lengths
 
 
@@ -158,6 +159,15 @@ def slice_near(sweep: Sweep, x: float, reach: float) -> tuple[int, int]:
     return int(np.searchsorted(sweep.x, x - apart)), int(np.searchsorted(sweep.x, x + apart, side="right"))
 
 
+@inline
+def scattering(count: int) -> int:
+    """Return a step through `count` places, modulo `count`, that visits all of them in a scattered order."""
+    step = max(1, int(0.6180339887498949 * count))
+    while math.gcd(step, count) > 1:
+        step += 1
+    return step
+
+
 @kernel
 def keep_outer(discs: Array, bounds: Array) -> Array:
     """Return which discs (N, 3) have a rim partly outside all other discs and inside the bounds."""
@@ -169,7 +179,9 @@ def keep_outer(discs: Array, bounds: Array) -> Array:
         if x + r <= bounds[0] or x - r >= bounds[2] or y + r <= bounds[1] or y - r >= bounds[3]:
             keep[i] = False
             continue
-        left, right = slice_near(sweep, x, r)
+        left, right = slice_near(
+            sweep, x, -r
+        )  # a disc that contains this one is larger than the distance of the centres
         for p in range(left, right):
             j = sweep.order[p]
             if j == i or not keep[j]:
@@ -186,37 +198,61 @@ def keep_outer(discs: Array, bounds: Array) -> Array:
     return keep
 
 
+@inline
+def joined(low: Array, high: Array, count: int) -> int:
+    """Join the intervals of covered angles that overlap, in place; returns how many remain, sorted."""
+    order = np.argsort(low[:count])
+    lows, highs = low[order], high[order]
+    size = 0
+    for q in range(count):
+        if size and lows[q] <= high[size - 1] + 2.0 * ANGLE:
+            high[size - 1] = max(high[size - 1], highs[q])
+        else:
+            low[size], high[size] = lows[q], highs[q]
+            size += 1
+    return size
+
+
 @kernel
 def free_arcs(discs: Array, bounds: Array) -> Rims:
-    """Return the parts of each rim not covered by other discs or walls; contact ends an arc."""
+    """Return the parts of each rim not covered by other discs or walls; contact ends an arc.
+
+    The covered angles are joined whenever `JOIN` of them have gathered. The scan of a rim stops once all of it is
+    covered. As it takes the neighbours in a scattered order, a rim amid thousands of discs needs few of them.
+    """
     n = discs.shape[0]
     first = np.zeros(n + 1, dtype=np.int64)
     begin = np.empty(4 * n + 16, dtype=np.float64)
     width = np.empty(4 * n + 16, dtype=np.float64)
-    low = np.empty(2 * (n + 5), dtype=np.float64)
-    high = np.empty(2 * (n + 5), dtype=np.float64)
-    order = np.empty(2 * (n + 5), dtype=np.int64)
+    low = np.empty(2 * (n + 5) + JOIN, dtype=np.float64)
+    high = np.empty(2 * (n + 5) + JOIN, dtype=np.float64)
     sweep = swept(discs)
     size = 0
     for i in range(n):
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
-        m = 0
+        m, full = 0, JOIN
         gone = False
+        gap_x, gap_y, gap_reach = x, y, np.inf  # a circle that contains the only gap left
         left, right = slice_near(sweep, x, r)
-        for p in range(left, right + 4):
-            if p < right:  # another disc
-                j = sweep.order[p]
+        stride = scattering(right - left)
+        for step in range(right - left + 4):
+            if step < right - left:  # another disc
+                j = sweep.order[left + step * stride % (right - left)]
                 if j == i:
                     continue
                 dx, dy, s = discs[j, 0] - x, discs[j, 1] - y, discs[j, 2]
                 d2 = dx * dx + dy * dy
                 if d2 > (r + s + EPS) * (r + s + EPS):
                     continue
+                if gap_reach < np.inf:
+                    apart = s + gap_reach
+                    if (discs[j, 0] - gap_x) ** 2 + (discs[j, 1] - gap_y) ** 2 > apart * apart:
+                        continue
                 d = math.sqrt(d2)
                 middle = math.atan2(dy, dx)
                 cosine = (r * r + d2 - s * s) / (2.0 * r * d) if d > 0.0 else 2.0
             else:  # a wall: right, upper, left, lower
-                k = p - right
+                k = step - (right - left)
                 if k == 0:
                     d = bounds[2] - x
                 elif k == 1:
@@ -240,30 +276,37 @@ def free_arcs(discs: Array, bounds: Array) -> Rims:
             if b > TURN:
                 low[m], high[m] = 0.0, b - TURN
                 m += 1
+            if m >= full:
+                m = joined(low, high, m)
+                if m == 1 and low[0] + TURN - high[0] <= 2.0 * ANGLE:
+                    gone = True
+                    break
+                full = 2 * m + JOIN
+                ahead, behind = high[0], low[0] + TURN
+                if m == 2 and low[0] <= 0.0 and high[1] >= TURN:
+                    behind = low[1]
+                if m == 1 or behind == low[1]:
+                    middle, half = 0.5 * (ahead + behind), 0.5 * (behind - ahead)
+                    gap_x, gap_y = x + r * math.cos(middle), y + r * math.sin(middle)
+                    gap_reach = r * half + 1e-6
         first[i] = size
         if gone:
             continue
-        while size + m + 1 > len(begin):
-            begin, width = doubled(begin), doubled(width)
         if m == 0:
+            while size + 1 > len(begin):
+                begin, width = doubled(begin), doubled(width)
             begin[size], width[size] = 0.0, TURN
             size += 1
             continue
-        for q in range(m):  # insertion sort of few elements
-            at = q
-            while at > 0 and low[order[at - 1]] > low[q]:
-                order[at] = order[at - 1]
-                at -= 1
-            order[at] = q
+        m = joined(low, high, m)
         # The gap that contains the angle 0 comes last.
-        reach = high[order[0]]
+        while size + m + 1 > len(begin):
+            begin, width = doubled(begin), doubled(width)
         for q in range(1, m):
-            here = order[q]
-            if low[here] > reach + 2.0 * ANGLE:
-                begin[size], width[size] = reach, low[here] - reach
-                size += 1
-            reach = max(reach, high[here])
-        rest = min(low[order[0]] + TURN - reach, TURN - ANGLE)  # less than a full rim, as a contact cuts it
+            begin[size], width[size] = high[q - 1], low[q] - high[q - 1]
+            size += 1
+        reach = high[m - 1]
+        rest = min(low[0] + TURN - reach, TURN - ANGLE)  # less than a full rim, as a contact cuts it
         if rest > 2.0 * ANGLE:
             begin[size], width[size] = wrapped(reach), rest
             size += 1
@@ -324,19 +367,25 @@ def along_rim(rims: Rims, arc: int, turn: int, here: float, there: float) -> flo
 
 
 @kernel
-def gates(discs: Array, bounds: Array) -> Array:
-    """Return the segments (G, 4) between touching discs, or a disc and a touching wall: no path crosses them."""
+def gates(discs: Array, bounds: Array, rims: Rims) -> Array:
+    """Return the segments (G, 4) between touching discs, or a disc and a touching wall: no path crosses them.
+
+    Two discs without a free arc need none: others cover the place where they touch.
+    """
     n = discs.shape[0]
+    buried = rims.first[1:] == rims.first[:-1]
     out = np.empty((16, 4), dtype=np.float64)
     sweep = swept(discs)
     size = 0
     for i in range(n):
+        if buried[i]:
+            continue
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
         left, right = slice_near(sweep, x, r)
         for p in range(left, right + 4):
             if p < right:
                 j = sweep.order[p]
-                if j <= i:
+                if j == i or (j < i and not buried[j]):
                     continue
                 bx, by = discs[j, 0], discs[j, 1]
                 gap = abs(bx - x) + abs(by - y)
@@ -375,7 +424,7 @@ def side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> fl
 
 @kernel
 def bins(discs: Array, bounds: Array) -> Bins:
-    """Sort discs into bins: every bin that a disc touches lists it."""
+    """Sort discs into bins: every bin that a disc touches lists it. A bin within a disc lists only one such disc."""
     n = discs.shape[0]
     wide, tall = bounds[2] - bounds[0], bounds[3] - bounds[1]
     cell = max(math.sqrt(wide * tall / max(n, 1)), max(wide, tall) / 200.0, 1e-9)
@@ -384,27 +433,49 @@ def bins(discs: Array, bounds: Array) -> Bins:
     shape[0], shape[1] = rows, cols
     start = np.zeros(rows * cols + 1, dtype=np.int64)
     items = np.empty(0, dtype=np.int32)
-    for write in range(2):  # count, then fill
-        if write:
+    filled = np.full(rows * cols, -1, dtype=np.int32)  # a disc that contains the bin
+    for step in range(3):  # find the contained bins, count, fill
+        if step == 2:
             for b in range(rows * cols):
-                start[b + 1] += start[b]
+                start[b + 1] = start[b] + (start[b + 1] if filled[b] < 0 else 1)
             items = np.empty(start[rows * cols], dtype=np.int32)
             at = start[: rows * cols].copy()
+            for b in range(rows * cols):
+                if filled[b] >= 0:
+                    items[at[b]] = filled[b]
         for j in range(n):
             x, y, r = discs[j, 0] - bounds[0], discs[j, 1] - bounds[1], discs[j, 2] + 1e-6 * cell
             r_lo, r_hi = max(0, math.floor((y - r) / cell)), min(rows - 1, math.floor((y + r) / cell))
-            c_lo, c_hi = max(0, math.floor((x - r) / cell)), min(cols - 1, math.floor((x + r) / cell))
             for row in range(r_lo, r_hi + 1):
                 dy = max(row * cell - y, y - (row + 1) * cell, 0.0)
-                for col in range(c_lo, c_hi + 1):
+                far = max(y - row * cell, (row + 1) * cell - y)
+                room = discs[j, 2] - 1e-6 * (cell + discs[j, 2])
+                c_lo, c_hi = max(0, math.floor((x - r) / cell)), min(cols - 1, math.floor((x + r) / cell))
+                in_lo, in_hi = cols, -1  # the contained bins of this row
+                if room > far:
+                    half = math.sqrt(room * room - far * far)
+                    in_lo, in_hi = max(0, math.ceil((x - half) / cell)), min(cols, math.floor((x + half) / cell)) - 1
+                if step == 0:
+                    for col in range(in_lo, in_hi + 1):
+                        filled[row * cols + col] = j
+                    continue
+                col = c_lo - 1
+                while col < c_hi:
+                    col += 1
+                    if in_lo <= col <= in_hi:
+                        col = in_hi
+                        continue
+                    b = row * cols + col
+                    if filled[b] >= 0:
+                        continue
                     dx = max(col * cell - x, x - (col + 1) * cell, 0.0)
                     if dx * dx + dy * dy > r * r:
                         continue
-                    if write:
-                        items[at[row * cols + col]] = j
-                        at[row * cols + col] += 1
+                    if step == 2:
+                        items[at[b]] = j
+                        at[b] += 1
                     else:
-                        start[row * cols + col + 1] += 1
+                        start[b + 1] += 1
     return Bins(start, items, shape, cell)
 
 
@@ -723,7 +794,7 @@ def shortest_path(discs: Array, bounds: Array, ends: Array, limit: float) -> tup
     n = discs.shape[0]
     rims = free_arcs(discs, bounds)
     near = touchable(discs, rims, ends, limit)
-    obstacles = Obstacles(discs, bounds, rims, bins(discs, bounds), gates(discs, bounds), near)
+    obstacles = Obstacles(discs, bounds, rims, bins(discs, bounds), gates(discs, bounds, rims), near)
     lines = empty_lines(max(256, 2 * n + 1))
     span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # the lines that leave each disc by turn; last, the start
     latest = np.full(2 * len(obstacles.rims.begin), -1, dtype=np.int64)
