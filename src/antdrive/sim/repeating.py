@@ -13,6 +13,7 @@ from antdrive.base.plane import polyline_length
 from antdrive.planners import list_planners
 from antdrive.robots import list_robots, load_robot
 from antdrive.sim.forms import option_text, setting_words, written
+from antdrive.sim.log.ending import control_periods
 from antdrive.sim.log.record import DriveRecord, canonical_hash, settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.rebuild import scenario_values
@@ -36,12 +37,11 @@ def command_of(rollout: Rollout) -> str | None:
         given = written(lambda name: values.get(name, SETTINGS[name].default))
     except (FieldError, InputError):
         return None
-    if record.margin_choice is not None:
-        given["margin"] = "auto"
     limit = record.task.time_limit or usual_time_limit(polyline_length(rollout.route), record.robot)
     usual = {
         "cell": record.cell == record.task.cell,
-        "time_limit": math.isclose(record.time_limit, limit, rel_tol=1e-3),
+        "time_limit": control_periods(record.time_limit, record.control_hz)
+        == control_periods(limit, record.control_hz),
     }
     given = {key: value for key, value in given.items() if key != "seed" and not usual.get(key)}
     settings = setting_words(given)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from antdrive.base.errors import input_error
-from antdrive.base.files import parse_json, read_bytes
+from antdrive.base.files import as_json, parse_json, read_bytes
 from antdrive.robots.spec import RobotSpec
-from antdrive.sim.log.certificate import certify
+from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.log.metrics import measure, succeeded
 from antdrive.sim.log.record import DriveRecord, differences, hashes_of, plain_value
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Task
@@ -29,14 +31,28 @@ def read_result(path: Path) -> Mapping[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def false_claims(result: Mapping[str, Any], rollout: Rollout, digest: str) -> Iterator[str]:
+def false_claims(
+    result: Mapping[str, Any],
+    rollout: Rollout,
+    certificate: Certificate,
+    metrics: Mapping[str, float],
+    digest: str,
+) -> Iterator[str]:
     """Yield a sentence for every value in a `result.json` that the log contradicts. Missing keys are no contradiction."""
     if result.get("digest") != digest:
         yield "result.json: belongs to another log: its digest differs"
         return
-    for key, logged in logged_settings(rollout).items():
+    result = json.loads(as_json(result))  # with null for NaN and infinity
+    facts = {**logged_settings(rollout), **_logged_results(rollout, certificate)}
+    for key, logged in facts.items():
         if key in result and not _agree(result[key], logged):
             yield f"result.json: {key}: differs from the log, which says {_short(logged)}"
+    claimed = result.get("metrics")
+    if not isinstance(claimed, Mapping):
+        return
+    for key, logged in json.loads(as_json(metrics)).items():
+        if key in claimed and not _agree(claimed[key], logged):
+            yield f"result.json: metrics.{key}: differs from the log, which says {_short(logged)}"
 
 
 def logged_settings(rollout: Rollout) -> dict[str, Any]:
@@ -59,6 +75,17 @@ def logged_settings(rollout: Rollout) -> dict[str, Any]:
         "control_hz": record.control_hz,
         **({"frame": list(task.frame)} if any(task.frame) else {}),
         "task": plain_value({"start": task.start, "goal": task.goal, "goal_tolerance_m": task.goal_tolerance}),
+    }
+
+
+def _logged_results(rollout: Rollout, certificate: Certificate) -> dict[str, Any]:
+    """Return the log's results by the keys of `result.json`."""
+    results: dict[str, Any] = json.loads(as_json(certificate.as_dict()))
+    return {
+        "sentence": rollout.outcome.value,
+        "reason": rollout.record.reason,
+        "succeeded": succeeded(rollout) and certificate.certified,
+        "certificate": results,
     }
 
 
@@ -125,7 +152,7 @@ def verify_log(
     if task is not None:
         problems += wrong_optima(rollout.record)
     if result is not None and result.exists():
-        problems += false_claims(read_result(result), rollout, rollout.digest)
+        problems += false_claims(read_result(result), rollout, certificate, measure(rollout), rollout.digest)
     sentence = certificate.sentence
     if replay:
         from antdrive.sim.rerun import replayed

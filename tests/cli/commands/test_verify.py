@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.base.files import as_json
 from antdrive.sim import Scenario, run
-from antdrive.worlds import save_task
+from antdrive.sim.log.record import SensingRecord, differences, hashes_of
+from antdrive.worlds import Disc, Wandering, save_task
 from tests.records import changed
 
 
@@ -147,3 +149,37 @@ def test_a_forged_optimum_needs_the_world_or_the_replay(antdrive, small_run, sma
     assert antdrive("verify", path)[0] == 0
     assert "  record.plan.euclidean_optimum_m: 3.3 m in the log, " in antdrive("verify", path, "--world", small)[1]
     assert "  replay: record.plan.euclidean_optimum_m: 3.3 in the log, " in antdrive("verify", path, "--replay")[1]
+
+
+def test_results_that_the_log_contradicts_are_named(antdrive, small_run, tmp_path):
+    small_run.rollout.save(tmp_path / "rollout.npz")
+    result = json.loads(as_json(small_run.as_dict()))
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps(result))
+    assert antdrive("verify", tmp_path)[0] == 0
+    for key, value in {
+        "succeeded": False,
+        "sentence": "flew",
+        "reason": "x",
+        "certificate": {"certified": True},
+    }.items():
+        path.write_text(json.dumps({**result, key: value}))
+        assert f"result.json: {key}: differs from the log" in antdrive("verify", tmp_path)[1]
+    path.write_text(json.dumps({**result, "metrics": {**result["metrics"], "spl": 0.5}}))
+    assert "result.json: metrics.spl: differs from the log" in antdrive("verify", tmp_path)[1]
+
+
+def test_unseen_cylinders_are_other_worlds_where_movers_avoid_them(small_run):
+    record = replace(small_run.rollout.record, unseen=(Disc(1.0, 1.0, 0.02),))
+    assert list(differences(record, task=record.task)) == []
+    world = replace(record.task.world, movers=(Wandering(radius=0.1, cell=0.5, period=2.0, start=(2.0, 2.0)),))
+    record = replace(record, task=replace(record.task, world=world))
+    assert "1 unseen cylinders more" in "".join(differences(record, task=record.task))
+
+
+def test_hashes_of_settings_cover_sensing_and_unseen_cylinders(small_run):
+    record = small_run.rollout.record
+    sensing = SensingRecord(map="none", localisation="true", odometry=1.0)
+    others = [replace(record, sensing=sensing), replace(record, sensing=replace(sensing, odometry=3.0))]
+    others.append(replace(record, unseen=(Disc(1.0, 1.0, 0.02),)))
+    assert len({hashes_of(one)["settings"] for one in [record, *others]}) == 4

@@ -588,6 +588,7 @@ def hashes_of(record: DriveRecord) -> dict[str, str]:
             **{key: values[key] for key in DRIVEN_WITH},
             "smoothing": record.smoothing.asked,
             **(record.settings or {}),
+            **{key: values[key] for key in ("sensing", "unseen") if values.get(key)},
         },
     }
     return {name: _sha256(part) for name, part in parts.items()}
@@ -599,7 +600,10 @@ def canonical_hash(value: Task | RobotSpec) -> str:
 
 
 def differences(record: DriveRecord, *, task: Task | None = None, robot: RobotSpec | None = None) -> Iterator[str]:
-    """Yield a sentence for a record's differences from a given world and robot."""
+    """Yield a sentence for a record's differences from a given world and robot.
+
+    Unseen cylinders make a drive harder and may be more, but not where wanderers keep away from them.
+    """
     for name, recorded, wanted in (("world", record.task, task), ("robot", record.robot, robot)):
         if wanted is None:
             continue
@@ -607,6 +611,8 @@ def differences(record: DriveRecord, *, task: Task | None = None, robot: RobotSp
         keys = [key for key in sorted({*logged, *given}) if logged.get(key) != given.get(key)]
         if keys:
             yield f"{name}: the log is about another one; its {', '.join(keys)} {'differ' if keys[1:] else 'differs'}"
+    if task is not None and record.unseen and record.task.world.movers:
+        yield f"world: the log has {len(record.unseen)} unseen cylinders more, which movers avoid"
 
 
 def _sha256(value: Mapping[str, Any]) -> str:

@@ -204,7 +204,9 @@ class ReportedRun:
         if self.log is not None:
             return self.log.metrics
         claimed = self.result.get("metrics")
-        return claimed if isinstance(claimed, Mapping) else {}
+        if not isinstance(claimed, Mapping):
+            return {}
+        return claimed if self.claimed else {key: value for key, value in claimed.items() if key == "plan_s"}
 
     @property
     def measured(self) -> dict[str, float | None]:
@@ -267,7 +269,7 @@ def log_facts(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFact
         sights = tuple(passed(rollout))
     except ValueError as error:
         raise input_error(name, str(error)) from None
-    claims = tuple(shown(claim) for claim in false_claims(result, rollout, digest))
+    claims = tuple(shown(claim) for claim in false_claims(result, rollout, certificate, metrics, digest))
     command, settings = shown(command_of(rollout) or "", LONGEST_COMMAND), logged_settings(rollout)
     return LogFacts(rollout.record, certificate, metrics, sights, len(rollout.scans), digest, settings, claims, command)
 
