@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,7 @@ class PlannerError(RuntimeError):
         return type(self), (self.planner, self.problem)
 
 
-def planner_errors(planner: Planner, name: str = "") -> UserCode:
+def planner_errors(planner: Planner, name: str = "") -> AbstractContextManager[None]:
     """Return a block that turns exceptions into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
 
     Args:
