@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +31,7 @@ class PlannerError(RuntimeError):
         return type(self), (self.planner, self.problem)
 
 
-def planner_errors(planner: Planner, name: str = "") -> AbstractContextManager[None]:
+def planner_errors(planner: Planner, name: str = "") -> contextlib.AbstractContextManager[None]:
     """Return a block that turns exceptions into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
 
     Args:
