@@ -64,13 +64,13 @@ def _catalogue(room: str, name: str) -> str:
 def _run(folder: Path) -> Path:
     """Write a run's folder; its drive is computed once."""
     from antdrive.sim import Scenario, run
-    from antdrive.views.run_folder import write_result, write_run
+    from antdrive.views.run_folder import write_run
 
     home = Path(tempfile.gettempdir()) / f"antdrive-hostile-{os.getuid()}"
     if not (home / "result.json").exists():
         home.mkdir(exist_ok=True)
         done = run(Scenario.of("empty", "astar", noise=1.0, time_limit=2.0))
-        write_result(done, write_run(done, home, figures=False), "antdrive run empty")
+        write_run(done, home, "antdrive run empty", figures=False)
     for file in ("rollout.npz", "result.json"):
         shutil.copyfile(home / file, folder / file)
     return folder / "rollout.npz"

@@ -48,6 +48,7 @@ def test_every_variable_that_the_code_reads_is_explained():
     folders = [ROOT / "src", ROOT / "tools"]
     sources = "".join(path.read_text() for folder in folders for path in folder.rglob("*.py"))
     read = set(re.findall(r"os\.environ(?:\.get\(|\[)\"(\w+)\"", sources))
+    read |= set(re.findall(r" = \"(ANTDRIVE_\w+)\"", sources))
     assert sorted(read) == sorted(first_cells("reference/environment.md", "## Variables of the environment"))
 
 

@@ -235,3 +235,11 @@ def test_optima_are_those_of_the_recorded_world(seen):
         record.plan.grid_optimum_m,
         record.plan.euclidean_optimum_m,
     )
+
+
+def test_equal_arrays_excuse_no_rounding_of_the_record(small_run):
+    log = small_run.rollout
+    plan = replace(log.record.plan, length_m=log.record.plan.length_m + 1e-6)
+    check = replayed(replace(log, record=replace(log.record, plan=plan)))
+    assert not check.exact
+    assert [problem.split(":")[1] for problem in check.problems] == [" record.plan.length_m"]

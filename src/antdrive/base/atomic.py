@@ -9,7 +9,7 @@ import re
 import shutil
 import tempfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -40,26 +40,18 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     killed processes for the same target are removed.
     """
     target = Path(path)
-    with ExitStack() as made:
-        try:
-            made.enter_context(made_folder(target.parent))
-            if target.is_dir():
-                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            _sweep(target)
-            prefix = f"{_prefix(target)}{os.getpid()}-"
-            handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=target.suffix)
-        except OSError as error:
-            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+
+    def make() -> Path:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        _sweep(target)
+        prefix = f"{_prefix(target)}{os.getpid()}-"
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=target.suffix)
         os.close(handle)
-        temporary = Path(name)
-        try:
-            yield temporary
-            temporary.chmod(0o666 & ~_umask())
-            temporary.replace(target)
-        except OSError as error:
-            raise _not_written(target, temporary, error) from None
-        finally:
-            temporary.unlink(missing_ok=True)
+        return Path(name)
+
+    with _replacing(target, make, 0o666) as temporary:
+        yield temporary
 
 
 def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
@@ -73,22 +65,36 @@ def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
 def atomic_folder(path: str | Path) -> Iterator[Path]:
     """Yield a temporary folder that becomes `path` on success and is removed on failure."""
     target = Path(path)
+
+    def make() -> Path:
+        if target.is_file() or (target.is_dir() and any(target.iterdir())):
+            raise InputError(f"{target}: exists; name a new folder")
+        return Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:LONGEST_STEM]}-"))
+
+    with _replacing(target, make, 0o777) as temporary:
+        yield temporary
+
+
+@contextmanager
+def _replacing(target: Path, make: Callable[[], Path], mode: int) -> Iterator[Path]:
+    """Yield the temporary path that `make` creates beside a target; it replaces the target on success."""
     with ExitStack() as made:
         try:
-            if target.is_file() or (target.is_dir() and any(target.iterdir())):
-                raise InputError(f"{target}: exists; name a new folder")
             made.enter_context(made_folder(target.parent))
-            temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:LONGEST_STEM]}-"))
+            temporary = make()
         except OSError as error:
             raise InputError(f"{target}: cannot be written ({error.strerror})") from None
         try:
             yield temporary
-            temporary.chmod(0o777 & ~_umask())
+            temporary.chmod(mode & ~_umask())
             temporary.replace(target)
         except OSError as error:
             raise _not_written(target, temporary, error) from None
         finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+            if temporary.is_dir():
+                shutil.rmtree(temporary, ignore_errors=True)
+            else:
+                temporary.unlink(missing_ok=True)
 
 
 def _not_written(target: Path, temporary: Path, error: OSError) -> Exception:

@@ -75,7 +75,7 @@ def plan_limit() -> float | None:
     Raises:
         InputError: the variable of the environment is neither a positive number nor "off".
     """
-    text = os.environ.get("ANTDRIVE_PLAN_LIMIT", "off")
+    text = os.environ.get(LIMIT, "off")
     if text == "off":
         return None
     try:

@@ -13,7 +13,7 @@ from antdrive.robots.noise import SLIP_TIME, steady_errors
 from antdrive.robots.spec import RobotSpec
 
 LEAST = 0.03  # of perfect robots, and the least of all [m]
-RESERVE = 0.01  # part of the margin beyond the predicted loss, as for calibrated margins [m]
+RESERVE = 0.01  # part of the margin beyond the predicted loss, of calibrated margins, too [m]
 #: Loss by noise that one drive in a thousand exceeds, in standard deviations: on routes with corners, and on smooth routes,
 #: whose curvature the controller knows.
 DEVIATIONS = {"none": 2.5, "taut": 1.0, "clearance": 1.0}

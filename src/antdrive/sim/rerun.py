@@ -97,12 +97,12 @@ def rerun(rollout: Rollout, planner: Planner | str | None = None) -> Rollout:
 
 def mismatches(rollout: Rollout, again: Rollout) -> Iterator[Mismatch]:
     """Yield every array and every key of the record that differs, claims excepted."""
-    for name in FORMS:
-        yield from _of_array(name, rollout, again)
+    arrays = [one for name in FORMS for one in _of_array(name, rollout, again)]
+    yield from arrays
     logged, computed = plain_value(rollout.record), plain_value(again.record)
     for key, proof in PROOFS.items():
         if proof is not Proof.CLAIM:
-            yield from _of_key(key, logged, computed)
+            yield from _of_key(key, logged, computed, exact=not arrays)
 
 
 def _sentences(wrong: Sequence[Mismatch]) -> Iterator[str]:
@@ -151,13 +151,13 @@ def _shape(array: npt.NDArray[Any]) -> str:
     return " × ".join(map(str, array.shape))
 
 
-def _of_key(key: str, logged: Any, computed: Any) -> Iterator[Mismatch]:
-    """Yield the difference of a key of the record."""
+def _of_key(key: str, logged: Any, computed: Any, *, exact: bool) -> Iterator[Mismatch]:
+    """Yield the difference of a key of the record; equal arrays excuse no rounding."""
     first, second = (_at(value, key) for value in (logged, computed))
     if first == second:
         return
     text = f"{_short(first)} in the log, {_short(second)} in the rerun"
-    yield Mismatch(f"record.{key}", text, rounded=_within_rounding(first, second))
+    yield Mismatch(f"record.{key}", text, rounded=not exact and _within_rounding(first, second))
 
 
 def _at(value: Any, key: str) -> Any:

@@ -70,7 +70,6 @@ def runs(made_up_drive, tmp_path_factory):
         drive = made_up_drive(collide=outcome == "collided", outcome=outcome)
         place = folder / f"run {k}"
         place.mkdir()
-        overview(drive, place / "overview.png", dpi=60)
         facts = {
             "world": "made-up", "planner": planner, "robot": "turtlebot", "seed": k, "outcome": outcome, "reason": "",
             "sentence": "touched an obstacle" if outcome == "collided" else "stopped at the goal without contact",
@@ -79,6 +78,7 @@ def runs(made_up_drive, tmp_path_factory):
             "certificate": {"certified": outcome == "succeeded", "bound_m": 0.1, "problems": ["it touched"] * (k == 1)},
         }  # fmt: skip
         (place / "result.json").write_text(json.dumps(facts))
+        overview(drive, place / "overview.png", dpi=60)
     film(made_up_drive(), folder / "run 0" / "film.mp4", size=(320, 240), fps=10)
     return folder
 
@@ -187,14 +187,16 @@ def test_without_a_log_a_drive_is_a_claim(small_run, tmp_path):
     assert "Claimed by result.json, without a log." in text
 
 
-def test_only_films_of_the_folder_and_of_this_log_are_shown(small_run, tmp_path):
+def test_only_films_and_figures_of_the_folder_and_of_this_log_are_shown(small_run, tmp_path):
     outside = tmp_path / "outside.mp4"
     outside.write_bytes(b"secret")
     folder = write_run(small_run, tmp_path / "runs" / "a", files={"film": str(outside)})
     (folder / "link.mp4").symlink_to(outside)
     (folder / "folder.mp4").mkdir()
     (folder / "earlier.mp4").write_bytes(b"old")
-    os.utime(folder / "earlier.mp4", (0, 0))
+    (folder / "certificate.png").write_bytes(b"an earlier drive's")
+    for name in ("earlier.mp4", "certificate.png"):
+        os.utime(folder / name, (0, 0))
     (folder / "mine.mp4").write_bytes(b"new")
     write_report(tmp_path / "runs", tmp_path / "report.html", embed_films=True)
     text = (tmp_path / "report.html").read_text()
@@ -202,6 +204,7 @@ def test_only_films_of_the_folder_and_of_this_log_are_shown(small_run, tmp_path)
     assert "link.mp4" not in text
     assert text.count("data:video/mp4") == 1
     assert "earlier.mp4 (older than the log)" in text
+    assert "certificate.png (older than the log)" in text
     (folder / "rollout.npz").unlink()
     write_report(tmp_path / "runs", tmp_path / "report.html", embed_films=True)
     assert "earlier.mp4 (older than result.json)" in (tmp_path / "report.html").read_text()

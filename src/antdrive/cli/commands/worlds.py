@@ -217,7 +217,7 @@ def import_world(
     if skip_unsupported:
         imported[0]["skipped"] = skipped
         lines.append(f"  kept {len(tasks[0].world.obstacles)} cylinders, skipped {len(skipped)} parts")
-        lines += [f"  skipped  {''.join(c if c.isprintable() else '?' for c in part)}" for part in skipped]
+        lines += [f"  skipped  {part}" for part in skipped]
     lines += [line for file in files for line in file_lines({"world": file})]
     show(json, {"worlds": imported} if is_set else imported[0], lines)
 

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 SUFFIX = ".drive.yaml"
 WORKER_KEY = "antdrive_unused"  # key for unused baselines reported by xdist workers
 
-PLAN_LIMIT = "ANTDRIVE_PLAN_LIMIT"
-
 _RESULTS = pytest.StashKey[list[Any]]()  # results of a test's drives
 FILMS_KEY = "antdrive_films"  # key for the film counting folder passed to xdist workers
 _FILM_COUNT = pytest.StashKey[str]()  # folder in which films of failed drives are counted
@@ -57,11 +55,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Initialise the records of this run, and set the limit on planning time for this process and its workers."""
+    from antdrive.base.guarded import LIMIT, USUAL_LIMIT
+
     given = config.getoption("drive_plan_limit")
     if given is not None:
-        os.environ[PLAN_LIMIT] = given
+        os.environ[LIMIT] = given
     else:
-        os.environ.setdefault(PLAN_LIMIT, "600")
+        os.environ.setdefault(LIMIT, USUAL_LIMIT)
     config.stash[_UNUSED], config.stash[_LISTENER] = set(), _Listener()
     config.pluginmanager.register(config.stash[_LISTENER], "antdrive-listener")
 

@@ -22,6 +22,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import read_bytes
 from antdrive.base.kernel_cache import cache_folder
 from antdrive.base.records import STRICT
+from antdrive.robots.default_margin import RESERVE
 from antdrive.runs.margins.loss import Loss, calibration_key, loss_on_course
 from antdrive.runs.pool import Pool, processes_for
 from antdrive.sim.log.margin import budget
@@ -31,7 +32,6 @@ from antdrive.sim.pipeline import Run
 from antdrive.sim.scenario import LossFactors, MarginChoice, Scenario
 
 PROBABILITY = 1e-3  # that a drive along a course loses more than predicted
-RESERVE = 0.01  # part of the margin beyond the predicted loss [m]
 TAIL = 0.2  # fraction of the drives, those with the largest losses, used to fit the tail
 FIRST_GUESS = 0.05  # first margin tried [m]
 SHAPES = (-0.5, 0.0)  # shapes of the tail, from bounded to exponential

@@ -196,26 +196,29 @@ def _filmed(run: Run) -> list[Attachment]:
 
 
 def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
-    """Attach the films and files of a run's folder. Films older than the log, or than result.json, are only linked."""
+    """Attach the films and files of a run's folder. Films and pictures of an earlier drive are only linked."""
     assert run.folder is not None
-    log = run.folder / "rollout.npz"
-    driven = (log if log.exists() else run.folder / "result.json").stat().st_mtime
-    other = "older than the log" if log.exists() else "older than result.json"
     for path in sorted(run.folder.iterdir()):
         kind = FILM_TYPES.get(path.suffix.lower())
         if kind is None or not _lies_in(path, run.folder):
             continue
-        if path.stat().st_mtime < driven:
-            run.links.append(Attachment(f"{path.name} ({other})", link_to(path, base)))
+        if age := _older(path, run.folder):
+            run.links.append(Attachment(path.name + age, link_to(path, base)))
             continue
         source = _data_uri(kind, path.read_bytes()) if embed_films else link_to(path, base)
         run.films.append(Attachment(path.name, source, is_video=kind.startswith("video/")))
     for names, attached in ((("rollout.npz", "result.json"), run.links), (("overview.png", "plan.png"), run.pictures)):
-        attached += [
-            Attachment(name, link_to(run.folder / name, base))
-            for name in names
-            if _lies_in(run.folder / name, run.folder)
-        ]
+        for path in (run.folder / name for name in names):
+            if _lies_in(path, run.folder):
+                age = _older(path, run.folder) if attached is run.pictures else ""
+                (run.links if age else attached).append(Attachment(path.name + age, link_to(path, base)))
+
+
+def _older(path: Path, folder: Path) -> str:
+    """Return " (older than the log)" if a film or picture was written before a run's log, or its result.json without one."""
+    log = folder / "rollout.npz"
+    source, name = (log, "the log") if log.exists() else (folder / "result.json", "result.json")
+    return f" (older than {name})" if path.stat().st_mtime < source.stat().st_mtime else ""
 
 
 def _lies_in(path: Path, folder: Path) -> bool:
@@ -230,6 +233,9 @@ def _attach_figures(runs: list[ReportedRun], base: Path, used: int) -> None:
             assert run.folder is not None
             path = run.folder / name
             if not _lies_in(path, run.folder):
+                continue
+            if age := _older(path, run.folder):
+                run.links.append(Attachment(name + age, link_to(path, base)))
                 continue
             figure = _embedded(path, caption)
             if used + len(figure.source) <= EMBEDDED_BYTES:
