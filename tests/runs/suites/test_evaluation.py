@@ -193,7 +193,10 @@ def test_a_baseline_from_before_a_metric_compares_the_others_and_says_so(small_r
     dataclasses.replace(baseline, metrics=older).save(path)
     evaluation = evaluate(small_run, PLAIN, Baseline.load(path))
     assert evaluation.passed
-    assert evaluation.notes == ("not compared: barn; missing in the baseline: renew it",)
+    assert evaluation.notes == ("not compared: barn; missing or null in the baseline: renew it",)
+    hidden = changed(baseline, spl=None, replans=None)
+    assert evaluate(small_run, PLAIN, hidden).notes == ("not compared: spl; missing or null in the baseline: renew it",)
+    assert evaluate(small_run, dataclasses.replace(PLAIN, tolerances={"spl": None}), hidden).notes == ()
     assert evaluate(small_run, PLAIN, baseline).notes == ()
     slow = dataclasses.replace(baseline, metrics={**older, "duration_s": 1.0})
     assert [fault.split(":")[0] for fault in evaluate(small_run, PLAIN, slow).faults] == ["duration_s"]

@@ -211,12 +211,6 @@ class Baseline:
             raise input_error(shown_path(path), "case", problem)
         return baseline
 
-    @property
-    def later_metrics(self) -> tuple[str, ...]:
-        """The names of metrics to compare that the baseline lacks, because they were added later."""
-        compared = (name for name in METRICS if name not in WALL_CLOCK and METRICS[name].better != "neither")
-        return tuple(name for name in compared if name not in self.metrics)
-
     def gaps(self) -> Iterator[tuple[str, str]]:
         """Yield missing and surplus parts, as key and problem; a comparison needs complete baselines."""
         parts = {name: getattr(self, name) for name in ("metrics", "nearest", "hashes", "drive_digest", "line")}

@@ -114,7 +114,7 @@ def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
     first = divergence(baseline, run.rollout)
     most = float(distances(baseline, run.rollout).max(initial=0.0))
     if first is not None:
-        yield f"{first.sentence}; at most {most:.3g} m apart"
+        yield f"{first.sentence}; at most {most:.3g} m apart at the same time"
     elif run.rollout.drive_digest == baseline.drive_digest:
         yield "the drive equals the baseline's bit for bit"
     else:
@@ -202,11 +202,15 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
             # else it is among the faults
             faults.extend(outcome_changes)
         if run.rollout is not None and baseline.line and run.outcome is baseline.outcome:
-            for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
-                _compare(name, run.rollout, baseline, demands, faults, gains)
+            missing = []
+            for name in compared(demands):
+                if math.isfinite(baseline.metric(name)):
+                    _compare(name, run.rollout, baseline, demands, faults, gains)
+                elif math.isfinite(METRICS[name](run.rollout)):
+                    missing.append(name)
             faults += _line_faults(run.rollout, baseline, demands)
-            if baseline.later_metrics:
-                notes.append(f"not compared: {', '.join(baseline.later_metrics)}; missing in the baseline: renew it")
+            if missing:
+                notes.append(f"not compared: {', '.join(missing)}; missing or null in the baseline: renew it")
     return Evaluation(tuple(faults), tuple(gains), tuple(notes))
 
 
@@ -263,16 +267,22 @@ def _demanded(outcome: Outcome, certified: bool, demands: Demands) -> bool:
     return outcome is demands.outcome and wanted in (None, certified)
 
 
+def compared(demands: Demands) -> list[str]:
+    """Return the metrics that are compared with a baseline, those of `FIRST` first."""
+    names = (*FIRST, *(name for name in METRICS if name not in FIRST))
+    comparable = (name for name in names if METRICS[name].better != "neither" and name not in WALL_CLOCK)
+    return [name for name in comparable if demands.tolerance(name) is not None]
+
+
 def _compare(
     name: str, rollout: Rollout, baseline: Baseline, demands: Demands, faults: list[str], gains: list[str]
 ) -> None:
     """Compare one metric with the baseline's."""
     metric, tolerance = METRICS[name], demands.tolerance(name)
-    if metric.better == "neither" or tolerance is None or name in WALL_CLOCK:
-        return
+    assert tolerance is not None
     now, then = metric(rollout), baseline.metric(name)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
-    if not math.isfinite(then) or (math.isnan(now) and rollout.record.exploring):
+    if math.isnan(now) and rollout.record.exploring:
         return  # old baselines compare the first plan of a mapless robot with the optimum
     if not math.isfinite(now):
         faults.append(f"{name}: {now:g}, in the baseline {then:.6g}{unit}")
@@ -291,12 +301,13 @@ def _compare(
 
 def limits(demands: Demands, baseline: Baseline) -> Iterator[Bound]:
     """Yield the bounds set by a baseline: its metrics plus or minus their tolerances."""
-    for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
-        better, tolerance, then = METRICS[name].better, demands.tolerance(name), baseline.metric(name)
-        if better == "neither" or tolerance is None or name in WALL_CLOCK or not math.isfinite(then):
+    for name in compared(demands):
+        tolerance, then = demands.tolerance(name), baseline.metric(name)
+        if tolerance is None or not math.isfinite(then):
             continue
         allowed = tolerance.allowed(then) + ROUNDED
-        yield Bound(name, "<=", then + allowed) if better == "lower" else Bound(name, ">=", then - allowed)
+        lower = METRICS[name].better == "lower"
+        yield Bound(name, "<=", then + allowed) if lower else Bound(name, ">=", then - allowed)
 
 
 def _place(name: str, rollout: Rollout) -> str:
