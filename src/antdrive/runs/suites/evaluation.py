@@ -20,6 +20,7 @@ from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.scenario import Scenario
 
 #: Distance at the same time beyond which two drives diverge [m].
 APART = 0.01
@@ -106,7 +107,8 @@ def explain(run: Run, baseline: Baseline | None) -> Iterator[str]:
     if baseline is not None:
         if run.rollout is not None and baseline.line:
             yield from _divergence(run, baseline)
-        yield from changes(run, baseline)
+        digest = "" if run.rollout is None else run.rollout.drive_digest
+        yield from changes(run.scenario, configuration_hashes(run), baseline, digest)
 
 
 def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
@@ -121,24 +123,28 @@ def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
         yield f"the drive follows the baseline's line within {max(most, 0.001):.3f} m"
 
 
-def changes(run: Run, baseline: Baseline) -> Iterator[str]:
-    """Yield the differences in setup between a run and its baseline, a line each."""
-    present: Mapping[str, str] = run.rollout.record.versions if run.rollout else versions()
+def changes(s: Scenario, hashes: Mapping[str, str], baseline: Baseline, digest: str) -> Iterator[str]:
+    """Yield the differences in setup between a scenario and its baseline, a line each.
+
+    Args:
+        s: the scenario
+        hashes: of its configuration; those that the baseline lacks are not compared
+        baseline: the earlier drive
+        digest: `Rollout.drive_digest`; empty if the robot did not drive
+    """
     others = [
         f"{name} {baseline.versions.get(name, 'none')} -> {version}"
-        for name, version in present.items()
+        for name, version in versions().items()
         if baseline.versions.get(name) != version
     ]
-    hashes = configuration_hashes(run)
-    if hashes and baseline.hashes:
-        changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
-        if changed:
-            yield f"changed since the baseline: {', '.join(changed)}"
-        elif others:
-            yield SAME
-        elif run.rollout is None or run.rollout.drive_digest != baseline.drive_digest:  # else the demands changed
-            yield f"{SAME}; so the code has changed"
-    chosen = run.scenario.chosen
+    shared = [name for name in hashes if name in baseline.hashes]
+    if changed := [name for name in shared if hashes[name] != baseline.hashes[name]]:
+        yield f"changed since the baseline: {', '.join(changed)}"
+    elif "settings" in shared and others:
+        yield SAME
+    elif "settings" in shared and digest != baseline.drive_digest:  # else the demands changed
+        yield f"{SAME}; so the code has changed"
+    chosen = s.chosen
     if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
         yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
     if others:
