@@ -15,7 +15,7 @@ from antdrive.cli.console import file_lines, planning, print_error, show, table
 from antdrive.cli.entrants import Entrant, check_worlds, entrants_of, repeat_command
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, SUCCEEDED
 from antdrive.cli.options import argument, option
-from antdrive.cli.output import film_drives, results_folder
+from antdrive.cli.output import film_drives, print_idle_settings, results_folder
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.runs.comparing import (
     COMPARED,
@@ -95,6 +95,7 @@ def compare(
     cases = [(world, number) for world in worlds for number in range(given["seed"], given["seed"] + seeds)]
     if film is not None:
         check_film(film)
+    print_idle_settings(list(scenarios.values()), {"seed"} if seeds > 1 else ())
     marks = {f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}
     mark = mark_of(marks, [(names[world], number) for world, number in cases])
     usual = Path("out") / file_name(f"compare-{'-'.join(names.values())}"[:100])
