@@ -189,7 +189,8 @@ def packed(content, path, kind=zipfile.ZIP_DEFLATED):
                 member.write(data)
 
 
-def test_every_byte_around_the_contents_of_a_log_is_as_numpy_writes_it(saved, tmp_path):
+@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 29])
+def test_every_byte_around_the_contents_of_a_log_is_as_numpy_writes_it(every, saved, tmp_path):
     """Only the system that wrote the archive may differ: nobody reads it."""
     raw, path = saved.read_bytes(), tmp_path / "changed.npz"
     with zipfile.ZipFile(saved) as archive:
@@ -201,11 +202,11 @@ def test_every_byte_around_the_contents_of_a_log_is_as_numpy_writes_it(saved, tm
     inside = {place for begin, size in contents for place in range(begin, begin + size)}
     around = [place for place in range(len(raw)) if place not in inside | systems]
     assert len(around) > 1000
-    for place in around:
+    for place in around[::every]:
         path.write_bytes(raw[:place] + bytes([raw[place] ^ 1]) + raw[place + 1 :])
         with pytest.raises(InputError, match="not a rollout"):
             read_record(path)
-    for place in systems:
+    for place in sorted(systems)[::every]:
         path.write_bytes(raw[:place] + bytes([0]) + raw[place + 1 :])
         assert Rollout.load(path).digest == read_record(saved).digest
 
