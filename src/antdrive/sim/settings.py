@@ -29,6 +29,8 @@ PANELS = ("World", "Planner", "Robot", "Sensing", "Movers", "Output")
 MAPS = ("given", "none")
 LOCALISATIONS = ("fixes", "odometry", "matching", "true")
 SMOOTHINGS = ("none", "taut", "clearance")
+#: Default smoothing of planners under comparison: others turn different plans into one route.
+COMPARED_SMOOTHING = "none"
 PHYSICS_HZ = (60, 10_000)  # slower physics makes the robot jerk
 SLOWEST_CONTROL = 10  # [Hz]
 

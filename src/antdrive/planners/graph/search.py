@@ -26,7 +26,9 @@ class Dijkstra(GridPlanner):
 
 @dataclass(frozen=True, kw_only=True)
 class AStar(GridPlanner):
-    """The shortest path over the grid's moves, by A* with the octile heuristic (Hart, Nilsson & Raphael 1968).
+    """The shortest path over the grid's moves, by A*.
+
+    The octile heuristic guides the search (Hart, Nilsson & Raphael 1968).
 
     Known weakness, measured (`tests/planners/graph/test_search.py`): paths turn by multiples of 45 degrees only.
     In five worlds of the catalogue they are up to 21 per cent longer than the exact shortest path among the

@@ -65,7 +65,8 @@ def differences(campaign: Campaign, jobs: Sequence[Job], folder: Path) -> tuple[
     """Return a sentence for each way in which a folder's finished runs differ from those of a campaign.
 
     Raises:
-        InputError: the folder holds another campaign, none of whose finished runs is in this one.
+        InputError: the folder holds another campaign, none of whose finished runs is in this one, or runs with another
+            default of smoothing.
     """
     former = former_grid(folder)
     if former is None or "planner_version" not in former.column_names:
@@ -80,7 +81,11 @@ def differences(campaign: Campaign, jobs: Sequence[Job], folder: Path) -> tuple[
     manifest: Mapping[str, Any] = {}
     with contextlib.suppress(InputError):  # a damaged one is replaced
         manifest = read_manifest(folder)
-    if left and left == len(finished) and manifest.get("campaign") != campaign.document.data:
+    none_kept = left and left == len(finished)
+    if none_kept and campaign.compared_by_default and set(former["smoothing"].to_pylist()) == {"clearance"}:
+        said = f"contains {_runs_of(left)} with smoothing clearance; several planners drive their own plans by default"
+        raise input_error(str(folder), f"{said}; add smoothing: clearance to resume, or use another folder (--out)")
+    if none_kept and manifest.get("campaign") != campaign.document.data:
         said = f"contains the {_runs_of(left)} of another campaign ({manifest.get('source')})"
         raise input_error(str(folder), f"{said}, none of which is in this one; use another folder (--out)")
     sentences = [
