@@ -136,7 +136,8 @@ def sweep(
         retry_crashed: whether to repeat crashed runs
         again: planners, by label or name, and outcomes whose runs are repeated; their present results are discarded
         progress: called at the start and after each run with the numbers of finished and of all runs
-        notify: called before the first run with a sentence for each way in which earlier runs differ from the campaign's
+        notify: called before the first run with a sentence for each way in which earlier runs differ from the campaign's, and
+            for each setting without effect
         work: the work on each run; None: drive it
 
     Raises:
@@ -150,8 +151,10 @@ def sweep(
     report = progress or (lambda done, size: None)
     with opened(folder) as store:
         missing = missing_runs(expansion.jobs, store.folder, retry_crashed=retry_crashed, again=again)
-        for note in differences(campaign, expansion.jobs, store.folder):
-            (notify or (lambda note: None))(note)
+        notes = differences(campaign, expansion.jobs, store.folder)
+        if notify is not None:
+            for note in (*notes, *expansion.idle_notes()):
+                notify(note)
         store.claim(_manifest(campaign, expansion))
         if missing.discarded:
             store.drop(missing.discarded)
