@@ -32,6 +32,7 @@ from antdrive.planners.plan import (
     path_cost,
 )
 
+INHERIT = "inherit antdrive.planners.IterativePlanner and yield an Iteration for each"
 WARMUP_ITERATIONS = 2  # iterations that call every kernel: the second evaporates and reuses results of the first
 
 
@@ -229,5 +230,12 @@ def as_iterative(planner: Planner) -> IterativePlanner | None:
     with planner_errors(planner):
         missing = [name for name in ("iterate", "iterations", "time_budget") if not hasattr(planner, name)]
     if missing:
-        raise PlannerError(type(planner).__name__, f"declares itself iterative, but lacks {', '.join(missing)}")
+        problem = f"declares itself iterative, but lacks {', '.join(missing)}; {INHERIT}"
+        raise PlannerError(type(planner).__name__, problem)
     return cast(IterativePlanner, planner)
+
+
+def without_iterations(planner: Planner, name: str) -> str:
+    """Return a sentence that a planner has no iterations, with what a user's class inherits to have them."""
+    own = not type(planner).__module__.startswith("antdrive.")
+    return f"{name} does not plan in iterations" + (f"; {INHERIT}" if own else "")
