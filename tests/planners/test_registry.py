@@ -29,6 +29,7 @@ from antdrive.planners import (
     record_name,
 )
 from antdrive.planners.iterative import INHERIT, without_iterations
+from antdrive.planners.registry import recorded_planner
 from antdrive.views.colours import PLANNER_STYLES
 from tests.planners.worlds_to_solve import catalogue, optimum
 
@@ -270,6 +271,13 @@ def test_subclasses_of_ants_with_and_without_options_load(tmp_path):
     (tmp_path / "mine.py").write_text(UNDECLARED)
     assert load_planner(f"{tmp_path}/mine.py:Plain", ants=7).ants == 7
     assert load_planner(f"{tmp_path}/mine.py:Own").ants == 30
+
+
+def test_a_class_that_is_loaded_is_found_by_its_name_in_records(tmp_path):
+    (tmp_path / "mine.py").write_text(UNDECLARED)
+    load_planner(f"{tmp_path}/mine.py:Own")
+    assert recorded_planner("Own", ants=9).ants == 9
+    assert recorded_planner("astar") is PLANNERS["astar"]
 
 
 def test_only_planners_of_users_are_told_what_to_inherit_for_iterations(tmp_path):

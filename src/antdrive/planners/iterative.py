@@ -17,6 +17,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import require
+from antdrive.base.plane import polyline_length
 from antdrive.planners.errors import PlannerError, planner_errors
 from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import (
@@ -211,6 +212,7 @@ class IterativePlanner(GridPlanner):
             cells=last.cells,
             cost=path_cost(last.cells, query.grid.cell),
             waypoints=last.waypoints,
+            length=None if last.waypoints is None else polyline_length(query.grid.xy(last.waypoints)),
             reason=note,
             work=work,
             work_unit=self.work_unit,

@@ -28,7 +28,7 @@ from antdrive.planners.graph.incremental import DStar, DStarLite
 from antdrive.planners.graph.search import AStar, Dijkstra
 from antdrive.planners.graph.sipp import SafeIntervals
 from antdrive.planners.plan import GridPlanner, Planner
-from antdrive.planners.user_code import is_user_code, module_hash, user_code_version, user_object
+from antdrive.planners.user_code import LOADED, is_user_code, module_hash, user_code_version, user_object
 
 #: The built-in planners.
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
@@ -70,6 +70,12 @@ def load_planner(name: str, /, **options: Any) -> Planner:
             raise InputError(f"planner: {_unknown(name, [*PLANNERS, *_plugins()])}")
         planner = _load(entry)
     return _with_options(name, planner, options)
+
+
+def recorded_planner(name: str, /, **options: Any) -> Planner:
+    """Return the planner with a name in a record: a registered one, or one of user code that this process has loaded."""
+    own = name not in PLANNERS and name in LOADED
+    return make_planner(LOADED[name], name, **options) if own else load_planner(name, **options)
 
 
 def make_planner(made: Any, name: str, /, **options: Any) -> Planner:

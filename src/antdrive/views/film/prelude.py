@@ -15,8 +15,9 @@ import numpy as np
 
 from antdrive.base import InputError
 from antdrive.base.types import Floats
-from antdrive.planners import Iteration, Query, as_iterative, load_planner
+from antdrive.planners import Iteration, Query, as_iterative
 from antdrive.planners.iterative import without_iterations
+from antdrive.planners.registry import recorded_planner
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.film.camera import Picture
 from antdrive.views.film.overlay import Values
@@ -28,7 +29,7 @@ def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
     """Repeat a run's planning and return its grid, the maximum number of iterations, and the iterations lazily."""
     record = rollout.record
     name = record.planner.name
-    loaded = load_planner(name, **record.planner.settings)
+    loaded = recorded_planner(name, **record.planner.settings)
     planner = as_iterative(loaded)
     if planner is None:
         raise InputError(f"prelude: {without_iterations(loaded, name)}")
