@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, file_lines, this_command
+from antdrive.cli.console import bar, file_lines, marked, this_command
 from antdrive.runs.results_folder import free_folder, opened
 from antdrive.views.run_folder import check_folder
 
@@ -45,7 +45,8 @@ def film_drives(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str
 def run_lines(run: Run, files: Mapping[str, str]) -> Iterator[str]:
     """Yield a run's outcome, metrics, certificate and files as lines."""
     s = run.scenario
-    yield f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}{in_brackets(run.reason)}"
+    heading = f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}{in_brackets(run.reason)}"
+    yield marked(run.succeeded, heading)
     if s.noise and not s.robot.noise.nonzero and s.map == "given" and s.known_perception.kind != "lidar":
         yield f"  --noise {s.noise:g} has no effect: the robot file of {s.robot.name} has no noise section"
     yield from margin_lines(s)

@@ -56,7 +56,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "reproduce": Command(
             "reproduce", "reproduce", "Repeat a paper's experiments and test its claims.", resumes=True, plans=True
         ),
-        "planners": Command("planners", "planners", "List the planners and their options."),
+        "planners": Command("planners", "planners", "List the planners, or describe some with their options."),
         "schema": Command("schema", "schema", "Print the JSON Schema of a file type."),
         "warm": Command("warm", "warm", "Compile all planners ahead of time."),
     }
