@@ -1,4 +1,4 @@
-# make demo   plan, drive, certify and film one world
+# make demo   ants search a path beside A*; both drive it, certified and filmed
 # make test   all tests but the long ones (make test-slow: the long ones)
 # make docs   the site, with everything that its pages show: docs/_build/html/index.html
 # make dist   wheel and sdist in dist/, checked in a fresh environment outside the checkout
@@ -40,7 +40,7 @@ $(VENV)/.docs: $(VENV)/.core
 warm: $(VENV)/.warm
 
 demo: $(VENV)/.warm
-	@$(BIN)/antdrive run forest --out $(DEMO) --film $(DEMO)/film.mp4
+	@$(BIN)/antdrive compare forest -p mmas -p astar --out $(DEMO) --film $(DEMO)/film.mp4 --prelude 5 --speed 2
 
 test: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/ruff check --quiet .

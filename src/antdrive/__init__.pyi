@@ -19,6 +19,8 @@ from .robots.robot_file import list_robots as list_robots
 from .robots.robot_file import load_robot as load_robot
 from .robots.spec import RobotSpec as RobotSpec
 from .runs.campaigns.sweeping import sweep as sweep
+from .runs.comparing import Comparison as Comparison
+from .runs.comparing import compare as compare
 from .sim.log.certificate import Certificate as Certificate
 from .sim.log.certificate import certify as certify
 from .sim.log.metrics import METRICS as METRICS

@@ -128,7 +128,7 @@ def test_every_planner_has_a_one_line_summary():
     for name, planner in PLANNERS.items():
         line = describe(planner)
         assert line.endswith("."), name
-        assert "\n" not in line
+        assert len(line) <= 80 - len("aco-han-elite  "), f"{name}: longer than a line of `antdrive planners`"
     assert "elitism 100" in describe(PLANNERS["aco-han-elite"])
     assert describe(PLANNERS["aco-han"]) == describe(AcoHan())
 

@@ -91,7 +91,10 @@ def test_wrong_questions_about_many_runs_are_refused_in_one_line(tmp_path, small
                 str(words): lambda w=words: sweep_with(**w) for words in ({"jobs": -1}, {"keep": "fialed"}, {"jobs": 0})
             },
             "no manifest": results,
-            **{text: lambda t=text: results("manifest.json", t) for text in ("{}", "[]", '{"size": "6"}')},
+            **{
+                text: lambda t=text: results("manifest.json", t)
+                for text in ("{}", "[]", '{"size": "6"}', '{"size": 6, "size": 7}')
+            },
         },
         "campaign files": {
             " ".join(text.split()): lambda t=text: test_campaign.expanded(t, tmp_path)

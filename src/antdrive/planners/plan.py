@@ -288,6 +288,7 @@ class Capabilities:
         needs_motions: plans in space and time among the query's motions, and returns a `TimedPlan`
         own_replanner: has a method `replanner(query, rng)`; other planners plan from scratch after every change
         cell_by_cell: has a method `agent(query, rng)` for driving; for other planners the robot follows the route
+        deterministic: draws no random numbers, so every seed gives the same plan
     """
 
     complete: bool = True
@@ -296,6 +297,7 @@ class Capabilities:
     needs_motions: bool = False
     own_replanner: bool = False
     cell_by_cell: bool = False
+    deterministic: bool = False
 
 
 @runtime_checkable

@@ -1,3 +1,5 @@
+from .comparing import Comparison as Comparison
+from .comparing import compare as compare
 from .failures.failure import Failure as Failure
 from .failures.failure import failure_of as failure_of
 from .failures.failure import parse_bound as parse_bound

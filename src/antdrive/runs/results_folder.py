@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from antdrive.base.atomic import LOCK, folder_lock
 from antdrive.base.errors import input_error
-from antdrive.base.files import MAX_JSON_BYTES, read_bytes, write_json
+from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes, write_json
 
 
 def free_folder(folder: Path, manifest: str, own: str) -> Path:
@@ -18,7 +17,7 @@ def free_folder(folder: Path, manifest: str, own: str) -> Path:
     if not (folder / manifest).exists():
         return folder
     try:
-        data = json.loads(read_bytes(folder / manifest, MAX_JSON_BYTES))
+        data = parse_json(read_bytes(folder / manifest, MAX_JSON_BYTES))
     except (ValueError, RecursionError):
         data = None
     same = isinstance(data, dict) and data.get("fingerprint") == own

@@ -35,32 +35,14 @@ def rollout_of(
     s: Scenario, parts: Parts, grid: Grid, answer: PlanResult, route: Route, log: Drive, limit: float, wall: float
 ) -> Rollout:
     """Assemble the log of a scenario's drive, with its time limit [s] and its wall time [s]."""
-    perception, avoidance, replanning = parts.perception, parts.avoidance, parts.replanning
     record = DriveRecord(
-        task=s.task,
-        unseen=s.unseen,
-        seed=s.seed,
-        planner=ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
+        **configuration_of(s, parts, grid, answer),
         plan=_plan_record(s, grid, answer),
-        robot=s.robot,
-        controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
-        perception=PerceptionRecord(kind=perception.kind, range_m=finite_or_none(perception.range))
-        if perception
-        else None,
-        avoidance=settings_of(avoidance) if avoidance else None,
-        replanning=settings_of(replanning) if replanning else None,
         replans=tuple(parts.guide.log),
         limiters=parts.limiters,
-        noise=s.noise,
-        margin=s.planned_margin,
         margin_choice=s.chosen.record if s.chosen is not None else None,
-        sensing=s.sensing,
-        settings=s.other_settings,
         inflate=s.inflate,
-        cell=grid.cell,
-        physics_hz=s.physics_hz,
-        control_hz=s.control_hz,
         time_limit=limit,
         outcome=log.outcome,
         reason=log.reason,
@@ -72,6 +54,31 @@ def rollout_of(
     for part in parts.logs:
         arrays |= part.logged(log, s.physics_hz // s.control_hz)
     return Rollout(**arrays, record=record)
+
+
+def configuration_of(s: Scenario, parts: Parts, grid: Grid, answer: PlanResult) -> dict[str, Any]:
+    """Return the fields of a scenario's record that a drive does not change, except its time limit and smoothing."""
+    perception, avoidance, replanning = parts.perception, parts.avoidance, parts.replanning
+    return {
+        "task": s.task,
+        "unseen": s.unseen,
+        "seed": s.seed,
+        "planner": ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
+        "robot": s.robot,
+        "controller": ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
+        "perception": PerceptionRecord(kind=perception.kind, range_m=finite_or_none(perception.range))
+        if perception
+        else None,
+        "avoidance": settings_of(avoidance) if avoidance else None,
+        "replanning": settings_of(replanning) if replanning else None,
+        "noise": s.noise,
+        "margin": s.planned_margin,
+        "sensing": s.sensing,
+        "settings": s.other_settings,
+        "cell": grid.cell,
+        "physics_hz": s.physics_hz,
+        "control_hz": s.control_hz,
+    }
 
 
 def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:

@@ -11,6 +11,7 @@ import pytest
 from antdrive import Run, run
 from antdrive.cli.commands import check
 from antdrive.cli.testing import evaluation
+from antdrive.runs.suites import Baseline
 
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
@@ -48,7 +49,7 @@ def test_a_suite_is_accepted_and_then_passes(antdrive, suite):
     older = suite.parent / "baselines" / "a" / "clear-0.json"
     older.write_text(re.sub(r' *"spl": [\d.]+,\n', "", older.read_text()))
     code, out, _ = antdrive("check", ".", "--jobs", "1", "--only", "clear")
-    assert (code, out.splitlines()[1]) == (0, "  not compared: spl; missing in the baseline: renew it")
+    assert (code, out.splitlines()[1]) == (0, "  not compared: spl; missing or null in the baseline: renew it")
 
 
 def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive, suite):
@@ -96,19 +97,19 @@ class Wrong:
 
 
 @pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
-def test_a_broken_test_hides_no_other(antdrive, suite, jobs):
+def test_a_broken_test_hides_no_other(antdrive, suite, jobs, small_run):
     """A damaged baseline, a setting that no drive takes, a planner that raises and one that is none, before a good test."""
+    Baseline.of(small_run, "raises[0]").save(suite.parent / "baselines" / "a" / "raises-0.json")
     (suite.parent / "mine.py").write_text(BROKEN)
     suite.write_text(
         "schema: 1\ndefaults: {planner: astar, world: small.yaml}\nscenarios:\n"
         "  merged: {}\n"
         "  fine-cells: {cell: 1.0e-9, baseline: false}\n"
-        "  raises: {planner: {file: mine.py, name: Raises}, baseline: false}\n"
+        "  raises: {planner: {file: mine.py, name: Raises}}\n"
         "  none: {planner: {file: mine.py, name: Wrong}, baseline: false}\n"
         "  good: {baseline: false}\n"
     )
     damaged = suite.parent / "baselines" / "a" / "merged-0.json"
-    damaged.parent.mkdir(parents=True)
     damaged.write_text("<<<<<<< HEAD\n{}\n")
     code, out, _ = antdrive("check", ".", "--jobs", jobs, "--results", "res", "--json")
     tests = {test["address"].partition("::")[2]: test for test in json.loads(out)["tests"]}
@@ -117,6 +118,7 @@ def test_a_broken_test_hides_no_other(antdrive, suite, jobs):
     assert "merged-0.json: not a baseline" in tests["merged[0]"]["faults"][0]
     assert "a.drive.yaml:5: scenarios.fine-cells.cell: " in tests["fine-cells[0]"]["faults"][0]
     assert tests["raises[0]"]["outcome"] == "planner_error"
+    assert tests["raises[0]"]["details"] == ["changed since the baseline: world"]
     assert "RuntimeError: lost" in Path(tests["raises[0]"]["files"]["traceback"]).read_text()
     assert code == 2, "of the worst: input is wrong"
 

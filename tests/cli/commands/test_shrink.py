@@ -99,7 +99,12 @@ def test_a_test_that_fails_by_its_bound_is_shrunk_until_it_would_keep_it(antdriv
     (small.parent / "a.drive.yaml").write_text(text)
     code, out, err = antdrive("shrink", "a.drive.yaml::a", "--json", "--no-figures", "--no-film", "--seconds", "1")
     assert (code, err) == (0, "")
-    assert json.loads(out)["failure"] == {"outcome": "succeeded", "touched": "nothing", "cause": "spl < 0.999"}
+    assert json.loads(out)["failure"] == {
+        "outcome": "succeeded",
+        "touched": "nothing",
+        "cause": "spl < 0.999",
+        "reason": "",
+    }
     (case,) = load_suite(next(Path("out/small-small").glob("*.drive.yaml")))
     assert case.entry.expect == {"outcome": "succeeded", "certified": True, "spl": "< 0.999"}
 
@@ -111,7 +116,12 @@ def test_a_test_that_fails_by_its_baseline_is_shrunk_while_it_is_worse(antdrive,
     replace(made, metrics={**made.metrics, "spl": 2.0}).save(small.parent / "baselines" / "a" / "a-0.json")
     code, out, err = antdrive("shrink", "a.drive.yaml::a", "--json", "--no-figures", "--no-film", "--seconds", "1")
     assert (code, err) == (0, "")
-    assert json.loads(out)["failure"] == {"outcome": "succeeded", "touched": "nothing", "cause": "spl < 1.99"}
+    assert json.loads(out)["failure"] == {
+        "outcome": "succeeded",
+        "touched": "nothing",
+        "cause": "spl < 1.99",
+        "reason": "",
+    }
 
 
 def test_the_folder_of_a_run_stands_for_its_log(refused, small_run, tmp_path):

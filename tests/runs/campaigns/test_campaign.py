@@ -344,3 +344,19 @@ def test_the_schema_names_every_key():
 def test_every_setting_of_the_schema_has_a_meaning():
     settings = campaign_schema()["properties"]["settings"]["anyOf"][0]["properties"]
     assert [key for key, one in settings.items() if not one.get("description")] == []
+
+
+@pytest.mark.parametrize(
+    ("planners", "smoothing", "driven"),
+    [
+        (["astar"], {}, ["clearance"]),
+        ([{"name": "as", "ants": [5]}], {}, ["clearance"]),
+        (["astar", "tangent"], {}, ["none"]),
+        ([{"name": "as", "ants": [5, 6]}], {}, ["none"]),
+        ([{"name": "as", "ants": {"from": 5, "to": 6, "step": 1}}], {}, ["none"]),
+        (["astar", "tangent"], {"smoothing": "clearance"}, ["clearance"]),
+    ],
+)
+def test_planners_under_comparison_drive_their_own_plans_unless_smoothing_is_given(planners, smoothing, driven):
+    expansion = expand(make_campaign({"worlds": "empty", "planners": planners, **smoothing}))
+    assert sorted({job.case.settings.fields["smoothing"] for job in expansion.jobs}) == driven

@@ -38,7 +38,7 @@ def test_each_world_is_driven_with_each_planner_as_run_does_it(worlds):
     assert [(row["world"], row["planner"]) for row in rows] == [
         ("small", "astar"), ("small", "aco-han ants=10"), ("other", "astar"), ("other", "aco-han ants=10")
     ]  # fmt: skip
-    alone = run(Scenario.of(worlds / "other.yaml", "aco-han", options={"ants": 10}))
+    alone = run(Scenario.of(worlds / "other.yaml", "aco-han", options={"ants": 10}, smoothing="none"))
     assert rows[3]["digest"] == alone.rollout.digest
     assert rows[3]["spl"] == alone.metric("spl")
     assert rows[3]["option.ants"] == 10
@@ -144,10 +144,22 @@ def test_another_campaign_does_not_take_the_place_of_the_first(tmp_path):
     part = sweep({**first, "seeds": [2, 5]}, tmp_path, jobs=0, work=work, notify=notes.append)
     assert (part.size, part.made) == (2, 1)
     assert [note.split(":")[0] for note in notes] == [
-        f"2 runs of the previous campaign (campaign) leave the table of {tmp_path}"
+        f"2 runs of the previous campaign (campaign) leave the table of {tmp_path}",
+        "seed has no effect",
     ]
     sweep(first, tmp_path, jobs=0, work=work, notify=notes.append)
     assert canonical_bytes(tmp_path) == made
+
+
+def test_a_folder_from_before_planners_drove_their_own_plans_is_refused_and_resumes_with_its_smoothing(tmp_path):
+    campaign = {"worlds": "empty", "planners": ["astar", "tangent"]}
+    old = {**campaign, "smoothing": "clearance"}
+    assert sweep(old, tmp_path, jobs=0, work=Deadly()).made == 2
+    with pytest.raises(
+        InputError, match=r"contains 2 runs with smoothing clearance.* add smoothing: clearance to resume"
+    ):
+        sweep(campaign, tmp_path, jobs=0, work=Deadly())
+    assert sweep(old, tmp_path, jobs=0, work=Deadly()).made == 0
 
 
 def test_runs_of_another_version_are_said(tmp_path, monkeypatch):
@@ -155,7 +167,7 @@ def test_runs_of_another_version_are_said(tmp_path, monkeypatch):
     sweep(campaign, tmp_path, jobs=0, work=Deadly())
     monkeypatch.setattr(sweeping, "versions", lambda: {"antdrive": "9.9"})
     sweep({**campaign, "seeds": 3}, tmp_path, jobs=0, work=Deadly(), notify=notes.append)
-    (note,) = notes
+    note, _ = notes  # and that seeds have no effect
     assert re.fullmatch(r"2 runs came from antdrive \S+, new ones come from 9\.9; a new folder repeats all", note)
 
 

@@ -44,6 +44,10 @@ def test_no_path_is_a_failure(small_scenario):
     task = Task(World("fence", (0.0, 0.0, 4.0, 3.0), fence), (0.5, 1.5, 0.0), (3.5, 1.5))
     found = failure_of(run(replace(small_scenario, task=task)))
     assert (found.outcome, found.touched) == (Outcome.NO_PATH.key, "nothing")
+    assert "of # m (radius # + margin #)" in found.cause, "to be the same in other worlds"
+    assert "of 0.21 m (radius 0.18 + margin 0.03)" in found.sentence
+    assert "#" not in found.sentence
+    assert found == replace(found, reason="")
 
 
 @pytest.mark.parametrize(("text", "holds"), [("min_clearance_m < 0.9", True), ("min_clearance_m>=.9", False)])

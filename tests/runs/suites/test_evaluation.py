@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from antdrive import METRICS, Outcome, run
 from antdrive.runs.suites import Baseline, Demands, evaluate, evaluation
-from antdrive.runs.suites.baseline import MAX_BYTES
+from antdrive.runs.suites.baseline import MAX_BYTES, configuration_hashes, fixed_hashes
 from antdrive.runs.suites.evaluation import Divergence, distances, divergence, explain, farthest, limits
 from antdrive.runs.suites.nearest import first_contact, nearest_of
 from antdrive.sim.log.metrics import Tolerance
+from antdrive.sim.log.record import hashes_of
 from antdrive.views.artefacts import MOST_FILMS, Results, baseline_rollout, file_name, remove_artefacts
 
 PLAIN = Demands()
@@ -193,7 +194,10 @@ def test_a_baseline_from_before_a_metric_compares_the_others_and_says_so(small_r
     dataclasses.replace(baseline, metrics=older).save(path)
     evaluation = evaluate(small_run, PLAIN, Baseline.load(path))
     assert evaluation.passed
-    assert evaluation.notes == ("not compared: barn; missing in the baseline: renew it",)
+    assert evaluation.notes == ("not compared: barn; missing or null in the baseline: renew it",)
+    hidden = changed(baseline, spl=None, replans=None)
+    assert evaluate(small_run, PLAIN, hidden).notes == ("not compared: spl; missing or null in the baseline: renew it",)
+    assert evaluate(small_run, dataclasses.replace(PLAIN, tolerances={"spl": None}), hidden).notes == ()
     assert evaluate(small_run, PLAIN, baseline).notes == ()
     slow = dataclasses.replace(baseline, metrics={**older, "duration_s": 1.0})
     assert [fault.split(":")[0] for fault in evaluate(small_run, PLAIN, slow).faults] == ["duration_s"]
@@ -256,6 +260,21 @@ def test_messages_name_what_changed_since_the_baseline(small_run, baseline):
     assert "so the code" not in older
     assert "changed since the baseline: robot" in text(hashes={**baseline.hashes, "robot": "0"})
     assert "versions since the baseline: numpy 1.0 -> " in text(versions={**baseline.versions, "numpy": "1.0"})
+
+
+def test_what_changed_is_named_without_a_drive_too(small_run, small_scenario, baseline, monkeypatch):
+    nowhere = run(dataclasses.replace(small_scenario, margin=1.4))
+    closed = Baseline.of(nowhere, "small[0]")
+    world = dataclasses.replace(small_scenario.task.world, obstacles=())
+    opened = run(dataclasses.replace(small_scenario, task=dataclasses.replace(small_scenario.task, world=world)))
+    assert [*explain(nowhere, baseline)] == ["changed since the baseline: settings"]
+    assert [*explain(opened, closed)] == ["changed since the baseline: world, settings"]
+    assert [*explain(opened, dataclasses.replace(closed, hashes={}))] == [], "accepted before they were kept"
+    assert [*explain(nowhere, closed)] == [], "so its demands are what changed"
+    assert configuration_hashes(small_run) == {
+        **hashes_of(dataclasses.replace(small_run.rollout.record, time_limit=1.0)),
+        **fixed_hashes(small_scenario),
+    }
 
 
 def test_what_was_touched_or_passed_is_named(small_run, collided_run):

@@ -159,8 +159,8 @@ def test_a_random_world_is_that_of_the_command_that_writes_it(tmp_path):
 def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "own_planners_of_a_test.py"
-    source = "from antdrive.planners import AStar\nclass Mine(AStar):\n    pass\nREADY = Mine()\n"
-    path.write_text(source)
+    text = "from antdrive.planners import AStar\nclass Mine(AStar):\n    pass\nREADY = Mine()\n"
+    path.write_text(text)
     for name in ("Mine", "READY"):
         for words, in_a_file in (
             (f"{{file: {path.name}, name: {name}}}", True),
@@ -173,15 +173,21 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path, monkeypat
             made = scenario_of(case)
             assert type(made.planner).__name__ == "Mine"
             assert made.planner_label == name
-            command = (
-                f"antdrive run empty --planner {path.name}:{name} --robot turtlebot --seed 0" if in_a_file else None
-            )
-            assert run_command(case) == command
-    path.write_text(source.replace("pass", "old = 1"))
+            source = path.name if in_a_file else path.stem
+            assert run_command(case) == f"antdrive run empty --planner {source}:{name} --robot turtlebot --seed 0"
+            elsewhere = run_command(case, anywhere=True)
+            assert elsewhere == f"antdrive run empty --planner {path}:{name} --robot turtlebot --seed 0"
+    installed = only(tmp_path, "world: empty, planner: {module: antdrive.planners, name: AStar}")
+    assert run_command(installed) == "antdrive run empty --planner antdrive.planners:AStar --robot turtlebot --seed 0"
+    (tmp_path / "pack").mkdir()
+    inside = only(tmp_path, "world: empty, planner: 'pack.mine:Mine'")
+    assert run_command(inside) == "antdrive run empty --planner pack.mine:Mine --robot turtlebot --seed 0"
+    assert run_command(inside, anywhere=True) is None, "antdrive check runs it"
+    path.write_text(text.replace("pass", "old = 1"))
     os.utime(path, (1, 1))
     made = scenario_of(only(tmp_path, f"world: empty, planner: {path.name}:Mine"))
     os.utime(path, (1, 1))
-    path.write_text(source.replace("pass", "old = 2"))
+    path.write_text(text.replace("pass", "old = 2"))
     os.utime(path, (1, 1))
     again = scenario_of(only(tmp_path, f"world: empty, planner: {path.name}:Mine"))
     assert (made.planner.old, again.planner.old) == (1, 2), "by its content, not by its time"

@@ -13,11 +13,12 @@ from PIL import Image
 
 from antdrive.base import InputError
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import ReplanRecord
+from antdrive.sim.log.record import ComponentRecord, ReplanRecord
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.colours import OUTCOME_LABELS
 from antdrive.views.film import film_options, overlay, playback, prelude, video
+from antdrive.views.film.comparison_film import SplitScreen, compare_film
 from antdrive.views.film.overlay import Layout, _entry_width, banner, legend_entries, legend_rows
 from antdrive.views.film.prelude import field_levels, plan_again, planning_frames
 from antdrive.views.film.shot import Shot
@@ -413,6 +414,17 @@ def test_a_prelude_shows_the_field_and_goes_on_to_the_last_iteration(walked):
     blue = [(frame[..., 2].astype(int) - frame[..., 0] > 60).sum() for frame in frames]
     assert min(blue) > 150, "the dark end of the field"
     assert (frames[0] != frames[-1]).any()
+
+
+def test_a_comparisons_prelude_shows_ants_at_work_beside_a_plan_without_a_field(walked, tmp_path):
+    other = changed(walked, "record", planner=ComponentRecord(name="astar", settings={}))
+    screen = SplitScreen([walked, other], "top", (640, 360), [("as",), ("astar",)])
+    first, _, last = screen.planning(3)
+    left, right = np.s_[60:, :318], np.s_[:, 322:]
+    assert (first[left] != last[left]).any()
+    assert (first[right] == last[right]).all()
+    with pytest.raises(InputError, match="no planner of the comparison has a field"):
+        compare_film([other, other], tmp_path / "c.gif", prelude=1)
 
 
 def test_a_film_is_longer_by_its_prelude(walked, tmp_path):

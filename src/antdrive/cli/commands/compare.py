@@ -1,7 +1,6 @@
 """`antdrive compare`."""
 
-import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,20 +11,20 @@ from antdrive.base.files import file_name, write_json
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
 from antdrive.cli.console import file_lines, planning, print_error, show, table
-from antdrive.cli.entrants import Entrant, check_worlds, entrants_of, repeat_command
+from antdrive.cli.entrants import check_worlds, entrants_of, repeat_command
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, SUCCEEDED
 from antdrive.cli.options import argument, option
-from antdrive.cli.output import film_drives, results_folder
+from antdrive.cli.output import film_drives, print_idle_settings, results_folder
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.runs.comparing import (
     COMPARED,
     PLANNER_FAULT,
-    Compared,
+    Comparison,
+    compare_scenarios,
     difference_cells,
-    differences,
     mark_of,
-    same_drives,
 )
+from antdrive.sim.settings import COMPARED_SMOOTHING
 from antdrive.views.run_folder import check_film, check_folder, write_run
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
 MARKER = "comparison.json"
 
 
-@options.with_settings(("smoothing", "noise", "margin", "cell", "seed"))
+@options.with_settings(("smoothing", "noise", "margin", "cell", "seed"), smoothing=COMPARED_SMOOTHING)
 def compare(
     *,
     context: typer.Context,
@@ -65,6 +64,7 @@ def compare(
     out: options.Out = None,
     figures: options.Figures = True,
     film: Annotated[Path | None, option("FILE", "Film the first world side by side: .mp4, .gif or .webp.")] = None,
+    prelude: options.Prelude = 0.0,
     speed: options.Speed = 1.0,
     query: CampaignQuery,
     json: options.Json = False,
@@ -72,11 +72,13 @@ def compare(
 ) -> int:
     """Compare planners on worlds or from campaign results.
 
-    Worlds: pairs the planners by world and seed; figures and film show the first pair. Exit code 0: every run succeeded.
+    Worlds: pairs the planners by world and seed; planners drive their own plans, unless --smoothing is given. Figures and film
+    show the first pair. Exit code 0: every run succeeded.
     Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
     from antdrive.cli.groups import print_exception
     from antdrive.planners import PlannerError
+    from antdrive.sim.pipeline import run
 
     if campaigns := campaign_folders(worlds, context, query):
         compare_campaigns(campaigns, planner or (), query, json)
@@ -92,65 +94,57 @@ def compare(
     names = {world: scenario.task.world.name for (world, _), scenario in scenarios.items()}
     if len(set(names.values())) < len(worlds):
         raise InputError(f"{' '.join(worlds)}: world names must be unique")
-    cases = [(world, number) for world in worlds for number in range(given["seed"], given["seed"] + seeds)]
     if film is not None:
         check_film(film)
-    marks = {f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}
-    mark = mark_of(marks, [(names[world], number) for world, number in cases])
+    elif prelude:
+        raise InputError("--prelude: needs --film")
+    print_idle_settings(list(scenarios.values()), {"seed"} if seeds > 1 else ())
+    numbers = range(given["seed"], given["seed"] + seeds)
+    cases = [(names[world], number) for world in worlds for number in numbers]
+    mark = mark_of({f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}, cases)
     usual = Path("out") / file_name(f"compare-{'-'.join(names.values())}"[:100])
     with results_folder(out, usual, MARKER, mark, write_manifest=False) as (folder, facts):
-        runs: list[Compared] = []
-        logs: dict[str, Rollout] = {}
-        for world, seed in cases:
-            part = folder if len(cases) == 1 else folder / file_name(f"{names[world]}-{seed}")
-            is_first = (world, seed) == cases[0]
-            for entrant in entrants:
-                scenario = dataclasses.replace(scenarios[world, entrant], seed=seed)
-                result = _drive(scenario, entrant, part / entrant.label)
-                if not runs:  # mark the folder early, so that an interrupted comparison owns its results
-                    write_json(folder / MARKER, facts)
-                if isinstance(result, PlannerError):
-                    print_exception(result)
-                    runs.append(Compared.failed(entrant.label, scenario, result))
-                    continue
-                command = repeat_command(scenario, entrant, world, robot, ends.words)
-                write_run(result, part / entrant.label, command, figures=figures and is_first)
-                runs.append(Compared.of(entrant.label, result, folder=str(part / entrant.label)))
-                if is_first and result.rollout is not None:
-                    logs[entrant.label] = result.rollout
-        files = (
-            {run.label: run.facts["folder"] for run in runs if run.facts["folder"]}
-            if len(cases) == 1
-            else {"folder": str(folder)}
-        )
-        comparison = {"differences": differences(runs), "same": same_drives(runs, given["smoothing"])}
-        comparison["drives"] = [{"label": run.label, **run.facts} for run in runs]
-        write_json(folder / MARKER, {**facts, **comparison})
-        files |= _views(logs, folder, film, speed, figures)
-    results = {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **comparison, "files": files}
-    show(json, results, _lines(runs, len(cases) > 1, comparison, files))
-    if len(logs) < 2:
-        planned = "only one planner" if logs else "no planner"
+        of, words = {entrant.label: entrant for entrant in entrants}, {name: world for world, name in names.items()}
+
+        def attempt(label: str, scenario: "Scenario") -> "tuple[Run | PlannerError, str | None]":
+            """Drive with a progress bar, and write the run."""
+            case = scenario.task.world.name, scenario.seed
+            part = (folder if len(cases) == 1 else folder / file_name("{}-{}".format(*case))) / label
+            check_folder(part)
+            result: Run | PlannerError
+            with planning(f"{case[0]}, seed {case[1]}: {label}"):
+                try:
+                    result = run(scenario)
+                except PlannerError as error:
+                    result = error
+            write_json(folder / MARKER, facts)  # early, so that an interrupted comparison owns its results
+            if isinstance(result, PlannerError):
+                print_exception(result)
+                return result, None
+            command = repeat_command(scenario, of[label], words[case[0]], robot, ends.words)
+            write_run(result, part, command, figures=figures and case == cases[0])
+            return result, str(part)
+
+        by_label = {entrant.label: [scenarios[world, entrant] for world in worlds] for entrant in entrants}
+        compared = compare_scenarios(by_label, numbers, attempt)
+        first = compared.runs[: len(entrants)]
+        folders = {run.label: run.facts["folder"] for run in first if run.facts["folder"]}
+        files = folders if len(cases) == 1 else {"folder": str(folder)}
+        write_json(folder / MARKER, {**facts, **compared.as_dict()})
+        files |= _views(compared.logs, folder, film, figures, speed=speed, prelude=prelude)
+    results = {"runs": {run.label: run.facts for run in first}, **compared.as_dict(), "files": files}
+    show(json, results, _lines(compared, files))
+    if len(compared.logs) < 2:
+        planned = "only one planner" if compared.logs else "no planner"
         print_error(f"{planned} found a path: no comparison figure or film")
-    if any(run.facts["outcome"] == PLANNER_FAULT for run in runs):
+    if any(run.facts["outcome"] == PLANNER_FAULT for run in compared.runs):
         return INTERNAL_ERROR
-    return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
+    return SUCCEEDED if all(run.facts["succeeded"] for run in compared.runs) else FAILED
 
 
-def _drive(scenario: "Scenario", entrant: Entrant, folder: Path) -> "Run | PlannerError":
-    """Drive with a progress bar, after checking that the results can be written. Return the run, or the planner's error."""
-    from antdrive.planners import PlannerError
-    from antdrive.sim.pipeline import run
-
-    check_folder(folder)
-    with planning(f"{scenario.task.world.name}, seed {scenario.seed}: {entrant.label}"):
-        try:
-            return run(scenario)
-        except PlannerError as error:
-            return error
-
-
-def _views(logs: "dict[str, Rollout]", folder: Path, film: Path | None, speed: float, figures: bool) -> dict[str, str]:
+def _views(
+    logs: "Mapping[str, Rollout]", folder: Path, film: Path | None, figures: bool, **options: float
+) -> dict[str, str]:
     """Write the figure and the film of the first world and seed. Return their paths."""
     files: dict[str, str] = {}
     if len(logs) > 1 and figures:
@@ -159,21 +153,15 @@ def _views(logs: "dict[str, Rollout]", folder: Path, film: Path | None, speed: f
         comparison_figure(logs, folder / "comparison.png")
         files["figure"] = str(folder / "comparison.png")
     if len(logs) > 1 and film is not None:
-        files["film"] = film_drives(list(logs.values()), film, speed=speed, titles=list(logs))["file"]
+        files["film"] = film_drives(list(logs.values()), film, titles=list(logs), **options)["file"]
     return files
 
 
-def _lines(runs: Sequence[Compared], many: bool, facts: Mapping[str, Any], files: Mapping[str, str]) -> Iterator[str]:
-    yield from table(
-        (*(("world", "seed") if many else ()), "planner", *COMPARED.values(), "outcome"),
-        (
-            (*((run.world, str(run.seed)) if many else ()), run.label, *run.cells, str(run.facts["sentence"]))
-            for run in runs
-        ),
-    )
-    if many:
-        yield f"differences from {runs[0].label} where both succeeded: median (minimum to maximum)"
+def _lines(compared: Comparison, files: Mapping[str, str]) -> Iterator[str]:
+    yield from table(compared.headings, compared.rows)
+    if len(compared.cases) > 1:
+        yield f"differences from {compared.labels[0]} where both succeeded: median (minimum to maximum)"
         heads = ("planner", "succeeded", "pairs", *COMPARED.values())
-        yield from table(heads, map(difference_cells, facts["differences"]))
-    yield from facts["same"]
+        yield from table(heads, map(difference_cells, compared.differences))
+    yield from compared.same
     yield from file_lines(files)

@@ -41,8 +41,8 @@ def render(
     logs = [Rollout.load(log_at(path)) for path in rollouts]
     shape = {} if size is None else {"size": parse_size(size)}
     one_frame = at is not None or out.suffix.lower() == ".png"
-    if len(logs) > 1 and (prelude or one_frame):
-        raise InputError(f"--out {out}: several rollouts need a film format and no --prelude")
+    if len(logs) > 1 and one_frame:
+        raise InputError(f"--out {out}: several rollouts need a film format")
     compile_once()
     if one_frame:
         from antdrive.views.film.video import still
@@ -50,6 +50,5 @@ def render(
         still(logs[0], out, at, camera=camera, **shape, note=caption(logs[0]))
         facts: dict[str, Any] = {"file": str(out), "frames": 1}
     else:
-        begins = {} if len(logs) > 1 else {"prelude": prelude}
-        facts = film_drives(logs, out, camera=camera, **shape, fps=fps, speed=speed, **begins)
+        facts = film_drives(logs, out, camera=camera, **shape, fps=fps, speed=speed, prelude=prelude)
     show(json, facts, file_lines({"film": facts["file"]}))

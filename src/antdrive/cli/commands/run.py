@@ -9,7 +9,7 @@ from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, planning, show, stage, this_command
 from antdrive.cli.options import flag, option
-from antdrive.cli.output import film_drives, run_lines
+from antdrive.cli.output import film_drives, print_idle_settings, run_lines
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.sim.settings import SETTINGS
 from antdrive.views.run_folder import check_film, check_folder, default_folder, write_result, write_run
@@ -46,13 +46,14 @@ def run(
     folder = out or default_folder(scenario)
     _check_views(scenario, film, prelude, gui)
     check_folder(folder)
+    print_idle_settings([scenario])
     compile_once()
     with folder_lock(folder):
         with planning(f"planning with {scenario.planner_name}"), keep_best():  # Ctrl-C keeps the best path so far
             planned = plan(scenario)
         with bar("driving") as progress:
             result = drive(scenario, planned=planned, progress=progress)
-        with stage("certified; writing log and figures"):
+        with stage("writing log and figures"):
             report = write_run(result, folder, this_command(), vector=vector, figures=figures)
         if film is not None and result.rollout is not None:
             filmed = film_drives([result.rollout], film, prelude=prelude)["file"]

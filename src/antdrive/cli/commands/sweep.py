@@ -95,7 +95,7 @@ def sweep(
     rest: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
     if dry_run or out is None:
         notes = () if out is None else differences(requested, expansion.jobs, out)
-        for note in notes:
+        for note in (*notes, *expansion.idle_notes()):
             print_error(note)
         size = len(expansion.jobs)
         missing = size if out is None else len(missing_runs(expansion.jobs, out, **rest).jobs)
@@ -146,7 +146,9 @@ def _size_lines(expansion: "Expansion", missing: int) -> Iterator[str]:
         plural = count != 1 or " " in name or name == "settings"
         return f"{count} {name if plural else name.removesuffix('s')}"
 
-    yield " x ".join(counted(name, count) for name, count in expansion.counts.items())
+    smoothings = dict.fromkeys(str(job.case.settings.fields["smoothing"]) for job in expansion.jobs)
+    values = {"smoothing": f"smoothing {', '.join(smoothings)}"}
+    yield " x ".join(values.get(name) or counted(name, count) for name, count in expansion.counts.items())
     omitted = f"; {expansion.duplicates} duplicate combinations omitted" if expansion.duplicates else ""
     yield f"{len(expansion.jobs)} runs, {missing} missing{omitted}"
 

@@ -10,6 +10,7 @@ import shlex
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -17,13 +18,14 @@ from typing import Any, Literal, TypeAlias
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PlannerError
 from antdrive.runs.pool import Pool, WorkerDied
-from antdrive.runs.suites.baseline import Baseline
+from antdrive.runs.suites.baseline import Baseline, fixed_hashes
 from antdrive.runs.suites.demands import Demands
-from antdrive.runs.suites.evaluation import RAISED, Evaluation, evaluate, explain, unmet_demands
+from antdrive.runs.suites.evaluation import RAISED, Evaluation, changes, evaluate, explain, unmet_demands
 from antdrive.runs.suites.scenarios import run_command, scenario_of
 from antdrive.runs.suites.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
+from antdrive.sim.scenario import Scenario
 from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, write_artefacts, write_traceback
 
 #: Baselines to write: none, only missing ones, or all.
@@ -138,10 +140,18 @@ class Check:
             wall_s=wall + (rollout.record.times.drive_wall_s if rollout else 0.0) + time.perf_counter() - started,
         )
 
-    def failed_early(self, outcome: str, fault: str, error: BaseException) -> CheckResult:
+    def changes(self, s: Scenario) -> tuple[str, ...]:
+        """Return what has changed in a scenario since its baseline, a sentence each, if its planner raised an error."""
+        with suppress(InputError):
+            if self.baseline is not None and (earlier := Baseline.own(self.baseline, self.name)) is not None:
+                return tuple(changes(s, fixed_hashes(s), earlier, ""))
+        return ()
+
+    def failed_early(
+        self, outcome: str, fault: str, error: BaseException, details: tuple[str, ...] = ()
+    ) -> CheckResult:
         """Return the result of a test ended by an error, with a traceback file unless the input was invalid."""
         files: dict[str, str] = {}
-        details: tuple[str, ...] = ()
         if self.folder is not None:
             try:
                 if outcome == INVALID_INPUT:
@@ -149,7 +159,7 @@ class Check:
                 else:
                     files = write_traceback(self.folder, error, self.commands)
             except (InputError, OSError) as problem:
-                details = (f"results: {problem}",)
+                details = (*details, f"results: {problem}")
         return CheckResult(
             address=self.address,
             passed=False,
@@ -223,7 +233,7 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     try:
         return check.evaluate(drive(scenario))
     except PlannerError as error:
-        return check.failed_early(RAISED, str(error), error)
+        return check.failed_early(RAISED, str(error), error, check.changes(scenario))
 
 
 def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:

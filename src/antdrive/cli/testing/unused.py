@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from antdrive.base.errors import InputError
-from antdrive.base.files import MAX_JSON_BYTES, read_bytes
+from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes
 from antdrive.runs.suites.names import select
 from antdrive.runs.suites.suite import BASELINES, SUFFIX, SuiteCase, baseline_folder, load_suite, shown_path
 
@@ -66,7 +65,7 @@ def _of_module(module: Path) -> Iterator[tuple[Path, str]]:
         if path.resolve() in used:
             continue
         try:
-            yield path, str(json.loads(read_bytes(path, MAX_JSON_BYTES))["case"])
+            yield path, str(parse_json(read_bytes(path, MAX_JSON_BYTES))["case"])
         except (ValueError, KeyError, TypeError, RecursionError):
             yield path, ""
 

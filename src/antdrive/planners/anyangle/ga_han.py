@@ -99,9 +99,9 @@ def seeded(rng: np.random.Generator) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class GaHan(ViaPointPlanner):
-    """A genetic algorithm on a few via points, refilled with random chromosomes (Han 2007).
+    """A genetic algorithm on a few via points.
 
-    Section 4.1 of the thesis: a chromosome is a sequence of via points on free cells. Each generation selects by
+    Han 2007, section 4.1: a chromosome is a sequence of via points on free cells. Each generation selects by
     1 / length, crosses, mutates, eliminates chromosomes that touch an obstacle and refills the population at
     random. The defaults are those of the thesis. `field` counts the chromosomes of the last population that
     pass each cell.

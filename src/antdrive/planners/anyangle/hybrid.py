@@ -29,9 +29,9 @@ ROUNDS = 20  # tightening passes over the via points of a new path
 
 @dataclass(frozen=True, kw_only=True)
 class Hybrid(ViaPointPlanner):
-    """Ants find the corridor, then a genetic algorithm moves via points freely within it (after Han 2007).
+    """Ants find a corridor; a genetic algorithm finds the line in it.
 
-    Section 6.3 of the thesis only proposes the combination; the details are antdrive's. `ant_runs` colonies run
+    Section 6.3 of Han 2007 only proposes the combination; the details are antdrive's. `ant_runs` colonies run
     in sequence, each for `ant_iterations` or until its first ant arrives, whichever is later. The best of their
     paths, pulled straight, seeds the population; the remaining `iterations` are generations. The history's means
     and counts and `field` describe first the ants, then the chromosomes. The history's best is always the length

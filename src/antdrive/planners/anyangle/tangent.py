@@ -141,11 +141,12 @@ def shortest(
 
 @dataclass(frozen=True, kw_only=True)
 class Tangent(GridPlanner):
-    """The shortest path in the plane, over the tangents between inflated discs: a lower bound for every planner.
+    """The shortest path in the plane: a lower bound for every planner.
 
-    A* on the tangent graph of Liu & Arimoto (1992); the result is exact. It plans among the discs of the query's
-    world, so it may find a path that the grid is too coarse for. `cells` are then the cells under the path, and
-    `cost` is infinite. Ends that lack the clearance connect through their cells' centres, as for all planners.
+    A* on the tangents between inflated discs (Liu & Arimoto 1992); the result is exact. It plans among the discs
+    of the query's world, so it may find a path that the grid is too coarse for. `cells` are then the cells under
+    the path, and `cost` is infinite. Ends that lack the clearance connect through their cells' centres, as for
+    all planners.
 
     Known weaknesses, measured (docs/notebook/planner-quality.md): the path grazes discs at exactly the clearance,
     which leaves a driving robot no margin. The number of tangents grows with the square of the number of discs.
@@ -165,7 +166,7 @@ class Tangent(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(needs_world=True)
+        return Capabilities(needs_world=True, deterministic=True)
 
     def __post_init__(self) -> None:
         require("bulge", self.bulge, above=0)

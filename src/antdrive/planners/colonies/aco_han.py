@@ -23,9 +23,9 @@ from antdrive.planners.colonies.colony import (
 
 @dataclass(frozen=True, kw_only=True)
 class AcoHan(Colony):
-    """Ants guided by pheromone on cells and by the direction of the goal (Han 2007).
+    """Ants led by pheromone on cells and by the goal.
 
-    Section 4.2 of the thesis: the weight of a move is the next cell's fraction of the pheromone plus alpha times
+    Han 2007, section 4.2: the weight of a move is the next cell's fraction of the pheromone plus alpha times
     the cosine between the move and the direction of the goal (eq. 4.2.1). Pheromone evaporates (eq. 4.2.2), every
     ant that arrives deposits on its cells (eq. 4.2.3), and an elite deposits more (eq. 4.2.4). The thesis'
     program differs from its equations; `form` selects one of them.

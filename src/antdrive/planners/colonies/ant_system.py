@@ -33,7 +33,7 @@ STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
 
 @dataclass(frozen=True, kw_only=True)
 class AntSystem(Colony):
-    """Ants guided by pheromone on arcs and by a heuristic: the ant system with the setup of ibraheem2016.
+    """Ant system: ants guided by pheromone on arcs and a heuristic.
 
     Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q / length
     on its arcs. The defaults are those of ibraheem2016. suganthi2019 uses beta 1 and heuristic "step"; lee2008
@@ -130,10 +130,10 @@ class AntSystem(Colony):
 
 @dataclass(frozen=True, kw_only=True)
 class AgeingAnts(AntSystem):
-    """An ant system in which older ants deposit less pheromone: the modified ACO of ibraheem2016, section 3.2.
+    """An ant system in which older ants deposit less pheromone.
 
-    Ant m of M deposits Q_m / length, and Q_m falls from Q_max to Q_min with m (eq. 5). The paper gives no
-    values for the two bounds.
+    The modified ACO of ibraheem2016, section 3.2: ant m of M deposits Q_m / length, and Q_m falls from Q_max to
+    Q_min with m (eq. 5). The paper gives no values for the two bounds.
 
     Known weaknesses, measured (docs/papers/ibraheem2016.md): as in `AntSystem`, ants die in dead ends, and
     ageing does not pay off. On maps of 30 x 30 and 40 x 40 cells paths are longer than those of `AntSystem` in
@@ -170,12 +170,13 @@ class AgeingAnts(AntSystem):
 
 @dataclass(frozen=True, kw_only=True)
 class ExploringAnts(AntSystem):
-    """Common ants, exploratory ants that avoid pheromone, and an elite: the improved ACO of suganthi2019.
+    """Common ants, ants that avoid pheromone, and an elite.
 
-    Section IV of suganthi2019: common ants choose by tau^alpha eta^beta (eq. 1), exploratory ants by eta^beta
-    / tau^alpha (eq. 5), and the best ants of an iteration, of either kind, deposit more (eq. 7-8). According to the
-    text below eq. 7, the second term is the deposit of common ants, and the third has the factor alpha = 1. Both are
-    the defaults here. With `depositors="all"` exploratory ants deposit like common ones.
+    The improved ACO of suganthi2019, section IV: common ants choose by tau^alpha eta^beta (eq. 1), exploratory
+    ants by eta^beta / tau^alpha (eq. 5), and the best ants of an iteration, of either kind, deposit more (eq.
+    7-8). According to the text below eq. 7, the second term is the deposit of common ants, and the third has the
+    factor alpha = 1. Both are the defaults here. With `depositors="all"` exploratory ants deposit like common
+    ones.
 
     The paper does not define the behaviour in dead ends nor whether loops are cut. With `backtrack=False` and
     `shortcut=False` ants die in dead ends and walk in loops. docs/papers/suganthi2019.md compares the
@@ -271,7 +272,7 @@ def normalised(eta: Floats, beta: float) -> Weights:
 
 @dataclass(frozen=True, kw_only=True)
 class MaxMinAnts(AntSystem):
-    """MAX-MIN ant system: one ant deposits per iteration, on trails kept between two bounds.
+    """MAX-MIN ant system: one ant deposits, on trails between bounds.
 
     Stützle & Hoos 2000: the depositing ant is the best of the iteration or the best so far (section 5), the
     bounds follow the best tour (eq. 7 and 11), and all trails start at the upper bound (section 3.3) and return

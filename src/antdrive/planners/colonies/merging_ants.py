@@ -28,7 +28,7 @@ from antdrive.planners.plan import Capabilities, PlanResult, Query
 
 @dataclass(frozen=True, kw_only=True)
 class MergingAnts(MaxMinAnts):
-    """MAX-MIN ants that avoid detours, scouts beside them, and the shortest path over all arcs they used.
+    """MAX-MIN ants and scouts; the shortest path over all their arcs.
 
     Bounds, backtracking, shortcuts and resets are those of `MaxMinAnts`. Additional rules:
 

@@ -28,12 +28,12 @@ ONLINE_FACTOR = 2.0  # factor on alpha per cycle of an agent; large, because the
 
 @dataclass(frozen=True, kw_only=True)
 class MaxMinDStar(GridPlanner):
-    """One ant follows pheromone, which spreads from the goal like the costs of D*: hasan's improved max-min algorithm.
+    """One ant follows pheromone spread from the goal like D*'s costs.
 
-    The ant always takes the neighbour with the smallest `pheromone^alpha * distance^beta` (eq. 1, as in the
-    paper's program). Because of the straight distance to the goal, the ant may cycle in front of a wall. The
-    author chose other exponents for such maps; here the rule `exponents` serves all maps, and the ant always arrives. The
-    result's `reason` reports the changes.
+    hasan's improved max-min algorithm: the ant always takes the neighbour with the smallest `pheromone^alpha *
+    distance^beta` (eq. 1, as in the paper's program). Because of the straight distance to the goal, the ant may
+    cycle in front of a wall. The author chose other exponents for such maps; here the rule `exponents` serves all
+    maps, and the ant always arrives. The result's `reason` reports the changes.
 
     Known weaknesses, measured (docs/papers/hasan.md): with alpha 1 and beta 1, alpha must be raised in five of
     the paper's six environments; with the paper's exponents, in none of them. Paths are up to 11 per cent longer than the
@@ -64,7 +64,7 @@ class MaxMinDStar(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(cell_by_cell=True)
+        return Capabilities(cell_by_cell=True, deterministic=True)
 
     def agent(self, query: Query, rng: np.random.Generator) -> PheromoneAgent:
         """Return hasan's robot at the query's start; it does not use `rng`."""

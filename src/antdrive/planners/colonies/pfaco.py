@@ -28,13 +28,14 @@ FORMS, FIELDS, MEMORIES = ("local", "rise", "letter"), ("start", "goal"), ("tabu
 
 @dataclass(frozen=True, kw_only=True)
 class PotentialFieldAnts(IterativePlanner):
-    """Ants guided by a potential field, with ranked paths and without generations: lee2008's improved ACO.
+    """Ants guided by a potential field, with ranked paths.
 
-    Section IV of lee2008: an ant chooses the next cell by pheromone^alpha U_ij^beta (eq. 13). The potential
-    rises away from the start (eq. 9) and falls near obstacles (eq. 11); the initial pheromone mixes potential
-    and chance (eq. 14). All ants move by one cell per tick. An ant that arrives enters its path into a ranking
-    list by length times number of cells (eq. 15), deposits by rank and restarts. Converged pheromone is rebuilt
-    from the list (section IV-B). An iteration here ends when `ants` walks have ended.
+    The improved ACO of lee2008, section IV, has no generations: an ant chooses the next cell by pheromone^alpha
+    U_ij^beta (eq. 13). The potential rises away from the start (eq. 9) and falls near obstacles (eq. 11); the
+    initial pheromone mixes potential and chance (eq. 14). All ants move by one cell per tick. An ant that arrives
+    enters its path into a ranking list by length times number of cells (eq. 15), deposits by rank and restarts.
+    Converged pheromone is rebuilt from the list (section IV-B). An iteration here ends when `ants` walks have
+    ended.
 
     The paper leaves three points open, each an option here: the definition of U_ij (`form`), whether an ant may
     return to a cell (`memory`), and the constants from `attraction` on. docs/papers/lee2008.md compares the

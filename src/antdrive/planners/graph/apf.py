@@ -15,12 +15,12 @@ from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanSt
 
 @dataclass(frozen=True, kw_only=True)
 class PotentialField(GridPlanner):
-    """Descent of the potential of an attracting goal and repelling obstacles (Lee et al. 2008, III); may get stuck.
+    """Descent in a potential field, which may end in a local minimum.
 
-    The planner follows the potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0
-    (eq. 11) along the allowed move of steepest descent. At a local minimum it stops and reports the cell; it
-    cannot cycle, as every step descends. The paper gives no values for the gains and d0; with these
-    defaults, runs arrive most often among random cylinders.
+    The goal attracts and obstacles repel (Lee et al. 2008, III). The planner follows the potential U = 1/2 k_att
+    d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0 (eq. 11) along the allowed move of steepest descent.
+    At a local minimum it stops and reports the cell; it cannot cycle, as every step descends. The paper gives no
+    values for the gains and d0; with these defaults, runs arrive most often among random cylinders.
 
     Known weaknesses, measured (docs/notebook/planner-quality.md): local minima. In forests of cylinders 9 of 10
     runs arrive on 20 x 20 cells and 2 of 10 on 50 x 50 and on 100 x 100; with a quarter of single cells blocked,
@@ -48,7 +48,7 @@ class PotentialField(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner. It may miss an existing path."""
-        return Capabilities(complete=False)
+        return Capabilities(complete=False, deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         from antdrive.planners.graph import _kernels_apf  # imported here because it loads the compiler

@@ -218,7 +218,7 @@ class IncrementalPlanner(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(own_replanner=True)
+        return Capabilities(own_replanner=True, deterministic=True)
 
     @abc.abstractmethod
     def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:
@@ -230,7 +230,9 @@ class IncrementalPlanner(GridPlanner):
 
 @dataclass(frozen=True, kw_only=True)
 class DStar(IncrementalPlanner):
-    """The shortest path over the grid's moves by basic D* (Stentz 1994), repaired when the map changes.
+    """The shortest path, repaired when the map changes, by basic D*.
+
+    The algorithm is that of Stentz 1994.
 
     Known weakness, measured (docs/notebook/planning-speed.md): the search has no heuristic. A first plan on 200 x
     200 cells among discs takes 4.4 ms, four times as long as with D* Lite; the median repair takes 43 us against
@@ -268,7 +270,9 @@ class DStarSearch(IncrementalSearch):
 
 @dataclass(frozen=True, kw_only=True)
 class DStarLite(IncrementalPlanner):
-    """The shortest path over the grid's moves by D* Lite (Koenig & Likhachev 2002), repaired when the map changes.
+    """The shortest path, repaired when the map changes, by D* Lite.
+
+    The algorithm is that of Koenig & Likhachev 2002.
 
     Known weakness, measured (docs/notebook/planning-speed.md): some repairs cost nearly as much as a new search.
     On 200 x 200 cells among discs one repair in a hundred takes 0.66 ms or more, a plan from scratch 1.0 ms; with

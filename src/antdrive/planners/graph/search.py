@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query
+from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query
 
 UNREACHABLE = "no sequence of allowed moves leads from the start to the goal"
 
@@ -20,18 +20,30 @@ class Dijkstra(GridPlanner):
     among cylinders it takes three times as long as A*. Its paths share A*'s weakness.
     """
 
+    @property
+    def capabilities(self) -> Capabilities:
+        """Capabilities and requirements of this planner."""
+        return Capabilities(deterministic=True)
+
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return shortest(query, informed=False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class AStar(GridPlanner):
-    """The shortest path over the grid's moves, by A* with the octile heuristic (Hart, Nilsson & Raphael 1968).
+    """The shortest path over the grid's moves, by A*.
+
+    The octile heuristic guides the search (Hart, Nilsson & Raphael 1968).
 
     Known weakness, measured (`tests/planners/graph/test_search.py`): paths turn by multiples of 45 degrees only.
     In five worlds of the catalogue they are up to 21 per cent longer than the exact shortest path among the
     discs (`tangent`), 12 per cent in the median; on open ground at most 8.2 per cent.
     """
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Capabilities and requirements of this planner."""
+        return Capabilities(deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return shortest(query, informed=True)

@@ -30,9 +30,10 @@ UNIT = "safe intervals expanded"
 
 @dataclass(frozen=True, kw_only=True)
 class SafeIntervals(GridPlanner):
-    """The earliest-arrival path among movers with known motions, with waits where they help: SIPP.
+    """The earliest arrival among movers with known motions, by SIPP.
 
-    The motions are those of the query; without any, the path is the shortest. The plan is a `TimedPlan`.
+    The plan waits where that helps. The motions are those of the query; without any, the path is the shortest.
+    The plan is a `TimedPlan`.
 
     Known weaknesses, measured (docs/notebook/planning-speed.md): all motions must be known in advance, and the
     effort grows with their number. Among 40 movers in circles the median plan takes 43 ms on 50 x 50 cells and 92
@@ -55,7 +56,7 @@ class SafeIntervals(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner: it needs the movers' motions."""
-        return Capabilities(needs_motions=True)
+        return Capabilities(needs_motions=True, deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return plan_in_time(

@@ -25,7 +25,7 @@ from antdrive.sim.forms import (
     written_default,
     written_kind,
 )
-from antdrive.sim.settings import SETTINGS
+from antdrive.sim.settings import COMPARED_SMOOTHING, SETTINGS
 
 MOST_SEEDS = 1_000_000  # as a count
 
@@ -75,7 +75,8 @@ def _axes() -> dict[str, Any]:
         kind, usual = written_kind(one), written_default(one)
         listed = Annotated[list[kind], Field(min_length=1), BeforeValidator(_listed)]  # type: ignore[valid-type]
         schema = WithJsonSchema(_of(TypeAdapter(kind).json_schema()))
-        fields[one.key] = (Annotated[listed, schema], Field([usual.default], description=usual.description))
+        more = f"; for several planners by default {COMPARED_SMOOTHING}" if one.name == "smoothing" else ""
+        fields[one.key] = (Annotated[listed, schema], Field([usual.default], description=f"{usual.description}{more}"))
     return fields
 
 
@@ -208,8 +209,22 @@ class Campaign:
     places: tuple[Location, ...]
 
     def values(self, name: str) -> list[Any]:
-        """Return the values of a setting with its own key."""
+        """Return the values of a setting with its own key; compared planners drive their own plans by default."""
+        if name == "smoothing" and self.compared_by_default:
+            return [COMPARED_SMOOTHING]
         return list(getattr(self.entry, AXES[name].key))
+
+    @property
+    def compared_by_default(self) -> bool:
+        """Whether the campaign lists several planners, or several values of a planner's option, and no smoothing."""
+        entries = self.entry.planners
+        several = len(entries) > 1 or any(
+            isinstance(value, dict) or (isinstance(value, list) and len(value) > 1)
+            for entry in entries
+            if isinstance(entry, dict)
+            for value in entry.values()
+        )
+        return several and AXES["smoothing"].key not in self.entry.model_fields_set
 
     def error(self, location: Location, problem: str) -> InputError:
         """Return the error for a value: file, line, key and problem.

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError, input_error
-from antdrive.base.files import MAX_JSON_BYTES, open_regular, read_bytes
+from antdrive.base.files import MAX_JSON_BYTES, open_regular, parse_json, read_bytes
 from antdrive.base.optional import parquet_library
 from antdrive.runs import results_folder
 from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, result_schema, result_table
@@ -149,7 +149,7 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
         raise input_error(str(folder), f"no {MANIFEST} here; antdrive sweep writes it")
     text = read_bytes(path, MAX_JSON_BYTES, "a campaign's manifest")
     try:
-        data = json.loads(text.decode("utf-8"))
+        data = parse_json(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:
         raise input_error(str(path), f"cannot be read ({error})") from None
     if not isinstance(data, dict) or type(data.get("size")) is not int:

@@ -65,7 +65,8 @@ def differences(campaign: Campaign, jobs: Sequence[Job], folder: Path) -> tuple[
     """Return a sentence for each way in which a folder's finished runs differ from those of a campaign.
 
     Raises:
-        InputError: the folder holds another campaign, none of whose finished runs is in this one.
+        InputError: the folder holds another campaign, none of whose finished runs is in this one, or runs with another
+            default of smoothing.
     """
     former = former_grid(folder)
     if former is None or "planner_version" not in former.column_names:
@@ -80,7 +81,11 @@ def differences(campaign: Campaign, jobs: Sequence[Job], folder: Path) -> tuple[
     manifest: Mapping[str, Any] = {}
     with contextlib.suppress(InputError):  # a damaged one is replaced
         manifest = read_manifest(folder)
-    if left and left == len(finished) and manifest.get("campaign") != campaign.document.data:
+    none_kept = left and left == len(finished)
+    if none_kept and campaign.compared_by_default and set(former["smoothing"].to_pylist()) == {"clearance"}:
+        said = f"contains {_runs_of(left)} with smoothing clearance; several planners drive their own plans by default"
+        raise input_error(str(folder), f"{said}; add smoothing: clearance to resume, or use another folder (--out)")
+    if none_kept and manifest.get("campaign") != campaign.document.data:
         said = f"contains the {_runs_of(left)} of another campaign ({manifest.get('source')})"
         raise input_error(str(folder), f"{said}, none of which is in this one; use another folder (--out)")
     sentences = [
@@ -131,7 +136,8 @@ def sweep(
         retry_crashed: whether to repeat crashed runs
         again: planners, by label or name, and outcomes whose runs are repeated; their present results are discarded
         progress: called at the start and after each run with the numbers of finished and of all runs
-        notify: called before the first run with a sentence for each way in which earlier runs differ from the campaign's
+        notify: called before the first run with a sentence for each way in which earlier runs differ from the campaign's, and
+            for each setting without effect
         work: the work on each run; None: drive it
 
     Raises:
@@ -145,8 +151,10 @@ def sweep(
     report = progress or (lambda done, size: None)
     with opened(folder) as store:
         missing = missing_runs(expansion.jobs, store.folder, retry_crashed=retry_crashed, again=again)
-        for note in differences(campaign, expansion.jobs, store.folder):
-            (notify or (lambda note: None))(note)
+        notes = differences(campaign, expansion.jobs, store.folder)
+        if notify is not None:
+            for note in (*notes, *expansion.idle_notes()):
+                notify(note)
         store.claim(_manifest(campaign, expansion))
         if missing.discarded:
             store.drop(missing.discarded)

@@ -14,7 +14,7 @@ from typing import Any
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
-from antdrive.base.files import MAX_JSON_BYTES, read_bytes
+from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes
 from antdrive.planners import Planner, PlannerError
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible
 from antdrive.planners.user_code import is_importable_elsewhere
@@ -90,7 +90,7 @@ class CandidateRunner:
         self._deadline = time.monotonic() + seconds
         self._journal, self._written = journal, time.monotonic()
         header = {
-            "failure": dataclasses.astuple(wanted),
+            "failure": (wanted.outcome, wanted.touched, wanted.cause),
             "bound": str(bound),
             "room": room,
             "versions": versions(),
@@ -196,7 +196,7 @@ def _digest(value: Any) -> str:
 def _read(journal: Path | None, header: str) -> dict[str, bool]:
     """Read an earlier session's answers about the same failure; empty without such a session."""
     try:
-        data = json.loads(read_bytes(journal, MAX_JSON_BYTES)) if journal is not None else {}
+        data = parse_json(read_bytes(journal, MAX_JSON_BYTES)) if journal is not None else {}
         answers = data["answers"] if data.get("header") == header else {}
     except (ValueError, AttributeError, KeyError, RecursionError):
         return {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from antdrive.base.checks import suggest
 from antdrive.base.errors import FieldError, input_error
@@ -54,11 +54,13 @@ class Failure:
         cause: for contacts with walls and known cylinders, the largest contribution to the lost margin until then (a
             key of `antdrive.sim.log.margin.CAUSES`); for a refused certificate the failed check; for a bound the bound;
             else the run's reason without its numbers
+        reason: the cause with its numbers, where it has any; ignored in comparisons
     """
 
     outcome: str
     touched: str
     cause: str
+    reason: str = field(default="", compare=False)
 
     @property
     def sentence(self) -> str:
@@ -66,7 +68,8 @@ class Failure:
         parts = [self.outcome]
         if self.touched != NOTHING:
             parts.append(f"with a {self.touched}" if self.touched != UNSEEN else f"with an {self.touched}")
-        return " ".join(parts) + (f" ({self.cause})" if self.cause else "")
+        cause = self.reason or self.cause
+        return " ".join(parts) + (f" ({cause})" if cause else "")
 
 
 def failure_of(done: Run, bound: Bound | None = None) -> Failure | None:
@@ -86,10 +89,10 @@ def failure_of(done: Run, bound: Bound | None = None) -> Failure | None:
         return None
     if done.outcome is Outcome.SUCCEEDED:
         assert done.certificate is not None
-        return Failure(done.outcome.key, touched, "certificate: " + without_numbers(done.certificate.problems[0]))
+        return _with_reason(done.outcome.key, touched, f"certificate: {done.certificate.problems[0]}")
     if rollout is not None and touched in (CYLINDER, WALL):
         return Failure(done.outcome.key, touched, cause_of_contact(rollout))
-    return Failure(done.outcome.key, touched, "" if touched != NOTHING else without_numbers(done.reason))
+    return _with_reason(done.outcome.key, touched, "" if touched != NOTHING else done.reason)
 
 
 def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
@@ -161,7 +164,11 @@ class Attempt:
 
 def failure_of_planner(error: PlannerError | None) -> Failure:
     """Return the failure of a run that ended in an error of the planner."""
-    return Failure(RAISED, NOTHING, without_numbers(str(error)))
+    return _with_reason(RAISED, NOTHING, str(error))
+
+
+def _with_reason(outcome: str, touched: str, reason: str) -> Failure:
+    return Failure(outcome, touched, without_numbers(reason), reason)
 
 
 def without_numbers(text: str) -> str:

@@ -81,14 +81,17 @@ def write_reproducer(
     """Write the suite of one minimal scenario; return its run, the suite, and whether it repeats in another process."""
     note = f"shrunk from {shrunk.original.task.world.name}: {shrunk.summary}"
     small = Attempt.of(renamed(shrunk.scenario, name, note))
-    handover = Handover(name, small, bound, shrunk.failure.sentence, planner)
+    failure = small.failure(bound)
+    handover = Handover(name, small, bound, (failure or shrunk.failure).sentence, planner)
     suite = write_suite(folder / f"{name}.drive.yaml", [handover])
-    repeats = suite_elsewhere(suite) == [small.fingerprint] and small.failure(bound) == shrunk.failure
+    repeats = suite_elsewhere(suite) == [small.fingerprint] and failure == shrunk.failure
     return small, suite, repeats
 
 
 def _write(small: Sequence[Attempt], findings: Sequence[Finding], folder: Path) -> Path:
     """Write the suite and the worlds of failures; return the suite's path."""
     pairs = enumerate(zip(small, findings, strict=True))
-    handovers = [Handover(_name(k), done, note=finding.failure.sentence) for k, (done, finding) in pairs]
+    handovers = [
+        Handover(_name(k), done, note=(done.failure() or finding.failure).sentence) for k, (done, finding) in pairs
+    ]
     return write_suite(folder / SUITE, handovers)

@@ -22,11 +22,14 @@ from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
 from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
 from antdrive.runs.suites.suite import shown_path
+from antdrive.sim.compose import compose
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import hashes_of
+from antdrive.sim.log.record import canonical_hash, hashes_of_configuration
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import ENDED_BY, Run, versions
+from antdrive.sim.recording import configuration_of
+from antdrive.sim.scenario import Scenario
 
 SCHEMA = 1
 MAX_BYTES = 20_000  # of a baseline
@@ -52,7 +55,7 @@ class Baseline:
         bound_m: the clearance proved by the certificate [m]; None without one
         metrics: every metric except wall-clock times; empty if the robot did not drive
         nearest: the closest approach; None if the robot did not drive
-        hashes: of the world, the unseen obstacles, the robot and the settings; empty if the robot did not drive
+        hashes: of the world, the unseen obstacles, the robot and the settings
         versions: of antdrive, Python and the packages that computed the drive
         drive_digest: `Rollout.drive_digest`; empty if the robot did not drive
         limiters: names of the rules that can limit the robot's speed
@@ -118,7 +121,7 @@ class Baseline:
             metrics=_metrics(rollout) if rollout else {},
             nearest=nearest_of(rollout) if rollout else None,
             hashes=configuration_hashes(run),
-            versions=dict(rollout.record.versions) if rollout else versions(),
+            versions=versions(),
             drive_digest=rollout.drive_digest if rollout else "",
             limiters=rollout.record.limiters if rollout else (),
             line_hz=LINE_HZ,
@@ -211,16 +214,10 @@ class Baseline:
             raise input_error(shown_path(path), "case", problem)
         return baseline
 
-    @property
-    def later_metrics(self) -> tuple[str, ...]:
-        """The names of metrics to compare that the baseline lacks, because they were added later."""
-        compared = (name for name in METRICS if name not in WALL_CLOCK and METRICS[name].better != "neither")
-        return tuple(name for name in compared if name not in self.metrics)
-
     def gaps(self) -> Iterator[tuple[str, str]]:
         """Yield missing and surplus parts, as key and problem; a comparison needs complete baselines."""
-        parts = {name: getattr(self, name) for name in ("metrics", "nearest", "hashes", "drive_digest", "line")}
-        if self.outcome in ENDED_BY.values() and not any(parts.values()):
+        parts = {name: getattr(self, name) for name in ("metrics", "nearest", "drive_digest", "line", "hashes")}
+        if self.outcome in ENDED_BY.values() and not any(part for name, part in parts.items() if name != "hashes"):
             return
         known = [name for name in METRICS if name not in WALL_CLOCK]
         for name in self.metrics:
@@ -239,16 +236,27 @@ _ADAPTER = TypeAdapter(Baseline)
 
 
 def configuration_hashes(run: Run) -> dict[str, str]:
-    """Return the hashes of a run's configuration: world, robot, settings, unseen obstacles; empty without a rollout.
+    """Return the hashes of a run's configuration: world, robot, settings, unseen obstacles.
 
     The time limit counts only if it was given: the default follows from the robot and the route.
     """
-    if run.rollout is None:
-        return {}
-    scenario, record = run.scenario, run.rollout.record
-    given = dataclasses.replace(record, time_limit=scenario.time_limit or scenario.task.time_limit or 1.0)
-    unseen = json.dumps([dataclasses.asdict(disc) for disc in record.unseen], sort_keys=True)
-    return {**hashes_of(given), "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest()}
+    s = run.scenario
+    fields = {
+        **configuration_of(s, compose(s), run.grid, run.plan),
+        "time_limit": s.time_limit or s.task.time_limit or 1.0,
+        "smoothing": s.smoothing,
+    }
+    return hashes_of_configuration(fields) | fixed_hashes(s)
+
+
+def fixed_hashes(s: Scenario) -> dict[str, str]:
+    """Return the hashes of a scenario's world, robot and unseen obstacles, which are known without a plan."""
+    unseen = json.dumps([dataclasses.asdict(disc) for disc in s.unseen], sort_keys=True)
+    return {
+        "world": canonical_hash(s.task),
+        "robot": canonical_hash(s.robot),
+        "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest(),
+    }
 
 
 def _chosen_margin(run: Run) -> float | None:

@@ -20,6 +20,7 @@ from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.scenario import Scenario
 
 #: Distance at the same time beyond which two drives diverge [m].
 APART = 0.01
@@ -106,7 +107,8 @@ def explain(run: Run, baseline: Baseline | None) -> Iterator[str]:
     if baseline is not None:
         if run.rollout is not None and baseline.line:
             yield from _divergence(run, baseline)
-        yield from changes(run, baseline)
+        digest = "" if run.rollout is None else run.rollout.drive_digest
+        yield from changes(run.scenario, configuration_hashes(run), baseline, digest)
 
 
 def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
@@ -114,31 +116,35 @@ def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
     first = divergence(baseline, run.rollout)
     most = float(distances(baseline, run.rollout).max(initial=0.0))
     if first is not None:
-        yield f"{first.sentence}; at most {most:.3g} m apart"
+        yield f"{first.sentence}; at most {most:.3g} m apart at the same time"
     elif run.rollout.drive_digest == baseline.drive_digest:
         yield "the drive equals the baseline's bit for bit"
     else:
         yield f"the drive follows the baseline's line within {max(most, 0.001):.3f} m"
 
 
-def changes(run: Run, baseline: Baseline) -> Iterator[str]:
-    """Yield the differences in setup between a run and its baseline, a line each."""
-    present: Mapping[str, str] = run.rollout.record.versions if run.rollout else versions()
+def changes(s: Scenario, hashes: Mapping[str, str], baseline: Baseline, digest: str) -> Iterator[str]:
+    """Yield the differences in setup between a scenario and its baseline, a line each.
+
+    Args:
+        s: the scenario
+        hashes: of its configuration; those that the baseline lacks are not compared
+        baseline: the earlier drive
+        digest: `Rollout.drive_digest`; empty if the robot did not drive
+    """
     others = [
         f"{name} {baseline.versions.get(name, 'none')} -> {version}"
-        for name, version in present.items()
+        for name, version in versions().items()
         if baseline.versions.get(name) != version
     ]
-    hashes = configuration_hashes(run)
-    if hashes and baseline.hashes:
-        changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
-        if changed:
-            yield f"changed since the baseline: {', '.join(changed)}"
-        elif others:
-            yield SAME
-        elif run.rollout is None or run.rollout.drive_digest != baseline.drive_digest:  # else the demands changed
-            yield f"{SAME}; so the code has changed"
-    chosen = run.scenario.chosen
+    shared = [name for name in hashes if name in baseline.hashes]
+    if changed := [name for name in shared if hashes[name] != baseline.hashes[name]]:
+        yield f"changed since the baseline: {', '.join(changed)}"
+    elif "settings" in shared and others:
+        yield SAME
+    elif "settings" in shared and digest != baseline.drive_digest:  # else the demands changed
+        yield f"{SAME}; so the code has changed"
+    chosen = s.chosen
     if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
         yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
     if others:
@@ -202,11 +208,15 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
             # else it is among the faults
             faults.extend(outcome_changes)
         if run.rollout is not None and baseline.line and run.outcome is baseline.outcome:
-            for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
-                _compare(name, run.rollout, baseline, demands, faults, gains)
+            missing = []
+            for name in compared(demands):
+                if math.isfinite(baseline.metric(name)):
+                    _compare(name, run.rollout, baseline, demands, faults, gains)
+                elif math.isfinite(METRICS[name](run.rollout)):
+                    missing.append(name)
             faults += _line_faults(run.rollout, baseline, demands)
-            if baseline.later_metrics:
-                notes.append(f"not compared: {', '.join(baseline.later_metrics)}; missing in the baseline: renew it")
+            if missing:
+                notes.append(f"not compared: {', '.join(missing)}; missing or null in the baseline: renew it")
     return Evaluation(tuple(faults), tuple(gains), tuple(notes))
 
 
@@ -263,16 +273,22 @@ def _demanded(outcome: Outcome, certified: bool, demands: Demands) -> bool:
     return outcome is demands.outcome and wanted in (None, certified)
 
 
+def compared(demands: Demands) -> list[str]:
+    """Return the metrics that are compared with a baseline, those of `FIRST` first."""
+    names = (*FIRST, *(name for name in METRICS if name not in FIRST))
+    comparable = (name for name in names if METRICS[name].better != "neither" and name not in WALL_CLOCK)
+    return [name for name in comparable if demands.tolerance(name) is not None]
+
+
 def _compare(
     name: str, rollout: Rollout, baseline: Baseline, demands: Demands, faults: list[str], gains: list[str]
 ) -> None:
     """Compare one metric with the baseline's."""
     metric, tolerance = METRICS[name], demands.tolerance(name)
-    if metric.better == "neither" or tolerance is None or name in WALL_CLOCK:
-        return
+    assert tolerance is not None
     now, then = metric(rollout), baseline.metric(name)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
-    if not math.isfinite(then) or (math.isnan(now) and rollout.record.exploring):
+    if math.isnan(now) and rollout.record.exploring:
         return  # old baselines compare the first plan of a mapless robot with the optimum
     if not math.isfinite(now):
         faults.append(f"{name}: {now:g}, in the baseline {then:.6g}{unit}")
@@ -291,12 +307,13 @@ def _compare(
 
 def limits(demands: Demands, baseline: Baseline) -> Iterator[Bound]:
     """Yield the bounds set by a baseline: its metrics plus or minus their tolerances."""
-    for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
-        better, tolerance, then = METRICS[name].better, demands.tolerance(name), baseline.metric(name)
-        if better == "neither" or tolerance is None or name in WALL_CLOCK or not math.isfinite(then):
+    for name in compared(demands):
+        tolerance, then = demands.tolerance(name), baseline.metric(name)
+        if tolerance is None or not math.isfinite(then):
             continue
         allowed = tolerance.allowed(then) + ROUNDED
-        yield Bound(name, "<=", then + allowed) if better == "lower" else Bound(name, ">=", then - allowed)
+        lower = METRICS[name].better == "lower"
+        yield Bound(name, "<=", then + allowed) if lower else Bound(name, ">=", then - allowed)
 
 
 def _place(name: str, rollout: Rollout) -> str:

@@ -12,7 +12,7 @@ from antdrive.base.checks import show
 from antdrive.base.errors import FieldError, InputError
 from antdrive.robots import list_robots, load_robot
 from antdrive.runs.margins.choice import with_chosen_margin
-from antdrive.runs.suites.names import SOURCES, is_own_entry, planner_of, robot_path, world_path
+from antdrive.runs.suites.names import is_own_entry, planner_of, robot_path, world_path
 from antdrive.runs.suites.suite import SuiteCase, shown_path
 from antdrive.sim.forms import option_text, scenario_fields, setting_words
 from antdrive.sim.scenario import Scenario
@@ -76,14 +76,25 @@ def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
 
 
 def _planner_word(case: SuiteCase, planner: dict[str, Any], anywhere: bool) -> str | None:
-    """Pop a planner's name and return it as commands write it; None for a module beside the suite."""
+    """Pop a planner's name and source; return it as commands write it, None for a package that they do not find."""
     name = planner.pop("name")
     if not is_own_entry({"name": name, **planner}):
         return str(name)
-    file, word = (planner.pop("file", None), name) if SOURCES & planner.keys() else name.rpartition(":")[::2]
-    if file is None or not file.endswith(".py"):
+    file, module = planner.pop("file", ""), planner.pop("module", "")
+    source, word = (file or module, name) if file or module else name.rpartition(":")[::2]
+    if not (file or source.endswith(".py")):
+        if not _is_beside(case, source) or (case.suite.parent == Path.cwd() and not anywhere):
+            return f"{source}:{word}"
+        source = f"{source}.py"
+    if not source.endswith(".py") or not (case.suite.parent / source).is_file():
         return None
-    return f"{_shown_name(case, file, {}, anywhere)}:{word}"
+    return f"{_shown_name(case, source, {}, anywhere)}:{word}"
+
+
+def _is_beside(case: SuiteCase, module: str) -> bool:
+    """Return whether a module's file or package lies beside the suite."""
+    top = case.suite.parent / module.partition(".")[0]
+    return top.is_dir() or top.with_suffix(".py").is_file()
 
 
 def _world_words(case: SuiteCase, anywhere: bool) -> tuple[str, str]:

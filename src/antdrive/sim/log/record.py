@@ -580,16 +580,17 @@ def hashes_of(record: DriveRecord) -> dict[str, str]:
 
     Each covers JSON with sorted keys and Python's default separators; `docs/explanation/certificate.md` describes them.
     """
-    values = record.as_dict()
+    return hashes_of_configuration({**vars(record), "smoothing": record.smoothing.asked})
+
+
+def hashes_of_configuration(fields: Mapping[str, Any]) -> dict[str, str]:
+    """Return the hashes of `hashes_of` from a record's fields that are known before the drive; smoothing as asked."""
+    values = plain_value({key: fields[key] for key in (*DRIVEN_WITH, "smoothing", "sensing", "unseen")})
     parts = {
-        "world": _meaning(record.task),
-        "robot": _meaning(record.robot),
-        "settings": {
-            **{key: values[key] for key in DRIVEN_WITH},
-            "smoothing": record.smoothing.asked,
-            **(record.settings or {}),
-            **{key: values[key] for key in ("sensing", "unseen") if values.get(key)},
-        },
+        "world": _meaning(fields["task"]),
+        "robot": _meaning(fields["robot"]),
+        "settings": {key: value for key, value in values.items() if value or key not in ("sensing", "unseen")}
+        | (fields["settings"] or {}),
     }
     return {name: _sha256(part) for name, part in parts.items()}
 

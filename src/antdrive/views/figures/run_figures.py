@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from antdrive.base.types import Floats
+from antdrive.runs.comparing import distinct, path_text
 from antdrive.sim.log.certificate import Certificate, in_metres
-from antdrive.sim.log.metrics import tracking_error
+from antdrive.sim.log.metrics import driven_length_m, tracking_error
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colours import BAD, CONTACT, GOOD, MUTED, OUTCOME_LABELS, ROUTE, SHELL, START, hexed, planner_style
 from antdrive.views.figures.canvas import (
@@ -203,7 +204,7 @@ def _draw_checks(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
 
 
 def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None = None, *, dpi: float = 160) -> Figure:
-    """Draw the driven paths of several planners on one map, each in its planner's colour.
+    """Draw the driven paths of several planners on one map, each in its planner's colour; bitwise identical drives are one line.
 
     Args:
         rollouts: the runs' logs, by planner
@@ -222,9 +223,11 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
         axes: Any = figure.add_subplot(label="map")
         draw_map(axes, scene)
         handles: list[Any] = []
-        for over, (name, rollout) in zip(reversed(range(len(rollouts))), rollouts.items(), strict=True):
-            colour, dash = planner_style(name)
-            label = f"{name}, {float(rollout.t[-1]):.1f} s"
+        drives = distinct(rollouts.items())
+        for over, (same, rollout) in zip(reversed(range(len(drives))), drives, strict=True):
+            colour, dash = planner_style(same[0])
+            path = path_text([rollouts[name].record.plan.length_m for name in same], driven_length_m(rollout))
+            label = f"{', '.join(same)}: {path} m, {float(rollout.t[-1]):.1f} s"
             width = 2.2 + 1.4 * over  # earlier lines are wider to stay visible below later ones
             handles += axes.plot(
                 *rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=width, label=label, zorder=6

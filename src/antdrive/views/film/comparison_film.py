@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -14,10 +14,13 @@ from PIL import Image, ImageDraw
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
+from antdrive.runs.comparing import distinct, path_text
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, planner_style
+from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, Colour, planner_style
+from antdrive.views.film import overlay
 from antdrive.views.film.camera import Picture, turns
 from antdrive.views.film.film_options import ENCODERS, FilmInfo, FilmOptions
+from antdrive.views.film.prelude import has_field, planning_stages, still_camera
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.text import fitted, font, pill, put, text_width
 from antdrive.views.film.video import HOLD, encoded, frame_times
@@ -39,22 +42,35 @@ def compare_film(
     speed: float = 1.0,
     titles: Sequence[str] | None = None,
     mark: Mark | None = None,
+    prelude: float = 0.0,
     progress: Callable[[float], None] | None = None,
 ) -> FilmInfo:
     """Film two to six runs side by side. A run that ends before the others keeps its last picture.
 
-    The arguments are those of `film`, plus a title per run and a mark at a place.
+    Bitwise identical drives share a tile. The arguments are those of `film`, plus a title per run and a mark at a place. The
+    prelude shows iterative planners at work beside the plans of the others.
+
+    Raises:
+        InputError: as `film`; or there are fewer than two or more than six runs.
     """
     target = Path(path)
     known_suffix(target, ENCODERS)
     options = FilmOptions(camera=camera, size=size or FULL, fps=fps, speed=speed).checked()
     if not 2 <= len(rollouts) <= MAX_RUNS:
         raise InputError(f"compare: needs 2 to {MAX_RUNS} runs, got {len(rollouts)}")
-    options = replace(options, size=size or fitting_size(rollouts, camera))
-    times = frame_times(max(float(log.t[-1] - log.t[0]) for log in rollouts), fps, speed)
-    screen = SplitScreen(rollouts, camera, options.size, titles, mark)
+    one_world = len({log.record.task.world.name for log in rollouts}) == 1
+    names = titles or [_title(log, one_world) for log in rollouts]
+    drives = distinct(zip(names, rollouts, strict=True))
+    logs = [log for _, log in drives]
+    before = round(prelude * fps)
+    if before and not any(map(has_field, logs)):
+        raise InputError("prelude: no planner of the comparison has a field")
+    options = replace(options, size=size or fitting_size(logs, camera))
+    times = frame_times(max(float(log.t[-1] - log.t[0]) for log in logs), fps, speed)
+    screen = SplitScreen(logs, camera, options.size, [same for same, _ in drives], mark)
     moments = [*times.tolist(), *itertools.repeat(math.inf, round(2 * HOLD * fps))]
-    return encoded(target, options, len(moments), map(screen.frame, moments), progress)
+    frames = itertools.chain(screen.planning(before) if before else (), map(screen.frame, moments))
+    return encoded(target, options, before + len(moments), frames, progress)
 
 
 class Mark(NamedTuple):
@@ -74,23 +90,28 @@ class SplitScreen:
         rollouts: Sequence[Rollout],
         camera: str,
         size: tuple[int, int],
-        titles: Sequence[str] | None = None,
+        titles: Sequence[tuple[str, ...]],
         mark: Mark | None = None,
     ) -> None:
         cols, rows = _tiling(rollouts, camera, size)
         wide, high = (size[0] // cols) // 2 * 2, (size[1] // rows) // 2 * 2
         self._size = size
         self._corners = [((k % cols) * wide, (k // cols) * high) for k in range(len(rollouts))]
-        one_world = len({log.record.task.world.name for log in rollouts}) == 1
-        names = titles or [_title(log, one_world) for log in rollouts]
         room = (wide - 2, high - 2)
-        self._tiles = [Tile(log, camera, room, name, mark) for log, name in zip(rollouts, names, strict=True)]
+        self._tiles = [Tile(log, camera, room, same, mark) for log, same in zip(rollouts, titles, strict=True)]
 
     def frame(self, at: float) -> Picture:
         """Return the frame (H, W, 3) at a time of all runs [s]."""
+        return self._joined(tile.frame(at) for tile in self._tiles)
+
+    def planning(self, count: int) -> Iterator[Picture]:
+        """Yield `count` frames (H, W, 3) of planning."""
+        return map(self._joined, zip(*(tile.planning(count) for tile in self._tiles), strict=True))
+
+    def _joined(self, parts: Iterable[Picture]) -> Picture:
+        """Return the tiles' pictures in one frame."""
         frame = np.full((*self._size[::-1], 3), (210, 216, 225), dtype=np.uint8)
-        for (x, y), tile in zip(self._corners, self._tiles, strict=True):
-            part = tile.frame(at)
+        for (x, y), part in zip(self._corners, parts, strict=True):
             frame[y : y + part.shape[0], x : x + part.shape[1]] = part
         return frame
 
@@ -99,11 +120,12 @@ class Tile:
     """Tile of one run: a header with its name and numbers, and the picture below."""
 
     def __init__(
-        self, rollout: Rollout, camera: str, size: tuple[int, int], name: str, mark: Mark | None = None
+        self, rollout: Rollout, camera: str, size: tuple[int, int], names: tuple[str, ...], mark: Mark | None = None
     ) -> None:
         self._unit, self._head = _head_of(size)
-        self.shot = Shot(rollout, camera=camera, size=(size[0], size[1] - self._head), bare=True)
-        self._name, self._mark = name, mark
+        self._rollout, self._size = rollout, (size[0], size[1] - self._head)
+        self.shot = Shot(rollout, camera=camera, size=self._size, bare=True)
+        self._names, self._mark = names, mark
         self._colour = planner_style(rollout.record.planner.name)[0]
         self._outcome = rollout.outcome
         self._length = rollout.record.plan.length_m
@@ -113,35 +135,54 @@ class Tile:
         """Return the tile (h, w, 3) at a time [s]; after the run's end, the last one."""
         end = self.shot.playback.duration
         if at < end:
-            return self._with_head(self._marked(self.shot.view(at), at), at, False)
+            return self._driving(self.shot.view(at), at, (f"{at:.1f} s", CALM))
         if self._last is None:
-            self._last = self._with_head(self._marked(self.shot.view(end, last=True), end), end, True)
+            self._last = self._driving(self.shot.view(end, last=True), end, OUTCOME_LABELS[self._outcome])
         return self._last
 
-    def _marked(self, view: Picture, at: float) -> Picture:
-        """Draw the mark from its time on and return the picture."""
+    def planning(self, count: int) -> Iterator[Picture]:
+        """Yield `count` tiles (h, w, 3) of planning: the iterations, or the plan of a planner without a field."""
+        if not has_field(self._rollout):
+            planned = self._with_head(self.shot.view(0.0), [f"planned {self._length:.2f} m"], ("planned", CALM))
+            yield from itertools.repeat(planned, count)
+            return
+        camera = still_camera(self.shot.options.camera)
+        shot = Shot(self._rollout, camera=camera, size=self._size, bare=True, planning=True)
+        for stage in planning_stages(self._rollout, count):
+            best = f"best {stage.state.best:.2f} m" if math.isfinite(stage.state.best) else "no path yet"
+            facts = [f"iteration {stage.number} / {stage.total}", best]
+            yield self._with_head(shot.planning_view(stage.grid, stage.levels, stage.path), facts, overlay.PLANNING)
+
+    def _driving(self, view: Picture, at: float, status: tuple[str, Colour]) -> Picture:
+        """Return the tile at a time with the mark from its time on."""
         if self._mark is not None and at >= self._mark.t:
             self.shot.put_label(view, self._mark.text, self._mark.x, self._mark.y)
-        return view
+        playback = self.shot.playback
+        facts = [
+            *(["the same line"] if len(self._names) > 1 else []),
+            f"path {path_text([self._length], playback.driven(at))} m",
+            f"min clearance {playback.min_clearance(at):.3f} m",
+            *([f"time {at:.1f} s"] if at >= playback.duration else []),
+        ]
+        return self._with_head(view, facts, status)
 
-    def _with_head(self, view: Picture, at: float, over: bool) -> Picture:
+    def _with_head(self, view: Picture, facts: Sequence[str], status: tuple[str, Colour]) -> Picture:
+        """Put the header over a view; facts that do not fit are left out from the end."""
         unit, wide = self._unit, view.shape[1]
         image = Image.new("RGB", (wide, self._head), BAND)
         draw = ImageDraw.Draw(image)
         draw.rectangle((0, 0, round(0.5 * unit), self._head), fill=self._colour)
-        words, colour = OUTCOME_LABELS[self._outcome] if over else (f"{at:.1f} s", CALM)
-        status = pill(words, round(0.85 * unit), colour)
-        room = wide - status.shape[1] - round(2.2 * unit)
+        badge = pill(status[0], round(0.85 * unit), status[1])
+        room = wide - badge.shape[1] - round(2.2 * unit)
         large, small = round(1.15 * unit), round(0.8 * unit)
-        name = fitted(self._name, room, large, True)
+        name = fitted(", ".join(self._names), room, large, True)
         draw.text((1.2 * unit, 0.3 * unit), name, font=font(large, True), fill=INK)
-        facts = [f"path {self._length:.2f} m", f"min clearance {self.shot.playback.min_clearance(at):.3f} m"]
-        facts = [*facts, f"time {at:.1f} s"] if over else facts
+        facts = list(facts)
         while len(facts) > 1 and text_width("  ·  ".join(facts), small) > wide - 2 * unit:
-            facts.pop(0)
+            facts.pop()
         draw.text((1.2 * unit, 1.9 * unit), "  ·  ".join(facts), font=font(small), fill=MUTED)
         head = np.array(image)
-        put(head, status, wide - status.shape[1] - round(0.5 * unit), 0.25 * unit)
+        put(head, badge, wide - badge.shape[1] - round(0.5 * unit), 0.25 * unit)
         return np.vstack([head, view])
 
 

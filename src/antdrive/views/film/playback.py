@@ -47,6 +47,7 @@ class Playback:
         self._twist = rollout.twist if len(rollout.twist) else np.zeros((rows, 2))
         self._clearance = rollout.clearance if len(rollout.clearance) else np.full(rows, np.nan)
         self._least = np.minimum.accumulate(self._clearance)
+        self._driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[:, :2], axis=0).T))])
         self._movers = rollout.movers if len(rollout.movers) else np.empty((rows, 0, 2))
         self._jumps = jumps(self._movers)
         lidar, hz = rollout.record.robot.lidar, rollout.record.physics_hz
@@ -146,6 +147,10 @@ class Playback:
     def min_clearance(self, at: float) -> float:
         """Return the smallest clearance of all rows up to a time [m]."""
         return float(self._least[self._row(at)])
+
+    def driven(self, at: float) -> float:
+        """Return the length of the path driven up to a time [m]."""
+        return float(np.interp(at, self.t, self._driven))
 
     def trail(self, since: float, until: float) -> tuple[Floats, Floats]:
         """Return points (N, 2) [m] of the path driven between two times, and the speeds (N,) there [m/s]."""

@@ -9,7 +9,7 @@ import itertools
 import math
 import zlib
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,22 +44,52 @@ def check_field(rollout: Rollout) -> None:
         raise InputError(f"prelude: {rollout.record.planner.name} has no field")
 
 
-def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
-    """Yield frames (H, W, 3) of a run's planning, from the first to the last iteration."""
+def has_field(rollout: Rollout) -> bool:
+    """Return whether a run's planning can be shown."""
+    try:
+        check_field(rollout)
+    except InputError:
+        return False
+    return True
+
+
+class PlanningStage(NamedTuple):
+    """What a frame of planning shows."""
+
+    number: int  # iterations so far
+    total: int  # maximum number of iterations
+    state: Iteration  # the last of them
+    grid: Grid  # the planner's grid
+    levels: Floats  # the field (R, C), as `field_levels`
+    path: Floats  # the best path so far (N, 2) [m]
+
+
+def planning_stages(rollout: Rollout, count: int) -> Iterator[PlanningStage]:
+    """Yield `count` stages of a run's planning, from the first to the last iteration."""
     grid, total, states = plan_again(rollout)
-    still = {**setting, "camera": "oblique" if setting["camera"] == "follow" else setting["camera"]}
-    shot = Shot(rollout, **still, planning=True)
     number, state = 1, next(states)
     for k in range(count):
         due = math.ceil((k + 1) * total / count)
         for later in itertools.islice(states, due - number):
             number, state = number + 1, later
         assert state.field is not None
-        levels = field_levels(grid, state.field)
         path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
-        yield shot.planning_frame(_values(number, total, state), grid, levels, path)
+        yield PlanningStage(number, total, state, grid, field_levels(grid, state.field), path)
     if not np.array_equal(state.cells, rollout.cells):
         raise InputError("prelude: planning again gave another path; the log is from another version or machine")
+
+
+def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
+    """Yield frames of a run's planning, from the first to the last iteration."""
+    still = {**setting, "camera": still_camera(setting["camera"])}
+    shot = Shot(rollout, **still, planning=True)
+    for one in planning_stages(rollout, count):
+        yield shot.planning_frame(_values(one.number, one.total, one.state), one.grid, one.levels, one.path)
+
+
+def still_camera(camera: str) -> str:
+    """Return the camera that shows planning before a drive shown by `camera`."""
+    return "oblique" if camera == "follow" else camera
 
 
 def field_levels(grid: Grid, field: Floats) -> Floats:

@@ -101,9 +101,14 @@ class Shot:
 
     def planning_frame(self, values: overlay.Values, grid: Grid, levels: Floats, path: Floats) -> Picture:
         """Return a frame (H, W, 3) of planning: the planner's field and its best path (N, 2) [m] so far."""
+        view = self.planning_view(grid, levels, path)
+        return np.vstack([view, self._band.draw(values, overlay.PLANNING)])
+
+    def planning_view(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
+        """Return the picture of `planning_frame` without the band."""
         view = self._compositor.field_frame(grid, levels, path)
         self._put_legend(view)
-        return np.vstack([view, self._band.draw(values, overlay.PLANNING)])
+        return view
 
     def extend_trail(self, at: float) -> None:
         """Extend the driven path to a time [s]."""
