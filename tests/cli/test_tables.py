@@ -38,7 +38,7 @@ TABLES = {
     "reproduce": (PAPER_HEADS, [tuple("0.123" for _ in PAPER_HEADS)]),
     "reproduce: claims": (VERDICT_HEADS, [("holds", "han2007", LONG, "median", "22", "21.3", LONG, "Table 3")]),
 }  # fmt: skip
-LISTS = [("planners",), ("planners", "aco-han", "astar"), ("worlds", "list"), ("robots", "list")]
+LISTS = [("controller",), ("planners",), ("planners", "aco-han", "astar"), ("worlds", "list"), ("robots", "list")]
 
 
 @pytest.fixture

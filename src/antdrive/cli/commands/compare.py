@@ -53,7 +53,7 @@ def compare(
         option(
             "GROUP.KEY=VALUE",
             "Option of a planner or label (aco-han.ants=50), of all planners (planner.ants=50) or of the controller "
-            "(controller.lookahead_time=0.5). Repeatable.",
+            "(controller.braking=0.5). Repeatable.",
             "--set",
             "-s",
         ),

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 from antdrive.base.checks import suggest
-from antdrive.base.docstrings import meanings_of
 from antdrive.base.errors import InputError
+from antdrive.base.records import meanings_of
 from antdrive.cli import options
 from antdrive.cli.console import show, table
 from antdrive.cli.options import argument

@@ -142,7 +142,7 @@ class PurePursuit:
     """Settings of a pure-pursuit controller.
 
     Attributes:
-        lookahead_time: lookahead divided by speed [s]
+        lookahead_time: lookahead divided by speed; the speed is at most the clear lookahead divided by this [s]
         preferred_lookahead_min: lookahead at low speed; reduced to `lookahead_min` where it is not clear [m]
         lookahead_min: shortest lookahead [m]
         lookahead_max: longest lookahead [m]
@@ -323,6 +323,11 @@ class ControllerOption(NamedTuple):
     unit: str
     meaning: str
     acts_on: ActsOn | None
+
+    @property
+    def routes(self) -> str:
+        """The routes on which it acts, in words."""
+        return "all" if self.acts_on is None else "with corners" if self.acts_on.corners else "smooth"
 
 
 def controller_options() -> Mapping[str, ControllerOption]:

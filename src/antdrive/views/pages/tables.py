@@ -45,7 +45,8 @@ def success_cells(summary: CampaignSummary) -> TextTable:
                 *(with_interval(*summary.medians[name][k]) for name in names),
             )
         )
-    return TextTable("Success by planner", headings, rows)
+    smoothings = list(dict.fromkeys(summary.table.texts("smoothing")))
+    return TextTable(f"Success by planner (smoothing {', '.join(smoothings)})", headings, rows)
 
 
 def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTable:
@@ -161,7 +162,7 @@ def write_latex(summary: CampaignSummary, out: Path) -> list[Path]:
     lines = ["% antdrive report; needs \\usepackage{booktabs} and, for long tables, \\usepackage{longtable}"]
     for table in all_cells(summary):
         lines += ["", f"% {latex_text(table.title)}", *_latex_table(table)]
-    lines += ["", *(f"% {latex_text(note)}" for note in summary.notes)]
+    lines += ["", *(f"% {latex_text(note)}" for note in (*summary.sentences, *summary.notes))]
     return [write_text(out, "\n".join(lines).rstrip() + "\n")]
 
 
