@@ -22,7 +22,7 @@ LAYOUT = "\n\t"  # control characters that lines may hold
 GOOD, BAD = "✓", "✗"  # signs of success and failure
 COLOURS = {GOOD: "green", BAD: "red"}
 PLAIN = {GOOD: "+", BAD: "x"}  # for streams that cannot encode the signs
-LEAST_WRAPPED = 26  # least width of a wrapped column [characters]
+LEAST_WRAPPED = 24  # least width of a wrapped column [characters]
 
 
 @contextmanager
