@@ -18,6 +18,7 @@ from typing import Any, Literal, Union
 from antdrive.base import FieldError, InputError
 from antdrive.base.errors import input_error
 from antdrive.base.guarded import OverLimit, UserCode, error_text, one_line, place
+from antdrive.base.version import __version__
 from antdrive.planners.anyangle.ga_han import GaHan
 from antdrive.planners.anyangle.hybrid import Hybrid
 from antdrive.planners.anyangle.tangent import Tangent
@@ -89,7 +90,7 @@ def planner_version(name: str) -> str:
         user_object(name)
         return user_code_version(name)
     if name in PLANNERS:
-        return f"antdrive {importlib.metadata.version('antdrive')}"
+        return f"antdrive {__version__}"
     load_planner(name)
     entry = _plugins()[name]
     version = entry.dist.version if entry.dist is not None else "without version"
