@@ -74,10 +74,11 @@ def _check_views(scenario: "Scenario", film: Path | None, prelude: float, gui: b
         check_display()
     if prelude > 0:
         from antdrive.planners import capabilities_of
+        from antdrive.planners.iterative import without_iterations
 
         if film is None:
             raise InputError("--prelude: needs --film")
         if not capabilities_of(scenario.planner).iterative:
-            raise InputError(f"--prelude: needs an iterative planner; {scenario.planner_name} is not one")
+            raise InputError(f"--prelude: {without_iterations(scenario.planner, scenario.planner_name)}")
     if film is not None:
         check_film(film)
