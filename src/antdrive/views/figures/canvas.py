@@ -25,6 +25,7 @@ from antdrive.views.colours import INK, MUTED, OUTCOME_LABELS, hexed
 from antdrive.views.scene import Scene
 
 SUFFIXES = (".png", ".pdf", ".svg")
+PRINTED = (".pdf", ".svg")  # of figures for a thesis
 
 _STYLE: Any = {
     "font.family": "DejaVu Sans",
@@ -47,6 +48,7 @@ _STYLE: Any = {
     "legend.fontsize": 8.0,
     "svg.hashsalt": "antdrive",
     "pdf.compression": 6,
+    "pdf.fonttype": 42,  # TrueType; publishers refuse Type 3
 }
 
 
