@@ -194,13 +194,19 @@ def _source(match: re.Match[str]) -> str:
 
 
 def controller() -> list[str]:
-    """Return each option of the controller with its default."""
-    from antdrive.robots.control.pursuit import PurePursuit
-    from antdrive.sim.log.record import settings_of
+    """Return each option of the controller with its default, unit and routes."""
+    from antdrive.robots.control.pursuit import controller_options
 
-    meanings = described(PurePursuit)
-    rows = [(code(key), code(value), cell(meanings[key])) for key, value in settings_of(PurePursuit()).items()]
-    return table("option, default, meaning", rows)
+    options = controller_options().items()
+    rows = [(code(key), code(one.default), one.unit or "–", one.routes, cell(one.meaning)) for key, one in options]
+    return table("option, default, unit, acts on routes, meaning", rows)
+
+
+def counterparts() -> list[str]:
+    """Return the counterpart of each parameter of Nav2's controller."""
+    from antdrive.robots.control.nav2 import NAV2
+
+    return table("Nav2, antdrive", [(code(name), text) for name, text in NAV2.items()])
 
 
 def _picture(folder: str, name: str) -> str:
@@ -370,7 +376,7 @@ def _class(part: object) -> str:
 #: What writes each part, by its name.
 GENERATED: dict[str, Callable[..., list[str]]] = {
     "arrays": arrays, "commands": commands, "composition": composition, "controller": controller,
-    "exit-codes": exit_codes, "keys": keys,
+    "counterparts": counterparts, "exit-codes": exit_codes, "keys": keys,
     "metrics": metrics, "outcomes": outcomes, "planner": planner, "planners": planners, "proofs": proofs, "record": record,
     "robots": robots, "tolerances": tolerances, "worlds": worlds,
 }  # fmt: skip

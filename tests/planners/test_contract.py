@@ -84,6 +84,14 @@ def test_the_same_seed_gives_the_same_plan(name):
     assert one.work == two.work
 
 
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_draws_no_random_numbers_if_and_only_if_it_is_deterministic(name):
+    rng = np.random.default_rng(5)
+    before = rng.bit_generator.state
+    quick(name, ants=10, iterations=2).plan(CATALOGUE["forest"], rng)
+    assert (rng.bit_generator.state == before) is capabilities_of(PLANNERS[name]).deterministic
+
+
 @pytest.mark.parametrize("name", ON_GRIDS)
 def test_an_enclosed_goal_has_no_path(name):
     result = solve(name, sealed())

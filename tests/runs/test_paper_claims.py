@@ -159,7 +159,7 @@ def test_no_worse_lets_a_small_effect_pass_and_no_larger_one():
     unclear = share(40, 12)  # 14 points
     assert unclear.value == pytest.approx(14.0)
     assert unclear.decision is Decision.OPEN
-    assert "contains 12; about" in unclear.why
+    assert "contains 12; the difference is small beside the spread" in unclear.why
 
 
 def test_the_gain_of_one_step_is_less_than_that_of_another():

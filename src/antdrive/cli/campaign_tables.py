@@ -124,7 +124,7 @@ def _tables(summary: "CampaignSummary") -> Iterator[str]:
         yield one.title
         yield from table(one.headings, one.rows)
         yield ""
-    yield from summary.notes
+    yield from (*summary.sentences, *summary.notes)
     yield f"Medians are over the {summary.common} instances that every planner solved."
 
 

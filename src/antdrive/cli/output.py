@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, file_lines, this_command
+from antdrive.cli.console import bar, file_lines, print_error, this_command
 from antdrive.runs.results_folder import free_folder, opened
 from antdrive.views.run_folder import check_folder
 
@@ -42,12 +42,18 @@ def film_drives(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str
         return write_film(logs, path, progress=progress, **options)
 
 
+def print_idle_settings(scenarios: Sequence[Scenario], given: Collection[str] = ()) -> None:
+    """Print the settings that cannot act on stderr; `given` as in `idle_notes`."""
+    from antdrive.sim.effects import idle_notes
+
+    for note in idle_notes(scenarios, given):
+        print_error(note)
+
+
 def run_lines(run: Run, files: Mapping[str, str]) -> Iterator[str]:
     """Yield a run's outcome, metrics, certificate and files as lines."""
     s = run.scenario
     yield f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}{in_brackets(run.reason)}"
-    if s.noise and not s.robot.noise.nonzero and s.map == "given" and s.known_perception.kind != "lidar":
-        yield f"  --noise {s.noise:g} has no effect: the robot file of {s.robot.name} has no noise section"
     yield from margin_lines(s)
     if run.rollout is not None and run.certificate is not None:
         result = run.as_dict()

@@ -56,7 +56,7 @@ def compose(s: Scenario) -> Parts:
     """Select the parts of a scenario's drive."""
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
     tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
-    moving = tracks_movers or bool(s.driven_world.movers)
+    moving = s.moving
     localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, s.task.start, s.seed)
     survey = None if mapped else _survey(s, tracks_movers)
     scans = _mover_detector(s) if mapped and tracks_movers else survey
@@ -113,7 +113,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
         margin=s.planned_margin,
         usual_margin=s.usual_margin,
         cell=s.planning_cell,
-        smoothing="none" if s.timed else s.smoothing,
+        smoothing=s.driven_smoothing,
         hz=s.control_hz,
         seed=s.seed,
         motions=s.trajectories.motions if s.timed else (),

@@ -127,7 +127,7 @@ class Scenario(Settings):
             raise FieldError("sees", f"lidar: {self.robot.name} {NO_LIDAR}")
         if kind == "lidar" and self.map == "given" and self.localisation == "odometry":
             raise FieldError("sees", "lidar: with a given map the pose must not drift; localise by fixes or true")
-        drifts = self.map == "none" and self.localisation in DRIFTING
+        drifts = self.map == "none" and self.drifting
         if drifts and self.task.world.movers and kind != "lidar":
             raise FieldError(
                 "sees",
@@ -201,7 +201,7 @@ class Scenario(Settings):
             robot=self.robot,
             controller=self.controller,
             noise=float(self.noise),
-            smoothing="none" if self.timed else self.smoothing,
+            smoothing=self.driven_smoothing,
             physics_hz=self.physics_hz,
             control_hz=self.control_hz,
         )
@@ -308,13 +308,64 @@ class Scenario(Settings):
         return bool(self.driven_world.movers) and capabilities_of(self.planner).needs_motions
 
     @property
+    def driven_smoothing(self) -> str:
+        """Kind of smoothing of the driven routes: none for plans in space and time."""
+        return "none" if self.timed else self.smoothing
+
+    @property
+    def usual_perception(self) -> Perception:
+        """Default perception of movers."""
+        return usual_perception(self.map, movers=bool(self.task.world.movers))
+
+    @property
     def known_perception(self) -> Perception:
         """Perception of movers as set, else the default."""
-        return self.perception or usual_perception(self.map, movers=bool(self.task.world.movers))
+        return self.perception or self.usual_perception
+
+    @property
+    def moving(self) -> bool:
+        """Whether the drive accounts for movers: the world has some, or the robot looks for them by lidar."""
+        return bool(self.driven_world.movers) or self.known_perception.kind == "lidar"
+
+    @property
+    def scans(self) -> bool:
+        """Whether the drive uses the robot's lidar."""
+        return self.map == "none" or (self.known_perception.kind == "lidar" and not self.timed)
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the robot's documented noise acts."""
+        return bool(self.noise) and self.robot.noise.nonzero
+
+    @property
+    def drifting(self) -> bool:
+        """Whether the pose comes from odometry, whose errors accumulate."""
+        return self.localisation in DRIFTING
+
+    def idle_settings(self, given: Collection[str] = ()) -> dict[str, str]:
+        """Return the settings that cannot act in this scenario: the reason of each by its key.
+
+        >>> Scenario.of("forest", "astar", seed=1).idle_settings()
+        {'seed': 'astar and the drive draw no random numbers'}
+
+        Args:
+            given: keys of settings to include at their defaults; the others are included if they differ
+        """
+        keys = (
+            (one, key)
+            for one in SETTINGS.values()
+            for key in one.keys(getattr(self, one.name)) or ([one.key] if one.key in given else [])
+        )
+        reasons = {key: one.setting.idle(self, key) for one, key in keys}
+        return {key: reason for key, reason in reasons.items() if reason}
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Return the random stream of a purpose. Streams of different purposes are independent."""
         return random_stream(self.seed, purpose)
+
+    def __repr__(self) -> str:
+        names = f"{self.planner_label} in {self.task.world.name} with {self.robot.name}"
+        return f"<Scenario: {names}, smoothing {self.smoothing}, noise {self.noise:g}, seed {self.seed}>"
 
     def _repr_html_(self) -> str:
         task = self.task

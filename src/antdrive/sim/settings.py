@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from annotated_types import Ge, Gt, Le
 
 from antdrive.base.errors import FieldError
+from antdrive.sim import effects
 from antdrive.sim.policy import Perception, ReplanPolicy
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class Setting:
     usual: str = ""  # meaning of the default None, for `--help`
     # version of the campaign-key format that added the setting; settings added after version 1 are omitted at their default
     since: int = 1
+    idle: effects.Idle = effects.never  # why it cannot act in a scenario
 
 
 def _pursuit() -> "PurePursuit":
@@ -78,12 +80,19 @@ class Settings:
             "KIND",
             choices=SMOOTHINGS,
             axis=True,
+            idle=effects.if_timed,
         ),
     ] = "clearance"
     noise: Annotated[
         float,
         Ge(0),
-        Setting("factor on the robot's documented noise; 0 is a perfect robot", "Robot", "FACTOR", axis=True),
+        Setting(
+            "factor on the robot's documented noise; 0 is a perfect robot",
+            "Robot",
+            "FACTOR",
+            axis=True,
+            idle=effects.without_noise,
+        ),
     ] = 0.0
     margin: Annotated[
         float | None,
@@ -123,14 +132,25 @@ class Settings:
             "KIND",
             choices=LOCALISATIONS,
             since=2,
+            idle=effects.with_exact_fixes,
         ),
     ] = "fixes"
     odometry: Annotated[
-        float, Ge(0), Setting("factor on the documented errors of odometry", "Sensing", "FACTOR", since=2)
+        float,
+        Ge(0),
+        Setting(
+            "factor on the documented errors of odometry", "Sensing", "FACTOR", since=2, idle=effects.without_odometry
+        ),
     ] = 1.0
     controller: Annotated[
         "PurePursuit",
-        Setting("settings of the controller, such as {lookahead_time: 0.5}", "Robot", flag="", form="controller"),
+        Setting(
+            "settings of the controller, such as {lookahead_time: 0.5}",
+            "Robot",
+            flag="",
+            form="controller",
+            idle=effects.on_other_routes,
+        ),
     ] = field(default_factory=_pursuit)
     perception: Annotated[
         Perception | None,
@@ -142,6 +162,7 @@ class Settings:
             key="sees",
             form="perception",
             usual="velocities; lidar without a map",
+            idle=effects.without_choice_of_perception,
         ),
     ] = None
     avoidance: Annotated[
@@ -151,6 +172,7 @@ class Settings:
             "Movers",
             key="avoid",
             form="avoidance",
+            idle=effects.without_movers,
         ),
     ] = field(default_factory=_avoidance)
     replanning: Annotated[
@@ -161,6 +183,7 @@ class Settings:
             "Movers",
             key="replan",
             form="replanning",
+            idle=effects.without_replans,
         ),
     ] = field(default_factory=ReplanPolicy)
     unseen: Annotated[
@@ -193,7 +216,12 @@ class Settings:
         Ge(SLOWEST_CONTROL),
         Setting("control periods per simulated second, at least 10; must divide physics_hz", "Robot", flag=""),
     ] = 60
-    seed: Annotated[int, Ge(0), Le(2**63 - 1), Setting("seed of all random numbers", "World", "NUMBER", axis=True)] = 0
+    seed: Annotated[
+        int,
+        Ge(0),
+        Le(2**63 - 1),
+        Setting("seed of all random numbers", "World", "NUMBER", axis=True, idle=effects.without_chance),
+    ] = 0
 
     def __post_init__(self) -> None:
         for one in SETTINGS.values():
@@ -236,6 +264,15 @@ class DeclaredSetting:
         """Default value of a scenario."""
         made = self.field.default_factory
         return self.field.default if made is dataclasses.MISSING else made()
+
+    def keys(self, value: Any) -> list[str]:
+        """Return the keys under which a value differs from the default: those of changed options, or the setting's own."""
+        if value == self.default:
+            return []
+        if self.setting.form != "controller":
+            return [self.key]
+        names = (one.name for one in dataclasses.fields(value))
+        return [f"{self.key}.{name}" for name in names if getattr(value, name) != getattr(self.default, name)]
 
     def check(self, value: Any) -> None:
         """Raise FieldError for a value of the wrong type, a number out of bounds or an unknown word."""

@@ -1,7 +1,9 @@
 """Commands that list, describe and generate."""
 
+import dataclasses
 import json
 import math
+import re
 import sys
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from antdrive.base.files import as_json
 from antdrive.planners import PLANNERS
+from antdrive.robots import PurePursuit, RobotSpec
 from antdrive.worlds import list_worlds, load_task
 
 
@@ -22,6 +25,26 @@ def test_every_planner_is_listed_with_its_options(antdrive):
     assert code == 0
     assert "aco-han" in out
     assert "elitism=100" in out
+
+
+def test_every_option_of_the_controller_is_listed_with_default_unit_and_meaning(antdrive):
+    code, out, err = antdrive("controller", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert {name: one["default"] for name, one in found.items()} == vars(PurePursuit())
+    assert all(one["about"] and "[" not in one["about"] for one in found.values())
+    assert (found["lookahead_time"]["unit"], found["lookahead_time"]["routes"]) == ("s", "smooth")
+    assert "corner_blend" in antdrive("controller")[1]
+
+
+def test_counterparts_of_nav2_parameters_are_options_of_the_controller_or_limits_of_robots(antdrive):
+    code, out, _ = antdrive("controller", "--nav2", "--json")
+    found = json.loads(out)
+    named = {name for text in found.values() for name in re.findall(r"`([^`]+)`", text)}
+    assert code == 0
+    assert named <= {one.name for kind in (PurePursuit, RobotSpec) for one in dataclasses.fields(kind)}
+    assert found["desired_linear_vel"] == "`max_speed` of the robot"
+    assert "allow_reversing" in antdrive("controller", "--nav2")[1]
 
 
 @pytest.mark.parametrize("words", [[], ["world"], ["robot"], ["suite"], ["campaign"]], ids=" ".join)

@@ -29,7 +29,7 @@ def fresh(drive, update=""):
 
 
 def test_a_drive_is_compared_with_a_baseline_beside_the_tests_file(drive, small_task, tmp_path):
-    with pytest.raises(DriveFailure, match=r"is missing; accept this drive with pytest .* --drive-update") as caught:
+    with pytest.raises(DriveFailure, match=r"is missing; accept this drive with antdrive accept ") as caught:
         drive(small_task, "astar")
     assert caught.value.result.outcome == "succeeded"
     fresh(drive, "all")(small_task, "astar")

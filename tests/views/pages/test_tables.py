@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import hypothesis.strategies as st
 import pytest
@@ -12,6 +13,7 @@ from antdrive.runs.statistics.intervals import Interval
 from antdrive.runs.statistics.run_table import RunTable
 from antdrive.views.pages.campaign_report import write_campaign_report
 from antdrive.views.pages.campaign_summary import headline, measure_title, summarise
+from antdrive.views.pages.quotes import disagreements
 from antdrive.views.pages.rendering import percent, percents, probability, short
 from antdrive.views.pages.tables import all_cells, latex_text, outcome_cells, pair_cells, success_cells
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
@@ -228,3 +230,45 @@ def test_cells_by_hand():
     assert [measure_title(name) for name in ("success", "duration_s", "plan_s", "spl", "turning_rad_per_m")] == [
         "success", "duration [s]", "planning time [s]", "spl", "turning [rad/m]",
     ]  # fmt: skip
+
+
+def test_a_sentence_states_each_measure_with_size_interval_tests_correction_and_clusters():
+    summary = table_of("ABC", 7)
+    success, duration = (quote for quote in summary.sentences if "p " in quote)
+    assert success.startswith(
+        "A succeeded in 100.0 % and B in 100.0 % of n = 28 pairs in 7 worlds: difference 0.0 points"
+    )
+    assert success.endswith("permutation test over worlds p = 1.000 (Holm, 3 pairs).")
+    row = min(summary.comparisons["duration_s"], key=lambda one: one.decisive_p)
+    low, high = map(short, row.interval)
+    assert duration == (
+        f"duration, {row.first} minus {row.second}: median {short(row.difference)} s over n = 28 pairs in 7 worlds that both "
+        f"solved, 95 % interval {low} to {high} (bootstrap over worlds); Wilcoxon's signed rank test p "
+        f"{probability(row.p_holm)}, permutation test over worlds p = {probability(row.p_worlds_holm)} (Holm, 3 pairs)."
+    )
+
+
+@pytest.mark.parametrize(
+    ("p", "over", "holm", "interval", "why"),
+    [
+        (0.01, 0.01, 0.02, (1, 2), None),
+        (0.20, 0.30, 0.40, (-1, 2), None),
+        (0.02, 0.04, 0.08, (1, 2), "it holds for one pair, p for 1 pairs together"),
+        (0.01, 0.06, 0.06, (1, 2), "worlds is too narrow, the test over worlds is not: no difference"),
+        (0.06, 0.02, 0.06, (1, 2), "it is of the median, the tests are of ranks: no difference is shown"),
+        (0.01, 0.01, 0.02, (-1, 2), "it is of the median, the tests are of ranks: the direction is shown"),
+    ],
+)
+def test_an_interval_and_a_p_that_disagree_are_explained(summary, p, over, holm, interval, why):
+    (row,) = summary.comparisons["duration_s"]
+    row = replace(row, p=p, p_worlds=over, p_holm=p, p_worlds_holm=holm, interval=Interval(*map(float, interval)))
+    said = list(disagreements({"duration [s]": [row]}))
+    assert len(said) == (why is not None)
+    assert all(why in one and one.endswith(" (good and poor_one: duration).") for one in said)
+
+
+def test_every_report_has_the_sentences(summary, tmp_path):
+    for kind in ("md", "tex", "html"):
+        text = write_campaign_report(summary, tmp_path, tmp_path / f"t.{kind}")[0].read_text()
+        assert "permutation test over worlds" in text
+    assert summary.as_dict()["sentences"] == summary.sentences

@@ -57,6 +57,9 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
             "reproduce", "reproduce", "Repeat a paper's experiments and test its claims.", resumes=True, plans=True
         ),
         "planners": Command("planners", "planners", "List the planners and their options."),
+        "controller": Command(
+            "controller", "controller", "List the options of the controller with default, unit and meaning."
+        ),
         "schema": Command("schema", "schema", "Print the JSON Schema of a file type."),
         "warm": Command("warm", "warm", "Compile all planners ahead of time."),
     }

@@ -14,7 +14,7 @@ from antdrive.cli.console import file_lines, planning, print_error, show, table
 from antdrive.cli.entrants import check_worlds, entrants_of, repeat_command
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, SUCCEEDED
 from antdrive.cli.options import argument, option
-from antdrive.cli.output import film_drives, results_folder
+from antdrive.cli.output import film_drives, print_idle_settings, results_folder
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.runs.comparing import (
     COMPARED,
@@ -53,7 +53,7 @@ def compare(
         option(
             "GROUP.KEY=VALUE",
             "Option of a planner or label (aco-han.ants=50), of all planners (planner.ants=50) or of the controller "
-            "(controller.lookahead_time=0.5). Repeatable.",
+            "(controller.braking=0.5). Repeatable.",
             "--set",
             "-s",
         ),
@@ -98,6 +98,7 @@ def compare(
         check_film(film)
     elif prelude:
         raise InputError("--prelude: needs --film")
+    print_idle_settings(list(scenarios.values()), {"seed"} if seeds > 1 else ())
     numbers = range(given["seed"], given["seed"] + seeds)
     cases = [(names[world], number) for world in worlds for number in numbers]
     mark = mark_of({f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}, cases)

@@ -9,7 +9,7 @@ from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, planning, show, this_command
 from antdrive.cli.options import flag, option
-from antdrive.cli.output import film_drives, run_lines
+from antdrive.cli.output import film_drives, print_idle_settings, run_lines
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.sim.settings import SETTINGS
 from antdrive.views.run_folder import check_film, check_folder, default_folder, write_result, write_run
@@ -45,6 +45,7 @@ def run(
     folder = out or default_folder(scenario)
     _check_views(scenario, film, prelude, gui)
     check_folder(folder)
+    print_idle_settings([scenario])
     compile_once()
     with folder_lock(folder):
         with planning(f"planning with {scenario.planner_name}"), keep_best():  # Ctrl-C keeps the best path so far
@@ -71,10 +72,11 @@ def _check_views(scenario: "Scenario", film: Path | None, prelude: float, gui: b
         check_display()
     if prelude > 0:
         from antdrive.planners import capabilities_of
+        from antdrive.planners.iterative import without_iterations
 
         if film is None:
             raise InputError("--prelude: needs --film")
         if not capabilities_of(scenario.planner).iterative:
-            raise InputError(f"--prelude: needs an iterative planner; {scenario.planner_name} is not one")
+            raise InputError(f"--prelude: {without_iterations(scenario.planner, scenario.planner_name)}")
     if film is not None:
         check_film(film)

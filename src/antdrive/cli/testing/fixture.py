@@ -122,7 +122,7 @@ class DriveFixture:
             demands=demands,
             baseline=self.baseline_path(whole) if baseline else None,
             commands=(shlex.join(["pytest", self._repeat]),),
-            accept=shlex.join(["pytest", self._repeat, "--drive-update"]),
+            accept=shlex.join(["antdrive", "accept", self._repeat]),
             update=self._update,
             folder=self._results.of(self._file, whole) if self._results else None,
             results=self._results,

@@ -166,7 +166,7 @@ class Tangent(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(needs_world=True)
+        return Capabilities(needs_world=True, deterministic=True)
 
     def __post_init__(self) -> None:
         require("bulge", self.bulge, above=0)

@@ -48,7 +48,7 @@ class PotentialField(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner. It may miss an existing path."""
-        return Capabilities(complete=False)
+        return Capabilities(complete=False, deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         from antdrive.planners.graph import _kernels_apf  # imported here because it loads the compiler

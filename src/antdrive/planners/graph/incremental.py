@@ -218,7 +218,7 @@ class IncrementalPlanner(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(own_replanner=True)
+        return Capabilities(own_replanner=True, deterministic=True)
 
     @abc.abstractmethod
     def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:

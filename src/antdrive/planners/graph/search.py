@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query
+from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query
 
 UNREACHABLE = "no sequence of allowed moves leads from the start to the goal"
 
@@ -19,6 +19,11 @@ class Dijkstra(GridPlanner):
     Known weakness, measured (docs/notebook/planner-quality.md): the search is not directed; on 100 x 100 cells
     among cylinders it takes three times as long as A*. Its paths share A*'s weakness.
     """
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Capabilities and requirements of this planner."""
+        return Capabilities(deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return shortest(query, informed=False)
@@ -34,6 +39,11 @@ class AStar(GridPlanner):
     In five worlds of the catalogue they are up to 21 per cent longer than the exact shortest path among the
     discs (`tangent`), 12 per cent in the median; on open ground at most 8.2 per cent.
     """
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Capabilities and requirements of this planner."""
+        return Capabilities(deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return shortest(query, informed=True)

@@ -56,7 +56,7 @@ class SafeIntervals(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner: it needs the movers' motions."""
-        return Capabilities(needs_motions=True)
+        return Capabilities(needs_motions=True, deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return plan_in_time(

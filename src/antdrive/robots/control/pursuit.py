@@ -9,15 +9,18 @@ lookahead is short, and rotates in place if the shortest arc is not clear.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, NamedTuple, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
+from annotated_types import Interval
 
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError
+from antdrive.base.records import attributes_of, require_ranges
 from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
@@ -46,6 +49,18 @@ LIMITERS: tuple[str, ...] = (
     "clearance",  # obstacles beside the robot are close
     "avoid",  # local avoidance of a mover
 )
+
+POSITIVE, FRACTION = Interval(ge=1e-3, le=100.0), Interval(ge=0.0, le=1.0)
+
+
+@dataclass(frozen=True)
+class ActsOn:
+    """Mark of an option that acts only on routes with corners, or only on smooth ones."""
+
+    corners: bool  # routes with corners: those whose curvature is unknown
+
+
+CORNERS, SMOOTH = ActsOn(corners=True), ActsOn(corners=False)
 
 
 class Twist(NamedTuple):
@@ -127,7 +142,7 @@ class PurePursuit:
     """Settings of a pure-pursuit controller.
 
     Attributes:
-        lookahead_time: lookahead divided by speed [s]
+        lookahead_time: lookahead divided by speed; the speed is at most the clear lookahead divided by this [s]
         preferred_lookahead_min: lookahead at low speed; reduced to `lookahead_min` where it is not clear [m]
         lookahead_min: shortest lookahead [m]
         lookahead_max: longest lookahead [m]
@@ -149,33 +164,28 @@ class PurePursuit:
         ValueError: a setting is out of range.
     """
 
-    lookahead_time: float = 0.25
-    preferred_lookahead_min: float = 0.3
-    lookahead_min: float = 0.12
-    lookahead_max: float = 1.0
-    lookahead_margin: float = 0.4
-    stopping_margin: float = 0.2
+    lookahead_time: Annotated[float, POSITIVE, SMOOTH] = 0.25
+    preferred_lookahead_min: Annotated[float, POSITIVE] = 0.3
+    lookahead_min: Annotated[float, POSITIVE] = 0.12
+    lookahead_max: Annotated[float, POSITIVE] = 1.0
+    lookahead_margin: Annotated[float, FRACTION] = 0.4
+    stopping_margin: Annotated[float, FRACTION] = 0.2
     rotate_in_place_above: float = 1.0
-    rotate_in_place_above_at_rest: float = 0.2
-    rotate_in_place_until: float = 0.08
+    rotate_in_place_above_at_rest: Annotated[float, POSITIVE] = 0.2
+    rotate_in_place_until: Annotated[float, POSITIVE] = 0.08
     braking: float = 0.7
-    blend: float = 0.2
-    corner_lookahead_time: float = 0.4
-    corner_blend: float = 0.6
-    min_speed_near_obstacles: float = 0.5
-    clearance_time: float = 0.05
-    creep_speed: float = 0.04
-    goal_distance: float = 0.01
+    blend: Annotated[float, POSITIVE, SMOOTH] = 0.2
+    corner_lookahead_time: Annotated[float, POSITIVE, CORNERS] = 0.4
+    corner_blend: Annotated[float, POSITIVE, CORNERS] = 0.6
+    min_speed_near_obstacles: Annotated[float, POSITIVE] = 0.5
+    clearance_time: Annotated[float, POSITIVE] = 0.05
+    creep_speed: Annotated[float, POSITIVE] = 0.04
+    goal_distance: Annotated[float, POSITIVE] = 0.01
 
     def __post_init__(self) -> None:
-        for key in _POSITIVE:
-            if not 1e-3 <= getattr(self, key) <= 100:
-                raise FieldError(key, f"must be between 0.001 and 100, got {getattr(self, key):g}")
+        require_ranges(self)
         if self.lookahead_max < self.lookahead_min:
             raise FieldError("lookahead_max", f"must be at least lookahead_min ({self.lookahead_min:g})")
-        for key in ("lookahead_margin", "stopping_margin"):
-            if not 0 <= getattr(self, key) <= 1:
-                raise FieldError(key, f"must be between 0 and 1, got {getattr(self, key):g}")
         if not 0 < self.braking <= 1:
             raise FieldError("braking", f"must be greater than 0 and at most 1, got {self.braking:g}")
         if not self.rotate_in_place_until < self.rotate_in_place_above < math.pi / 2:
@@ -299,6 +309,39 @@ class PurePursuit:
         return ObstacleIndex(discs, starts, bounds, side)
 
 
+class ControllerOption(NamedTuple):
+    """An option of the controller.
+
+    Attributes:
+        default: default value
+        unit: its unit; empty: none
+        meaning: what it does
+        acts_on: the routes on which it acts; None: all
+    """
+
+    default: float
+    unit: str
+    meaning: str
+    acts_on: ActsOn | None
+
+    @property
+    def routes(self) -> str:
+        """The routes on which it acts, in words."""
+        return "all" if self.acts_on is None else "with corners" if self.acts_on.corners else "smooth"
+
+
+def controller_options() -> Mapping[str, ControllerOption]:
+    """Return the controller's options by name."""
+    meanings, hints = attributes_of(PurePursuit.__doc__), get_type_hints(PurePursuit, include_extras=True)
+    options = {}
+    for one in fields(PurePursuit):
+        marks = getattr(hints[one.name], "__metadata__", ())
+        text, _, unit = meanings[one.name].partition(" [")
+        acts_on = next((mark for mark in marks if isinstance(mark, ActsOn)), None)
+        options[one.name] = ControllerOption(getattr(PurePursuit(), one.name), unit.removesuffix("]"), text, acts_on)
+    return options
+
+
 def unsorted_obstacles(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
     """Return an obstacle index with a single square."""
     return ObstacleIndex(discs, np.array([0, len(discs)]), np.asarray(bounds, dtype=np.float64), EVERYTHING)
@@ -308,20 +351,3 @@ def unsorted_obstacles(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
 def _discs_by_square(world: Keyed[World], side: float, distance: float) -> tuple[Floats, npt.NDArray[np.int64]]:
     bounds = np.asarray(world.value.bounds, dtype=np.float64)
     return _kernels_obstacles.index_discs(world.value.discs, bounds, side, distance)
-
-
-_POSITIVE = (
-    "lookahead_time",
-    "preferred_lookahead_min",
-    "lookahead_min",
-    "lookahead_max",
-    "rotate_in_place_above_at_rest",
-    "rotate_in_place_until",
-    "blend",
-    "corner_lookahead_time",
-    "corner_blend",
-    "min_speed_near_obstacles",
-    "clearance_time",
-    "creep_speed",
-    "goal_distance",
-)

@@ -17,8 +17,10 @@ from antdrive.robots import list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
 from antdrive.runs.campaigns.job import Job, NamedRobot, NamedSettings, NamedTask, PlannerVariant, SweepCase, run_key
 from antdrive.runs.campaigns.resolving import campaign_tasks, campaign_worlds, planner_variants
+from antdrive.sim.effects import idle_notes
 from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting_words
 from antdrive.sim.log.record import canonical_hash
+from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Task
 
 WORLDS, ROBOTS = "worlds", "robots"  # subfolders with the files that commands name
@@ -35,6 +37,19 @@ class Expansion:
     worlds: dict[str, Task]  # world files named by the runs' commands, by path relative to the campaign's folder
     robots: dict[str, Path]  # robot files, likewise
     planners: dict[str, Path]  # files of custom planners, likewise
+
+    def idle_notes(self) -> list[str]:
+        """Return a sentence for every setting without effect in some of the configurations."""
+        cases, seeds = {id(job.case): job.case for job in self.jobs}, {job.seed for job in self.jobs}
+        alike: dict[tuple[object, ...], Scenario] = {}  # whatever the task
+        scenarios: list[Scenario] = []
+        for case in cases.values():
+            movers = frozenset((type(one), getattr(one, "seed", None)) for one in case.place.task.world.movers)
+            key = movers, case.robot.content, str(case.settings.columns), case.planner.label
+            if key not in alike:
+                alike[key] = case.scenario(min(seeds), 0.0 if case.settings.fields["margin"] == "auto" else None)
+            scenarios.append(alike[key])
+        return idle_notes(scenarios, {"seed"} if len(seeds) > 1 else ())
 
 
 def expand(campaign: Campaign) -> Expansion:

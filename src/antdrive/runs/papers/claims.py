@@ -83,7 +83,8 @@ Numbers = npt.NDArray[np.int64]
 RunsByArm = Mapping[Arm, Sequence[PaperRun]]
 NO_PATH = 1e9  # replaces infinity in differences, so that "no path" minus "no path" is 0
 FEWEST = 6  # with fewer runs intervals are meaningless
-MANY = 1000  # larger factors of maps and seeds are not reported
+MANY = 1000  # most runs that a claim can need
+REPEATABLE = 10  # larger factors of maps and seeds are not reported
 EQUAL = 1e-6  # tolerance of bounds
 ABOUT = 0.05  # allowed relative deviation from a printed mean
 ENDLESS_TEXT = "∞"
@@ -328,8 +329,10 @@ def _undecided(measured: Measured, claim: Claim) -> str:
     if abs(bound - value) < 1e-9 or not abs(towards) < NO_PATH / 10:
         return words
     times = (towards / abs(bound - value)) ** 2
-    more = f"about {times:{'.0f' if times > 10 else '.1f'}} times as many maps and seeds would decide"
-    return f"{words}; {more}" if 1.1 < times < MANY else words
+    if times <= 1.1:
+        return words
+    more = f"about {times:.1f} times as many maps and seeds would decide"
+    return f"{words}; {more if times < REPEATABLE else 'the difference is small beside the spread of the runs'}"
 
 
 def _counts(difference: Floats) -> str:

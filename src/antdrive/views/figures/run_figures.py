@@ -228,13 +228,14 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
         draw_map(axes, scene)
         handles: list[Any] = []
         drives = distinct(rollouts.items())
-        names = [same[0] for same, _ in drives]
-        styles = label_styles(names, [log.record.planner.name for _, log in drives])
-        lines = [log.pose[thinned(len(log.pose), LINE_POINTS), :2] for _, log in drives]
-        for (same, log), line, style in zip(drives, lines, styles, strict=True):
-            length = path_text([rollouts[name].record.plan.length_m for name in same], driven_length_m(log))
+        names = [same[0][0] for same in drives]
+        logs = [same[0][1] for same in drives]
+        styles = label_styles(names, [log.record.planner.name for log in logs])
+        lines = [log.pose[thinned(len(log.pose), LINE_POINTS), :2] for log in logs]
+        for same, log, line, style in zip(drives, logs, lines, styles, strict=True):
+            length = path_text((one.record.plan.length_m for _, one in same), driven_length_m(log))
             alike = " (identical)" if len(same) > 1 else ""
-            label = f"{', '.join(same)}{alike}: {length} m, {float(log.t[-1]):.1f} s"
+            label = f"{', '.join(name for name, _ in same)}{alike}: {length} m, {float(log.t[-1]):.1f} s"
             handles += axes.plot(*line.T, color=style.light, ls=style.dash, lw=2.2, label=label, zorder=6)
         if len(drives) > 1:
             _name_lines(axes, names, lines, [style.light for style in styles])

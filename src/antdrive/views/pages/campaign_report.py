@@ -258,7 +258,7 @@ def _title(name: str) -> str:
 
 def _common(summary: CampaignSummary) -> dict[str, Any]:
     definitions = {name: METRICS[name].definition for name in summary.comparisons if name in METRICS}
-    parts = {"cards": headline(summary), "notes": summary.notes, "definitions": definitions}
+    parts = {"cards": headline(summary), "notes": [*summary.sentences, *summary.notes], "definitions": definitions}
     return {"title": summary.title, "summary": summary, **parts}
 
 

@@ -28,6 +28,7 @@ from antdrive.runs.statistics.run_table import HASHES, RunTable
 from antdrive.runs.statistics.significance import FLIPS
 from antdrive.runs.statistics.success import PlannerSuccess, common_medians, success_table
 from antdrive.sim.log.metrics import METRICS
+from antdrive.views.pages.quotes import disagreements, quotes
 from antdrive.views.pages.rendering import percent, percents
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
@@ -56,6 +57,13 @@ class CampaignSummary:
     def table(self) -> RunTable:
         """Table of the runs."""
         return self.paired.table
+
+    @property
+    def sentences(self) -> list[str]:
+        """A sentence to quote for each measure, then one for each cause of intervals and p that disagree."""
+        titled = {measure_title(name): rows for name, rows in self.comparisons.items()}
+        stated = [one for title, rows in titled.items() for one in quotes(self.paired, title, rows)]
+        return [*stated, *disagreements(titled)]
 
     @property
     def notes(self) -> list[str]:
@@ -88,6 +96,7 @@ class CampaignSummary:
                 ]
                 for name, rows in self.medians.items()
             },
+            "sentences": self.sentences,
             "notes": self.notes,
         }
 

@@ -46,7 +46,8 @@ def success_cells(summary: CampaignSummary) -> TextTable:
                 *(with_interval(*summary.medians[name][k]) for name in names),
             )
         )
-    return TextTable("Success by planner", headings, rows)
+    smoothings = list(dict.fromkeys(summary.table.texts("smoothing")))
+    return TextTable(f"Success by planner (smoothing {', '.join(smoothings)})", headings, rows)
 
 
 def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTable:
@@ -194,7 +195,7 @@ def write_latex(summary: CampaignSummary, out: Path, columns: Sequence[str] = ()
     lines = ["% antdrive report; needs \\usepackage{booktabs} and, for long tables, \\usepackage{longtable}"]
     for table in chosen_tables(all_cells(summary), columns):
         lines += ["", f"% {latex_text(table.title)}", *_latex_table(table, summary)]
-    lines += ["", *(f"% {latex_text(note)}" for note in summary.notes)]
+    lines += ["", *(f"% {latex_text(note)}" for note in (*summary.sentences, *summary.notes))]
     return [write_text(out, "\n".join(lines).rstrip() + "\n")]
 
 

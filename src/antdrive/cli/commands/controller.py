@@ -1,0 +1,27 @@
+"""`antdrive controller`."""
+
+from typing import Annotated
+
+from antdrive.cli import options
+from antdrive.cli.console import show, table
+from antdrive.cli.options import flag
+
+
+def controller(
+    nav2: Annotated[bool, flag("List Nav2's parameters and their counterparts instead.", "--nav2")] = False,
+    json: options.Json = False,
+) -> None:
+    """List the options of the controller with default, unit and meaning."""
+    from antdrive.robots.control.nav2 import NAV2
+    from antdrive.robots.control.pursuit import controller_options
+
+    if nav2:
+        show(json, dict(NAV2), table(("Nav2's Regulated Pure Pursuit", "antdrive"), NAV2.items()))
+        return
+    known = controller_options()
+    facts = {
+        name: {"default": one.default, "unit": one.unit, "about": one.meaning, "routes": one.routes}
+        for name, one in known.items()
+    }
+    rows = ((name, f"{one.default:g}", one.unit or "-", one.routes, one.meaning) for name, one in known.items())
+    show(json, facts, table(("option", "default", "unit", "acts on routes", "meaning"), rows))

@@ -1,0 +1,101 @@
+"""Settings without effect: for each setting, a reason why it cannot act in a scenario; empty if it can."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
+#: Returns why the setting with a key, such as `controller.blend`, cannot act in a scenario; empty if it can.
+Idle: TypeAlias = "Callable[[Scenario, str], str]"
+
+
+def never(s: Scenario, key: str) -> str:
+    """Return no reason: the setting can always act."""
+    return ""
+
+
+def if_timed(s: Scenario, key: str) -> str:
+    """Return a reason for a planner whose cells are driven as planned, at its times."""
+    as_asked = s.smoothing == s.driven_smoothing
+    return "" if as_asked else f"{s.planner_label} plans in space and time; its cells are driven as planned"
+
+
+def without_noise(s: Scenario, key: str) -> str:
+    """Return a reason for a robot without noise levels and without scans."""
+    if s.scans or s.robot.noise.nonzero:
+        return ""
+    return f"the robot file of {s.robot.name} has no noise section"
+
+
+def with_exact_fixes(s: Scenario, key: str) -> str:
+    """Return a reason for true poses where fixes have no error either."""
+    return "without noise, fixes are exact as well" if s.localisation == "true" and not s.noisy else ""
+
+
+def without_odometry(s: Scenario, key: str) -> str:
+    """Return a reason for a robot that is localised otherwise."""
+    return "" if s.drifting else f"localisation {s.localisation} uses no odometry errors; odometry and matching do"
+
+
+def on_other_routes(s: Scenario, key: str) -> str:
+    """Return a reason for an option of the controller that acts only on routes of the other kind."""
+    from antdrive.robots.control.pursuit import CORNERS, SMOOTH, controller_options
+
+    options, name = controller_options(), key.partition(".")[2]
+    raw = s.driven_smoothing == "none"
+    if options[name].acts_on is SMOOTH and raw:
+        return f"routes without smoothing have corners; set controller.corner_{name}"
+    if options[name].acts_on is CORNERS and not raw and s.map == "given" and not s.moving:
+        return f"smoothing {s.smoothing} leaves no corners; set controller.{name.removeprefix('corner_')}"
+    return ""
+
+
+def without_movers(s: Scenario, key: str) -> str:
+    """Return a reason for a world without movers, in which the robot looks for none."""
+    return "" if s.moving else "the world has no movers"
+
+
+def without_choice_of_perception(s: Scenario, key: str) -> str:
+    """Return a reason for a world without movers, and for a planner that knows their motions."""
+    if s.timed:
+        return f"{s.planner_label} is given the movers' motions"
+    return "" if s.perception == s.usual_perception else without_movers(s, key)
+
+
+def without_replans(s: Scenario, key: str) -> str:
+    """Return a reason for a drive without movers on a given map."""
+    return without_movers(s, key) if s.map == "given" else ""
+
+
+def without_chance(s: Scenario, key: str) -> str:
+    """Return a reason for a drive that draws no random numbers."""
+    from antdrive.planners import capabilities_of
+    from antdrive.worlds import Wandering
+
+    wander = any(isinstance(one, Wandering) and one.seed is None for one in s.driven_world.movers)
+    if s.noisy or s.drifting or wander or (s.scans and s.noise) or not capabilities_of(s.planner).deterministic:
+        return ""
+    return f"{s.planner_label} and the drive draw no random numbers"
+
+
+def idle_notes(scenarios: Sequence[Scenario], given: Collection[str] = ()) -> list[str]:
+    """Return a sentence for every setting without effect in some of the scenarios.
+
+    Args:
+        scenarios: one for each configuration
+        given: keys of settings that count as given even at their defaults
+    """
+    found: dict[tuple[str, str], list[str]] = {}
+    for s in scenarios:
+        for key, reason in s.idle_settings(given).items():
+            found.setdefault((key, reason), []).append(f"{s.task.world.name} with {s.planner_label}")
+    return [f"{key} has no effect{_share(places, len(scenarios))}: {reason}" for (key, reason), places in found.items()]
+
+
+def _share(places: Iterable[str], count: int) -> str:
+    """Return in which of the configurations something holds; empty if in all."""
+    names = list(places)
+    return "" if len(names) == count else f" in {len(names)} of {count} configurations, such as {names[0]}"

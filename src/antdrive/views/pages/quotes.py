@@ -1,0 +1,96 @@
+"""Sentences that state a comparison of planners, to quote."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from antdrive.runs.statistics.comparison import ALPHA, SUCCESS, PairedComparison
+from antdrive.runs.statistics.pairing import PairedRuns
+from antdrive.views.pages.rendering import percent, percents, probability, short
+
+
+def quotes(paired: PairedRuns, title: str, rows: Sequence[PairedComparison]) -> Iterator[str]:
+    """Yield a sentence about the pair with the smallest p of a measure's table."""
+    tested = _tested(rows)
+    if not tested:
+        return
+    row = min(tested, key=lambda one: one.decisive_p)
+    tests = [
+        "exact McNemar test" if row.measure == SUCCESS else "Wilcoxon's signed rank test",
+        "permutation test over worlds",
+    ]
+    found = [
+        f"{test} p {_equals(p)}"
+        for test, p in zip(tests, (row.p_holm, row.p_worlds_holm), strict=True)
+        if not math.isnan(p)
+    ]
+    over = f"n = {_counted(row.pairs, 'pair')} in {_counted(row.worlds, 'world')}"
+    yield f"{_effect(paired, title, row, over)}; {', '.join(found)} (Holm, {_counted(len(tested), 'pair')})."
+
+
+def disagreements(tables: Mapping[str, Sequence[PairedComparison]]) -> Iterator[str]:
+    """Yield a sentence for every cause of an interval and a p that disagree, with the pairs and measures.
+
+    Args:
+        tables: the comparisons by title of their measure
+    """
+    where: dict[str, dict[str, list[str]]] = {}
+    for title, rows in tables.items():
+        tested = _tested(rows)
+        for one in tested:
+            if why := _disagreement(one, len(tested)):
+                pair = f"{one.first} and {one.second}"
+                where.setdefault(why, {}).setdefault(pair, []).append(title.partition(" [")[0])
+    for why, pairs in where.items():
+        places = "; ".join(f"{pair}: {', '.join(titles)}" for pair, titles in pairs.items())
+        yield f"{why} ({places})."
+
+
+def _tested(rows: Sequence[PairedComparison]) -> list[PairedComparison]:
+    return [row for row in rows if not math.isnan(row.decisive_p)]
+
+
+def _effect(paired: PairedRuns, title: str, row: PairedComparison, over: str) -> str:
+    """Return the size of the difference with its interval."""
+    i, j = paired.planners.index(row.first), paired.planners.index(row.second)
+    mask = paired.counted(i, j)
+    if row.measure == SUCCESS:
+        shares = [percent(float(paired.success[mask, k].mean())) for k in (i, j)]
+        several = paired.several_in_worlds(mask)
+        method = "Newcombe, widened by a bootstrap over worlds" if several else "Newcombe"
+        return (
+            f"{row.first} succeeded in {shares[0]} % and {row.second} in {shares[1]} % of {over}: difference "
+            f"{percent(row.difference)} points, 95 % interval {percents(row.interval)} ({method})"
+        )
+    name, _, unit = title.removesuffix("]").partition(" [")
+    median = f"{short(row.difference)} {unit}".rstrip()
+    return (
+        f"{name}, {row.first} minus {row.second}: median {median} over {over} that both "
+        f"solved, 95 % interval {short(row.interval.low)} to {short(row.interval.high)} (bootstrap over worlds)"
+    )
+
+
+def _disagreement(row: PairedComparison, tested: int) -> str:
+    """Return why interval and p disagree; empty if they agree."""
+    excludes, decided = row.interval.low > 0 or row.interval.high < 0, row.decisive_p < ALPHA
+    if math.isnan(row.interval.low) or excludes == decided:
+        return ""
+    success = row.measure == SUCCESS
+    other = "it is widened to hold over worlds" if success else "it is of the median, the tests are of ranks"
+    if decided:
+        return f"The interval contains 0 although p is below {ALPHA:g}, since {other}: the direction is shown, not the size"
+    if max(p for p in (row.p, row.p_worlds) if not math.isnan(p)) < ALPHA:
+        other = f"it holds for one pair, p for {tested} pairs together (Holm)"
+    elif row.p < ALPHA:
+        other = f"a bootstrap over {row.worlds} worlds is too narrow, the test over worlds is not"
+    return f"The interval excludes 0 although p is not below {ALPHA:g}, since {other}: no difference is shown"
+
+
+def _equals(p: float) -> str:
+    text = probability(p)
+    return text if text.startswith("<") else f"= {text}"
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
