@@ -92,6 +92,7 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "show_memory": False,
     "capture_repr": ("_repr_html_",),
+    "ignore_repr_types": "FilmInfo",  # the scraper shows films
     "remove_config_comments": True,
     "within_subsection_order": "antdrive_site.gallery_order",
     "plot_gallery": "True",

@@ -153,7 +153,7 @@ def parsed(path):
 def test_the_version_is_the_same_everywhere():
     citation = parsed(ROOT / "CITATION.cff")
     assert (citation["version"], str(citation["date-released"])) == (VERSION, DATED[0][1])
-    assert DATED[0][0] == VERSION
+    assert DATED[0][0] == VERSION == antdrive.__version__
 
 
 def test_the_changelog_has_dated_sections_below_what_is_unreleased():

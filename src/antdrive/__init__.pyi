@@ -6,6 +6,7 @@ from . import testing as testing
 from . import views as views
 from . import worlds as worlds
 from .base.errors import InputError as InputError
+from .base.version import __version__ as __version__
 from .planners.plan import GridPlanner as GridPlanner
 from .planners.plan import Planner as Planner
 from .planners.plan import PlanResult as PlanResult

@@ -149,6 +149,10 @@ def test_the_first_folder_that_can_be_written_is_chosen(monkeypatch, tmp_path):
     given = tmp_path / "given"
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(given))
     assert kernel_cache.cache_folder() == given
+    assert (given / ".gitignore").read_text() == "*\n"
+    (given / ".gitignore").unlink()
+    assert kernel_cache.cache_folder() == given
+    assert not (given / ".gitignore").exists(), "an existing folder is somebody's"
     closed.add(given)
     assert kernel_cache.cache_folder() is None
 

@@ -9,6 +9,7 @@ import sys
 import xml.etree.ElementTree
 from pathlib import Path
 
+import numba
 import pytest
 import yaml
 
@@ -77,6 +78,12 @@ def test_its_workflow_calls_pytest_with_options_that_exist(checkout, variables):
     (installs,) = [step["run"].split() for step in job["steps"] if step.get("run", "").startswith("pip")]
     assert [f"./{place}" for place in places] == [word for word in installs if "/" in word]
     assert "antdrive" not in installs, "is on no index"
+    compiler = next(step for step in job["steps"] if step.get("id") == "compiler")
+    (text,) = re.findall(r"^python -c \"(.*)\" >> \"\$GITHUB_OUTPUT\"$", compiler["run"])
+    said = run([sys.executable, "-c", text], checkout, variables).stdout
+    assert re.fullmatch(rf"for={re.escape(numba.__version__)}-\S+\n", said)
+    key = next(step["with"]["key"] for step in job["steps"] if "actions/cache" in step.get("uses", ""))
+    assert "${{ steps.compiler.outputs.for }}" in key
     kept = next(step["with"]["path"] for step in job["steps"] if "upload-artifact" in step.get("uses", ""))
     assert words[words.index("--drive-results") + 1] == kept
 

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from antdrive.base.errors import InputError
 from antdrive.planners import load_planner
 from antdrive.runs import barn_challenge
-from antdrive.runs.barn_challenge import by_map, campaign_data, lines, reference_times, score, unpacked
+from antdrive.runs.barn_challenge import OFFICIAL, REPORT_TEST, by_map, campaign_data, lines, reference_times, unpacked
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.sim import Scenario, run
@@ -75,7 +75,7 @@ def test_every_planners_path_is_safe_to_follow(planner, noise, smoothing, number
     ("arrived", "seconds", "expected"), [(True, 6.0, 0.5), (True, 20.0, 0.25), (True, 99.0, 0.125), (False, 6.0, 0.0)]
 )
 def test_the_score_is_the_challenges(arrived, seconds, expected):
-    assert score(arrived, seconds, 5.0) == expected
+    assert OFFICIAL.score(arrived, seconds, 5.0) == expected
 
 
 def test_a_failed_run_scores_nothing_and_has_no_time():
@@ -89,16 +89,20 @@ def test_a_failed_run_scores_nothing_and_has_no_time():
     )
     first, second, everything = lines(table, {"world_0": 4.0})
     assert (first.world, first.runs, first.arrived, first.seconds, first.score) == ("world_0", 2, 1, 10.0, 0.2)
-    assert (second.world, second.score) == ("world_6", 0.4)  # no reference path: its own optimum's score
+    assert first.exact == 0.25
+    assert (second.world, second.exact) == ("world_6", 0.4)
+    assert math.isnan(second.score)  # no reference path
+    assert second.cells[-2:] == ("–", "0.4000")
     assert (everything.runs, everything.arrived, everything.seconds) == (3, 2, 15.0)
-    assert everything.score == pytest.approx(0.8 / 3)
+    assert everything.exact == pytest.approx(0.9 / 3)
 
 
-def test_reference_paths_are_measured_in_the_challenges_cells(tmp_path):
+def test_reference_paths_are_measured_as_the_scripts_do(tmp_path):
     np.save(tmp_path / "path_12.npy", np.array([(14, 0), (15, 1), (15, 2)]))
-    xy = [(-2.25, 3.0), (-2.325, 5.175), (-2.175, 5.325), (-2.175, 5.475), (-2.25, 13.0)]
-    length = sum(math.dist(a, b) for a, b in itertools.pairwise(xy))
-    assert reference_times(tmp_path) == {"world_12": pytest.approx(length / 2)}
+    cells = [(-2.475, 5.075), (-2.325, 5.225), (-2.325, 5.375)]
+    for formula, x in ((OFFICIAL, -2.25), (REPORT_TEST, -2.0)):
+        length = sum(math.dist(a, b) for a, b in itertools.pairwise([(x, 3.0), *cells, (x, 13.0)]))
+        assert reference_times(tmp_path, formula) == {"world_12": pytest.approx(length / 2)}
     (tmp_path / "path_18.npy").write_bytes(b"no array")
     with pytest.raises(InputError, match="path_18"):
         reference_times(tmp_path)

@@ -1,20 +1,27 @@
 """HTML of worlds, plans and rollouts in notebooks, and planners' colours."""
 
+import base64
+import io
 import itertools
 import pydoc
 import re
 import subprocess
 import sys
+import types
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from antdrive.base.progress import progress_bar
 from antdrive.planners import PLANNERS, PlanResult, PlanStatus, Query, load_planner
-from antdrive.sim import Scenario, certify
+from antdrive.sim import Scenario, certify, run
 from antdrive.sim.log.outcome import Outcome
 from antdrive.views.colours import OUTCOME_LABELS, PLANNER_COLOURS, PLANNER_STYLES, planner_style
+from antdrive.views.figures.run_figures import overview
+from antdrive.views.film.film_options import FilmInfo
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, Wandering, World, load_task, rasterise
 from tests.records import changed
 
@@ -69,6 +76,54 @@ def test_looking_at_a_world_imports_nothing_heavy():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_representations_fit_one_line(small_run, collided_run):
+    for done in (small_run, collided_run):
+        for shown in (done, done.scenario, done.plan, done.rollout):
+            assert len(repr(shown)) < 200
+            assert "\n" not in repr(shown)
+    assert "certified collision-free" in repr(small_run)
+    assert "touched an obstacle, " in repr(collided_run)
+    assert "a < b" in repr(PlanResult(status=PlanStatus.NO_PATH, reason="a < b"))
+
+
+def test_figures_show_as_png_without_pyplot(small_run):
+    picture = Image.open(io.BytesIO(overview(small_run.rollout)._repr_png_()))
+    assert picture.format == "PNG"
+    assert 600 < picture.width < 1400
+
+
+def film_info(path):
+    return FilmInfo(path, frames=30, size=(320, 180), fps=30.0, camera="oblique", wall_s=0.1)
+
+
+@pytest.mark.parametrize(("name", "tag"), [("a & b.mp4", "video"), ("film.gif", "img"), ("film.webp", "img")])
+def test_small_films_are_embedded_and_large_ones_linked(tmp_path, monkeypatch, name, tag):
+    info = film_info(tmp_path / name)
+    assert "the file is gone" in info._repr_html_()
+    info.path.write_bytes(b"film")
+    html = info._repr_html_()
+    assert f"<{tag}" in html
+    assert base64.b64encode(b"film").decode() in html
+    monkeypatch.setattr(sys.modules[FilmInfo.__module__], "MOST_EMBEDDED", 3)
+    html = info._repr_html_()
+    assert "base64" not in html
+    assert ElementTree.fromstring(html).find("a").text == str(info.path)
+
+
+def test_a_bar_shows_in_notebooks_and_on_request(small_scenario, small_run, capsys, monkeypatch):
+    run(small_scenario, planned=(small_run.grid, small_run.plan), progress=True)
+    assert "astar in small [" in capsys.readouterr().err
+    for wanted, shown in ((None, False), (True, True), (False, False)):
+        with progress_bar(wanted, "campaign") as update:
+            update(3, 3)
+        assert ("3 of 3 runs" in capsys.readouterr().err) == shown
+    kernel = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(kernel=None))
+    monkeypatch.setitem(sys.modules, "IPython", kernel)
+    with progress_bar(None, "campaign"):
+        pass
+    assert capsys.readouterr().err.startswith("\rcampaign [")
 
 
 def moving():

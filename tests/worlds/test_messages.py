@@ -72,7 +72,7 @@ MORE_TASKS = (
     "  - {name: dock, goal: [1, 5]}\n", "  - {name: out, goal: [99, 5]}\n", "  - {goal: [1, 5]}\n", "frame: [0, 0]\n",
 )  # fmt: skip
 OF_OTHER_PROGRAMS = {
-    "w.sdf": "<sdf/>", "w.world": "<sdf/>", "w.map": "type octile",
+    "w.sdf": "<sdf/>", "w.world": "<sdf/>", "world_54.world": "<sdf/>", "w.map": "type octile",
     "w.yaml": "image: w.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n",
 }  # fmt: skip
 #: Changes of the element in which an exported SDF world keeps its task.

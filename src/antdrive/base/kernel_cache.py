@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -59,11 +60,15 @@ def cache_folder() -> Path | None:
     """Return the folder for machine code; None without a writable folder.
 
     The first writable one of: `NUMBA_CACHE_DIR`, the package's `__pycache__`, the user's cache folder, and a private folder
-    among the temporary files.
+    among the temporary files. Git ignores a new one.
     """
     given = os.environ.get("NUMBA_CACHE_DIR")
     for folder in (*([Path(given)] if given else []), *default_folders()):
+        new = not os.path.exists(folder)
         if _writable(folder):
+            if new:
+                with contextlib.suppress(OSError):
+                    (folder / ".gitignore").write_text("*\n")
             return folder
     return _private_folder()
 

@@ -188,9 +188,9 @@ def application() -> Any:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
+        from antdrive.base.version import __version__
 
-        print_line(f"antdrive {version('antdrive')}")
+        print_line(f"antdrive {__version__}")
         raise typer.Exit
 
 

@@ -214,6 +214,12 @@ class PlanResult:
         """The polyline to drive as fractional (row, col) (M, 2): `waypoints` if there are any, else `cells`."""
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
+    def __repr__(self) -> str:
+        path = f" of {self.line_length:.3f} m" if len(self.cells) else ""
+        reason = f" ({self.reason:.200})" if self.reason else ""
+        effort = f"{self.work:,} {self.work_unit}, {1000 * self.wall_s:.1f} ms"
+        return f"<{type(self).__name__}: {self.status.value}{path}{reason}, {effort}>"
+
     def _repr_html_(self) -> str:
         from antdrive.worlds.svg import card, curve_svg, path_svg
 
@@ -226,7 +232,7 @@ class PlanResult:
         return card(picture, self.status.value + (f": {self.reason}" if self.reason else ""), facts)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class TimedPlan(PlanResult):
     """A plan with times: the robot reaches each cell at `arrive`, waits, and leaves it at `leave`.
 

@@ -23,6 +23,7 @@ import numpy as np
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.files import open_regular
 from antdrive.base.plane import polyline_length
+from antdrive.base.types import Point
 from antdrive.sim.log.metrics import BARN_SPEED
 from antdrive.worlds.formats.barn import BARN_CELL, BARN_GOAL, BARN_START
 
@@ -30,14 +31,14 @@ if TYPE_CHECKING:
     import pyarrow
 
 WORLDS, PATHS = "world_*.world", "path_*.npy"
-FIELD = (-4.425, 5.175)  # cell (0, 0) of a reference path [m]
+FIELD = (-4.575, 5.075)  # cell (0, 0) of a reference path by the scripts [m]; its cylinders: 0.15 and 0.1 m farther
 MAX_MEMBERS, MAX_BYTES = 2000, 300_000_000  # of an archive of worlds; the set's 300 worlds have 210 MB
 MAX_PATH_BYTES = 1_000_000
 #: Decompressors by the first bytes of a file.
 DECOMPRESS: Mapping[bytes, Any] = MappingProxyType(
     {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ\x00": lzma.open}
 )
-HEADS = ("world", "runs", "certified", "mean time [s]", "mean score")
+HEADS = ("world", "runs", "certified", "mean time [s]", "score", "exact score")
 PUBLISHED_HEADS = ("published", "success [%]", "mean time [s]", "mean score", "where")
 #: Disclaimer of the table.
 OURS = "Results of this simulator on the challenge's public worlds; not an official score."
@@ -64,15 +65,49 @@ def _cell(value: float, digits: int) -> str:
     return "–" if math.isnan(value) else f"{value:.{digits}f}"
 
 
-COPIED = "secondary quotes of the organisers' report on the BARN challenge at ICRA 2026"
-LICS = "the team's published log (address lost); method: Damanik et al. 2024, arXiv 2406.14947"
+@dataclass(frozen=True)
+class Formula:
+    """A variant of the challenge's score: 0 without success, else OT / clip(time, `least` OT, `most` OT).
+
+    OT is the length of the polyline from `start` along the challenge's path file to the goal, divided by 2 m/s.
+    """
+
+    name: str  # its bounds
+    least: float  # [OT]
+    most: float  # [OT]
+    start: Point  # [m]
+    source: str  # who uses it
+
+    def score(self, succeeded: bool, seconds: float, fastest: float) -> float:
+        """Return the score of one run.
+
+        Args:
+            succeeded: whether the robot reached the goal without a collision
+            seconds: its time by the challenge's clock [s]
+            fastest: OT [s]
+        """
+        return fastest / min(max(seconds, self.least * fastest), self.most * fastest) if succeeded else 0.0
+
+
+#: The score of the leaderboards since 2024.
+OFFICIAL = Formula("2 to 8 OT", 2, 8, BARN_START[:2], "run.py, barn_runner.py (ROS 2), leaderboards since 2024")
+#: The same organisers' report script, and their older run.py.
+REPORT_TEST = Formula("4 to 8 OT", 4, 8, (-2.0, 3.0), "report_test.py, leaderboard of 2022")
+FORMULAS = (OFFICIAL, REPORT_TEST)
+FORMULA = "success * OT / clip(time, 2 OT, 8 OT), OT = length of the challenge's path file / 2 m/s"
+FORMULA_SOURCE = "github.com/Daffan/the-barn-challenge; github.com/Saadmaghani/The-Barn-Challenge-Ros2"
+
+REPORT = "Lessons Learned from the Fifth BARN Challenge, https://people.cs.gmu.edu/~xiao/papers/barn26_report.pdf"
+LEADERBOARD = "https://people.cs.gmu.edu/~xiao/Research/BARN_Challenge/BARN_Challenge24.html"
+LICS = "github.com/damanikjosh/the-barn-challenge, out.txt (first 500 lines); Damanik et al. 2024, arXiv 2406.14947"
 DWA = "github.com/Daffan/the-barn-challenge, res/dwa_out.txt"
 
 #: Published results for comparison.
 PUBLISHED = (
-    Published("IN2 BOT, 2026", "hidden worlds, 50 x 10, secondary source, unverified", COPIED, 0.4975),
-    Published("EW-Glab, 2026", "hidden worlds, secondary source, unverified", COPIED, 0.4880),
+    Published("IN2 BOT, 2026", "hidden worlds, 50 x 10, official, from a quote", REPORT, 0.4975),
+    Published("EW-Glab, 2026", "hidden worlds, 50 x 10, official, from a quote", REPORT, 0.4880),
     Published("LiCS-KI, 1.5 m/s", "the 50 public worlds x 10, team's log, rescored", LICS, 0.4889, 0.98, 7.69),
+    Published("LiCS-KI, 2024", "hidden worlds, official, from a quote", LEADERBOARD, 0.4762),
     Published("DWA, 0.5 m/s", "the 50 public worlds x 10, organisers' log, rescored", DWA, 0.1586, 0.85),
 )
 
@@ -85,25 +120,33 @@ class BarnLine:
     runs: int  # number of runs
     arrived: int  # number of runs certified at the goal
     seconds: float  # their mean time by the challenge's clock [s]; NaN if there are none
-    score: float  # mean score of all runs
+    score: float  # mean score of all runs, OT from the challenge's path files; NaN if a world has none
+    exact: float  # mean score of all runs, OT from the exact shortest path
 
     @property
     def cells(self) -> tuple[str, ...]:
         """The row of the table, under `HEADS`."""
-        return self.world, str(self.runs), str(self.arrived), _cell(self.seconds, 2), _cell(self.score, 4)
+        return (
+            self.world,
+            str(self.runs),
+            str(self.arrived),
+            _cell(self.seconds, 2),
+            _cell(self.score, 4),
+            _cell(self.exact, 4),
+        )
 
 
-def unpacked(source: Path, folder: Path) -> Path:
-    """Return the folder with the worlds of a folder or archive; unpack an archive."""
+def unpacked(source: Path, folder: Path, wanted: str = WORLDS) -> Path:
+    """Return the folder with the worlds (or the wanted files) of a folder or archive; unpack an archive."""
     archives = sorted(source.glob("*.tar.*")) if source.is_dir() else [source]
     worlds = source
-    if archives and not (source.is_dir() and any(source.rglob(WORLDS))):
+    if archives and not (source.is_dir() and any(source.rglob(wanted))):
         worlds = folder
         with tempfile.TemporaryDirectory() as temporary:  # nothing of a damaged archive stays
             _unpack(archives[0], Path(temporary))
             shutil.copytree(temporary, folder, dirs_exist_ok=True)
-    if not any(worlds.rglob(WORLDS)):
-        raise input_error(str(source), f"no {WORLDS} here; name the folder of the challenge's worlds, or their archive")
+    if not any(worlds.rglob(wanted)):
+        raise input_error(str(source), f"no {wanted} here; name the folder of the challenge's worlds, or their archive")
     return worlds
 
 
@@ -174,10 +217,10 @@ def localisation_with_map(kind: str) -> str:
     return "true" if kind == "true" else "fixes"
 
 
-def reference_times(folder: Path) -> dict[str, float]:
-    """Return the time of the challenge's reference path at 2 m/s, by the world's name [s].
+def reference_times(folder: Path, formula: Formula = OFFICIAL) -> dict[str, float]:
+    """Return OT, the time of the challenge's reference path at 2 m/s, by the world's name [s].
 
-    The path leads from the start along the cells of the file to the goal.
+    The path leads from the formula's start along the cells of the file to the point 10 m ahead.
     """
     times = {}
     for path in folder.rglob(PATHS):
@@ -185,17 +228,12 @@ def reference_times(folder: Path) -> dict[str, float]:
             content = file.read()
         try:
             cells = np.load(io.BytesIO(content), allow_pickle=False)
-            way = np.vstack([BARN_START[:2], BARN_CELL * cells + FIELD, BARN_GOAL])
+            way = np.vstack([formula.start, BARN_CELL * cells + FIELD, (formula.start[0], BARN_GOAL[1])])
         except (ValueError, OSError, EOFError, TypeError, MemoryError) as error:
             raise InputError(f"{path}: not a reference path of a BARN world ({error})") from None
         length = polyline_length(way)
         times[path.stem.replace("path_", "world_")] = length / BARN_SPEED
     return times
-
-
-def score(succeeded: bool, seconds: float, fastest: float) -> float:
-    """Return the challenge's score of one run."""
-    return fastest / min(max(seconds, 2 * fastest), 8 * fastest) if succeeded else 0.0
 
 
 def by_map(table: pyarrow.Table) -> dict[str, pyarrow.Table]:
@@ -214,11 +252,8 @@ def lines(table: pyarrow.Table, fastest: Mapping[str, float]) -> Iterator[BarnLi
 
 
 def _line(world: str, rows: Sequence[Mapping[str, Any]], fastest: Mapping[str, float]) -> BarnLine:
-    scores = []
-    for row in rows:
-        reference = fastest.get(row["world"])
-        own = (row["barn"] or 0.0) if row["succeeded"] else 0.0
-        scores.append(own if reference is None else score(row["succeeded"], row["arrival_s"], reference))
+    scores = [OFFICIAL.score(one["succeeded"], one["arrival_s"], fastest.get(one["world"], math.nan)) for one in rows]
+    exact = [(one["barn"] or 0.0) if one["succeeded"] else 0.0 for one in rows]
     times = [row["arrival_s"] for row in rows if row["succeeded"]]
     seconds = statistics.fmean(times) if times else math.nan
-    return BarnLine(world, len(rows), len(times), seconds, statistics.fmean(scores))
+    return BarnLine(world, len(rows), len(times), seconds, statistics.fmean(scores), statistics.fmean(exact))

@@ -47,12 +47,16 @@ def drive_hash(log: Rollout) -> str:
     return hashlib.sha256(name + b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
-def distinct(drives: Iterable[tuple[str, Rollout]]) -> list[tuple[tuple[str, ...], Rollout]]:
-    """Return every bitwise different drive once, with the names of all that drive it, in order."""
-    found: dict[str, tuple[list[str], Rollout]] = {}
+#: Names and logs of one drive, which are bitwise identical but for their plans.
+SameDrive: TypeAlias = "Sequence[tuple[str, Rollout]]"
+
+
+def distinct(drives: Iterable[tuple[str, Rollout]]) -> list[SameDrive]:
+    """Group named logs by drive, in order."""
+    found: dict[str, list[tuple[str, Rollout]]] = {}
     for name, log in drives:
-        found.setdefault(drive_hash(log), ([], log))[0].append(name)
-    return [(tuple(names), log) for names, log in found.values()]
+        found.setdefault(drive_hash(log), []).append((name, log))
+    return list(found.values())
 
 
 def path_text(planned: Iterable[float], driven: float) -> str:
@@ -62,14 +66,23 @@ def path_text(planned: Iterable[float], driven: float) -> str:
 
 @dataclass(frozen=True)
 class Compared:
-    """A run of a comparison, without its log."""
+    """A run of a comparison, without its log.
 
-    label: str  # the planner's label
-    world: str  # the world's name
-    seed: int  # the random seed
-    facts: Mapping[str, Any]  # `Run.as_dict`
-    drive: str = ""  # `drive_hash`; empty without a drive
-    plan: bytes = b""  # the planned line as bytes
+    Attributes:
+        label: the planner's label
+        world: the world's name
+        seed: the random seed
+        facts: `Run.as_dict` and the folder
+        drive: a hash of the drive without its plan; empty without a drive
+        plan: the planned line as bytes
+    """
+
+    label: str
+    world: str
+    seed: int
+    facts: Mapping[str, Any]
+    drive: str = ""
+    plan: bytes = b""
 
     @classmethod
     def of(cls, label: str, s: Scenario, result: Run | PlannerError, folder: str | None) -> Compared:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from antdrive.base.errors import FieldError
+from antdrive.base.progress import progress_bar
 from antdrive.planners import PlanResult, PlanStatus
 from antdrive.sim.compose import compose, warm_up_replanning
 from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
@@ -110,6 +111,13 @@ class Run:
             "digest": self.rollout.digest if self.rollout else None,
         }
 
+    def __repr__(self) -> str:
+        s, log = self.scenario, self.rollout
+        reason = f" ({self.reason:.200})" if self.reason else ""
+        drive = f", {log.t[-1]:.1f} s" if log is not None else ""
+        proof = f", {self.certificate.statement}" if self.certificate is not None else ""
+        return f"<Run of {s.planner_label} in {s.task.world.name}: {self.outcome.value}{reason}{drive}{proof}>"
+
     def _repr_html_(self) -> str:
         s = self.scenario
         facts: dict[str, object] = {"planner": s.planner_label, "robot": s.robot.name}
@@ -141,19 +149,21 @@ def run(
     s: Scenario,
     *,
     planned: tuple[Grid, PlanResult] | None = None,
-    progress: Progress = ignore_progress,
+    progress: Progress | bool | None = None,
 ) -> Run:
     """Plan and drive one scenario.
 
     Args:
         s: the scenario
         planned: the result of `plan` for the scenario, or your own plan on its grid, which is checked; None: plan first
-        progress: called with the completed fraction of the route
+        progress: called with the completed fraction of the route; True: show a bar on stderr; False: show nothing; None:
+            show a bar in a notebook
 
     Raises:
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
     """
-    grid, answer, rollout = driven(s, planned, progress)
+    with progress_bar(progress, f"{s.planner_label} in {s.task.world.name}") as update:
+        grid, answer, rollout = driven(s, planned, update)
     return Run(s, grid, answer, rollout, None if rollout is None else certify(rollout))
 
 

@@ -363,6 +363,10 @@ class Scenario(Settings):
         """Return the random stream of a purpose. Streams of different purposes are independent."""
         return random_stream(self.seed, purpose)
 
+    def __repr__(self) -> str:
+        names = f"{self.planner_label} in {self.task.world.name} with {self.robot.name}"
+        return f"<Scenario: {names}, smoothing {self.smoothing}, noise {self.noise:g}, seed {self.seed}>"
+
     def _repr_html_(self) -> str:
         task = self.task
         facts = {

@@ -1,8 +1,10 @@
 """`antdrive barn`, without its drives."""
 
 import importlib
+import json
 from pathlib import Path
 
+import numpy as np
 import pyarrow
 import pytest
 
@@ -50,3 +52,38 @@ def test_a_failure_is_listed_with_its_film_or_its_log(driven, antdrive, monkeypa
     monkeypatch.setattr(films, "film_failures", lambda *_words, **_settings: {"b": Path("b.mp4")})
     ends = [antdrive("barn", driven, *words)[1].splitlines()[-1] for words in ((), ("--film",))]
     assert ends == [f"  world_0, seed 0: collided  obstacles[3]  {end}" for end in ("rollouts/b.npz", "b.mp4")]
+
+
+@pytest.fixture
+def log(tmp_path):
+    """A log with two of its trials, beside the path file of its world: cells straight ahead, OT 5 s."""
+    (tmp_path / "paths").mkdir()
+    np.save(tmp_path / "paths" / "path_6.npy", np.array([(15.5, 0), (15.5, 29)]))
+    path = tmp_path / "log.txt"
+    path.write_text("6 1 0 0 15.0 0.3333\n6 0 1 0 3.0 0.0000\n")
+    return path
+
+
+def test_a_log_is_scored_by_both_formulas_and_its_gaps_are_named(log, antdrive):
+    code, out, _ = antdrive("barn", "paths", "--score", log)
+    lines = out.splitlines()
+    assert (code, lines[0]) == (1, f"score 0.1667  {log}: 2 trials, worlds: 1")  # (5/15 + 0) / 2
+    assert lines[1] == "  50.0 % succeeded, 50.0 % collided, 0.0 % timed out, mean time 15.0000 s"
+    assert lines[2].startswith("  incomplete: 1 of the 50 public worlds; missing: 0, 12, 18")
+    assert lines[3] == "  incomplete: worlds with fewer than 10 trials: 6 (2)"
+    assert [line.split()[:5] for line in lines[6:8]] == [
+        ["2", "to", "8", "OT", "0.1667"],
+        ["4", "to", "8", "OT", "0.1250"],  # 5/20
+    ]
+    facts = json.loads(antdrive("barn", "paths", "--score", log, "--json")[1])
+    assert facts["scores"] == {"2 to 8 OT": pytest.approx(1 / 6), "4 to 8 OT": 0.125}
+    assert len(facts["published"]) == 5
+
+
+def test_a_log_that_cannot_be_scored_is_refused_in_one_line(log, refused):
+    assert "drives nothing" in refused("barn", "paths", "--score", log, "--film")
+    log.write_text("6 1 0 0 15.0\n6 1 0 0\n")
+    assert "log.txt: line 2: must be WORLD SUCCESS" in refused("barn", "paths", "--score", log)
+    (log.parent / "paths" / "path_6.npy").unlink()
+    log.write_text("6 1 0 0 15.0\n")
+    assert "no path_*.npy here" in refused("barn", "paths", "--score", log)

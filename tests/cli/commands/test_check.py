@@ -12,6 +12,7 @@ from antdrive import Run, run
 from antdrive.cli.commands import check
 from antdrive.cli.testing import evaluation
 from antdrive.runs.suites import Baseline
+from antdrive.views.artefacts import Results
 
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
@@ -204,6 +205,52 @@ def test_ci_gets_junit_a_summary_and_unused_baselines(antdrive, suite, monkeypat
     assert antdrive("check", "a.drive.yaml::closed", "--strict")[0] == 1
 
 
+PYTHON = """
+import pytest
+
+def test_named(drive):
+    drive("small.yaml", "astar")
+
+def test_broken(drive):
+    drive("small.yaml", "astar", baseline=False)
+    assert 1 == 2, "of its own"
+
+def test_without_drives():
+    raise NotImplementedError
+"""
+
+
+def test_python_tests_are_accepted_and_checked_like_suites(antdrive, suite):
+    """Beside a suite, a module without drives that cannot be imported, and the planner of another test."""
+    (suite.parent / "test_accepted_here.py").write_text(PYTHON)
+    (suite.parent / "test_of_others.py").write_text("import no_such_module\n")
+    words = (".", "--jobs", "1", "--film", "never", "--results", "res", "--json")
+    code, out, err = antdrive("accept", *words)
+    tests = {test["address"]: test for test in json.loads(out)["tests"]}
+    assert (code, err) == (1, "")
+    assert tests["test_accepted_here.py::test_named"]["accepted"] == "written"
+    broken = [test for test in json.loads(out)["tests"] if not test["passed"]]
+    assert [test["faults"] for test in broken] == [["AssertionError: of its own"]]
+    assert broken[0]["commands"] == ["pytest test_accepted_here.py::test_broken"]
+    assert len(json.loads(out)["tests"]) == 3 + 3
+    assert (suite.parent / "baselines" / "test_accepted_here" / "test_named.json").exists()
+    (suite.parent / "small.yaml").write_text(
+        "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.2, 1], cell: 0.2}\n"
+    )
+    code, out, _ = antdrive("check", "test_accepted_here.py::test_named", *words[3:-1])
+    assert (code, out.splitlines()[0]) == (1, "test_accepted_here.py::test_named: FAILED")
+    assert "  changed since the baseline: world" in out
+    assert antdrive("accept", "test_accepted_here.py::test_named", *words[3:-1])[1].splitlines() == [
+        "test_accepted_here.py::test_named: renewed", "1 of 1 passed",
+    ]  # fmt: skip
+
+
+def test_a_module_without_drives_is_one_line(antdrive, refused, suite):
+    (suite.parent / "test_plain_here.py").write_text("def test_nothing(): pass\n")
+    assert "test_plain_here.py: no test uses the fixture drive" in refused("accept", "test_plain_here.py")
+    assert "no_such.py" in refused("accept", "no_such.py")
+
+
 @pytest.mark.slow
 def test_processes_change_nothing(antdrive, suite):
     antdrive("accept", ".", "--jobs", "1")
@@ -213,7 +260,7 @@ def test_processes_change_nothing(antdrive, suite):
 
 
 @pytest.mark.parametrize(("cores", "asked", "started"), [(3, None, 3), (3, 2, 2), (64, None, 10)])
-def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeypatch):
+def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeypatch, tmp_path):
     """joblib counts those of a container; the operating system says how many its host has."""
     found: list[int] = []
     case = SimpleNamespace(given={"margin": 0.03})
@@ -226,5 +273,5 @@ def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeyp
     monkeypatch.setattr("antdrive.runs.suites.select", lambda words, only: [case] * 10)
     monkeypatch.setattr("antdrive.cli.testing.check_cases", check_cases)
     monkeypatch.setattr(check, "compile_once", lambda: None)
-    assert check.drive_suites(["a"], None, asked, "", None, "never", json=True) == []
+    assert check.drive_suites(["a"], None, asked, "", Results(tmp_path), json=True) == []
     assert found == [started]

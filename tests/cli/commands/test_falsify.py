@@ -9,11 +9,22 @@ import pytest
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import load_suite
 
-CARELESS = ["-p", "astar", "-r", "jackal", "--margin", "0", "--noise", "6", "--smoothing", "none"]
+GREEDY = """from dataclasses import dataclass
+from antdrive.planners import AStar
+
+@dataclass(frozen=True)
+class Greedy(AStar):
+    calm: float = 1.0
+"""
+CARELESS = ["-r", "jackal", "--margin", "0", "--noise", "6", "--smoothing", "none"]
 
 
-def test_failures_are_handed_over_as_a_suite(antdrive):
+@pytest.mark.parametrize("planner", ["astar", "mine.py:Greedy", pytest.param("mine:Greedy", marks=pytest.mark.slow)])
+def test_failures_are_handed_over_as_a_suite(antdrive, planner):
+    """Those of a planner of one's own, too: its class is found beside, by other processes as well."""
+    Path("mine.py").write_text(GREEDY)
     words = ["falsify", *CARELESS, "--budget", "2", "--seed", "3", "--method", "random", "--shrink", "0", "--no-film"]
+    words += ["-p", planner, *(["--set", "planner.calm=0.5"] if ":" in planner else [])]
     for name in ("failure-9/result.json", "failure-9/film.mp4", "failure-8/mine.txt"):
         path = Path("found") / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -26,6 +37,7 @@ def test_failures_are_handed_over_as_a_suite(antdrive):
     cases = load_suite(Path("found") / "failures.drive.yaml")
     assert len(cases) == facts["distinct"] == len(facts["reported"])
     assert {scenario_of(case).noise for case in cases} == {6.0}
+    assert all(getattr(scenario_of(case).planner, "calm", 0.5) == 0.5 for case in cases)
     assert not Path("found/failure-9").exists(), "of an earlier search"
     assert Path("found/failure-8/mine.txt").exists()
     logs = sorted(Path("found").glob("failure-*/rollout.npz"))
@@ -36,6 +48,8 @@ def test_failures_are_handed_over_as_a_suite(antdrive):
         "antdrive check found/failures.drive.yaml::failure-1",
     )
     assert antdrive("report", "found", "-o", "page.html")[0] == 0
+    if ":" in planner:
+        assert antdrive("check", "found/failures.drive.yaml", "--jobs", "1")[0] == 0
 
 
 def test_a_set_up_without_failures_is_exit_code_0(antdrive):
@@ -65,7 +79,7 @@ def test_nothing_of_an_earlier_search_is_left(antdrive):
 @pytest.mark.slow
 def test_failures_are_shrunk_and_filmed(antdrive):
     code, out, _ = antdrive(
-        "falsify", *CARELESS, "--budget", "2", "--seed", "3", "--method", "random", "--out", "found"
+        "falsify", "-p", "astar", *CARELESS, "--budget", "2", "--seed", "3", "--method", "random", "--out", "found"
     )
     assert code == 1
     assert "failure-1  " in out

@@ -13,15 +13,17 @@ from antdrive.runs.failures.handover import (
     Handover,
     _robot,
     expectation,
+    renamed,
     run_elsewhere,
     scenario_name,
-    suite_elsewhere,
     write_suite,
 )
 from antdrive.runs.suites.demands import Bound
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Certificate, Perception, ReplanPolicy, Scenario
+from antdrive.sim.log.record import MarginRecord
+from antdrive.sim.scenario import MarginChoice
 from antdrive.worlds import Disc
 
 
@@ -86,6 +88,15 @@ def test_the_suite_holds_as_long_as_the_failure_repeats(collided_run, tmp_path):
     assert result.faults == ("outcome: succeeded, expected collided",), "and nothing about a missing baseline"
 
 
+def test_a_chosen_margin_is_handed_over_as_a_number(small_scenario, tmp_path):
+    record = MarginRecord(loss_m=0.02, reserve_m=0.01, probability=0.001, drives=80)
+    choice = MarginChoice(margin=0.04, record=record, factors=replace(small_scenario, margin=0.04).loss_factors)
+    auto = replace(small_scenario, margin=0.04, margin_choice=choice)
+    assert auto.chosen == choice
+    done = Attempt.of(renamed(auto, "auto"))
+    assert run_elsewhere(write_suite(tmp_path / "s.drive.yaml", [Handover("auto", done)])) == [done.fingerprint]
+
+
 def test_what_is_expected_of_a_success_that_fails_otherwise(small_run):
     bound = Bound("min_clearance_m", "<", 0.02)
     assert expectation(small_run, bound) == {"outcome": "succeeded", "certified": True, "min_clearance_m": "< 0.02"}
@@ -93,17 +104,12 @@ def test_what_is_expected_of_a_success_that_fails_otherwise(small_run):
     assert expectation(refused) == {"outcome": "succeeded", "certified": False}
 
 
-def test_another_process_gives_the_same_bits(small_run):
-    same, other = run_elsewhere([small_run.scenario, replace(small_run.scenario, margin=0.031)])
-    assert same == Attempt(small_run.scenario, small_run).fingerprint != other
-
-
 def test_what_was_written_is_what_another_process_runs(small_run, tmp_path):
     suite = write_suite(tmp_path / "s.drive.yaml", [handed(name, small_run) for name in ("one", "two", "three")])
     world = tmp_path / "worlds" / "two.yaml"
     world.write_text(world.read_text().replace("radius: 0.3", "radius: 0.31"))
     (tmp_path / "worlds" / "three.yaml").unlink()
-    one, two, three = suite_elsewhere(suite)
+    one, two, three = run_elsewhere(suite)
     assert one == Attempt(small_run.scenario, small_run).fingerprint != two
     assert "scenarios.three.world: worlds/three.yaml: no such file" in three
 

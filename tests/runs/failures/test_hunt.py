@@ -14,7 +14,7 @@ from antdrive.runs.failures import failure as failing
 from antdrive.runs.failures import hunt as hunting
 from antdrive.runs.failures import reproducers
 from antdrive.runs.failures.failure import Attempt, failure_of
-from antdrive.runs.failures.handover import expectation
+from antdrive.runs.failures.handover import expectation, renamed
 from antdrive.runs.failures.hunt import (
     METHODS,
     POINTS,
@@ -188,8 +188,9 @@ def test_ctrl_c_while_shrinking_hands_over_what_was_found(found, tmp_path, monke
         raise KeyboardInterrupt
 
     monkeypatch.setattr(reproducers, "shrink", interrupted)
-    other = replace(found.distinct[0], fingerprint="of another drive")
-    reported = write_reproducers(Hunt((found.distinct[0], other), 2), tmp_path)
+    first = found.distinct[0]
+    other = replace(first, scenario=renamed(first.scenario, "other"), fingerprint="of another drive")
+    reported = write_reproducers(Hunt((first, other), 2), tmp_path)
     assert [one.repeats for one in reported] == [True, False]
 
 

@@ -122,7 +122,7 @@ def test_tests_in_python_have_baselines_of_their_own(project):
     project.makepyfile(test_mine=FIXTURE)
     first = project.runpytest(*PLUGIN, "test_mine.py")
     first.assert_outcomes(failed=3, passed=1)
-    first.stdout.fnmatch_lines(["E*is missing; accept this drive with pytest test_mine.py::test_named --drive-update"])
+    first.stdout.fnmatch_lines(["E*is missing; accept this drive with antdrive accept test_mine.py::test_named"])
     first.stdout.no_fnmatch_line("*fixture.py*")  # the traceback ends in the test
     project.runpytest(*PLUGIN, "test_mine.py", "--drive-update").assert_outcomes(passed=4)
     found = sorted(path.name for path in (project.path / "baselines" / "test_mine").iterdir())

@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -10,7 +12,6 @@ from antdrive.views.film.comparison_film import FULL, LEAST_TILE, Mark, SplitScr
 from tests.records import changed
 
 SIZE = (640, 360)
-NAMES = [("astar",), ("mmas",)]
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +23,10 @@ def drives(made_up_drive):
     ]
 
 
+def screen_of(logs, camera, size=SIZE, names=("astar", "mmas"), mark=None):
+    return SplitScreen([[named] for named in zip(itertools.cycle(names), logs, strict=False)], camera, size, mark)
+
+
 def shaped(log, high):
     """Return the log in a world whose height is `high` times its width."""
     xmin, ymin, xmax, _ = log.record.world.bounds
@@ -29,7 +34,7 @@ def shaped(log, high):
 
 
 def test_tiles_show_the_same_moment_and_a_finished_run_keeps_its_last_picture(drives):
-    screen = SplitScreen(drives, "top", SIZE, NAMES)
+    screen = screen_of(drives, "top")
     at = [screen.frame(t) for t in (0.3, 0.7, 0.8)]
     alone = screen._tiles[1].shot.playback.pose(0.8)
     assert all(picture.shape == (*SIZE[::-1], 3) for picture in at)
@@ -41,7 +46,7 @@ def test_tiles_show_the_same_moment_and_a_finished_run_keeps_its_last_picture(dr
 
 
 def test_each_run_has_its_planners_colour_and_its_outcome(drives):
-    screen = SplitScreen(drives, "top", SIZE, NAMES)
+    screen = screen_of(drives, "top")
     end = screen.frame(np.inf)
     for k, log in enumerate(drives):
         colour = np.array(planner_style(log.record.planner.name)[0])
@@ -52,7 +57,7 @@ def test_each_run_has_its_planners_colour_and_its_outcome(drives):
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
 def test_up_to_six_runs_fit_into_the_frame(drives, count):
-    screen = SplitScreen((drives * 3)[:count], "oblique", SIZE, (NAMES * 3)[:count])
+    screen = screen_of((drives * 3)[:count], "oblique")
     assert len(set(screen._corners)) == count
     for (x, y), tile in zip(screen._corners, screen._tiles, strict=True):
         high, wide, _ = tile.frame(0.1).shape
@@ -71,14 +76,14 @@ def test_the_film_has_the_frames_it_claims(drives, tmp_path):
 def test_a_mark_is_in_every_tile_from_its_moment_on(drives):
     x, y = drives[1].pose[len(drives[1].pose) // 3, :2]
     mark = Mark(0.3, float(x), float(y), "here")
-    plain, marked = SplitScreen(drives, "top", SIZE, NAMES), SplitScreen(drives, "top", SIZE, NAMES, mark)
+    plain, marked = screen_of(drives, "top"), screen_of(drives, "top", mark=mark)
     for at, shown in ((0.2, False), (0.4, True), (np.inf, True)):
         differs = (plain.frame(at) != marked.frame(at)).any(axis=-1)
         assert differs[:, :318].any() == differs[:, 320:].any() == shown
 
 
 def test_titles_replace_the_planners_names(drives):
-    named, plain = (SplitScreen(drives, "top", SIZE, names) for names in ([("then",), ("now",)], NAMES))
+    named, plain = (screen_of(drives, "top", names=names) for names in (("then", "now"), ("astar", "mmas")))
     differs = (named.frame(0.1) != plain.frame(0.1)).any(axis=-1)
     assert differs[:30].any()
     assert not differs[60:].any()
@@ -86,7 +91,7 @@ def test_titles_replace_the_planners_names(drives):
 
 def test_oblique_views_of_a_wide_world_stand_above_each_other(drives):
     def corners(camera, high):
-        return SplitScreen([shaped(log, high) for log in drives], camera, SIZE, NAMES)._corners
+        return screen_of([shaped(log, high) for log in drives], camera)._corners
 
     assert corners("oblique", 1.0) == [(0, 0), (320, 0)]
     assert corners("oblique", 0.5) == [(0, 0), (0, 180)]
@@ -98,7 +103,7 @@ def test_a_film_from_above_has_no_empty_ground_beside_the_worlds(drives, high, c
     logs = [shaped(log, high) for log in (drives * 3)[:count]]
     size = fitting_size(logs, "top")
     assert all(160 <= side <= most and side % 2 == 0 for side, most in zip(size, FULL, strict=True))
-    screen = SplitScreen(logs, "top", size, (NAMES * 3)[:count])
+    screen = screen_of(logs, "top", size)
     shot = screen._tiles[0].shot
     assert len(screen._corners) == count
     x0, y0, x1, y1 = logs[0].record.task.world.bounds
@@ -120,7 +125,11 @@ def test_a_film_without_a_size_fits_its_worlds(drives, tmp_path):
 def test_planners_of_one_drive_share_a_tile_that_names_them_all(drives, tmp_path, monkeypatch):
     seen = []
     original = comparison_film.SplitScreen
-    monkeypatch.setattr(comparison_film, "SplitScreen", lambda *given: seen.append(given[3]) or original(*given))
+    monkeypatch.setattr(
+        comparison_film,
+        "SplitScreen",
+        lambda *given: seen.append([[name for name, _ in same] for same in given[0]]) or original(*given),
+    )
     logs = [drives[0], drives[1], changed(drives[0], "record", planner=ComponentRecord(name="sipp", settings={}))]
     compare_film(logs, tmp_path / "c.gif", size=SIZE, fps=1, camera="top")
-    assert seen == [[("astar", "sipp"), ("mmas",)]]
+    assert seen == [[["astar", "sipp"], ["mmas"]]]

@@ -418,7 +418,7 @@ def test_a_prelude_shows_the_field_and_goes_on_to_the_last_iteration(walked):
 
 def test_a_comparisons_prelude_shows_ants_at_work_beside_a_plan_without_a_field(walked, tmp_path):
     other = changed(walked, "record", planner=ComponentRecord(name="astar", settings={}))
-    screen = SplitScreen([walked, other], "top", (640, 360), [("as",), ("astar",)])
+    screen = SplitScreen([[("as", walked)], [("astar", other)]], "top", (640, 360))
     first, _, last = screen.planning(3)
     left, right = np.s_[60:, :318], np.s_[:, 322:]
     assert (first[left] != last[left]).any()

@@ -1,8 +1,10 @@
 """`antdrive barn`."""
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
@@ -15,6 +17,7 @@ from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     from antdrive.runs.barn_challenge import BarnLine
+    from antdrive.runs.barn_log import LogScore
     from antdrive.runs.campaigns.results import SweepResults
     from antdrive.runs.statistics.price import Price
 
@@ -26,7 +29,9 @@ if TYPE_CHECKING:
     localisation="matching",
 )
 def barn(
-    source: Annotated[Path, argument("FOLDER", "Folder or archive of the challenge's world_N.world files.")],
+    source: Annotated[
+        Path, argument("FOLDER", "Folder or archive of the challenge's world_N.world and path_N.npy files.")
+    ],
     with_map: Annotated[bool, flag("Also drive with the map and compare.", "--with-map")] = False,
     planner: options.Planner = "astar",
     robot: options.Robot = "jackal",
@@ -34,13 +39,21 @@ def barn(
     jobs: options.Jobs = None,
     out: Annotated[Path, option("FOLDER", "Output folder; resumable.")] = Path("out/barn"),
     films: Annotated[bool, flag("Film failed runs, with the cause, into OUT/films.", "--film")] = False,
+    score: Annotated[
+        Path | None, option("LOG", "Score a log of the challenge instead of driving; needs only the path_N.npy files.")
+    ] = None,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
-    """Drive the BARN Challenge worlds and print the results table.
+    """Drive the BARN Challenge worlds, or score a log of the challenge, and print the results table.
 
-    Repeat the command to resume it. Exit code 0: all runs are done, whatever their outcomes.
+    Repeat the command to resume it. Exit code 0: all runs are done, or the log has 10 trials of each of the 50 public worlds,
+    whatever their outcomes.
     """
+    if score:
+        if with_map or films:
+            raise InputError("--score: drives nothing; leave out --with-map and --film")
+        return _score(source, score, json)
     from antdrive.base.optional import parquet_library
     from antdrive.planners import load_planner
     from antdrive.robots import load_robot
@@ -87,6 +100,56 @@ def barn(
     return results.complete
 
 
+def _score(source: Path, log: Path, json: bool) -> bool:
+    """Print the score of a log. Return whether the log is complete."""
+    from antdrive.runs import barn_challenge as challenge
+    from antdrive.runs.barn_log import read_log, score_log
+
+    trials = read_log(log)
+    with TemporaryDirectory() as temporary:
+        folder = challenge.unpacked(source, Path(temporary), challenge.PATHS)
+        result = score_log(trials, {one: challenge.reference_times(folder, one) for one in challenge.FORMULAS})
+    facts = {
+        **vars(result),
+        "formula": challenge.FORMULA,
+        "formulas": [vars(one) for one in challenge.FORMULAS],
+        "source": challenge.FORMULA_SOURCE,
+        "published": [vars(entry) for entry in challenge.PUBLISHED],
+    }
+    show(json, facts, _score_lines(log, result))
+    return not result.gaps
+
+
+def _score_lines(log: Path, result: "LogScore") -> Iterator[str]:
+    from antdrive.runs import barn_challenge as challenge
+
+    yield f"score {result.scores[challenge.OFFICIAL.name]:.4f}  {log}: {result.trials} trials, worlds: {result.worlds}"
+    time = "" if math.isnan(result.seconds) else f", mean time {result.seconds:.4f} s"
+    ends = zip((result.success, result.collided, result.timed_out), ("succeeded", "collided", "timed out"), strict=True)
+    yield f"  {', '.join(f'{100 * share:.1f} % {words}' for share, words in ends)}{time}"
+    yield from (f"  incomplete: {gap}" for gap in result.gaps)
+    yield from (f"  note: {note}" for note in result.notes)
+    yield ""
+    rows = (
+        (one.name, f"{result.scores[one.name]:.4f}", f"{1 / one.least:.2f}", one.source) for one in challenge.FORMULAS
+    )
+    yield from table(("clip", "mean score", "at most", "used by"), rows)
+    yield ""
+    yield f"score: {challenge.FORMULA}"
+    yield "means over worlds of the means over a world's trials"
+    yield f"source: {challenge.FORMULA_SOURCE}"
+    yield ""
+    yield from _published()
+
+
+def _published() -> Iterator[str]:
+    from antdrive.runs.barn_challenge import PUBLISHED, PUBLISHED_HEADS
+
+    yield from table(PUBLISHED_HEADS, (entry.cells for entry in PUBLISHED))
+    for source in dict.fromkeys(entry.source for entry in PUBLISHED):
+        yield f"  {', '.join(entry.who for entry in PUBLISHED if entry.source == source)}: {source}"
+
+
 def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
     """Film the failed runs. Return the films by run key."""
     from antdrive.views.film.video import film_failures
@@ -96,17 +159,17 @@ def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
 
 
 def _lines(rows: "Sequence[BarnLine]", known: "BarnLine | None", price: "Price | None") -> Iterator[str]:
-    from antdrive.runs.barn_challenge import HEADS, OURS, PUBLISHED, PUBLISHED_HEADS
+    from antdrive.runs.barn_challenge import FORMULA, HEADS, OURS
 
     listed = [*rows, *([dataclasses.replace(known, world="all, with the map")] if known else [])]
     yield from table(HEADS, (line.cells for line in listed))
+    yield f"score: {FORMULA}"
+    yield "exact score: OT = length of the exact shortest path / 2 m/s"
     yield ""
     if price:
         yield price.sentence
         yield ""
-    yield from table(PUBLISHED_HEADS, (entry.cells for entry in PUBLISHED))
-    for source in dict.fromkeys(entry.source for entry in PUBLISHED):
-        yield f"  {', '.join(entry.who for entry in PUBLISHED if entry.source == source)}: {source}"
+    yield from _published()
     yield ""
     yield OURS
 

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated, cast, get_args
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, print_error, print_line, show
+from antdrive.cli.console import bar, marked, print_error, print_line, show
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.scenario_options import with_chosen_margin
 
 if TYPE_CHECKING:
     from antdrive.cli.testing.evaluation import CheckResult, Update
-    from antdrive.views.artefacts import Films
+    from antdrive.views.artefacts import Films, Results
 
 Suites = Annotated[
     list[str],
-    argument("SUITE", "Suite (*.drive.yaml), folder, SUITE::scenario or SUITE::scenario[seed]."),
+    argument("SUITE", "Suite (*.drive.yaml), test_*.py, folder, SUITE::scenario[seed] or FILE.py::test."),
 ]
 Only = Annotated[str | None, option("PATTERN", "Run only matching scenarios, such as 'aisle-*'.")]
 ResultsFolder = Annotated[Path | None, option("FOLDER", "Folder for logs, figures, films.  [default: user cache]")]
@@ -36,15 +36,13 @@ def check(
     strict: Annotated[bool, flag("Fail on unused baselines.", "--strict")] = False,
     json: options.Json = False,
 ) -> int:
-    """Run suites and compare the drives with their baselines.
+    """Run suites, and Python tests with the fixture `drive`, and compare the drives with their baselines.
 
     Exit code 0: every drive meets its suite's expectations and is no worse than its baseline.
     """
     from antdrive.cli.testing.session_summary import add_to_page, drives_in, properties, save_junit
-    from antdrive.cli.testing.unused import unused_beside
 
-    outcomes = drive_suites(tests, only, jobs, "", results, film, json=json)
-    unused = unused_beside(tests)
+    outcomes, unused = drive_tests(tests, only, jobs, "", results, film, json=json)
     if junit is not None:
         save_junit(outcomes, junit)
     add_to_page((drive for result in outcomes for drive in drives_in(properties(result))), unused, print_error)
@@ -60,18 +58,16 @@ def accept(
     film: Film = "failed",
     json: options.Json = False,
 ) -> int:
-    """Run suites and save the drives as baselines.
+    """Run suites, and Python tests with the fixture `drive`, and save the drives as baselines.
 
-    A drive that misses its suite's expectations is rejected, with log, figures and film. Exit code 0: every drive was accepted.
+    A drive that misses its test's expectations is rejected, with log, figures and film. Exit code 0: every drive was accepted.
     """
-    from antdrive.cli.testing.unused import unused_beside
-
-    outcomes = drive_suites(tests, only, jobs, "new" if new else "all", results, film, json=json)
-    return _summarise(outcomes, json, unused_beside(tests))
+    outcomes, unused = drive_tests(tests, only, jobs, "new" if new else "all", results, film, json=json)
+    return _summarise(outcomes, json, unused)
 
 
-def drive_suites(
-    suites: list[str],
+def drive_tests(
+    words: list[str],
     only: str | None,
     jobs: int | None,
     update: "Update",
@@ -79,11 +75,11 @@ def drive_suites(
     film: str,
     *,
     json: bool,
-) -> "list[CheckResult]":
-    """Drive and evaluate all named tests with a progress bar, and print each result."""
-    from antdrive.cli.testing import check_cases
-    from antdrive.runs.pool import cores
-    from antdrive.runs.suites import scenario_of, select
+) -> "tuple[list[CheckResult], list[str]]":
+    """Drive and evaluate all named tests, and print each result; return the results and the unused baselines."""
+    from antdrive.cli.testing.python_tests import drive_python_tests, is_module
+    from antdrive.cli.testing.unused import unused_beside
+    from antdrive.runs.suites.suite import SUFFIX
     from antdrive.views.artefacts import Films, Results, default_folder
     from antdrive.views.run_folder import check_folder
 
@@ -92,6 +88,26 @@ def drive_suites(
     if folder is not None:
         check_folder(folder)
     results = Results(folder or default_folder(Path.cwd()), cast("Films", film))
+    outcomes, unused = drive_python_tests([w for w in words if is_module(w) or Path(w).is_dir()], only, update, results)
+    for result in () if json else outcomes:
+        _print(result)
+    suites = [word for word in words if not is_module(word)]
+    if outcomes:
+        suites = [word for word in suites if not Path(word).is_dir() or any(Path(word).rglob(f"*{SUFFIX}"))]
+    if suites:
+        outcomes += drive_suites(suites, only, jobs, update, results, json=json)
+        unused += unused_beside(suites)
+    return outcomes, unused
+
+
+def drive_suites(
+    suites: list[str], only: str | None, jobs: int | None, update: "Update", results: "Results", *, json: bool
+) -> "list[CheckResult]":
+    """Drive and evaluate the tests of suites with a progress bar, and print each result."""
+    from antdrive.cli.testing import check_cases
+    from antdrive.runs.pool import cores
+    from antdrive.runs.suites import scenario_of, select
+
     cases = select(suites, only)
     compile_once()
     for case in cases:
@@ -111,7 +127,8 @@ def drive_suites(
 
 def _print(result: "CheckResult") -> None:
     """Print the result of one test."""
-    print_line(f"{result.address}: {(result.accepted or 'passed') if result.passed else 'FAILED'}")
+    words = (result.accepted or "passed") if result.passed else "FAILED"
+    print_line(marked(result.passed, f"{result.address}: {words}"))
     for line in (*result.gains, *result.notes) if result.passed else result.message.splitlines():
         print_line(f"  {line}")
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from antdrive.base.errors import InputError
 from antdrive.base.files import file_name
 from antdrive.cli import options
 from antdrive.cli.console import bar, show, table
@@ -49,11 +48,6 @@ def falsify(
     from antdrive.runs.failures.hunt import check_method, find_failures
 
     check_method(method)
-    if is_user_code(setup.planner):
-        raise InputError(
-            f"--planner {setup.planner}: must be registered, because failures are repeated in other processes; "
-            "register the class under the entry point antdrive.planners"
-        )
     seed = given.pop("seed")
     scenario = setup.scenario("empty", given)
     mark = fingerprint(scenario, budget, seed, method, obstacles, seconds)
@@ -64,7 +58,7 @@ def falsify(
             hunt = find_failures(
                 scenario, obstacles=obstacles, progress=lambda runs, failures: progress(runs / budget), **search
             )
-        reported = _report(hunt, folder, seconds, film)
+        reported = _report(hunt, folder, setup.planner if is_user_code(setup.planner) else None, seconds, film)
     facts = {
         "planner": scenario.planner_label,
         "robot": scenario.robot.name,
@@ -81,14 +75,14 @@ def falsify(
     return not hunt.findings
 
 
-def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reproducer]":
+def _report(hunt: "Hunt", folder: Path, planner: str | None, seconds: float, film: bool) -> "list[Reproducer]":
     """Shrink, repeat and write each distinct failure, replacing those of an earlier search."""
     from antdrive.runs.failures.reproducers import SUITE, write_reproducers
 
     reported = []
     if hunt.findings:
         with bar("shrinking") as progress:
-            reported = write_reproducers(hunt, folder, seconds=seconds, progress=progress)
+            reported = write_reproducers(hunt, folder, planner=planner, seconds=seconds, progress=progress)
     else:
         (folder / SUITE).unlink(missing_ok=True)
     for place in folder.glob("failure-*/"):

@@ -175,6 +175,16 @@ def note(item: pytest.Item, result: CheckResult) -> None:
     item.user_properties.extend(properties(result))
 
 
+def results_in(item: pytest.Item) -> list[CheckResult]:
+    """Return the results of a test's drives so far."""
+    return [*item.stash[_RESULTS]] if _RESULTS in item.stash else []
+
+
+def unused_in(config: pytest.Config) -> set[str]:
+    """Return the unused baselines that this pytest run has found."""
+    return config.stash.get(_UNUSED, set())
+
+
 def update_of(config: pytest.Config) -> Update:
     """Return which baselines this pytest run writes."""
     if config.getoption("drive_update"):

@@ -44,7 +44,7 @@ class Driving:
     def __call__(self, job: Job) -> Finished:
         """Make the run. An error of the planner or of antdrive is the run's result and does not end the campaign."""
         try:
-            done = run(prepare(job))
+            done = run(prepare(job), progress=False)
         except InputError:
             raise
         except PlannerError as error:

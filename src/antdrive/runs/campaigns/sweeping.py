@@ -16,6 +16,7 @@ from typing import Any, get_args
 from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.optional import parquet_library
+from antdrive.base.progress import progress_bar
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.runs.campaigns.expanding import Expansion, expand
 from antdrive.runs.campaigns.job import Job, SweepCase
@@ -120,7 +121,7 @@ def sweep(
     keep: Keep | None = None,
     retry_crashed: bool = False,
     again: Sequence[str] = (),
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | bool | None = None,
     notify: Callable[[str], None] | None = None,
     work: Work | None = None,
 ) -> SweepResults:
@@ -135,7 +136,8 @@ def sweep(
         keep: which runs' logs are kept: none, failed or all; None: the campaign's choice
         retry_crashed: whether to repeat crashed runs
         again: planners, by label or name, and outcomes whose runs are repeated; their present results are discarded
-        progress: called at the start and after each run with the numbers of finished and of all runs
+        progress: called at the start and after each run with the numbers of finished and of all runs; True: show a bar on
+            stderr; False: show nothing; None: show a bar in a notebook
         notify: called before the first run with a sentence for each way in which earlier runs differ from the campaign's, and
             for each setting without effect
         work: the work on each run; None: drive it
@@ -148,8 +150,7 @@ def sweep(
     _check(campaign, jobs, dask, keep)
     expansion = expansion or expand(campaign)
     parquet_library()
-    report = progress or (lambda done, size: None)
-    with opened(folder) as store:
+    with progress_bar(progress, "campaign") as report, opened(folder) as store:
         missing = missing_runs(expansion.jobs, store.folder, retry_crashed=retry_crashed, again=again)
         notes = differences(campaign, expansion.jobs, store.folder)
         if notify is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import itertools
 import os
 from collections.abc import Mapping, Sequence
@@ -140,40 +139,32 @@ def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
     return expected
 
 
-def suite_elsewhere(suite: Path) -> list[str]:
-    """Return the fingerprints of a suite's scenarios, run in other processes; an invalid file gives its message."""
+def run_elsewhere(*suites: Path) -> list[str]:
+    """Return the fingerprints of all scenarios of suites, run in other processes; a message for an invalid or dead one."""
+    places = [(suite.resolve(), index) for suite in suites for index in range(len(load_suite(suite)))]
     with Pool(2) as pool:
-        return list(pool.results(functools.partial(_fingerprint_from, suite.resolve()), range(len(load_suite(suite)))))
+        return [done.died or done.value for done in pool.in_order(_fingerprint_from, places)]
 
 
-def _fingerprint_from(suite: Path, index: int) -> str:
+def _fingerprint_from(place: tuple[Path, int]) -> str:
+    suite, index = place
     try:
-        return _fingerprint(scenario_of(load_suite(suite)[index]))
+        return Attempt.of(scenario_of(load_suite(suite)[index])).fingerprint
     except InputError as error:
         return str(error)
 
 
 def renamed(scenario: Scenario, name: str, note: str = "") -> Scenario:
-    """Return the scenario with its world renamed, and a note added to the world's source."""
+    """Return the scenario as suites have it: its world renamed, a note added to the world's source, its margin a number."""
     task = scenario.task
     source = "; ".join(part for part in (task.world.source, note) if part) if note else task.world.source
     world = dataclasses.replace(task.world, name=name, source=source)
-    return dataclasses.replace(scenario, task=dataclasses.replace(task, world=world))
+    return dataclasses.replace(scenario, task=dataclasses.replace(task, world=world), margin_choice=None)
 
 
 def scenario_name(text: str) -> str:
     """Turn a text into a valid name of a scenario."""
     return file_name(text, ascii_only=True).lstrip("_.-")[:90] or "failure"
-
-
-def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
-    """Return the fingerprints of scenarios run in other processes."""
-    with Pool(2) as pool:
-        return list(pool.results(_fingerprint, scenarios))
-
-
-def _fingerprint(scenario: Scenario) -> str:
-    return Attempt.of(scenario).fingerprint
 
 
 def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str, Any]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from antdrive.runs.failures.failure import Attempt
-from antdrive.runs.failures.handover import Handover, renamed, run_elsewhere, suite_elsewhere, write_suite
+from antdrive.runs.failures.handover import Handover, planner_beside, renamed, run_elsewhere, write_suite
 from antdrive.runs.failures.hunt import Finding, Hunt
 from antdrive.runs.failures.shrinker import Shrunk, shrink
 from antdrive.runs.suites.demands import Bound
@@ -40,11 +41,23 @@ class Reproducer:
 
 
 def write_reproducers(
-    hunt: Hunt, folder: Path, *, seconds: float = 20.0, progress: Callable[[float], None] | None = None
+    hunt: Hunt,
+    folder: Path,
+    *,
+    planner: str | None = None,
+    seconds: float = 20.0,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Reproducer]:
     """Shrink the distinct failures of a search, write them as a suite with worlds, and repeat them in another process.
 
     Ctrl-C ends the shrinking; the remaining failures are written unshrunk.
+
+    Args:
+        hunt: the search
+        folder: of the suite
+        planner: the planner as FILE.py:CLASS or MODULE:CLASS, if it is not registered
+        seconds: time limit for shrinking each failure [s]
+        progress: called with the completed fraction
     """
     small: list[Attempt] = []
     for k, finding in enumerate(hunt.distinct):
@@ -57,11 +70,16 @@ def write_reproducers(
         small.append(Attempt.of(renamed(scenario, name)))
         if progress is not None:
             progress((k + 1) / (len(hunt.distinct) + 1))
-    suite = _write(small, hunt.distinct, folder)
-    originals, written = run_elsewhere([finding.scenario for finding in hunt.distinct]), suite_elsewhere(suite)
+    notes = [(done.failure() or one.failure).sentence for done, one in zip(small, hunt.distinct, strict=True)]
+    suite = _write(small, notes, folder, planner)
+    with tempfile.TemporaryDirectory(prefix="antdrive-falsify-") as place:
+        found = [Attempt(finding.scenario, None) for finding in hunt.distinct]
+        originals = _write(found, [""] * len(found), Path(place), planner)
+        elsewhere = run_elsewhere(originals, suite)
+    pairs = zip(elsewhere[: len(found)], elsewhere[len(found) :], strict=True)
     return [
-        Reproducer(_name(k), finding, done, _repeats(finding, done, originals[k], written[k]))
-        for k, (finding, done) in enumerate(zip(hunt.distinct, small, strict=True))
+        Reproducer(_name(k), finding, done, _repeats(finding, done, *pair))
+        for k, (finding, done, pair) in enumerate(zip(hunt.distinct, small, pairs, strict=True))
     ]
 
 
@@ -84,14 +102,19 @@ def write_reproducer(
     failure = small.failure(bound)
     handover = Handover(name, small, bound, (failure or shrunk.failure).sentence, planner)
     suite = write_suite(folder / f"{name}.drive.yaml", [handover])
-    repeats = suite_elsewhere(suite) == [small.fingerprint] and failure == shrunk.failure
+    repeats = run_elsewhere(suite) == [small.fingerprint] and failure == shrunk.failure
     return small, suite, repeats
 
 
-def _write(small: Sequence[Attempt], findings: Sequence[Finding], folder: Path) -> Path:
-    """Write the suite and the worlds of failures; return the suite's path."""
-    pairs = enumerate(zip(small, findings, strict=True))
+def _write(failed: Sequence[Attempt], notes: Sequence[str], folder: Path, planner: str | None) -> Path:
+    """Write the suite and the worlds of failures, each with a note; return the suite's path."""
     handovers = [
-        Handover(_name(k), done, note=(done.failure() or finding.failure).sentence) for k, (done, finding) in pairs
+        Handover(
+            one.scenario.task.world.name,
+            one,
+            note=note,
+            planner=planner_beside(None, planner, one.scenario, folder),
+        )
+        for one, note in zip(failed, notes, strict=True)
     ]
     return write_suite(folder / SUITE, handovers)

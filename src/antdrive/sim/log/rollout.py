@@ -420,6 +420,10 @@ class Rollout:
         if steps > most:
             yield f"movers: the wanderers of record.task take {steps:.3g} steps in this log; at most {most:.3g} are checked"
 
+    def __repr__(self) -> str:
+        names = f"{self.record.planner.name} in {self.record.task.world.name}"
+        return f"<Rollout of {names}: {self.outcome.value}, {self.t[-1]:.1f} s in {len(self.t)} rows>"
+
     def _repr_html_(self) -> str:
         from antdrive.worlds.svg import LINE, card, world_svg
 

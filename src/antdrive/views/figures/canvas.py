@@ -5,6 +5,7 @@ The file's suffix selects PNG, PDF or SVG. Equal data gives equal bytes: files c
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,7 @@ from antdrive.views.colours import INK, MUTED, OUTCOME_LABELS, hexed
 from antdrive.views.scene import Scene
 
 SUFFIXES = (".png", ".pdf", ".svg")
+NOTEBOOK_DPI = 90  # pixels per inch of figures in notebooks, at most
 
 _STYLE: Any = {
     "font.family": "DejaVu Sans",
@@ -50,6 +52,16 @@ _STYLE: Any = {
 }
 
 
+class NotebookFigure(Figure):
+    """A figure that notebooks show, without pyplot and without a magic command."""
+
+    def _repr_png_(self) -> bytes:
+        picture = io.BytesIO()
+        with styled():
+            self.savefig(picture, format="png", dpi=min(self.dpi, NOTEBOOK_DPI), metadata={"Software": None})
+        return picture.getvalue()
+
+
 def styled() -> Any:
     """Return a context manager that applies the common style."""
     return matplotlib.rc_context(_STYLE)
@@ -57,7 +69,7 @@ def styled() -> Any:
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a width and height [inches]; no display is needed."""
-    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    figure = NotebookFigure(figsize=(width, height), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 

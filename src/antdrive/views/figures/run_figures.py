@@ -224,10 +224,11 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
         draw_map(axes, scene)
         handles: list[Any] = []
         drives = distinct(rollouts.items())
-        for over, (same, rollout) in zip(reversed(range(len(drives))), drives, strict=True):
-            colour, dash = planner_style(same[0])
-            path = path_text([rollouts[name].record.plan.length_m for name in same], driven_length_m(rollout))
-            label = f"{', '.join(same)}: {path} m, {float(rollout.t[-1]):.1f} s"
+        for over, same in zip(reversed(range(len(drives))), drives, strict=True):
+            name, rollout = same[0]
+            colour, dash = planner_style(name)
+            path = path_text((log.record.plan.length_m for _, log in same), driven_length_m(rollout))
+            label = f"{', '.join(name for name, _ in same)}: {path} m, {float(rollout.t[-1]):.1f} s"
             width = 2.2 + 1.4 * over  # earlier lines are wider to stay visible below later ones
             handles += axes.plot(
                 *rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=width, label=label, zorder=6

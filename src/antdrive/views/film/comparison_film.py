@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
-from antdrive.runs.comparing import distinct, path_text
+from antdrive.runs.comparing import SameDrive, distinct, path_text
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, Colour, planner_style
 from antdrive.views.film import overlay
@@ -61,13 +61,13 @@ def compare_film(
     one_world = len({log.record.task.world.name for log in rollouts}) == 1
     names = titles or [_title(log, one_world) for log in rollouts]
     drives = distinct(zip(names, rollouts, strict=True))
-    logs = [log for _, log in drives]
+    logs = [same[0][1] for same in drives]
     before = round(prelude * fps)
     if before and not any(map(has_field, logs)):
         raise InputError("prelude: no planner of the comparison has a field")
     options = replace(options, size=size or fitting_size(logs, camera))
     times = frame_times(max(float(log.t[-1] - log.t[0]) for log in logs), fps, speed)
-    screen = SplitScreen(logs, camera, options.size, [same for same, _ in drives], mark)
+    screen = SplitScreen(drives, camera, options.size, mark)
     moments = [*times.tolist(), *itertools.repeat(math.inf, round(2 * HOLD * fps))]
     frames = itertools.chain(screen.planning(before) if before else (), map(screen.frame, moments))
     return encoded(target, options, before + len(moments), frames, progress)
@@ -83,22 +83,22 @@ class Mark(NamedTuple):
 
 
 class SplitScreen:
-    """Frames of several runs, each in a tile."""
+    """Frames of several runs, each in a tile; planners of the same drive share one."""
 
     def __init__(
         self,
-        rollouts: Sequence[Rollout],
+        drives: Sequence[SameDrive],
         camera: str,
         size: tuple[int, int],
-        titles: Sequence[tuple[str, ...]],
         mark: Mark | None = None,
     ) -> None:
+        rollouts = [same[0][1] for same in drives]
         cols, rows = _tiling(rollouts, camera, size)
         wide, high = (size[0] // cols) // 2 * 2, (size[1] // rows) // 2 * 2
         self._size = size
         self._corners = [((k % cols) * wide, (k // cols) * high) for k in range(len(rollouts))]
         room = (wide - 2, high - 2)
-        self._tiles = [Tile(log, camera, room, same, mark) for log, same in zip(rollouts, titles, strict=True)]
+        self._tiles = [Tile(same, camera, room, mark) for same in drives]
 
     def frame(self, at: float) -> Picture:
         """Return the frame (H, W, 3) at a time of all runs [s]."""
@@ -119,16 +119,15 @@ class SplitScreen:
 class Tile:
     """Tile of one run: a header with its name and numbers, and the picture below."""
 
-    def __init__(
-        self, rollout: Rollout, camera: str, size: tuple[int, int], names: tuple[str, ...], mark: Mark | None = None
-    ) -> None:
+    def __init__(self, same: SameDrive, camera: str, size: tuple[int, int], mark: Mark | None = None) -> None:
+        rollout = same[0][1]
         self._unit, self._head = _head_of(size)
         self._rollout, self._size = rollout, (size[0], size[1] - self._head)
         self.shot = Shot(rollout, camera=camera, size=self._size, bare=True)
-        self._names, self._mark = names, mark
+        self._names, self._mark = [name for name, _ in same], mark
         self._colour = planner_style(rollout.record.planner.name)[0]
         self._outcome = rollout.outcome
-        self._length = rollout.record.plan.length_m
+        self._planned = [log.record.plan.length_m for _, log in same]  # [m]
         self._last: Picture | None = None  # the tile once the run is over
 
     def frame(self, at: float) -> Picture:
@@ -143,7 +142,7 @@ class Tile:
     def planning(self, count: int) -> Iterator[Picture]:
         """Yield `count` tiles (h, w, 3) of planning: the iterations, or the plan of a planner without a field."""
         if not has_field(self._rollout):
-            planned = self._with_head(self.shot.view(0.0), [f"planned {self._length:.2f} m"], ("planned", CALM))
+            planned = self._with_head(self.shot.view(0.0), [f"planned {self._planned[0]:.2f} m"], ("planned", CALM))
             yield from itertools.repeat(planned, count)
             return
         camera = still_camera(self.shot.options.camera)
@@ -159,8 +158,8 @@ class Tile:
             self.shot.put_label(view, self._mark.text, self._mark.x, self._mark.y)
         playback = self.shot.playback
         facts = [
-            *(["the same line"] if len(self._names) > 1 else []),
-            f"path {path_text([self._length], playback.driven(at))} m",
+            *(["drive the same line"] if len(self._names) > 1 else []),
+            f"path {path_text(self._planned, playback.driven(at))} m",
             f"min clearance {playback.min_clearance(at):.3f} m",
             *([f"time {at:.1f} s"] if at >= playback.duration else []),
         ]

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from base64 import b64encode
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from antdrive.base.errors import InputError
 from antdrive.views.film.camera import CAMERAS
@@ -23,6 +27,7 @@ ENCODERS: dict[str, tuple[str, ...]] = {
     ),
     ".webp": ("-c:v", "libwebp_anim", "-pix_fmt", "yuv420p", "-quality", "70", "-compression_level", "2", "-loop", "0"),
 }
+MOST_EMBEDDED = 8_000_000  # bytes of a film that notebooks embed; they link to larger ones
 STILLS: dict[str, dict[str, Any]] = {
     ".png": {},
     ".webp": {"quality": 82, "method": 4},
@@ -70,6 +75,21 @@ class FilmInfo:
     fps: float
     camera: str
     wall_s: float
+
+    def _repr_html_(self) -> str:
+        width, height = self.size
+        about = f"{self.duration_s:.1f} s, {width} x {height} px"
+        link = f'<a href="{escape(quote(os.path.relpath(self.path)))}">{escape(str(self.path))}</a>'
+        data = self.path.read_bytes() if self.path.is_file() else b""
+        if not 0 < len(data) <= MOST_EMBEDDED:
+            return f"<p>{link}: {about}, {len(data) / 1e6:.1f} MB{'' if data else ', the file is gone'}</p>"
+        kind = self.path.suffix.lower()[1:]
+        source = (
+            f'style="max-width: 100%" width="{width}" src="data:{"video" if kind == "mp4" else "image"}/{kind};base64,'
+        )
+        source += b64encode(data).decode() + '"'
+        shown = f"<video controls loop muted {source}></video>" if kind == "mp4" else f'<img alt="{about}" {source}>'
+        return f"<figure>{shown}<figcaption>{link}: {about}</figcaption></figure>"
 
     @property
     def duration_s(self) -> float:

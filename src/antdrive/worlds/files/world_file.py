@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -29,6 +30,7 @@ Start = Annotated[Triple, Field(description="write [x, y, yaw] in metres and rad
 Goal = Annotated[Pair, Field(description="write [x, y] in metres")]
 
 FOREIGN_SUFFIXES = (".sdf", ".world", ".map")  # files of other programs; `antdrive worlds import` converts them
+_BARN_NAME = re.compile(r"world_\d+\.world")  # of the BARN set
 _CATALOG = Path(__file__).parent.with_name("catalog")
 
 
@@ -142,7 +144,8 @@ def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
     except FieldError as error:
         raise input_error(error.problem) from None
     if path.suffix.lower() in FOREIGN_SUFFIXES:
-        raise input_error(str(path), f"not a world file; convert it with: antdrive worlds import {path}")
+        barn = " --barn" if _BARN_NAME.fullmatch(path.name) else ""  # without it another task would be imported
+        raise input_error(str(path), f"not a world file; convert it with: antdrive worlds import {path}{barn}")
     return _tasks_in(read_yaml(path), os.fspath(path), path.stem)
 
 
