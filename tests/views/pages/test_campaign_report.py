@@ -10,7 +10,7 @@ import pytest
 from antdrive.runs.statistics.run_table import RunTable
 from antdrive.views.colour_vision import luminance
 from antdrive.views.colours import label_styles
-from antdrive.views.pages.campaign_report import campaign_data, write_campaign_report
+from antdrive.views.pages.campaign_report import _styles, campaign_data, write_campaign_report
 from antdrive.views.pages.campaign_summary import summarise
 from antdrive.views.pages.charts import campaign_charts, write_charts
 from tests.runs.made_up_campaign import Skill, made_up_columns
@@ -234,6 +234,13 @@ def test_charts_for_a_thesis_have_truetype_fonts_names_and_one_width(summary, tm
             assert b"/MediaBox [ 0 0 338.4 " in content
         else:
             assert all(style.light.encode() in content for style in styles)
+
+
+def test_an_own_planner_has_the_same_colour_in_campaigns_as_in_films():
+    columns = made_up_columns({"Greedy": Skill(), "astar": Skill()}, worlds=2, seeds=1)
+    columns["planner_name"] = ["mine.py:Greedy" if label == "Greedy" else label for label in columns["planner"]]
+    summary = summarise(RunTable(columns), title="t")
+    assert _styles(summary) == label_styles(summary.paired.planners)
 
 
 @pytest.mark.slow

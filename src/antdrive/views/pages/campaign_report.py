@@ -168,7 +168,7 @@ def _styles(summary: CampaignSummary) -> list[LabelStyle]:
 
     names = dict(zip(summary.table.texts("planner"), summary.table.texts("planner_name"), strict=True))
     planners = summary.paired.planners
-    return label_styles(planners, [names[label] or label for label in planners])
+    return label_styles(planners, [record_name(names[label]) or label for label in planners])
 
 
 def _write_page(summary: CampaignSummary, folder: Path, out: Path, columns: Sequence[str]) -> list[Path]:
