@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from antdrive.base.records import meanings_of
+
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PART = re.compile(r"^(<!-- generated: (.+?) -->\n).*?^(<!-- end -->)$", re.MULTILINE | re.DOTALL)
@@ -131,16 +133,6 @@ def exit_codes() -> list[str]:
     return table("exit code, meaning", [(code(value.split(" = ")[1]), meaning) for value, meaning in lines])
 
 
-def described(kind: type) -> dict[str, str]:
-    """Return the meaning of each attribute from the docstrings of a class and its bases; the class itself wins."""
-    found: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        section = inspect.cleandoc(vars(base).get("__doc__") or "").partition("\nAttributes:\n")[2]
-        entries = re.split(r"^    (\w+): ", re.split(r"^\S", section, flags=re.MULTILINE)[0], flags=re.MULTILINE)[1:]
-        found |= {name: " ".join(text.split()) for name, text in zip(entries[::2], entries[1::2], strict=True)}
-    return found
-
-
 def planners() -> list[str]:
     """Return each planner with its summary, options and defaults."""
     from antdrive.planners import PLANNERS
@@ -170,7 +162,7 @@ def planner(*names: str) -> list[str]:
         text = re.sub(r"^Known weakness(es)?(, measured)?( \(([^)]*)\))?[:.]\s*", _source, weakness)
         text = re.sub(r"`?docs/([\w/.-]+)\.md`?", r"[\1](../../\1.md)", text)
         lines += [f"**Known weaknesses.** {text}", ""]
-    meanings = described(kind)
+    meanings = meanings_of(kind)
     rows = [(code(key), code(value), cell(meanings[key])) for key, value in settings_of(first).items()]
     lines += table("option, default, meaning", rows)
     for name in names[1:]:
@@ -258,7 +250,7 @@ def arrays() -> list[str]:
 
     from antdrive.sim.log.rollout import FORMS, Rollout
 
-    rows, contents = [], described(Rollout)
+    rows, contents = [], meanings_of(Rollout)
     for name, form in FORMS.items():
         shape = re.search(r"\((T|N|K|P|S)[\w, ]*\)", contents[name])
         if shape:
@@ -273,7 +265,7 @@ def record() -> list[str]:
     def rows(kind: type, prefix: str = "") -> Iterator[Row]:
         for field in dataclasses.fields(kind):
             name, of = f"{prefix}{field.name}", str(field.type)
-            yield code(name), json_type(of), cell(described(kind)[field.name])
+            yield code(name), json_type(of), cell(meanings_of(kind)[field.name])
             inner = re.search(r"\b(\w+Record)\b", of)
             if inner:
                 yield from rows(getattr(records, inner[1]), f"{name}[]." if of.startswith("tuple") else f"{name}.")

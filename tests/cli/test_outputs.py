@@ -80,7 +80,7 @@ WRITING = [
 
 
 def test_every_command_that_takes_an_output_is_called():
-    takes_none = {"verify", "margin", "find-margin", "planners", "schema", "warm", "accept"}
+    takes_none = {"controller", "verify", "margin", "find-margin", "planners", "schema", "warm", "accept"}
     words = {*COMMANDS, *(f"worlds {name}" for name in WORLDS), *(f"robots {name}" for name in ROBOTS)}
     called = {line for line in INVALID for word in words if line.startswith(f"{word} ")}
     assert len(called) == len(INVALID)

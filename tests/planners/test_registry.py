@@ -28,6 +28,8 @@ from antdrive.planners import (
     planner_version,
     record_name,
 )
+from antdrive.planners.iterative import INHERIT, without_iterations
+from antdrive.planners.registry import recorded_planner
 from antdrive.views.colours import PLANNER_STYLES
 from tests.planners.worlds_to_solve import catalogue, optimum
 
@@ -234,6 +236,55 @@ def test_a_class_that_is_no_planner_is_told_what_to_write(tmp_path, name, frozen
     (tmp_path / "mine.py").write_text(WRONG.format("(frozen=True)" if frozen else ""))
     with pytest.raises(InputError, match=words):
         load_planner(f"{tmp_path}/mine.py{name}")
+
+
+UNDECLARED = """
+from dataclasses import dataclass
+from typing import ClassVar
+from antdrive.planners import AntSystem
+class Keeps(AntSystem):
+    share: float = 0.5
+class Few(AntSystem):
+    ants = 30
+class Plain(AntSystem):
+    known: ClassVar[int] = 3
+@dataclass(frozen=True, kw_only=True)
+class Own(AntSystem):
+    ants: int = 30
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("Keeps", "the options of Keeps (share) need @dataclass(frozen=True, kw_only=True) above the class"),
+        ("Few", "write `ants: int = 30`, and @dataclass(frozen=True, kw_only=True) above the class"),
+    ],
+)
+def test_a_forgotten_decorator_or_type_is_named(tmp_path, name, problem):
+    (tmp_path / "mine.py").write_text(UNDECLARED)
+    with pytest.raises(InputError, match=re.escape(problem)):
+        load_planner(f"{tmp_path}/mine.py:{name}")
+
+
+def test_subclasses_of_ants_with_and_without_options_load(tmp_path):
+    (tmp_path / "mine.py").write_text(UNDECLARED)
+    assert load_planner(f"{tmp_path}/mine.py:Plain", ants=7).ants == 7
+    assert load_planner(f"{tmp_path}/mine.py:Own").ants == 30
+
+
+def test_a_class_that_is_loaded_is_found_by_its_name_in_records(tmp_path):
+    (tmp_path / "mine.py").write_text(UNDECLARED)
+    load_planner(f"{tmp_path}/mine.py:Own")
+    assert recorded_planner("Own", ants=9).ants == 9
+    assert recorded_planner("astar") is PLANNERS["astar"]
+
+
+def test_only_planners_of_users_are_told_what_to_inherit_for_iterations(tmp_path):
+    (tmp_path / "mine.py").write_text(MINE)
+    mine = load_planner(f"{tmp_path}/mine.py:Mine")
+    assert without_iterations(mine, "Mine") == f"Mine does not plan in iterations; {INHERIT}"
+    assert without_iterations(PLANNERS["astar"], "astar") == "astar does not plan in iterations"
 
 
 def test_a_file_is_read_again_when_it_has_changed(tmp_path):

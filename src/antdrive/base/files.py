@@ -22,6 +22,12 @@ def file_name(name: str, keep: str = "-_.", *, ascii_only: bool = False) -> str:
     return "".join(c if (c.isalnum() and (c.isascii() or not ascii_only)) or c in keep else "_" for c in name)
 
 
+def summary_of(path: Path) -> str:
+    """Return the summary of a catalogue's file: the comment in its first line."""
+    with path.open(encoding="utf-8") as file:
+        return file.readline().removeprefix("#").strip()
+
+
 def as_json(value: Any) -> str:
     """Format a value as indented strict JSON: infinities and nan become null."""
     return json.dumps(_json_value(value), indent=2, allow_nan=False)

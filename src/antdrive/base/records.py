@@ -29,6 +29,13 @@ def attributes_of(docstring: str | None) -> dict[str, str]:
     return {name: " ".join(text.split()) for name, text in zip(entries[::2], entries[1::2], strict=True)}
 
 
+def meanings_of(kind: type) -> dict[str, str]:
+    """Return the description of each field from the docstrings of a class and its bases; the class itself wins."""
+    return {
+        name: text for base in reversed(kind.__mro__) for name, text in attributes_of(vars(base).get("__doc__")).items()
+    }
+
+
 @functools.cache
 def ranges_of(kind: Hashable) -> Mapping[str, tuple[float, float]]:
     """Return the range of each field of a record whose annotation has both limits."""

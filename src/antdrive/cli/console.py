@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import shlex
 import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -17,6 +19,10 @@ from antdrive.base.errors import visible
 from antdrive.base.files import as_json
 
 LAYOUT = "\n\t"  # control characters that lines may hold
+GOOD, BAD = "✓", "✗"  # signs of success and failure
+COLOURS = {GOOD: "green", BAD: "red"}
+PLAIN = {GOOD: "+", BAD: "x"}  # for streams that cannot encode the signs
+LEAST_WRAPPED = 24  # least width of a wrapped column [characters]
 
 
 @contextmanager
@@ -49,6 +55,13 @@ def bar(label: str) -> Iterator[Callable[[float], None]]:
     columns = ("{task.percentage:>3.0f} %", "TimeRemainingColumn")
     with _progress(label, *columns, total=1.0, redirect_stdout=on_top) as show:
         yield lambda fraction: show(completed=fraction) if show else None
+
+
+@contextmanager
+def stage(label: str) -> Iterator[None]:
+    """Show what a command does while that has no measurable progress."""
+    with _progress(label, "TimeElapsedColumn"):
+        yield
 
 
 @contextmanager
@@ -115,17 +128,40 @@ def print_error(message: str) -> None:
 
 def print_line(text: str = "") -> None:
     """Print one line on stdout; an error names it."""
+    _print(_signed(visible(text, LAYOUT)))
+
+
+def _print(text: str) -> None:
     try:
-        typer.echo(visible(text, LAYOUT))
+        typer.echo(text)
     except BrokenPipeError:
         raise
     except OSError as error:
         raise OSError(error.errno, error.strerror, "stdout") from None
 
 
+def _signed(text: str) -> str:
+    """Colour the signs of success and failure on a terminal, unless `NO_COLOR` is set; spell them if stdout cannot."""
+    coloured = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    for one, colour in COLOURS.items():
+        if one in text:
+            word = one if _encodes(one) else PLAIN[one]
+            text = text.replace(one, typer.style(word, fg=colour) if coloured else word)
+    return text
+
+
+def _encodes(text: str) -> bool:
+    """Return whether stdout can write a text."""
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True
+
+
 def print_json(value: Any) -> None:
     """Print one JSON object on stdout."""
-    print_line(as_json(value))
+    _print(visible(as_json(value), LAYOUT))
 
 
 def show(json: bool, facts: Any, lines: Iterable[str]) -> None:
@@ -138,14 +174,62 @@ def show(json: bool, facts: Any, lines: Iterable[str]) -> None:
 
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Yield lines of aligned columns, truncated at the terminal's width, complete elsewhere."""
-    lines = [tuple(headers), *(tuple(row) for row in rows)]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(headers) - 1)]
+    """Yield the lines of a table: aligned columns where they fit the terminal, and elsewhere than on terminals.
+
+    Where they do not fit, only the last column is wrapped; else rows become columns; else each row is a block with a line
+    for each column. Nothing is cut.
+    """
+    heads, body = tuple(headers), [tuple(row) for row in rows]
     columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    lines = [heads, *body]
+    aligned = list(_aligned(lines))
+    if columns is None or _fits(aligned, columns):
+        return iter(aligned)
+    left = columns - sum(2 + max(len(line[i]) for line in lines) for i in range(len(heads) - 1))
+    if left >= max(LEAST_WRAPPED, *(len(word) for line in lines for word in line[-1].split())):
+        return _aligned(part for line in lines for part in _wrapped(line, left))
+    turned = list(_aligned(zip(*lines, strict=True)))
+    return iter(turned) if _fits(turned, columns) else _blocks(heads, body, columns)
+
+
+def _aligned(lines: Iterable[Sequence[str]]) -> Iterator[str]:
+    lines = list(lines)
+    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]) - 1)]
     for line in lines:
-        aligned = [cell.ljust(width) for cell, width in zip(line, widths, strict=False)]
-        text = "  ".join([*aligned, line[-1]]).rstrip()
-        yield text if columns is None or len(text) <= columns else text[: columns - 1] + "…"
+        padded = [cell.ljust(width) for cell, width in zip(line, widths, strict=False)]
+        yield "  ".join([*padded, line[-1]]).rstrip()
+
+
+def _fits(lines: Iterable[str], columns: int) -> bool:
+    return all(len(line) <= columns for line in lines)
+
+
+def _wrapped(line: Sequence[str], width: int) -> Iterator[tuple[str, ...]]:
+    """Yield a row as several, its last column wrapped to a width."""
+    *first, last = line
+    for part in _words(last, width):
+        yield (*first, part)
+        first = [""] * len(first)
+
+
+def _blocks(heads: Sequence[str], rows: Iterable[Sequence[str]], columns: int) -> Iterator[str]:
+    """Yield each row as a block: a line for each column, those after the first indented."""
+    names = [heads[0], *(f"  {head}" for head in heads[1:])]
+    width = max(map(len, names))
+    for row in rows:
+        for name, cell in zip(names, row, strict=True):
+            for part in _words(cell, max(LEAST_WRAPPED, columns - width - 2)):
+                yield f"{name:{width}}  {part}".rstrip()
+                name = ""  # of the lines that follow
+
+
+def _words(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
+
+
+def marked(good: bool, text: str) -> str:
+    """Return a text, on a terminal with the sign of success or failure before it; `print_line` colours the sign."""
+    return f"{GOOD if good else BAD} {text}" if sys.stdout.isatty() else text
 
 
 def file_lines(files: Mapping[str, object]) -> Iterator[str]:

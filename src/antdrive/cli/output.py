@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, file_lines, print_error, this_command
+from antdrive.cli.console import bar, file_lines, marked, print_error, this_command
 from antdrive.runs.results_folder import free_folder, opened
 from antdrive.views.run_folder import check_folder
 
@@ -53,7 +53,8 @@ def print_idle_settings(scenarios: Sequence[Scenario], given: Collection[str] = 
 def run_lines(run: Run, files: Mapping[str, str]) -> Iterator[str]:
     """Yield a run's outcome, metrics, certificate and files as lines."""
     s = run.scenario
-    yield f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}{in_brackets(run.reason)}"
+    heading = f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}{in_brackets(run.reason)}"
+    yield marked(run.succeeded, heading)
     yield from margin_lines(s)
     if run.rollout is not None and run.certificate is not None:
         result = run.as_dict()

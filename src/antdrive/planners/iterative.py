@@ -17,6 +17,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import require
+from antdrive.base.plane import polyline_length
 from antdrive.planners.errors import PlannerError, planner_errors
 from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import (
@@ -32,6 +33,7 @@ from antdrive.planners.plan import (
     path_cost,
 )
 
+INHERIT = "inherit antdrive.planners.IterativePlanner and yield an Iteration for each"
 WARMUP_ITERATIONS = 2  # iterations that call every kernel: the second evaporates and reuses results of the first
 
 
@@ -210,6 +212,7 @@ class IterativePlanner(GridPlanner):
             cells=last.cells,
             cost=path_cost(last.cells, query.grid.cell),
             waypoints=last.waypoints,
+            length=None if last.waypoints is None else polyline_length(query.grid.xy(last.waypoints)),
             reason=note,
             work=work,
             work_unit=self.work_unit,
@@ -229,5 +232,12 @@ def as_iterative(planner: Planner) -> IterativePlanner | None:
     with planner_errors(planner):
         missing = [name for name in ("iterate", "iterations", "time_budget") if not hasattr(planner, name)]
     if missing:
-        raise PlannerError(type(planner).__name__, f"declares itself iterative, but lacks {', '.join(missing)}")
+        problem = f"declares itself iterative, but lacks {', '.join(missing)}; {INHERIT}"
+        raise PlannerError(type(planner).__name__, problem)
     return cast(IterativePlanner, planner)
+
+
+def without_iterations(planner: Planner, name: str) -> str:
+    """Return a sentence that a planner has no iterations, with what a user's class inherits to have them."""
+    own = not type(planner).__module__.startswith("antdrive.")
+    return f"{name} does not plan in iterations" + (f"; {INHERIT}" if own else "")

@@ -28,8 +28,8 @@ from antdrive.planners.graph.apf import PotentialField
 from antdrive.planners.graph.incremental import DStar, DStarLite
 from antdrive.planners.graph.search import AStar, Dijkstra
 from antdrive.planners.graph.sipp import SafeIntervals
-from antdrive.planners.plan import Planner
-from antdrive.planners.user_code import is_user_code, module_hash, user_code_version, user_object
+from antdrive.planners.plan import GridPlanner, Planner
+from antdrive.planners.user_code import LOADED, is_user_code, module_hash, user_code_version, user_object
 
 #: The built-in planners.
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
@@ -49,6 +49,7 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
 
 #: The entry-point group for planners of other packages: an object with a method `plan`, or its class.
 GROUP = "antdrive.planners"
+DECORATOR = "@dataclass(frozen=True, kw_only=True)"
 
 
 def load_planner(name: str, /, **options: Any) -> Planner:
@@ -70,6 +71,12 @@ def load_planner(name: str, /, **options: Any) -> Planner:
             raise InputError(f"planner: {_unknown(name, [*PLANNERS, *_plugins()])}")
         planner = _load(entry)
     return _with_options(name, planner, options)
+
+
+def recorded_planner(name: str, /, **options: Any) -> Planner:
+    """Return the planner with a name in a record: a registered one, or one of user code that this process has loaded."""
+    own = name not in PLANNERS and name in LOADED
+    return make_planner(LOADED[name], name, **options) if own else load_planner(name, **options)
 
 
 def make_planner(made: Any, name: str, /, **options: Any) -> Planner:
@@ -244,6 +251,8 @@ def _instance(made: Any, who: str, source: str = "") -> Planner:
     with _loading(who, source):
         if issubclass(type(made), type) and (lacking := _mismatch(made)):
             raise InputError(f"{who} cannot be created{source}: give all its options default values ({lacking})")
+        if issubclass(type(made), type) and (problem := _undeclared_options(made)):
+            raise InputError(f"{who} cannot be created{source}: {problem}")
         planner = made() if issubclass(type(made), type) else made
         if not isinstance(planner, Planner) or not callable(planner.plan):
             raise InputError(
@@ -253,6 +262,24 @@ def _instance(made: Any, who: str, source: str = "") -> Planner:
         if wrong := _mismatch(planner.plan, None, None):
             raise InputError(f"{who} is not a planner{source}: its method must be plan(query, rng) ({wrong})")
     return planner
+
+
+def _undeclared_options(kind: type) -> str:
+    """Return how to declare options that a subclass of `GridPlanner` fails to make fields; empty if it makes all fields."""
+    known: set[str] = set()
+    for one in reversed(kind.__mro__):
+        typed = {name for name, hint in vars(one).get("__annotations__", {}).items() if "ClassVar" not in str(hint)}
+        is_record = "__dataclass_fields__" in vars(one)
+        lost = sorted(name for name in typed if not (is_record or name.startswith("_")))
+        untyped = sorted(known & set(vars(one)) - typed)
+        if issubclass(one, GridPlanner) and lost:
+            return f"the options of {one.__name__} ({', '.join(lost)}) need {DECORATOR} above the class"
+        if untyped:
+            value, name = vars(one)[untyped[0]], untyped[0]
+            typed_line = f"{name}: {type(value).__name__} = {value!r:.20}"
+            return f"{one.__name__} sets {name} without a type; write `{typed_line}`, and {DECORATOR} above the class"
+        known |= typed if is_record else set()
+    return ""
 
 
 def _loading(who: str, source: str, passing: tuple[type[Exception], ...] = ()) -> UserCode:

@@ -28,6 +28,8 @@ FROZEN_BASE = "cannot inherit non-frozen dataclass"  # message of Python about a
 DIGITS = 8  # hexadecimal digits of a file's hash
 FROM_FILE = "_antdrive_user_"  # name prefix of modules loaded from files
 
+#: Users' classes that this process has loaded, by their names in records; the latest of a name.
+LOADED: dict[str, Any] = {}
 #: The folder of each user module, by the module's name.
 _OWNERS: dict[str, Path] = {}
 #: Modules set aside while a module of the same name from another folder is in use.
@@ -67,7 +69,8 @@ class UserCodeError(InputError):
 def user_object(name: str) -> Any:
     """Return the object of a user's file or module that the part after the last colon names."""
     source, _, word = (f"{name}:" if name.endswith(".py") else name).rpartition(":")
-    return load_object(source, word, is_file=source.endswith(".py"))
+    LOADED[word] = load_object(source, word, is_file=source.endswith(".py"))
+    return LOADED[word]
 
 
 def load_object(source: str, word: str, folder: Path | None = None, *, is_file: bool) -> Any:

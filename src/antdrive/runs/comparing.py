@@ -66,14 +66,23 @@ def path_text(planned: Iterable[float], driven: float) -> str:
 
 @dataclass(frozen=True)
 class Compared:
-    """A run of a comparison, without its log."""
+    """A run of a comparison, without its log.
 
-    label: str  # the planner's label
-    world: str  # the world's name
-    seed: int  # the random seed
-    facts: Mapping[str, Any]  # `Run.as_dict`
-    drive: str = ""  # `drive_hash`; empty without a drive
-    plan: bytes = b""  # the planned line as bytes
+    Attributes:
+        label: the planner's label
+        world: the world's name
+        seed: the random seed
+        facts: `Run.as_dict` and the folder
+        drive: a hash of the drive without its plan; empty without a drive
+        plan: the planned line as bytes
+    """
+
+    label: str
+    world: str
+    seed: int
+    facts: Mapping[str, Any]
+    drive: str = ""
+    plan: bytes = b""
 
     @classmethod
     def of(cls, label: str, s: Scenario, result: Run | PlannerError, folder: str | None) -> Compared:

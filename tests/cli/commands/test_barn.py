@@ -67,7 +67,7 @@ def log(tmp_path):
 def test_a_log_is_scored_by_both_formulas_and_its_gaps_are_named(log, antdrive):
     code, out, _ = antdrive("barn", "paths", "--score", log)
     lines = out.splitlines()
-    assert (code, lines[0]) == (1, f"score 0.1667  {log}: 2 trials in 1 worlds")  # (5/15 + 0) / 2
+    assert (code, lines[0]) == (1, f"score 0.1667  {log}: 2 trials, worlds: 1")  # (5/15 + 0) / 2
     assert lines[1] == "  50.0 % succeeded, 50.0 % collided, 0.0 % timed out, mean time 15.0000 s"
     assert lines[2].startswith("  incomplete: 1 of the 50 public worlds; missing: 0, 12, 18")
     assert lines[3] == "  incomplete: worlds with fewer than 10 trials: 6 (2)"

@@ -29,6 +29,13 @@ def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive, small, t
     assert Path("again.gif").exists()
 
 
+def test_a_prelude_without_a_film_or_an_iterative_planner_is_refused_before_any_drive(refused, small):
+    words = ["compare", small, "-p", "astar", "-p", "tangent", "--prelude", "2"]
+    assert "--prelude: needs --film" in refused(*words)
+    assert "--prelude: needs an iterative planner" in refused(*words, "--film", "c.mp4")
+    assert not Path("out").exists()
+
+
 def test_fewer_than_two_paths_are_nothing_to_compare(antdrive, tmp_path):
     words = ["compare", "no-path", "-p", "astar", "-p", "dijkstra", "--out", str(tmp_path / "c"), "--no-figures"]
     code, _, err = antdrive(*words)

@@ -13,6 +13,7 @@ from antdrive.runs.failures.handover import (
     Handover,
     _robot,
     expectation,
+    renamed,
     run_elsewhere,
     scenario_name,
     write_suite,
@@ -21,6 +22,8 @@ from antdrive.runs.suites.demands import Bound
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Certificate, Perception, ReplanPolicy, Scenario
+from antdrive.sim.log.record import MarginRecord
+from antdrive.sim.scenario import MarginChoice
 from antdrive.worlds import Disc
 
 
@@ -83,6 +86,15 @@ def test_the_suite_holds_as_long_as_the_failure_repeats(collided_run, tmp_path):
     (case,) = load_suite(suite)
     result = check_case(case)
     assert result.faults == ("outcome: succeeded, expected collided",), "and nothing about a missing baseline"
+
+
+def test_a_chosen_margin_is_handed_over_as_a_number(small_scenario, tmp_path):
+    record = MarginRecord(loss_m=0.02, reserve_m=0.01, probability=0.001, drives=80)
+    choice = MarginChoice(margin=0.04, record=record, factors=replace(small_scenario, margin=0.04).loss_factors)
+    auto = replace(small_scenario, margin=0.04, margin_choice=choice)
+    assert auto.chosen == choice
+    done = Attempt.of(renamed(auto, "auto"))
+    assert run_elsewhere(write_suite(tmp_path / "s.drive.yaml", [Handover("auto", done)])) == [done.fingerprint]
 
 
 def test_what_is_expected_of_a_success_that_fails_otherwise(small_run):

@@ -13,7 +13,8 @@ import antdrive.testing
 from antdrive import Scenario, load_robot, rasterise, run
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli.testing.fixture import DriveFailure, DriveFixture, assert_collision_free, assert_reached_goal
-from antdrive.planners import load_planner
+from antdrive.planners import AStar, load_planner
+from antdrive.runs.suites import Baseline
 from antdrive.runs.suites.strategies import tasks, worlds
 from antdrive.worlds import point_clearance
 from tests.worlds.oracles import passable
@@ -39,6 +40,22 @@ def test_a_drive_is_compared_with_a_baseline_beside_the_tests_file(drive, small_
     slower = replace(load_robot("turtlebot"), max_speed=0.4)
     with pytest.raises(DriveFailure, match=r"duration_s: .* longer, tolerance"):
         fresh(drive)(small_task, "astar", slower)
+
+
+class Raises(AStar):
+    """A planner that raises an error."""
+
+    def plan(self, query, rng):
+        raise IndexError("pop from empty list")
+
+
+def test_a_planner_that_raises_fails_its_test_with_the_command_that_repeats_it(drive, small_run):
+    Baseline.of(small_run, "test_it[a/b]").save(drive.baseline_path("test_it[a/b]"))
+    with pytest.raises(DriveFailure) as caught:
+        drive("empty", Raises())
+    fault, changed, repeat = str(caught.value).splitlines()
+    assert fault.startswith("planner Raises raised IndexError: pop from empty list")
+    assert (changed, repeat) == ("changed since the baseline: world", "repeat: pytest 'test_mine.py::test_it[a/b]'")
 
 
 def test_each_drive_of_a_test_has_a_name(drive, small_task):

@@ -56,7 +56,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "reproduce": Command(
             "reproduce", "reproduce", "Repeat a paper's experiments and test its claims.", resumes=True, plans=True
         ),
-        "planners": Command("planners", "planners", "List the planners and their options."),
+        "planners": Command("planners", "planners", "List the planners, or describe some with their options."),
         "controller": Command(
             "controller", "controller", "List the options of the controller with default, unit and meaning."
         ),

@@ -123,7 +123,7 @@ def _score(source: Path, log: Path, json: bool) -> bool:
 def _score_lines(log: Path, result: "LogScore") -> Iterator[str]:
     from antdrive.runs import barn_challenge as challenge
 
-    yield f"score {result.scores[challenge.OFFICIAL.name]:.4f}  {log}: {result.trials} trials in {result.worlds} worlds"
+    yield f"score {result.scores[challenge.OFFICIAL.name]:.4f}  {log}: {result.trials} trials, worlds: {result.worlds}"
     time = "" if math.isnan(result.seconds) else f", mean time {result.seconds:.4f} s"
     ends = zip((result.success, result.collided, result.timed_out), ("succeeded", "collided", "timed out"), strict=True)
     yield f"  {', '.join(f'{100 * share:.1f} % {words}' for share, words in ends)}{time}"
@@ -134,6 +134,7 @@ def _score_lines(log: Path, result: "LogScore") -> Iterator[str]:
         (one.name, f"{result.scores[one.name]:.4f}", f"{1 / one.least:.2f}", one.source) for one in challenge.FORMULAS
     )
     yield from table(("clip", "mean score", "at most", "used by"), rows)
+    yield ""
     yield f"score: {challenge.FORMULA}"
     yield "means over worlds of the means over a world's trials"
     yield f"source: {challenge.FORMULA_SOURCE}"

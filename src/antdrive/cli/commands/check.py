@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast, get_args
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, print_error, print_line, show
+from antdrive.cli.console import bar, marked, print_error, print_line, show
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.scenario_options import with_chosen_margin
@@ -127,7 +127,8 @@ def drive_suites(
 
 def _print(result: "CheckResult") -> None:
     """Print the result of one test."""
-    print_line(f"{result.address}: {(result.accepted or 'passed') if result.passed else 'FAILED'}")
+    words = (result.accepted or "passed") if result.passed else "FAILED"
+    print_line(marked(result.passed, f"{result.address}: {words}"))
     for line in (*result.gains, *result.notes) if result.passed else result.message.splitlines():
         print_line(f"  {line}")
 

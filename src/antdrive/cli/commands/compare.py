@@ -77,7 +77,7 @@ def compare(
     Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
     from antdrive.cli.groups import print_exception
-    from antdrive.planners import PlannerError
+    from antdrive.planners import PlannerError, capabilities_of
     from antdrive.sim.pipeline import run
 
     if campaigns := campaign_folders(worlds, context, query):
@@ -98,6 +98,8 @@ def compare(
         check_film(film)
     elif prelude:
         raise InputError("--prelude: needs --film")
+    if prelude and not any(capabilities_of(scenario.planner).iterative for scenario in scenarios.values()):
+        raise InputError("--prelude: needs an iterative planner; none of these is one")
     print_idle_settings(list(scenarios.values()), {"seed"} if seeds > 1 else ())
     numbers = range(given["seed"], given["seed"] + seeds)
     cases = [(names[world], number) for world in worlds for number in numbers]

@@ -23,5 +23,5 @@ def controller(
         name: {"default": one.default, "unit": one.unit, "about": one.meaning, "routes": one.routes}
         for name, one in known.items()
     }
-    rows = ((name, f"{one.default:g}", one.unit or "-", one.routes, one.meaning) for name, one in known.items())
-    show(json, facts, table(("option", "default", "unit", "acts on routes", "meaning"), rows))
+    rows = ((name, f"{one.default:g} {one.unit}".strip(), one.routes, one.meaning) for name, one in known.items())
+    show(json, facts, table(("option", "default", "routes", "meaning"), rows))

@@ -1,28 +1,51 @@
 """`antdrive planners`."""
 
 import dataclasses
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
 
+from antdrive.base.checks import suggest
+from antdrive.base.errors import InputError
+from antdrive.base.records import meanings_of
 from antdrive.cli import options
-from antdrive.cli.console import show
+from antdrive.cli.console import show, table
+from antdrive.cli.options import argument
 from antdrive.cli.output import plain
 
 
-def planners(json: options.Json = False) -> None:
-    """List the planners and their options."""
+def planners(
+    names: Annotated[list[str] | None, argument("NAME", "Planners to describe with their options.")] = None,
+    json: options.Json = False,
+) -> None:
+    """List the planners, or describe some with their options."""
     from antdrive.planners import describe, list_planners
 
-    known = {name: (describe(planner), _options(planner)) for name, planner in list_planners().items()}
+    known = list_planners()
+    for name in names or ():
+        if name not in known:
+            raise InputError(f"{name}: unknown planner; {suggest(name, known)}")
+    chosen = {name: known[name] for name in names or known}
     facts = {
-        name: {"about": about, "options": {key: plain(value) for key, value in values.items()}}
-        for name, (about, values) in known.items()
+        name: {
+            "about": describe(planner),
+            "options": {key: plain(value) for key, value in _options(planner).items()},
+            "meanings": meanings_of(type(planner)),
+        }
+        for name, planner in chosen.items()
     }
-    lines = []
-    for name, (about, values) in known.items():
-        lines.append(f"{name:14} {about}")
-        if values:
-            lines.append(f"{'':14}   {', '.join(f'{key}={value}' for key, value in values.items())}")
-    show(json, facts, lines)
+    show(json, facts, _details(facts) if names else _list(facts))
+
+
+def _list(facts: Mapping[str, Any]) -> Iterator[str]:
+    yield from table(("planner", "about"), ((name, one["about"]) for name, one in facts.items()))
+    yield "options: antdrive planners NAME"
+
+
+def _details(facts: Mapping[str, Any]) -> Iterator[str]:
+    for name, one in facts.items():
+        yield f"{name}: {one['about']}"
+        rows = [(key, str(value), one["meanings"].get(key, "")) for key, value in one["options"].items()]
+        yield from table(("option", "default", "meaning"), rows) if rows else ("  no options",)
 
 
 def _options(planner: Any) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from antdrive.base.errors import InputError
+from antdrive.base.files import summary_of
 from antdrive.cli import options
 from antdrive.cli.console import file_lines, show, table
 from antdrive.cli.options import argument, flag, option
@@ -15,13 +16,14 @@ def list_all(json: options.Json = False) -> None:
     """List the robots in the catalogue."""
     from antdrive.robots import list_robots, load_robot, robot_to_dict
 
-    specs = [load_robot(name) for name in list_robots()]
+    specs = {summary_of(path): load_robot(name) for name, path in list_robots().items()}
     rows = (
-        (spec.name, f"{spec.radius:.3f}", f"{spec.max_speed:g}", f"{spec.max_acceleration:g}", spec.source or "")
-        for spec in specs
+        (spec.name, f"{spec.radius:.3f}", f"{spec.max_speed:g}", f"{spec.max_acceleration:g}", about)
+        for about, spec in specs.items()
     )
     heads = ("robot", "radius m", "m/s", "m/s2", "about")
-    show(json, {spec.name: robot_to_dict(spec) for spec in specs}, table(heads, rows))
+    facts = {spec.name: {**robot_to_dict(spec), "about": about} for about, spec in specs.items()}
+    show(json, facts, [*table(heads, rows), "details: antdrive robots NAME, antdrive robots show NAME"])
 
 
 def print_robot(name: Annotated[str, argument("NAME", "Catalogue robot.")], json: options.Json = False) -> None:

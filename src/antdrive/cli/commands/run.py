@@ -7,7 +7,7 @@ from antdrive.base.atomic import folder_lock
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, planning, show, this_command
+from antdrive.cli.console import bar, planning, show, stage, this_command
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, print_idle_settings, run_lines
 from antdrive.cli.scenario_options import Ends, Setup
@@ -41,7 +41,8 @@ def run(
     from antdrive.sim.pipeline import plan
     from antdrive.sim.pipeline import run as drive
 
-    scenario = setup.scenario(ends.of(world), given)
+    with stage("reading the scenario"):
+        scenario = setup.scenario(ends.of(world), given)
     folder = out or default_folder(scenario)
     _check_views(scenario, film, prelude, gui)
     check_folder(folder)
@@ -52,7 +53,8 @@ def run(
             planned = plan(scenario)
         with bar("driving") as progress:
             result = drive(scenario, planned=planned, progress=progress)
-        report = write_run(result, folder, this_command(), vector=vector, figures=figures)
+        with stage("writing log and figures"):
+            report = write_run(result, folder, this_command(), vector=vector, figures=figures)
         if film is not None and result.rollout is not None:
             filmed = film_drives([result.rollout], film, prelude=prelude)["file"]
             report = write_result(result, {**report["files"], "film": filmed}, this_command())
@@ -72,10 +74,11 @@ def _check_views(scenario: "Scenario", film: Path | None, prelude: float, gui: b
         check_display()
     if prelude > 0:
         from antdrive.planners import capabilities_of
+        from antdrive.planners.iterative import without_iterations
 
         if film is None:
             raise InputError("--prelude: needs --film")
         if not capabilities_of(scenario.planner).iterative:
-            raise InputError(f"--prelude: needs an iterative planner; {scenario.planner_name} is not one")
+            raise InputError(f"--prelude: {without_iterations(scenario.planner, scenario.planner_name)}")
     if film is not None:
         check_film(film)

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.console import print_error, print_json, print_line
+from antdrive.cli.console import marked, print_error, print_json, print_line
 from antdrive.cli.exits import INVALID_INPUT
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import log_at
@@ -47,7 +47,9 @@ def verify(
             checked[path] = {"certified": False, "problems": [str(error)], "readable": False}
             continue
         if not json:
-            print_line(f"{path}: {report['sentence']}{f'; about {about}' if about and report['certified'] else ''}")
+            certified = report["certified"]
+            suffix = f"; about {about}" if about and certified else ""
+            print_line(marked(certified, f"{path}: {report['sentence']}{suffix}"))
             for problem in report["problems"]:
                 print_line(f"  {problem}")
     all_certified = all(report["certified"] for report in checked.values())

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import FieldError, InputError
-from antdrive.base.files import file_name
+from antdrive.base.files import file_name, summary_of
 from antdrive.cli import options
 from antdrive.cli.console import bar, file_lines, show, table
 from antdrive.cli.options import argument, flag, option
@@ -31,15 +31,16 @@ def list_worlds(json: options.Json = False) -> None:
     from antdrive.worlds import list_worlds as catalogue
     from antdrive.worlds import load_task
 
-    known = {name: _facts(load_task(name)) for name in catalogue()}
-    heads = ("world", "size m", "obstacles", "movers", "cell m", "about")
-    show(json, known, table(heads, (_row(name, facts) for name, facts in known.items())))
+    known = {name: {**_facts(load_task(name)), "about": summary_of(path)} for name, path in catalogue().items()}
+    heads = ("world", "size m", "obstacles", "movers", "about")
+    rows = (_row(name, facts) for name, facts in known.items())
+    show(json, known, [*table(heads, rows), "details: antdrive worlds show NAME"])
 
 
 def _row(name: str, facts: Mapping[str, Any]) -> tuple[str, ...]:
     xmin, ymin, xmax, ymax = facts["bounds"]
     counts = (str(facts["obstacles"]), str(facts["movers"]))
-    return name, f"{xmax - xmin:g} x {ymax - ymin:g}", *counts, f"{facts['cell']:g}", facts["source"] or ""
+    return name, f"{xmax - xmin:g} x {ymax - ymin:g}", *counts, facts["about"]
 
 
 def _facts(task: "Task") -> dict[str, Any]:

@@ -140,12 +140,13 @@ class Check:
             wall_s=wall + (rollout.record.times.drive_wall_s if rollout else 0.0) + time.perf_counter() - started,
         )
 
-    def changes(self, s: Scenario) -> tuple[str, ...]:
-        """Return what has changed in a scenario since its baseline, a sentence each, if its planner raised an error."""
+    def raised(self, s: Scenario, error: PlannerError) -> CheckResult:
+        """Return the result of a test whose planner raised an error, with what has changed since the baseline."""
+        details: tuple[str, ...] = ()
         with suppress(InputError):
             if self.baseline is not None and (earlier := Baseline.own(self.baseline, self.name)) is not None:
-                return tuple(changes(s, fixed_hashes(s), earlier, ""))
-        return ()
+                details = tuple(changes(s, fixed_hashes(s), earlier, ""))
+        return self.failed_early(RAISED, str(error), error, details)
 
     def failed_early(
         self, outcome: str, fault: str, error: BaseException, details: tuple[str, ...] = ()
@@ -233,7 +234,7 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     try:
         return check.evaluate(drive(scenario))
     except PlannerError as error:
-        return check.failed_early(RAISED, str(error), error, check.changes(scenario))
+        return check.raised(scenario, error)
 
 
 def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:

@@ -9,7 +9,7 @@ from typing import Any
 
 from antdrive.base.errors import FieldError
 from antdrive.cli.testing.evaluation import Check, CheckResult, Update
-from antdrive.planners import Planner
+from antdrive.planners import Planner, PlannerError
 from antdrive.robots import RobotSpec, list_robots
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.nearest import first_contact, nearest_of
@@ -101,7 +101,7 @@ class DriveFixture:
             settings: further settings of `Scenario.of`, such as seed, noise and margin
 
         Raises:
-            DriveFailure: the drive misses a demand or is worse than its baseline.
+            DriveFailure: the drive misses a demand or is worse than its baseline, or the planner raised an error.
             InputError: the world, the planner or the robot is invalid.
             FieldError: a setting is invalid, or two drives of a test have the same name.
         """
@@ -114,9 +114,9 @@ class DriveFixture:
         if name in self._names:
             raise FieldError("name", f"{name!r} is used twice in this test; give each drive its own name")
         self._names.add(name)
-        run = self.run(world, planner, robot, **settings)
+        scenario = self._scenario(world, planner, robot, settings)
         whole = f"{self._test}-{name}" if name else self._test
-        result = Check(
+        check = Check(
             address=self._address,
             name=whole,
             demands=demands,
@@ -126,7 +126,14 @@ class DriveFixture:
             update=self._update,
             folder=self._results.of(self._file, whole) if self._results else None,
             results=self._results,
-        ).evaluate(run)
+        )
+        try:
+            run = drive_scenario(scenario)
+        except PlannerError as error:
+            result = check.raised(scenario, error)
+            self._report(result)
+            raise DriveFailure(result) from error
+        result = check.evaluate(run)
         self._report(result)
         if not result.passed:
             raise DriveFailure(result)
@@ -151,18 +158,29 @@ class DriveFixture:
         Raises:
             InputError: the world, the planner or the robot is invalid.
             FieldError: a setting is invalid.
+            PlannerError: the planner raised an error.
         """
+        return drive_scenario(self._scenario(world, planner, robot, settings))
+
+    def _scenario(
+        self,
+        world: str | Path | Task | Scenario,
+        planner: str | Planner | None,
+        robot: str | Path | RobotSpec | None,
+        settings: Mapping[str, Any],
+    ) -> Scenario:
+        """Return the scenario of a call."""
         if isinstance(world, Scenario):
             beside = {"planner": planner, "robot": robot, **settings}
             given = [key for key, value in beside.items() if key in settings or value is not None]
             if given:
                 raise FieldError(given[0], "is part of the scenario; change it with dataclasses.replace")
-            return drive_scenario(world)
+            return world
         planner = "ants" if planner is None else planner
         robot = "turtlebot" if robot is None else robot
         place = world if isinstance(world, Task) else self._beside(world, list_worlds())
         body = robot if isinstance(robot, RobotSpec) else self._beside(robot, list_robots())
-        return drive_scenario(Scenario.of(place, planner, body, **settings))
+        return Scenario.of(place, planner, body, **settings)
 
     def baseline_path(self, name: str) -> Path:
         """Return the baseline file of a drive.

@@ -12,7 +12,6 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import require
-from antdrive.base.plane import polyline_length
 from antdrive.planners.anyangle.lines import RouteEnds, cells_along, route_ends, terrain
 from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
@@ -26,12 +25,6 @@ class ViaPointPlanner(IterativePlanner):
     def work_unit(self) -> str:
         """The unit of `work`."""
         return "chromosomes rated"
-
-    def _conclude(self, query: Query, done: list[Iteration], note: str) -> PlanResult:
-        result = super()._conclude(query, done, note)
-        if result.waypoints is None:
-            return result
-        return dataclasses.replace(result, length=polyline_length(query.grid.xy(result.waypoints)))
 
 
 class Incumbent:

@@ -155,11 +155,11 @@ def _fingerprint_from(place: tuple[Path, int]) -> str:
 
 
 def renamed(scenario: Scenario, name: str, note: str = "") -> Scenario:
-    """Return the scenario with its world renamed, and a note added to the world's source."""
+    """Return the scenario as suites have it: its world renamed, a note added to the world's source, its margin a number."""
     task = scenario.task
     source = "; ".join(part for part in (task.world.source, note) if part) if note else task.world.source
     world = dataclasses.replace(task.world, name=name, source=source)
-    return dataclasses.replace(scenario, task=dataclasses.replace(task, world=world))
+    return dataclasses.replace(scenario, task=dataclasses.replace(task, world=world), margin_choice=None)
 
 
 def scenario_name(text: str) -> str:

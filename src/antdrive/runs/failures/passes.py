@@ -12,13 +12,12 @@ import numpy as np
 
 from antdrive.base import Bounds, Floats
 from antdrive.base.errors import FieldError
-from antdrive.planners import capabilities_of
 from antdrive.runs.failures.candidates import CandidateRunner
 from antdrive.runs.failures.ddmin import one_minimal
 from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.scenario import Scenario
-from antdrive.worlds import Disc, Mover, Wandering
+from antdrive.worlds import Disc, Mover
 
 Item = TypeVar("Item")
 
@@ -175,8 +174,7 @@ def _needed(
 
 def _is_random(scenario: Scenario) -> bool:
     """Return whether a run depends on its seed."""
-    wandering = any(isinstance(mover, Wandering) and mover.seed is None for mover in scenario.task.world.movers)
-    return scenario.noise > 0 or wandering or capabilities_of(scenario.planner).iterative
+    return "seed" not in scenario.idle_settings({"seed"})
 
 
 def _with_seeds(candidates: Iterable[Scenario | None]) -> Iterator[Scenario | None]:

@@ -15,7 +15,9 @@ import numpy as np
 
 from antdrive.base import InputError
 from antdrive.base.types import Floats
-from antdrive.planners import Iteration, Query, as_iterative, load_planner
+from antdrive.planners import Iteration, Query, as_iterative
+from antdrive.planners.iterative import without_iterations
+from antdrive.planners.registry import recorded_planner
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.film.camera import Picture
 from antdrive.views.film.overlay import Values
@@ -27,9 +29,10 @@ def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
     """Repeat a run's planning and return its grid, the maximum number of iterations, and the iterations lazily."""
     record = rollout.record
     name = record.planner.name
-    planner = as_iterative(load_planner(name, **record.planner.settings))
+    loaded = recorded_planner(name, **record.planner.settings)
+    planner = as_iterative(loaded)
     if planner is None:
-        raise InputError(f"prelude: {name} does not plan in iterations and has no field")
+        raise InputError(f"prelude: {without_iterations(loaded, name)}")
     if planner.time_budget is not None:
         raise InputError("prelude: a plan under a time budget cannot be repeated")
     grid = rasterise(record.task.world, record.cell, record.inflate)
@@ -41,7 +44,7 @@ def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
 def check_field(rollout: Rollout) -> None:
     """Raise `InputError` unless a run's planner has a field."""
     if next(plan_again(rollout)[2]).field is None:
-        raise InputError(f"prelude: {rollout.record.planner.name} has no field")
+        raise InputError(f"prelude: {rollout.record.planner.name} has no field; set the `field` of each Iteration")
 
 
 def has_field(rollout: Rollout) -> bool:
