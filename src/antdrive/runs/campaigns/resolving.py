@@ -291,7 +291,7 @@ def _drawn(
     cell = max(entry.get("cell") or world.task.cell for entry in campaign.settings)
     grid = rasterise(world.task.world, cell, inflate)
     free = np.argwhere(grid.moves > 0)
-    floor = len(free) / max(1, np.count_nonzero(rasterise(world.task.world, cell, 0.0).moves))
+    floor = len(free) / max(1, int(np.count_nonzero(rasterise(world.task.world, cell, 0.0).moves)))
     for number in range(request.random):
         task = _draw(rng, grid, free, request.min_distance, world.task, robots, unseen) if len(free) else None
         if task is None:
