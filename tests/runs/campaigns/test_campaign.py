@@ -224,7 +224,7 @@ def test_a_planner_in_a_file_has_options_and_a_key_that_follows_the_file(tmp_pat
 
     (tmp_path / "mine.py").write_text(MINE)
     first = rows()
-    assert [row["planner"] for row in first] == ["mine.py:Mine width=4", "mine.py:Mine width=5"]
+    assert [row["planner"] for row in first] == ["Mine width=4", "Mine width=5"]
     hashed = hashlib.sha256(MINE.encode()).hexdigest()[:8]
     assert first[0]["planner_version"] == f"mine.py {hashed}"
     assert f"--planner planners/{hashed}/mine.py:Mine" in str(first[0]["command"])
@@ -239,7 +239,7 @@ def test_classes_of_one_name_in_two_files_are_two_planners(tmp_path):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "mine.py").write_text(MINE.replace("from beside import NOTHING", f"FOLDER = {folder!r}"))
     campaign = make_campaign({"worlds": ["empty"], "planners": ["a/mine.py:Mine", "b/mine.py:Mine"]}, tmp_path)
-    assert [job.case.planner.label for job in expand(campaign).jobs] == ["mine.py:Mine", "b/mine.py:Mine"]
+    assert [job.case.planner.label for job in expand(campaign).jobs] == ["mine-Mine", "b-mine-Mine"]
 
 
 MAP = "type octile\nheight 4\nwidth 6\nmap\n" + "......\n" * 4

@@ -59,7 +59,7 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
         if drive.get("baseline") in ("written", "renewed"):
             yield f"baseline {drive['baseline']}: {drive['test']}"
         if drive.get("gains") and drive["passed"] == "true":
-            yield f"better than its baseline: {drive['test']} ({drive['gains']}); --drive-update renews it"
+            yield f"better than its baseline: {drive['test']} ({drive['gains']}); renew it with antdrive accept"
         if drive.get("notes"):
             yield f"{drive['test']}: {drive['notes']}"
         if drive.get("results") and drive["passed"] == "false":

@@ -17,6 +17,7 @@ from antdrive.base.checks import show, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PLANNERS, Query, load_planner, planner_version
+from antdrive.planners.user_code import label_names
 from antdrive.robots import PurePursuit, RobotSpec, overlap_at
 from antdrive.robots.default_margin import LEAST, default_margin
 from antdrive.runs.campaigns.campaign import Campaign, RandomTasks, seeds_of
@@ -170,7 +171,11 @@ def planner_variants(campaign: Campaign) -> list[PlannerVariant]:
                 written = entry if isinstance(entry, str) else entry["name"]
                 label = variant.label.replace(variant.name, written, 1)
                 variants[label] = dataclasses.replace(variant, label=label, name=written)
-    return list(variants.values())
+    names = list(dict.fromkeys(variant.name for variant in variants.values()))
+    short = dict(zip(names, label_names(names), strict=True))
+    return [
+        dataclasses.replace(one, label=one.label.replace(one.name, short[one.name], 1)) for one in variants.values()
+    ]
 
 
 def _variants(campaign: Campaign, place: Location, options: dict[str, Any]) -> Iterator[PlannerVariant]:
