@@ -134,6 +134,33 @@ def test_random_tasks_are_apart_the_same_in_any_campaign_and_named():
     assert len({job.case.place.task.start for job in alone}) == 4
 
 
+def test_bad_problems_are_named_or_skipped(tmp_path):
+    (tmp_path / "w.map").write_text("type octile\nheight 4\nwidth 5\nmap\n....@\n.....\n.....\n.....\n")
+    ends = ((3, 0, 0, 3), (0, 3, 4, 3), (4, 0, 0, 0))  # beside a blocked cell, clear, on a blocked cell
+    problems = ["\t".join(map(str, (0, "w.map", 5, 4, *one, 3))) for one in ends]
+    (tmp_path / "w.map.scen").write_text("\n".join(["version 1", *problems]) + "\n")
+    entry = {"import": "w.map", "problem": "0-2", "resolution": 0.4}
+
+    def expanded(**more):
+        return expand(make_campaign({"worlds": [entry | more], "planners": ["astar"]}, tmp_path))
+
+    with pytest.raises(InputError, match=r"problem 2: .*blocked cell.*; with skip: true"):
+        expanded()
+    with pytest.raises(InputError, match=r"w, problem 0 with turtlebot: .*overlaps.*; with skip: true"):
+        expanded(problem=0)
+    expansion = expanded(skip=True)
+    assert [job.case.place.name for job in expansion.jobs] == ["problem-1"]
+    assert expansion.remarks[0].startswith("2 problems skipped; problem 2: ")
+    with pytest.raises(InputError, match="every problem is skipped; the first: problem 2"):
+        expanded(skip=True, problem=2)
+
+
+def test_the_floor_of_random_tasks_is_stated():
+    campaign = {"worlds": ["slalom", "empty"], "planners": ["astar"], "tasks": {"random": 1}}
+    (remark,) = expand(make_campaign(campaign)).remarks
+    assert re.match(r"random tasks are drawn from \d\d% \(world slalom\) to 100% of the floor", remark)
+
+
 def test_worlds_of_one_name_are_called_by_their_files(tmp_path):
     for folder in ("a", "b"):
         task = dataclasses.replace(load_task("empty"), start=(1.0, 1.0 + (folder == "b"), 0.0))

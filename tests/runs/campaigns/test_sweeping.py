@@ -182,7 +182,7 @@ BASE = {"worlds": ["empty", "no-path"], "planners": ["astar"]}
     ],
 )
 def test_what_a_run_raises_is_its_result(raised, outcome, reason, monkeypatch):
-    def fails(scenario):
+    def fails(scenario, progress):
         raise raised
 
     monkeypatch.setattr(running, "run", fails)
