@@ -2,7 +2,6 @@
 
 import base64
 import io
-import itertools
 import pydoc
 import re
 import subprocess
@@ -19,7 +18,7 @@ from antdrive.base.progress import progress_bar
 from antdrive.planners import PLANNERS, PlanResult, PlanStatus, Query, load_planner
 from antdrive.sim import Scenario, certify, run
 from antdrive.sim.log.outcome import Outcome
-from antdrive.views.colours import OUTCOME_LABELS, PLANNER_COLOURS, PLANNER_STYLES, planner_style
+from antdrive.views.colours import OUTCOME_LABELS, PLANNER_STYLES
 from antdrive.views.figures.run_figures import overview
 from antdrive.views.film.film_options import FilmInfo
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, Wandering, World, load_task, rasterise
@@ -183,18 +182,6 @@ def test_the_help_of_a_scenario_begins_with_what_it_is():
 @pytest.mark.parametrize("name", PLANNERS)
 def test_every_planner_has_a_style(name):
     assert name in PLANNER_STYLES
-
-
-def test_no_two_planners_have_similar_colours():
-    colours = np.array([colour for colour, _ in PLANNER_STYLES.values()], dtype=float)
-    gaps = [np.linalg.norm(one - other) for one, other in itertools.combinations(colours, 2)]
-    assert min(gaps) > 40
-    assert len(PLANNER_COLOURS) == len(PLANNER_STYLES)
-
-
-def test_a_plugins_planner_has_a_style_of_its_name():
-    assert planner_style("somebody-elses") == planner_style("somebody-elses")
-    assert planner_style("somebody-elses")[1] == "dashdot"
 
 
 def test_every_outcome_has_a_label():

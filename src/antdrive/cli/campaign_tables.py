@@ -129,13 +129,18 @@ def _tables(summary: "CampaignSummary") -> Iterator[str]:
 
 
 def report_campaigns(
-    folders: Sequence[Path], out: Path, json: bool, title: str | None, planners: Sequence[str], query: CampaignQuery
+    folders: Sequence[Path], out: Path | None, json: bool, query: CampaignQuery, figures: Path | None, **given: Any
 ) -> None:
     """Write the report of one or several campaigns."""
     from antdrive.views.pages.campaign_report import report_campaign
 
-    files = report_campaign(folders, out, title=title, planners=planners, **query.arguments)
+    files = report_campaign(folders, out, figures=figures, **given, **query.arguments)
     size = sum(path.stat().st_size for path in files)
     facts = {"file": str(files[0]), "files": [str(path) for path in files], "bytes": size}
-    names = dict(zip(("report", "pairs"), files, strict=False))
-    show(json, facts, [f"{size / 1e6:.2f} MB", *file_lines(names)])
+    reports = [path for path in files if path.suffix not in (".pdf", ".svg")]
+    names: dict[str, Path] = dict(zip(("report", "pairs"), reports, strict=False))
+    show(
+        json,
+        facts,
+        [f"{size / 1e6:.2f} MB", *file_lines({**names, **({} if figures is None else {"figures": figures})})],
+    )

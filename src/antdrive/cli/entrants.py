@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli.scenario_options import GROUPS, grouped
+from antdrive.planners.user_code import label_names
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -50,6 +51,9 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
                 f"--planner {word}: must be NAME or LABEL=NAME, such as few=aco-han; labels use letters, digits, - and _"
             )
         labels[label] = name if mark else label
+    bare = [label for label, name in labels.items() if label == name]
+    short = dict(zip(bare, label_names(bare, labels.keys() - set(bare)), strict=True))
+    labels = {short.get(label, label): name for label, name in labels.items()}
     if len(labels) < len(words) or not 2 <= len(labels) <= MAX_PLANNERS:
         raise InputError(
             f"{' '.join(['--planner', *words])}: give two to six different planners; "

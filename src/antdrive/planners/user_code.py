@@ -13,14 +13,15 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
 from antdrive.base.document import MAX_BYTES
 from antdrive.base.errors import InputError, input_error
-from antdrive.base.files import read_bytes
+from antdrive.base.files import file_name, read_bytes
 from antdrive.base.guarded import OverLimit, UserCode, error_text, place, value_text
 from antdrive.planners.errors import PlannerError
 
@@ -48,6 +49,27 @@ def record_name(name: str) -> str:
         name: a name for `load_planner`
     """
     return name.rpartition(":")[2]
+
+
+def label_names(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:
+    """Return labels for tables and folders: `Greedy` for `mine.py:Greedy`, or `mine-Greedy` if another planner is a Greedy.
+
+    Args:
+        names: different names for `load_planner`
+        taken: further labels in use
+    """
+    short = [record_name(name) for name in names]
+    used = Counter([*short, *taken])
+    found: list[str] = []
+    for name, label in zip(names, short, strict=True):
+        if is_user_code(name) and used[label] > 1:
+            source = "-".join(Path(name.rpartition(":")[0].removesuffix(".py")).parts[-2:])
+            label = f"{file_name(source, '-_').strip('_-')}-{label}"
+        unique, number = label, 2
+        while unique in found or (unique != label and unique in used):
+            unique, number = f"{label}-{number}", number + 1
+        found.append(unique)
+    return found
 
 
 class UserCodeError(InputError):

@@ -28,6 +28,8 @@ class NoiseModel:
 
     Attributes:
         estimate: the estimated pose at the last control period: x, y [m] and yaw [rad]
+        encoders: the velocity that the wheels' encoders measured in the last control period
+        odometry: the velocity that odometry measured in it; without a gyro that of the encoders
 
     Args:
         noise: the levels
@@ -44,6 +46,7 @@ class NoiseModel:
         self._ticks_per_fix = max(1, round(1 / (noise.pose_rate * period)))
         self._tick = 0
         self.estimate = start
+        self.encoders = self.odometry = Twist(0.0, 0.0)
         self._gain = _gains(noise, track)
 
     def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
@@ -54,8 +57,9 @@ class NoiseModel:
         noise, rng = self._noise, self._rng
         rolled = self._wheels(twist) / (1 + self._slip) * (1 + noise.encoder * rng.standard_normal(2))
         fix = np.asarray(pose) + rng.standard_normal(3) * (noise.pose_xy, noise.pose_xy, noise.pose_yaw)
+        self.encoders = self.odometry = self._twist(*rolled)
         if self._tick:
-            self.estimate = _moved(self.estimate, self._twist(*rolled), self._period)
+            self.estimate = _moved(self.estimate, self.odometry, self._period)
         if self._tick % self._ticks_per_fix == 0:
             x, y, yaw = self.estimate
             gain_xy, gain_yaw = self._gain

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
+from antdrive.views.colour_vision import differences, luminance
 
 Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
 
@@ -77,13 +77,19 @@ SPEED_STOPS: tuple[Colour, ...] = (
 #: Colours of a planner's field, such as pheromone, from its low to its high values.
 FIELD_STOPS: tuple[Colour, ...] = ((244, 246, 249), (213, 228, 243), (143, 188, 224), (63, 131, 191), (18, 63, 122))
 
-#: One colour per planner. The first seven are Okabe and Ito's without yellow, which is invisible on white. Each later one
-#: is far (CIELAB) from its predecessors for full colour vision and for deuteranopia.
+#: One colour per planner of the catalogue. The first seven are Okabe and Ito's without yellow, which is invisible on white.
 PLANNER_COLOURS: tuple[Colour, ...] = (
     *((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (27, 35, 51)),
-    *((17, 68, 204), (85, 68, 0), (221, 187, 136), (119, 0, 51), (170, 0, 136), (221, 51, 68), (68, 34, 119)),
-    *((170, 204, 85), (153, 204, 170), (204, 51, 255), (119, 85, 102)),
+    *((144, 0, 252), (84, 48, 0), (240, 0, 84), (72, 0, 120), (144, 108, 252), (168, 12, 108), (12, 0, 168)),
+    *((192, 180, 96), (36, 24, 0), (72, 108, 60), (144, 72, 0)),
 )
+
+#: Colours of users' planners and of a planner's further labels.
+OWN_COLOURS: tuple[Colour, ...] = (
+    *((108, 60, 192), (132, 192, 132), (156, 24, 144), (96, 0, 96)),
+    *((132, 156, 252), (60, 60, 48), (168, 180, 168), (36, 72, 84)),
+)
+LEAST_DIFFERENCE = 14.0  # of any two of these colours, for any colour vision (CIE76)
 
 _DASHES = ("solid", "dashed", "dotted")
 _PLANNERS = (
@@ -96,12 +102,6 @@ _PLANNERS = (
 PLANNER_STYLES: Mapping[str, tuple[Colour, str]] = MappingProxyType(
     {name: (PLANNER_COLOURS[k], _DASHES[k // 7]) for k, name in enumerate(_PLANNERS)}
 )
-
-
-def planner_style(name: str) -> tuple[Colour, str]:
-    """Return a planner's colour and line style; those of a plugin's planner depend on its name alone."""
-    k = zlib.crc32(name.encode()) % len(PLANNER_COLOURS)
-    return PLANNER_STYLES.get(name, (PLANNER_COLOURS[k], "dashdot"))
 
 
 def field_colours(level: npt.ArrayLike) -> Floats:
@@ -127,34 +127,68 @@ def hexed(colour: Colour) -> str:
 
 
 DARK_LUMINANCE = 0.22  # minimum luminance on a dark page: a contrast of 4.3
-LIGHT_LUMINANCE = 0.45  # maximum luminance on a light page
+LIGHT_LUMINANCE = 0.46  # maximum luminance on light ground
 
 
 class LabelStyle(NamedTuple):
-    """How a planner is drawn."""
+    """How a planner is drawn in films, figures and pages."""
 
-    light: str  # its colour on a light page, as #rrggbb; no two labels of a page share one
-    dark: str  # its colour on a dark page
+    colour: Colour  # no two labels of a picture share one
+    dark: str  # its colour on a dark page, as #rrggbb
     dash: str  # its line style
 
+    @property
+    def light(self) -> str:
+        """Its colour as #rrggbb."""
+        return hexed(self.colour)
 
-def label_styles(labels: Sequence[str], names: Sequence[str]) -> list[LabelStyle]:
-    """Return the style of each label."""
-    counts, seen = Counter(names), Counter[str]()
+
+def label_styles(labels: Sequence[str], names: Sequence[str] | None = None) -> list[LabelStyle]:
+    """Return the styles of all labels of one picture.
+
+    The first label of a planner of the catalogue has that planner's fixed style. A user's planner has a colour of its name, a
+    further label of a planner one of the label, unless another label of the picture has it. Equal labels have one style.
+
+    Args:
+        labels: the labels
+        names: their planners' names; default: the labels
+    """
+    if len(set(labels)) < len(labels):
+        once = dict(zip(labels, names or labels, strict=True))
+        styled = dict(zip(once, label_styles(list(once), list(once.values())), strict=True))
+        return [styled[label] for label in labels]
+    keys = [name if names is None or name not in names[:k] else labels[k] for k, name in enumerate(names or labels)]
+    fixed = {k: PLANNER_STYLES[key] for k, key in enumerate(keys) if key in PLANNER_STYLES and key not in keys[:k]}
+    taken = [colour for colour, _ in fixed.values()]
     styles: list[LabelStyle] = []
-    for name in names:
-        colour, dash = planner_style(name)
-        place, count = seen[name], counts[name]
-        seen[name] += 1
-        if count > 1:  # from dark to light
-            colour = _shifted(colour, -0.45 + 0.9 * place / (count - 1))
-            dash = ("solid", "dashed", "dotted", "dashdot")[place % 4]
-        light = _until(colour, LIGHT_LUMINANCE, darker=True)
-        taken = {style.light for style in styles}
-        while hexed(light) in taken:
-            light = (light[0], light[1], (light[2] + 1) % 256)
-        styles.append(LabelStyle(hexed(light), hexed(_until(colour, DARK_LUMINANCE, darker=False)), dash))
-    return styles
+    for k, key in enumerate(keys):
+        colour, dash = fixed.get(k) or (_own_colour(key, taken), ("dashdot", "dashed", "dotted", "solid")[k % 4])
+        taken += [] if k in fixed else [colour]
+        styles.append(LabelStyle(colour, "", dash))
+    return [
+        style._replace(dark=dark) for style, dark in zip(styles, _on_dark([one.colour for one in styles]), strict=True)
+    ]
+
+
+def _own_colour(key: str, taken: Sequence[Colour]) -> Colour:
+    """Return a colour of `OWN_COLOURS` that a key selects; once all are taken, the tint that differs most from them."""
+    first = zlib.crc32(key.encode()) % len(OWN_COLOURS)
+    free = [colour for colour in (*OWN_COLOURS[first:], *OWN_COLOURS[:first]) if colour not in taken]
+    if free:
+        return free[0]
+    tints = [_shifted(colour, by / 10) for by in range(-6, 5) for colour in (*PLANNER_COLOURS, *OWN_COLOURS)]
+    tints = [tint for tint in tints if luminance(tint) <= LIGHT_LUMINANCE]
+    return tints[int(differences(tints, taken).min(axis=1).argmax())]
+
+
+def _on_dark(colours: Sequence[Colour]) -> list[str]:
+    """Return colours as #rrggbb for a dark page: each the darkest readable tint that differs from those before it."""
+    found: list[Colour] = []
+    for colour in colours:
+        tints = [tint for step in range(18) if luminance(tint := _shifted(colour, 0.05 * step)) >= DARK_LUMINANCE]
+        apart = np.minimum(differences(tints, found).min(axis=1), LEAST_DIFFERENCE) if found else np.zeros(1)
+        found.append(tints[int(apart.argmax())])
+    return list(map(hexed, found))
 
 
 def _shifted(colour: Colour, by: float) -> Colour:
@@ -162,18 +196,3 @@ def _shifted(colour: Colour, by: float) -> Colour:
     target = 255 if by > 0 else 0
     red, green, blue = (round(c + abs(by) * (target - c)) for c in colour)
     return red, green, blue
-
-
-def _until(colour: Colour, luminance: float, *, darker: bool) -> Colour:
-    """Darken or lighten a colour until it reaches a luminance."""
-    for step in range(21):
-        tint = _shifted(colour, (-0.05 if darker else 0.05) * step)
-        if (_luminance(tint) <= luminance) if darker else (_luminance(tint) >= luminance):
-            break
-    return tint
-
-
-def _luminance(colour: Colour) -> float:
-    """Return the relative luminance (WCAG 2), 0 to 1."""
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (v / 255 for v in colour)]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

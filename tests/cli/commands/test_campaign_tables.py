@@ -104,3 +104,20 @@ def test_a_campaign_without_a_finished_run_is_refused(refused, camp):
 
 def test_a_campaign_is_told_by_the_files_that_its_store_writes():
     assert CAMPAIGN_FILES == (store.MANIFEST, store.GRID_FILE)
+
+
+def test_a_report_for_a_thesis_is_a_narrow_table_and_its_charts(antdrive, tmp_path, camp):
+    code, out, _ = antdrive(
+        "report", camp, "-o", tmp_path / "t.tex", "--columns", "planner, share", "--figures", tmp_path / "figs"
+    )
+    assert (code, (tmp_path / "t.tex").read_text().count(r"\begin{tabular}{lr}")) == (0, 1)
+    assert {path.suffix for path in (tmp_path / "figs").iterdir()} == {".pdf", ".svg"}
+    assert "t.tex" in out
+    assert "figs" in out
+    for words, said in (
+        ((), "give -o FILE, --figures DIR"),
+        (("-o", tmp_path / "t.html", "--columns", "share"), "--columns: applies to"),
+    ):
+        code, _, err = antdrive("report", camp, *words)
+        assert code == 2
+        assert said in err

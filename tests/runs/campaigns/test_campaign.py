@@ -134,6 +134,33 @@ def test_random_tasks_are_apart_the_same_in_any_campaign_and_named():
     assert len({job.case.place.task.start for job in alone}) == 4
 
 
+def test_bad_problems_are_named_or_skipped(tmp_path):
+    (tmp_path / "w.map").write_text("type octile\nheight 4\nwidth 5\nmap\n....@\n.....\n.....\n.....\n")
+    ends = ((3, 0, 0, 3), (0, 3, 4, 3), (4, 0, 0, 0))  # beside a blocked cell, clear, on a blocked cell
+    problems = ["\t".join(map(str, (0, "w.map", 5, 4, *one, 3))) for one in ends]
+    (tmp_path / "w.map.scen").write_text("\n".join(["version 1", *problems]) + "\n")
+    entry = {"import": "w.map", "problem": "0-2", "resolution": 0.4}
+
+    def expanded(**more):
+        return expand(make_campaign({"worlds": [entry | more], "planners": ["astar"]}, tmp_path))
+
+    with pytest.raises(InputError, match=r"problem 2: .*blocked cell.*; with skip: true"):
+        expanded()
+    with pytest.raises(InputError, match=r"w, problem 0 with turtlebot: .*overlaps.*; with skip: true"):
+        expanded(problem=0)
+    expansion = expanded(skip=True)
+    assert [job.case.place.name for job in expansion.jobs] == ["problem-1"]
+    assert expansion.remarks[0].startswith("2 problems skipped; problem 2: ")
+    with pytest.raises(InputError, match="every problem is skipped; the first: problem 2"):
+        expanded(skip=True, problem=2)
+
+
+def test_the_floor_of_random_tasks_is_stated():
+    campaign = {"worlds": ["slalom", "empty"], "planners": ["astar"], "tasks": {"random": 1}}
+    (remark,) = expand(make_campaign(campaign)).remarks
+    assert re.match(r"random tasks are drawn from \d\d% \(world slalom\) to 100% of the floor", remark)
+
+
 def test_worlds_of_one_name_are_called_by_their_files(tmp_path):
     for folder in ("a", "b"):
         task = dataclasses.replace(load_task("empty"), start=(1.0, 1.0 + (folder == "b"), 0.0))
@@ -197,7 +224,7 @@ def test_a_planner_in_a_file_has_options_and_a_key_that_follows_the_file(tmp_pat
 
     (tmp_path / "mine.py").write_text(MINE)
     first = rows()
-    assert [row["planner"] for row in first] == ["mine.py:Mine width=4", "mine.py:Mine width=5"]
+    assert [row["planner"] for row in first] == ["Mine width=4", "Mine width=5"]
     hashed = hashlib.sha256(MINE.encode()).hexdigest()[:8]
     assert first[0]["planner_version"] == f"mine.py {hashed}"
     assert f"--planner planners/{hashed}/mine.py:Mine" in str(first[0]["command"])
@@ -212,7 +239,7 @@ def test_classes_of_one_name_in_two_files_are_two_planners(tmp_path):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "mine.py").write_text(MINE.replace("from beside import NOTHING", f"FOLDER = {folder!r}"))
     campaign = make_campaign({"worlds": ["empty"], "planners": ["a/mine.py:Mine", "b/mine.py:Mine"]}, tmp_path)
-    assert [job.case.planner.label for job in expand(campaign).jobs] == ["mine.py:Mine", "b/mine.py:Mine"]
+    assert [job.case.planner.label for job in expand(campaign).jobs] == ["mine-Mine", "b-mine-Mine"]
 
 
 MAP = "type octile\nheight 4\nwidth 6\nmap\n" + "......\n" * 4

@@ -104,7 +104,7 @@ def test_a_corrected_planner_is_run_again_and_said_so(tmp_path):
     assert [first.outcomes, second.outcomes] == [{"planner_fault": 1, "succeeded": 1}, {"succeeded": 2}]
     assert second.made == 1
     (note,) = notes
-    assert re.fullmatch(r"1 run of mine\.py:Mine came from mine\.py \w{8}; mine\.py \w{8} repeats them", note)
+    assert re.fullmatch(r"1 run of Mine came from mine\.py \w{8}; mine\.py \w{8} repeats them", note)
     copy = second.table["command"][0].as_py().split()[4]
     assert (tmp_path / "out" / copy.rpartition(":")[0]).read_text() == PLANNER
 
@@ -184,7 +184,7 @@ BASE = {"worlds": ["empty", "no-path"], "planners": ["astar"]}
     ],
 )
 def test_what_a_run_raises_is_its_result(raised, outcome, reason, monkeypatch):
-    def fails(scenario):
+    def fails(scenario, progress):
         raise raised
 
     monkeypatch.setattr(running, "run", fails)

@@ -106,8 +106,10 @@ def to_map(points):
 def test_every_row_is_there_with_its_pose(said, log):
     moving = of(said, "/tf")[1:]
     assert [entry.at for entry in moving] == [round(t * 1e9) for t in log.t.tolist()]
-    for entry, pose, movers in zip(moving, log.pose.tolist(), log.movers.tolist(), strict=True):
-        base, *others = entry.message.transforms
+    for entry, pose, movers in zip(moving, log.pose.tolist(), to_map(log.movers), strict=True):
+        base, _, truth, *others = entry.message.transforms
+        assert (truth.header.frame_id, truth.child_frame_id) == ("map", "ground_truth")
+        assert {t.header.frame_id for t in others} == {"map"}
         assert nanoseconds(base.header.stamp) == entry.at
         found = base.transform.translation
         assert math.hypot(found.x - pose[0], found.y - pose[1]) < 1e-6
@@ -116,9 +118,34 @@ def test_every_row_is_there_with_its_pose(said, log):
         assert np.abs(np.array(places) - movers).max() < 1e-6
 
 
+def placed(transform):
+    """Return a transform's position and heading as complex numbers."""
+    q = transform.rotation
+    return complex(transform.translation.x, transform.translation.y), complex(q.w, q.z) ** 2
+
+
+def test_map_to_odom_to_base_is_the_estimate(said, log):
+    for entry, (x, y, yaw) in zip(of(said, "/tf")[1:], log.estimate.tolist(), strict=True):
+        base, correction = entry.message.transforms[:2]
+        assert (correction.header.frame_id, correction.child_frame_id) == ("map", base.header.frame_id)
+        (at, turn), (corner, turned) = placed(base.transform), placed(correction.transform)
+        assert abs(corner + turned * at - complex(*to_map((x, y)))) < 1e-9
+        assert abs(turned * turn - np.exp(1j * (yaw + FRAME[2]))) < 1e-9
+
+
+def test_wheels_turn_as_odometry_moves(said, log):
+    states, robot = [entry.message for entry in of(said, "/joint_states")], log.record.robot
+    assert {tuple(state.name) for state in states} == {("left_wheel_joint", "right_wheel_joint")}
+    left, right = np.array([state.velocity for state in states]).T * robot.wheel_radius
+    twists = np.array([(m.message.twist.twist.linear.x, m.message.twist.twist.angular.z) for m in of(said, "/odom")])
+    assert np.allclose(np.column_stack([(left + right) / 2, (right - left) / robot.track]), twists, atol=1e-12)
+    angles = np.array([state.position for state in states])
+    assert np.allclose(np.diff(angles, axis=0), np.array([s.velocity for s in states])[1:] / 240, atol=1e-9)
+
+
 def test_odometry_commands_and_numbers_are_those_of_the_log(said, log):
     odometry = [entry.message for entry in of(said, "/odom")]
-    assert [(m.header.frame_id, m.child_frame_id) for m in odometry] == [("odom", "base_link")] * len(log.t)
+    assert [(m.header.frame_id, m.child_frame_id) for m in odometry] == [("odom", "base_footprint")] * len(log.t)
     poses = [(m.pose.pose.position.x, m.pose.pose.position.y, heading(m.pose.pose.orientation)) for m in odometry]
     assert np.abs(np.array(poses) - log.pose).max() < 1e-9
     twists = [(m.twist.twist.linear.x, m.twist.twist.angular.z) for m in odometry]
@@ -127,8 +154,10 @@ def test_odometry_commands_and_numbers_are_those_of_the_log(said, log):
     assert np.array_equal(commands, log.command)
     assert [entry.message.data for entry in of(said, "/clearance")] == log.clearance.tolist()
     assert [entry.message.data for entry in of(said, "/limiter")] == log.limiter.tolist()
-    estimates = [entry.message.pose.pose.position.x for entry in of(said, "/estimate")]
-    assert np.array_equal(estimates, log.estimate[:, 0])
+    for topic, poses in (("/estimate", log.estimate), ("/ground_truth/odom", log.pose)):
+        places = [entry.message.pose.pose.position for entry in of(said, topic)]
+        assert np.abs(np.array([(at.x, at.y) for at in places]) - to_map(poses)).max() < 1e-9
+        assert {entry.message.header.frame_id for entry in of(said, topic)} == {"map"}
 
 
 def test_stamps_are_in_order_and_have_a_transform_at_or_before_them(said, log):
@@ -138,25 +167,40 @@ def test_stamps_are_in_order_and_have_a_transform_at_or_before_them(said, log):
         transforms = getattr(entry.message, "transforms", [])
         known |= {transform.child_frame_id for transform in transforms}
         header = getattr(entry.message, "header", None)
+        if entry.topic == "/joint_states":
+            continue
         frames = [header.frame_id] if header else [m.header.frame_id for m in getattr(entry.message, "markers", [])]
         assert set(frames) <= known | {"map"}
         for stamp in [header.stamp] if header else [t.header.stamp for t in transforms]:
             assert nanoseconds(stamp) == entry.at
-    assert known == {"odom", "base_link", "base_scan", "left_wheel", "right_wheel", "mover_0", "mover_1"}
+    robot = {"base_footprint", "base_link", "base_scan", "left_wheel", "right_wheel"}
+    assert known == robot | {"odom", "ground_truth", "mover_0", "mover_1"}
 
 
-def test_fixed_transforms_are_sent_twice_and_the_world_lies_in_its_map(said):
+def test_fixed_transforms_are_sent_twice(said):
     (static,), first = of(said, "/tf_static"), of(said, "/tf")[0]
     assert static.at == first.at == 0
     for entry in (static, first):
         placed = {t.child_frame_id: (t.header.frame_id, t.transform) for t in entry.message.transforms}
-        parent, lies = placed["odom"]
-        assert (parent, lies.translation.x, lies.translation.y) == ("map", FRAME[0], FRAME[1])
-        assert heading(lies.rotation) == pytest.approx(FRAME[2])
+        parent, lies = placed["base_link"]
+        assert (parent, lies.translation.x, lies.translation.y) == ("base_footprint", 0.0, 0.0)
 
 
-def test_the_map_is_the_grid_that_was_planned_on(said, log):
-    (entry,) = of(said, "/map")
+def test_the_map_holds_the_obstacles_themselves(said, log):
+    grid = of(said, "/map")[0].message
+    (x0, y0, *_), cell = log.record.world.bounds, grid.info.resolution
+    cells = np.array(grid.data).reshape(grid.info.height, grid.info.width)
+    assert (cells[[0, -1]] == 100).all()
+    assert (cells[:, [0, -1]] == 100).all()
+    rows, cols = np.indices(cells.shape) - 0.5
+    points = x0 + cols * cell + 1j * (y0 + rows * cell)
+    away = np.min([np.abs(points - complex(d.x, d.y)) - d.radius for d in log.record.world.obstacles], axis=0)
+    inside = np.s_[1:-1, 1:-1]
+    assert np.array_equal(cells[inside] == 100, away[inside] <= 0)
+
+
+def test_the_costmap_is_the_grid_that_was_planned_on(said, log):
+    (entry,) = of(said, "/global_costmap/costmap")
     info, record = entry.message.info, log.record
     grid = rasterise(record.task.world, record.cell, record.inflate)
     assert (info.height, info.width, info.resolution) == (*grid.shape, pytest.approx(grid.cell))
@@ -214,7 +258,7 @@ def test_the_robot_is_described_with_its_footprint(said, log):
     body = robot.find("link[@name='base_link']/visual/geometry/cylinder")
     assert float(body.get("radius", "")) == log.record.robot.footprint.rounding
     children = {joint.find("child").get("link") for joint in robot.iter("joint")}
-    assert children == {"left_wheel", "right_wheel"}
+    assert children == {"base_link", "left_wheel", "right_wheel"}
 
 
 def test_a_lidar_that_the_drive_did_not_use_measures_at_export(folder, said, log):
@@ -240,7 +284,7 @@ def test_scans_are_taken_at_export_only_if_asked_for(folder):
 
 
 def test_late_subscribers_get_latched_messages(folder):
-    once = {"/tf_static", "/map", "/robot_description", "/obstacles", "/movers", "/plan"}
+    once = {"/tf_static", "/map", "/global_costmap/costmap", "/robot_description", "/obstacles", "/movers", "/plan"}
     for path in (folder / "bag", folder / "drive.mcap"):
         with rosbag2.Reader(path) as reader:
             offered = {c.topic: c.ext.offered_qos_profiles[0].durability.name for c in reader.connections}

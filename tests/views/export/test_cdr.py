@@ -64,17 +64,24 @@ def test_transforms(names):
 def test_odometry_and_twists():
     rng = np.random.default_rng(4)
     pose, twist = rng.normal(size=(4, 3)), rng.normal(size=(4, 2))
+    of_pose, of_twist = rng.normal(size=(4, 3, 3)), rng.normal(size=(4, 2, 2))
     twists = [of("geometry_msgs/msg/Twist", linear=vector(v, 0, 0), angular=vector(0, 0, w)) for v, w in twist.tolist()]
     expected = []
-    for stamp, (x, y, yaw), speeds in zip(STAMPS.tolist(), pose.tolist(), twists, strict=True):
+    for i, (stamp, (x, y, yaw), speeds) in enumerate(zip(STAMPS.tolist(), pose.tolist(), twists, strict=True)):
         at = of(
             "geometry_msgs/msg/Pose", position=of("geometry_msgs/msg/Point", x=x, y=y, z=0.0), orientation=turn(yaw)
         )
-        there = of("geometry_msgs/msg/PoseWithCovariance", pose=at, covariance=np.zeros(36))
-        moves = of("geometry_msgs/msg/TwistWithCovariance", twist=speeds, covariance=np.zeros(36))
+        squares = np.zeros((2, 6, 6))
+        for row, p in enumerate((0, 1, 5)):
+            squares[0, p, [0, 1, 5]] = of_pose[i, row]
+        squares[1, 0, [0, 5]], squares[1, 5, [0, 5]] = of_twist[i]
+        there = of("geometry_msgs/msg/PoseWithCovariance", pose=at, covariance=squares[0].reshape(-1))
+        moves = of("geometry_msgs/msg/TwistWithCovariance", twist=speeds, covariance=squares[1].reshape(-1))
         kind, frame = "nav_msgs/msg/Odometry", header(stamp, "odom")
-        expected.append(of(kind, header=frame, child_frame_id="base_link", pose=there, twist=moves))
-    assert_equal(samples.odometry("/odom", "base_link", STAMPS, pose, twist), expected)
+        expected.append(of(kind, header=frame, child_frame_id="base_footprint", pose=there, twist=moves))
+    assert_equal(
+        samples.odometry("/odom", ("odom", "base_footprint"), STAMPS, pose, twist, of_pose, of_twist), expected
+    )
     assert_equal(samples.twists("/cmd_vel", STAMPS, twist), twists)
 
 

@@ -57,7 +57,9 @@ def off_surfaces(log, points):
 def test_scans_end_on_cylinders_and_walls(log, said):
     fixed = {t.child_frame_id: t for topic, _, m in said if topic == "/tf_static" for t in m.transforms}
     assert fixed["base_scan"].header.frame_id == "base_link"
-    moving = {at: t for topic, at, m in said if topic == "/tf" for t in m.transforms if t.child_frame_id == "base_link"}
+    moving = {
+        at: t for topic, at, m in said if topic == "/tf" for t in m.transforms if t.child_frame_id == "ground_truth"
+    }
     for at, scan in [(at, message) for topic, at, message in said if topic == "/scan"]:
         ranges = np.asarray(scan.ranges)
         angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
@@ -103,7 +105,7 @@ def test_the_map_of_a_robot_without_one_is_what_it_had_seen(log, said):
     assert known[0] < known[-1]
     diagonal = maps[0][1].info.resolution / math.sqrt(2)
     for _, grid in maps:
-        assert grid.header.frame_id == "robot_map"
+        assert grid.header.frame_id == "map"
         hit, free = middles(grid, 100), middles(grid, 0)
         assert len(hit) > 50
         assert off_surfaces(log, hit) < diagonal + 0.001
@@ -119,16 +121,14 @@ def test_the_map_lies_so_that_the_robot_is_where_it_believes_to_be(log, tmp_path
     drifted = replace(log, estimate=np.column_stack([away.real, away.imag, log.pose[:, 2] + 0.2]))
     said = read(drifted, tmp_path)
     at, grid = next((at, m) for topic, at, m in said if topic == "/map" and at)
-    lies = next(
-        t.transform
-        for topic, when, m in said
-        if topic == "/tf" and when == at
-        for t in m.transforms
-        if t.child_frame_id == "robot_map"
-    )
+    moving = next(m.transforms for topic, when, m in said if topic == "/tf" and when == at)
+    poses = {t.child_frame_id: t.transform for t in moving}
     hit = middles(grid, 100)
-    assert off_surfaces(log, placed(lies, hit)) < 1.2 * grid.info.resolution
+    base, true = (placed(poses[name], np.array([0.0, 1.0])) for name in ("base_footprint", "ground_truth"))
+    base = placed(poses["odom"], base)  # the robot's believed place, and a point 1 m ahead
+    seen = (hit - base[0]) / (base[1] - base[0])  # from the robot
+    assert off_surfaces(log, true[0] + seen * (true[1] - true[0])) < 1.2 * grid.info.resolution
     assert off_surfaces(log, hit) > 0.2
     (route,) = [m for topic, _, m in said if topic == "/plan"]
-    assert {route.header.frame_id} == {"robot_map"}
+    assert {route.header.frame_id} == {"map"}
     assert [p.pose.position.x for p in route.poses] == log.route[:, 0].tolist()

@@ -18,7 +18,7 @@ from antdrive.planners import History, PlanResult, PlanStatus, Query, load_plann
 from antdrive.robots import load_robot
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.outcome import Outcome
-from antdrive.views.colours import BAD, CONTACT, GOOD, SHELL, START, planner_style
+from antdrive.views.colours import BAD, CONTACT, GOOD, SHELL, START, label_styles
 from antdrive.views.figures import plan_figures as module
 from antdrive.views.figures.canvas import panels, save_figure
 from antdrive.views.figures.paper_figures import (
@@ -158,8 +158,8 @@ def test_each_planner_keeps_its_colour(tmp_path):
             history_figure({name: [history(4), history(5)]}, tmp_path / f"{name}.png", dpi=80, optimum=3.9)
         )
         other = "mmas" if name == "ants" else "ants"
-        assert near(picture, planner_style(name)[0]) > 100
-        assert near(picture, planner_style(other)[0]) == 0
+        assert near(picture, label_styles([name])[0].colour) > 100
+        assert near(picture, label_styles([other])[0].colour) == 0
 
 
 def test_lengths_by_ants_and_sweeps_are_drawn(tmp_path):
@@ -167,7 +167,7 @@ def test_lengths_by_ants_and_sweeps_are_drawn(tmp_path):
     picture = pixels(
         ants_figure(lengths, tmp_path / "a.png", planner="aco-han", optimum=30.0, printed={10: 45.0}, dpi=80)
     )
-    assert near(picture, planner_style("aco-han")[0]) > 100
+    assert near(picture, label_styles(["aco-han"])[0].colour) > 100
     table = {True: np.array([[30.0, 31.0], [32.0, np.nan]]), False: np.array([[33.0, 34.0], [35.0, 36.0]])}
     sweep_figure([0.2, 0.4], [0.1, 0.3], table, tmp_path / "s.pdf")
     assert (tmp_path / "s.pdf").stat().st_size > 3000
@@ -300,8 +300,8 @@ def test_several_planners_on_one_map(made_up_drive, tmp_path):
     one = made_up_drive()
     other = replace(one, pose=one.pose + [0, 0.2, 0])
     picture = pixels(comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80))
-    assert near(picture, planner_style("astar")[0], 12) > 50
-    assert near(picture, planner_style("mmas")[0], 12) > 100
+    for style in label_styles(["astar", "mmas"], [one.record.planner.name] * 2):
+        assert near(picture, style.colour, 12) > 100
 
 
 def test_every_figure_gives_its_axes_back_to_be_labelled_and_saved(made_up_drive, planned, searched, tmp_path):

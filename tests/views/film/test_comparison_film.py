@@ -6,7 +6,7 @@ from PIL import Image
 
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ComponentRecord
-from antdrive.views.colours import OUTCOME_LABELS, planner_style
+from antdrive.views.colours import OUTCOME_LABELS, label_styles
 from antdrive.views.film import comparison_film
 from antdrive.views.film.comparison_film import FULL, LEAST_TILE, Mark, SplitScreen, compare_film, fitting_size
 from tests.records import changed
@@ -49,7 +49,7 @@ def test_each_run_has_its_planners_colour_and_its_outcome(drives):
     screen = screen_of(drives, "top")
     end = screen.frame(np.inf)
     for k, log in enumerate(drives):
-        colour = np.array(planner_style(log.record.planner.name)[0])
+        colour = np.array(label_styles([log.record.planner.name])[0].colour)
         assert np.abs(end[2, 320 * k + 2].astype(int) - colour).max() == 0
     green = np.array(OUTCOME_LABELS[Outcome.SUCCEEDED][1])
     assert (np.abs(end.astype(int) - green).max(axis=-1) < 6).sum() > 500

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from antdrive.runs.statistics.run_table import RunTable
-from antdrive.views.colours import _luminance, label_styles
-from antdrive.views.pages.campaign_report import campaign_data, write_campaign_report
+from antdrive.views.colour_vision import luminance
+from antdrive.views.colours import label_styles
+from antdrive.views.pages.campaign_report import _styles, campaign_data, write_campaign_report
 from antdrive.views.pages.campaign_summary import summarise
-from antdrive.views.pages.charts import campaign_charts
+from antdrive.views.pages.charts import campaign_charts, write_charts
 from tests.runs.made_up_campaign import Skill, made_up_columns
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 
@@ -214,10 +215,32 @@ def test_styles_of_labels_differ_and_are_readable_on_their_ground():
     assert len({style.light for style in styles}) == len(styles)
     for style in styles:
         light, dark = (
-            _luminance((int(c[1:3], 16), int(c[3:5], 16), int(c[5:7], 16))) for c in (style.light, style.dark)
+            luminance((int(c[1:3], 16), int(c[3:5], 16), int(c[5:7], 16))) for c in (style.light, style.dark)
         )
-        assert light < 0.46
+        assert light <= 0.46
         assert dark > 0.21
+
+
+def test_charts_for_a_thesis_have_truetype_fonts_names_and_one_width(summary, tmp_path):
+    styles = label_styles(summary.paired.planners)
+    files = write_charts(campaign_charts(summary, styles)[:3], summary.paired.planners, tmp_path)
+    assert [path.suffix for path in files] == [".pdf", ".svg"] * 3
+    assert files[0].name == "performance-profile-driven-length.pdf"
+    for path in files:
+        content = path.read_bytes()
+        if path.suffix == ".pdf":
+            assert b"/Type3" not in content
+            assert b"/TrueType" in content or b"/Type0" in content
+            assert b"/MediaBox [ 0 0 338.4 " in content
+        else:
+            assert all(style.light.encode() in content for style in styles)
+
+
+def test_an_own_planner_has_the_same_colour_in_campaigns_as_in_films():
+    columns = made_up_columns({"Greedy": Skill(), "astar": Skill()}, worlds=2, seeds=1)
+    columns["planner_name"] = ["mine.py:Greedy" if label == "Greedy" else label for label in columns["planner"]]
+    summary = summarise(RunTable(columns), title="t")
+    assert _styles(summary) == label_styles(summary.paired.planners)
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
+from antdrive.base.errors import InputError
 from antdrive.runs.statistics.intervals import Interval
 from antdrive.runs.statistics.run_table import RunTable
 from antdrive.views.pages.campaign_report import write_campaign_report
@@ -49,8 +50,22 @@ def test_latex_has_as_many_cells_in_each_row_as_columns(summary, tmp_path):
         rows = [line for line in rest.splitlines() if line.endswith(r"\\")]
         assert len(rows) >= 2
         assert {line.count(" & ") + 1 for line in rows} == {len(align)}
+    assert text.count(r"\begin{table}") == text.count(r"\caption{") == text.count(r"\label{tab:") == 6
     assert r"poor\_one" in text
     assert "poor_one" not in text
+
+
+def test_columns_select_tables_and_their_columns_in_order(summary, tmp_path):
+    columns = ["planner", "95 % interval", "Share"]
+    text = write_campaign_report(summary, tmp_path, tmp_path / "t.tex", columns)[0].read_text()
+    assert text.count(r"\begin{tabular}{lrr}") == text.count(r"\begin{tabular}") == 1
+    assert r"planner & 95 \% interval & share [\%] \\" in text
+    markdown = write_campaign_report(summary, tmp_path, tmp_path / "t.md", columns)[0].read_text()
+    assert next(line for line in markdown.splitlines() if line.startswith("|")).count("|") == 4
+    (plain,) = write_campaign_report(summary, tmp_path, tmp_path / "t.csv", ["planner", "share"])
+    assert plain.read_text().startswith("planner,share\n")
+    with pytest.raises(InputError, match="--columns: no table has planner, colour; choose from planner, share"):
+        write_campaign_report(summary, tmp_path, tmp_path / "t.tex", ["planner", "colour"])
 
 
 @given(st.text(alphabet=st.characters(codec="ascii", exclude_categories=["Cc"]), max_size=12))

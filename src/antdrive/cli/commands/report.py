@@ -16,7 +16,15 @@ def report(
     folders: Annotated[
         list[Path], argument("FOLDER", "Folders that contain runs of `antdrive run`, or campaign folders.")
     ],
-    out: Annotated[Path, option("FILE", "Report: .html or .md; for campaigns also .tex or .csv.")],
+    out: Annotated[Path | None, option("FILE", "Report: .html or .md; for campaigns also .tex or .csv.")] = None,
+    figures: Annotated[Path | None, option("DIR", "Folder for all charts as PDF and SVG, for a thesis.")] = None,
+    columns: Annotated[
+        str | None,
+        option(
+            "NAME,...",
+            "Campaign: columns of .md, .tex or .csv, such as planner,share. Tables without all are left out.",
+        ),
+    ] = None,
     title: Annotated[str | None, option("TEXT", "Title.  [default: the folders' names]")] = None,
     embed_films: Annotated[bool, flag("Embed films instead of linking to them.", "--embed-films")] = False,
     planner: Annotated[list[str] | None, option("LABEL", "Campaign: report on this planner only. Repeatable.")] = None,
@@ -28,17 +36,26 @@ def report(
     Runs: a sortable table, films, figures, and the commands that repeat the runs. Campaigns: paired comparisons of
     planners, charts, and all runs.
     """
+    if out is None and figures is None:
+        raise InputError("give -o FILE, --figures DIR, or both")
+    named = [name.strip() for name in columns.split(",") if name.strip()] if columns else []
     campaigns = [folder for folder in folders if is_campaign(folder)]
     if campaigns and len(campaigns) == len(folders):
-        report_campaigns(folders, out, json, title, planner or (), query)
+        report_campaigns(folders, out, json, query, figures, title=title, planners=planner or (), columns=named)
         return
     other = next(folder for folder in folders if folder not in campaigns)
     if campaigns:
         raise InputError(f"{other}: is not a campaign folder, but {campaigns[0]} is; write separate reports")
-    refuse_campaign_options([*(["planner"] if planner else []), *query.given], other)
-    from antdrive.views.pages.run_report import write_report
+    refuse_campaign_options([*(["planner"] if planner else []), *(["columns"] if named else []), *query.given], other)
+    from antdrive.views.pages.run_report import write_report, write_run_figures
 
-    count = write_report(folders, out, title=title, embed_films=embed_films)
-    size = out.stat().st_size
-    facts = {"file": str(out), "runs": count, "bytes": size}
-    show(json, facts, [f"{count} runs, {size / 1e6:.2f} MB", *file_lines({"report": out})])
+    facts: dict[str, object] = {}
+    lines: list[str] = []
+    if out is not None:
+        count = write_report(folders, out, title=title, embed_films=embed_films)
+        facts = {"file": str(out), "runs": count, "bytes": out.stat().st_size}
+        lines = [f"{count} runs, {out.stat().st_size / 1e6:.2f} MB", *file_lines({"report": out})]
+    if figures is not None:
+        facts["figures"] = [str(path) for path in write_run_figures(folders, figures)]
+        lines += file_lines({"figures": figures})
+    show(json, facts, lines)

@@ -95,7 +95,7 @@ def sweep(
     rest: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
     if dry_run or out is None:
         notes = () if out is None else differences(requested, expansion.jobs, out)
-        for note in (*notes, *expansion.idle_notes()):
+        for note in (*notes, *expansion.remarks, *expansion.idle_notes()):
             print_error(note)
         size = len(expansion.jobs)
         missing = size if out is None else len(missing_runs(expansion.jobs, out, **rest).jobs)

@@ -16,7 +16,7 @@ from antdrive.base.files import file_name
 from antdrive.robots import list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
 from antdrive.runs.campaigns.job import Job, NamedRobot, NamedSettings, NamedTask, PlannerVariant, SweepCase, run_key
-from antdrive.runs.campaigns.resolving import campaign_tasks, campaign_worlds, planner_variants
+from antdrive.runs.campaigns.resolving import OWN, SKIP, campaign_tasks, campaign_worlds, planner_variants
 from antdrive.sim.effects import idle_notes
 from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting_words
 from antdrive.sim.log.record import canonical_hash
@@ -37,6 +37,7 @@ class Expansion:
     worlds: dict[str, Task]  # world files named by the runs' commands, by path relative to the campaign's folder
     robots: dict[str, Path]  # robot files, likewise
     planners: dict[str, Path]  # files of custom planners, likewise
+    remarks: tuple[str, ...]  # sentences about skipped problems and about the floor of random tasks
 
     def idle_notes(self) -> list[str]:
         """Return a sentence for every setting without effect in some of the configurations."""
@@ -59,10 +60,13 @@ def expand(campaign: Campaign) -> Expansion:
         InputError: a named item is missing or has an invalid value; the message has file, line and key.
     """
     planners, robots = planner_variants(campaign), _robots(campaign)
-    worlds = campaign_worlds(campaign)
+    skipped: list[str] = []
+    worlds = campaign_worlds(campaign, skipped)
     tasks = list(campaign_tasks(campaign, worlds, [one.robot for one in robots]))
     settings = _settings(campaign)
-    _check(campaign, tasks, robots, settings, planners[0])
+    tasks = _fitting(campaign, tasks, robots, settings, planners[0], skipped)
+    if not tasks:
+        raise campaign.error(("worlds",), f"every problem is skipped; the first: {skipped[0]}")
     jobs: dict[str, Job] = {}
     files: dict[str, Task] = {}
     for case in _cases(tasks, robots, settings, planners, files):
@@ -81,7 +85,20 @@ def expand(campaign: Campaign) -> Expansion:
     wanted = len(tasks) * len(robots) * len(settings) * len(planners) * len(campaign.entry.seeds)
     own = {one.word: one.file for one in robots if one.file is not None}
     codes = {one.word.rpartition(":")[0]: one.file for one in planners if one.file is not None}
-    return Expansion(tuple(jobs.values()), wanted - len(jobs), counts, files, own, codes)
+    return Expansion(
+        tuple(jobs.values()), wanted - len(jobs), counts, files, own, codes, tuple(_remarks(tasks, skipped))
+    )
+
+
+def _remarks(tasks: Sequence[NamedTask], skipped: Sequence[str]) -> Iterator[str]:
+    """Yield sentences about skipped problems and about the share of the floor that random tasks were drawn from."""
+    if skipped:
+        yield f"{len(skipped)} {'problem' if len(skipped) == 1 else 'problems'} skipped; {skipped[0]}"
+    floors = {one.world: one.floor for one in tasks if one.name.startswith("random-")}
+    if floors:
+        least, most = min(floors, key=floors.__getitem__), max(floors.values())
+        share = f"{floors[least]:.0%}" if len(floors) == 1 else f"{floors[least]:.0%} (world {least}) to {most:.0%}"
+        yield f"random tasks are drawn from {share} of the floor: where the largest robot fits with its margin"
 
 
 def _count_tasks(tasks: Sequence[NamedTask]) -> dict[str, int]:
@@ -134,14 +151,16 @@ def _settings(campaign: Campaign) -> list[NamedSettings]:
 _PLACES = {"start": ("tasks",), "seed": ("seeds",)} | {one.key: (one.key,) for one in AXES.values()}
 
 
-def _check(
+def _fitting(
     campaign: Campaign,
     tasks: Sequence[NamedTask],
     robots: Sequence[NamedRobot],
     settings: Sequence[NamedSettings],
     planner: PlannerVariant,
-) -> None:
-    """Reject, before any work, invalid settings and starts without room for the robot."""
+    skipped: list[str],
+) -> list[NamedTask]:
+    """Reject, before any work, invalid settings and starts without room for the robot; skip those of `skip: true`."""
+    unfit: dict[int, str] = {}
     obstructed = list({one.fields["unseen"]: one for one in reversed(settings)}.values())
     moving = [n for n, task in enumerate(tasks) if task.task.world.movers]
     whole = {0, *moving[:1]}  # perception depends on whether there are movers
@@ -161,7 +180,15 @@ def _check(
                 except FieldError as error:
                     place = _PLACES.get(error.key, (*one.place, error.key))
                     where = task.place if error.key == "start" and not campaign.tasks else place
-                    raise campaign.error(where, f"{task.world} with {robot.name}: {error.problem}") from None
+                    name = task.world if task.name == OWN else f"{task.world}, {task.name.replace('-', ' ')}"
+                    problem = f"{name} with {robot.name}: {error.problem}"
+                    if error.key != "start" or not task.name.startswith("problem-"):
+                        raise campaign.error(where, problem) from None
+                    if not task.skip:
+                        raise campaign.error(where, f"{problem}; {SKIP}") from None
+                    unfit[n] = problem
+    skipped += unfit.values()
+    return [task for n, task in enumerate(tasks) if n not in unfit]
 
 
 def _cases(

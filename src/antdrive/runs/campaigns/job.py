@@ -32,6 +32,8 @@ class NamedTask:
     catalogue: str | None  # the world's name in the catalogue, if the task is the catalogue's
     place: Location  # location of the world in the campaign
     others: Mapping[str, Task] = field(default_factory=dict)  # the world file's other tasks, by name
+    skip: bool = False  # whether to skip the task if the robot does not fit at its start
+    floor: float = 1.0  # share of the world's floor from which the task was drawn
 
 
 @dataclass(frozen=True, eq=False)

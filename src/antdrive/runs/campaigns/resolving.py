@@ -17,6 +17,7 @@ from antdrive.base.checks import show, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PLANNERS, Query, load_planner, planner_version
+from antdrive.planners.user_code import label_names
 from antdrive.robots import PurePursuit, RobotSpec, overlap_at
 from antdrive.robots.default_margin import LEAST, default_margin
 from antdrive.runs.campaigns.campaign import Campaign, RandomTasks, seeds_of
@@ -28,13 +29,14 @@ from antdrive.worlds.formats.importing import import_file
 from antdrive.worlds.generators.generate import generated
 
 OWN = "own"  # name of a world's default task
+SKIP = "with skip: true such problems are skipped"
 
 
-def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
+def campaign_worlds(campaign: Campaign, skipped: list[str]) -> list[NamedTask]:
     """Return the worlds of a campaign with their default tasks, in its order; files of a pattern are sorted by name.
 
     Worlds with the same name get their path or options as part of the name, so names are unique. Several problems of
-    one map are tasks of one world.
+    one map are tasks of one world. Entries with `skip: true` add the errors of their problems to `skipped`.
     """
     tasks: list[tuple[NamedTask, str]] = []
     for i, entry in enumerate(campaign.entry.worlds):
@@ -44,7 +46,7 @@ def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
         elif "generate" in entry:
             tasks += _random(campaign, place, dict(entry))
         elif "import" in entry:
-            tasks += _imported(campaign, place, dict(entry))
+            tasks += _imported(campaign, place, dict(entry), skipped)
         else:
             raise campaign.error(place, "write a name, a file, {generate: forest, seeds: 20} or {import: FILES}")
     return _distinct(tasks)
@@ -114,9 +116,11 @@ def _random(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Itera
         yield NamedTask(f"{kind}-{seed}{suffix}", OWN, task, None, place), f"{kind}-{seed}{suffix} ({place[1]})"
 
 
-def _imported(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Iterator[tuple[NamedTask, str]]:
-    pattern, barn = entry.pop("import"), entry.pop("barn", False)
-    if not isinstance(pattern, str) or not isinstance(barn, bool):
+def _imported(
+    campaign: Campaign, place: Location, entry: dict[str, Any], skipped: list[str]
+) -> Iterator[tuple[NamedTask, str]]:
+    pattern, barn, skip = entry.pop("import"), entry.pop("barn", False), entry.pop("skip", False)
+    if not isinstance(pattern, str) or not isinstance(barn, bool) or not isinstance(skip, bool):
         raise campaign.error(place, "write {import: FILES, barn: true} with the options of antdrive worlds import")
     problems = _problems(campaign, place, entry)
     suffix = "".join(f" {key}={option_text(value)}" for key, value in entry.items())
@@ -129,10 +133,17 @@ def _imported(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Ite
                 raise campaign.error((*place, error.key), error.problem) from None
             except TypeError:
                 raise campaign.error(place, "an option has an invalid type") from None
+            except InputError as error:
+                if problem is None or not path.exists():
+                    raise
+                if not skip:
+                    raise campaign.error(place, f"problem {problem}: {error}; {SKIP}") from None
+                skipped.append(f"problem {problem}: {error}")
+                continue
             for task in tasks:
                 name = OWN if problem is None else f"problem-{problem}"
                 second = f"{os.path.relpath(path, campaign.folder)}#{task.world.name}{suffix}"
-                yield NamedTask(task.world.name, name, task, None, place), second
+                yield NamedTask(task.world.name, name, task, None, place, skip=skip), second
 
 
 def _problems(campaign: Campaign, place: Location, entry: dict[str, Any]) -> list[int] | list[None]:
@@ -160,7 +171,11 @@ def planner_variants(campaign: Campaign) -> list[PlannerVariant]:
                 written = entry if isinstance(entry, str) else entry["name"]
                 label = variant.label.replace(variant.name, written, 1)
                 variants[label] = dataclasses.replace(variant, label=label, name=written)
-    return list(variants.values())
+    names = list(dict.fromkeys(variant.name for variant in variants.values()))
+    short = dict(zip(names, label_names(names), strict=True))
+    return [
+        dataclasses.replace(one, label=one.label.replace(one.name, short[one.name], 1)) for one in variants.values()
+    ]
 
 
 def _variants(campaign: Campaign, place: Location, options: dict[str, Any]) -> Iterator[PlannerVariant]:
@@ -281,6 +296,7 @@ def _drawn(
     cell = max(entry.get("cell") or world.task.cell for entry in campaign.settings)
     grid = rasterise(world.task.world, cell, inflate)
     free = np.argwhere(grid.moves > 0)
+    floor = len(free) / max(1, int(np.count_nonzero(rasterise(world.task.world, cell, 0.0).moves)))
     for number in range(request.random):
         task = _draw(rng, grid, free, request.min_distance, world.task, robots, unseen) if len(free) else None
         if task is None:
@@ -289,7 +305,8 @@ def _drawn(
                 f"{world.world} for a robot of radius {inflate:.3g} m with its margin; use a smaller min_distance"
             )
             raise campaign.error(("tasks",), problem)
-        yield dataclasses.replace(world, name=f"random-{request.seed}-{number}", task=task, catalogue=None)
+        name = f"random-{request.seed}-{number}"
+        yield dataclasses.replace(world, name=name, task=task, catalogue=None, floor=floor)
 
 
 def _draw(

@@ -139,7 +139,7 @@ def sweep(
         progress: called at the start and after each run with the numbers of finished and of all runs; True: show a bar on
             stderr; False: show nothing; None: show a bar in a notebook
         notify: called before the first run with a sentence for each way in which earlier runs differ from the campaign's, and
-            for each setting without effect
+            for each setting without effect, for skipped problems and for the floor of random tasks
         work: the work on each run; None: drive it
 
     Raises:
@@ -154,7 +154,7 @@ def sweep(
         missing = missing_runs(expansion.jobs, store.folder, retry_crashed=retry_crashed, again=again)
         notes = differences(campaign, expansion.jobs, store.folder)
         if notify is not None:
-            for note in (*notes, *expansion.idle_notes()):
+            for note in (*notes, *expansion.remarks, *expansion.idle_notes()):
                 notify(note)
         store.claim(_manifest(campaign, expansion))
         if missing.discarded:
@@ -241,6 +241,7 @@ def _manifest(campaign: Campaign, expansion: Expansion) -> dict[str, Any]:
         "hash": hashlib.sha256(keys.encode()).hexdigest(),
         "counts": expansion.counts,
         "duplicates": expansion.duplicates,
+        "remarks": list(expansion.remarks),
         "versions": versions(),
     }
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from antdrive.robots import NoiseModel, RobotSpec, Twist
 from antdrive.robots.spec import Noise, Odometry
 from antdrive.sim.driving.parts import Rows
 from antdrive.sim.log.streams import random_stream
-from antdrive.sim.physics.engine import State
 from antdrive.sim.sensing.dead_reckoning import DeadReckoning
+
+if TYPE_CHECKING:
+    from antdrive.sim.physics.engine import State
 
 
 class Exact:
@@ -105,8 +107,10 @@ class Reckoned(Fixes):
         """Return the odometry pose of a robot whose true velocity is `twist`."""
         noise = self._noise
         rolled = self._wheels(twist) / (1 + self._slip) * (1 + noise.encoder * self._rng.standard_normal(2))
+        self.encoders = self._twist(*rolled)
         if self._tick:
-            self.estimate = self._reckoning.advance(self._twist(*rolled).speed, twist.yaw_rate, self._period)
+            self.estimate = self._reckoning.advance(self.encoders.speed, twist.yaw_rate, self._period)
+            self.odometry = Twist(*self._reckoning.measured)
         self._tick += 1
         return self.estimate
 

@@ -15,6 +15,7 @@ class DeadReckoning:
 
     Attributes:
         pose: the estimated pose: x, y [m] and yaw [rad]
+        measured: speed [m/s] and yaw rate [rad/s] of the last sample
 
     Args:
         odometry: the measurement errors
@@ -28,7 +29,7 @@ class DeadReckoning:
         self._scale = 1 + odometry.speed_scale * float(scale)
         self._turn = 1 + odometry.yaw_scale * float(turn)
         self._bias = odometry.gyro_bias * float(bias)
-        self.pose = start
+        self.pose, self.measured = start, (0.0, 0.0)
 
     def advance(self, speed: float, yaw_rate: float, dt: float) -> Pose:
         """Advance by one sample, and return the estimated pose.
@@ -42,6 +43,7 @@ class DeadReckoning:
         louder = 1 / math.sqrt(SAMPLE_RATE * dt)  # short samples average less noise
         measured = speed * (self._scale + self._odometry.speed_noise * louder * float(once))
         rate = yaw_rate * self._turn + self._bias + self._odometry.gyro_noise * louder * float(turn_noise)
+        self.measured = measured, rate
         x, y, yaw = self.pose
         middle = yaw + rate * dt / 2
         way = measured * dt

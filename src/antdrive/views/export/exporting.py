@@ -16,6 +16,7 @@ from antdrive.base.atomic import atomic_folder, atomic_write
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.files import require_new
 from antdrive.base.plane import world_to_map
+from antdrive.sim.driving.odometry import odometry_of
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.samples import DriveScans, samples
@@ -128,6 +129,9 @@ def _drive(rollout: Rollout) -> tuple[list[str], Iterable[Sequence[Any]]]:
     heads += ["command_speed_m_s", "command_yaw_rate_rad_s", "clearance_m", "limiter"]
     columns = [rollout.t, *world_to_map(frame, rollout.pose).T, *rollout.twist.T, *rollout.command.T, rollout.clearance]
     columns.append(np.array(rollout.record.limiters, dtype=object)[rollout.limiter])
+    measured = odometry_of(rollout)  # in the frame odom, as /odom
+    heads += ["odom_x_m", "odom_y_m", "odom_yaw_rad", "odom_speed_m_s", "odom_yaw_rate_rad_s"]
+    columns += [*measured.pose.T, *measured.twist.T]
     if len(rollout.estimate):
         heads += ["estimate_x_m", "estimate_y_m", "estimate_yaw_rad"]
         columns += [*world_to_map(frame, rollout.estimate).T]

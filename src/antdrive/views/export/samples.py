@@ -9,10 +9,21 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import relative_frame
+from antdrive.base.plane import relative_frame, world_to_map
 from antdrive.base.types import Floats, Ints
+from antdrive.sim.driving.odometry import LoggedOdometry, odometry_of
 from antdrive.sim.log.rollout import Rollout, ranges_of
-from antdrive.views.export.topics import BASE, ESTIMATE, LIDAR, ODOM, ROBOT_MAP, Topic, mover_frame, nanoseconds
+from antdrive.views.export.topics import (
+    FOOTPRINT,
+    LIDAR,
+    MAP,
+    ODOM,
+    TRUTH,
+    WHEEL_JOINTS,
+    Topic,
+    mover_frame,
+    nanoseconds,
+)
 
 HEADER = b"\x00\x01\x00\x00"  # CDR, little endian
 
@@ -67,23 +78,39 @@ class CdrLayout:
 
 def samples(rollout: Rollout, scans: DriveScans) -> list[Topic]:
     """Return the topics with a message per row of a log or per scan."""
-    stamps = nanoseconds(rollout.t)
-    frames = [(ODOM, BASE), *((ODOM, mover_frame(i)) for i in range(rollout.movers.shape[1]))]
+    stamps, frame, measured = nanoseconds(rollout.t), rollout.record.task.frame, odometry_of(rollout)
+    truth, believed = world_to_map(frame, rollout.pose), world_to_map(frame, estimate_of(rollout))
+    frames = [(ODOM, FOOTPRINT), (MAP, ODOM), (MAP, TRUTH)]
+    frames += [(MAP, mover_frame(i)) for i in range(rollout.movers.shape[1])]
     still = np.zeros((*rollout.movers.shape[:2], 1))
-    placed = [rollout.pose[:, None], np.concatenate([rollout.movers, still], axis=2)]
-    if rollout.record.exploring:
-        frames.append((ODOM, ROBOT_MAP))
-        placed.append(_own_maps(rollout)[:, None])
-    poses = np.concatenate(placed, axis=1)
+    movers = world_to_map(frame, np.concatenate([rollout.movers, still], axis=2))
+    robot = np.stack([measured.pose, relative_frame(measured.pose, believed), truth], axis=1)
+    none = np.zeros((len(stamps), 3, 3))
     topics = [
-        transforms("/tf", stamps, frames, poses),
-        odometry("/odom", BASE, stamps, rollout.pose, rollout.twist),
+        transforms("/tf", stamps, frames, np.concatenate([robot, movers], axis=1)),
+        odometry(
+            "/odom",
+            (ODOM, FOOTPRINT),
+            stamps,
+            measured.pose,
+            measured.twist,
+            measured.pose_covariance,
+            measured.twist_covariance,
+        ),
+        odometry("/ground_truth/odom", (MAP, TRUTH), stamps, truth, rollout.twist, none, none[:, :2, :2]),
+        joint_states("/joint_states", stamps, rollout, measured),
         twists("/cmd_vel", stamps, rollout.command),
         numbers("/clearance", "std_msgs/msg/Float64", "f8", stamps, rollout.clearance),
         numbers("/limiter", "std_msgs/msg/UInt8", "u1", stamps, rollout.limiter),
     ]
     if len(rollout.estimate):
-        topics.append(odometry("/estimate", ESTIMATE, stamps, rollout.estimate, rollout.twist))
+        turn = _turn2(frame[2])
+        covariance = turn @ measured.estimate_covariance @ turn.T
+        topics.append(
+            odometry(
+                "/estimate", (MAP, FOOTPRINT), stamps, believed, measured.twist, covariance, measured.twist_covariance
+            )
+        )
     return [*topics, *scan_topics(rollout, scans)]
 
 
@@ -108,9 +135,26 @@ def scan_topics(rollout: Rollout, scans: DriveScans) -> list[Topic]:
     return [laser_scans("/scan", nanoseconds(rollout.t[scans.rows]), scans.ranges, values)]
 
 
-def _own_maps(rollout: Rollout) -> Floats:
-    """Return the pose of the robot's occupancy map in each row, x, y [m] and yaw [rad] (N, 3)."""
-    return relative_frame(rollout.estimate, rollout.pose) if len(rollout.estimate) else np.zeros((len(rollout.t), 3))
+def estimate_of(rollout: Rollout) -> Floats:
+    """Return the robot's estimated pose in each row, x, y [m] and yaw [rad] (N, 3): the true one without noise."""
+    return rollout.estimate if len(rollout.estimate) else rollout.pose
+
+
+def joint_states(topic: str, stamps: Ints, rollout: Rollout, measured: LoggedOdometry) -> Topic:
+    """Return angles [rad] and speeds [rad/s] of the wheels as their encoders measured them."""
+    layout = CdrLayout()
+    _header(layout, "")
+    layout.length(2)
+    for joint in WHEEL_JOINTS:
+        layout.text(joint)
+    for name in ("position", "velocity"):
+        layout.length(2)
+        layout.number(name, "f8", 2)
+    layout.length(0)
+    speeds = measured.wheels / rollout.record.robot.wheel_radius
+    steps = np.diff(rollout.t, prepend=rollout.t[:1])[:, None]
+    values = {"position": np.cumsum(speeds * steps, axis=0), "velocity": speeds}
+    return Topic(topic, "sensor_msgs/msg/JointState", stamps, layout.messages(_stamp_values(stamps) | values))
 
 
 def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], poses: Floats) -> Topic:
@@ -126,16 +170,26 @@ def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], pose
     return Topic(topic, "tf2_msgs/msg/TFMessage", stamps, layout.messages(values))
 
 
-def odometry(topic: str, child: str, stamps: Ints, pose: Floats, twist: Floats) -> Topic:
-    """Return odometry messages; covariances are 0, unknown in ROS."""
+def odometry(
+    topic: str,
+    frames: tuple[str, str],
+    stamps: Ints,
+    pose: Floats,
+    twist: Floats,
+    pose_covariance: Floats,
+    twist_covariance: Floats,
+) -> Topic:
+    """Return odometry messages with covariances of x, y and yaw (N, 3, 3), of speed and yaw rate (N, 2, 2)."""
     layout = CdrLayout()
-    _header(layout, ODOM)
-    layout.text(child)
+    _header(layout, frames[0])
+    layout.text(frames[1])
     layout.number("pose", "f8", 7)
     layout.number("pose_covariance", "f8", 36)
     layout.number("twist", "f8", 6)
     layout.number("twist_covariance", "f8", 36)
     values = _stamp_values(stamps) | {"pose": _pose7(pose), "twist": _twist6(twist)}
+    values |= {"pose_covariance": _square6(pose_covariance, (0, 1, 5))}
+    values |= {"twist_covariance": _square6(twist_covariance, (0, 5))}
     return Topic(topic, "nav_msgs/msg/Odometry", stamps, layout.messages(values))
 
 
@@ -190,6 +244,19 @@ def _twist6(twist: Floats) -> Floats:
     twists = np.zeros((len(twist), 6))
     twists[:, 0], twists[:, 5] = twist[:, 0], twist[:, 1]
     return twists
+
+
+def _square6(covariance: Floats, places: tuple[int, ...]) -> Floats:
+    """Return covariances of x, y, z and rotations about them (N, 36) from those of some of the six."""
+    squares = np.zeros((len(covariance), 6, 6))
+    squares[np.ix_(range(len(covariance)), places, places)] = covariance
+    return squares.reshape(-1, 36)
+
+
+def _turn2(yaw: float) -> Floats:
+    """Return the matrix (3, 3) that turns x and y by a yaw [rad]."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
 LOGGED = "taken by the drive"

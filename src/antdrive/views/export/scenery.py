@@ -16,16 +16,17 @@ from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.topics import (
     BASE,
+    FOOTPRINT,
     LIDAR,
     MAP,
-    ODOM,
-    ROBOT_MAP,
+    WHEEL_LINKS,
     Topic,
     message_types,
     mover_frame,
     nanoseconds,
 )
 from antdrive.views.scene import Scene, contact_point
+from antdrive.worlds.world import World
 
 SPHERE, CYLINDER, LINE_STRIP = 2, 3, 4  # marker types
 KNOWN, UNSEEN, MOVING = (0.45, 0.47, 0.52, 1.0), (0.85, 0.2, 0.2, 1.0), (0.95, 0.6, 0.1, 1.0)
@@ -57,8 +58,7 @@ def _message(name: str, kind: str, times: Sequence[float], contents: Iterable[An
 def _static(rollout: Rollout) -> Any:
     """Return the static transforms."""
     robot, start = rollout.record.robot, float(rollout.t[0])
-    x, y, yaw = rollout.record.task.frame
-    placed = [(MAP, ODOM, (x, y, 0.0), yaw)]
+    placed = [(FOOTPRINT, BASE, (0.0, 0.0, 0.0), 0.0)]
     placed += [(BASE, link, place, 0.0) for link, place in wheel_places(robot).items()]
     lidar = robot.lidar
     if lidar is not None:
@@ -82,13 +82,17 @@ def _static(rollout: Rollout) -> Any:
 
 
 def _maps(rollout: Rollout) -> list[Topic]:
-    """Return the planner's grid, once, or a mapless robot's growing occupancy map."""
+    """Return the true obstacles and the planner's grid, once, or a mapless robot's growing occupancy map."""
     if not rollout.record.exploring:
-        frame, grids = MAP, [planning_grid(rollout)]
+        topics = {"/map": [wall_map(rollout)], "/global_costmap/costmap": [planning_grid(rollout)]}
     else:
-        frame, grids = ROBOT_MAP, list(occupancy_maps(rollout)) if len(rollout.scans) else []
-    kind, times = "nav_msgs/msg/OccupancyGrid", [grid.at for grid in grids]
-    return [_message("/map", kind, times, [_grid(grid, frame) for grid in grids], latched=True)] if grids else []
+        topics = {"/map": list(occupancy_maps(rollout))} if len(rollout.scans) else {}
+    return [
+        _message(
+            name, "nav_msgs/msg/OccupancyGrid", [g.at for g in grids], [_grid(g, MAP) for g in grids], latched=True
+        )
+        for name, grids in topics.items()
+    ]
 
 
 def _grid(ground: GroundGrid, frame: str) -> Any:
@@ -106,27 +110,23 @@ def _grid(ground: GroundGrid, frame: str) -> Any:
 
 def _routes(rollout: Rollout) -> Topic:
     """Return each route at its start time, its points with the heading towards the next one."""
-    frame = ROBOT_MAP if rollout.record.exploring else MAP
     times, contents = [], []
     for at, points in routes_of(rollout):
         steps = np.diff(points, axis=0, append=points[-1:])
         headings = np.arctan2(steps[:, 1], steps[:, 0])
         headings[-1] = headings[-2] if len(headings) > 1 else 0.0
         poses = [
-            _of("geometry_msgs/msg/PoseStamped", header=_header(frame, at), pose=_pose(pose))
+            _of("geometry_msgs/msg/PoseStamped", header=_header(MAP, at), pose=_pose(pose))
             for pose in np.column_stack([points, headings]).tolist()
         ]
         times.append(at)
-        contents.append(_of("nav_msgs/msg/Path", header=_header(frame, at), poses=poses))
+        contents.append(_of("nav_msgs/msg/Path", header=_header(MAP, at), poses=poses))
     return _message("/plan", "nav_msgs/msg/Path", times, contents, latched=True)
 
 
 def routes_of(rollout: Rollout) -> Iterator[tuple[float, Floats]]:
-    """Yield each route's start time [s] and points (N, 2) [m] in the map's frame.
-
-    A mapless robot's routes are in the frame of its occupancy map.
-    """
-    frame = (0.0, 0.0, 0.0) if rollout.record.exploring else rollout.record.task.frame
+    """Yield each route's start time [s] and points (N, 2) [m] in the map's frame, as the robot estimates its pose there."""
+    frame = rollout.record.task.frame
     for rows, route in rollout.legs():
         yield float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)]), world_to_map(frame, route)
 
@@ -265,6 +265,7 @@ def _turn(yaw: float) -> Any:
 
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1  # values of nav_msgs/OccupancyGrid
+WALL_CELL, MOST_CELLS = 0.05, 2000  # side of a cell of /map [m], at most as many along a side
 PERIOD = 1.0  # between two maps of a mapless robot [s]
 
 
@@ -280,17 +281,28 @@ class GroundGrid:
 
 def planning_grid(rollout: Rollout) -> GroundGrid:
     """Return the planner's grid in the map's frame: free where the robot's centre may be."""
+    record = rollout.record
+    return _ground(rollout, record.task.world, record.cell, record.inflate)
+
+
+def wall_map(rollout: Rollout) -> GroundGrid:
+    """Return the true obstacles in the map's frame, not inflated, with a ring of cells for the outer walls."""
+    world = rollout.record.world
+    return _ground(rollout, world, max(WALL_CELL, max(world.size) / MOST_CELLS), 0.0, ring=1)
+
+
+def _ground(rollout: Rollout, world: World, cell: float, inflate: float, ring: int = 0) -> GroundGrid:
+    """Return a world's grid in the map's frame, with a ring of occupied cells around it."""
     from antdrive.worlds.grid import rasterise
 
-    record = rollout.record
-    free = rasterise(record.task.world, record.cell, record.inflate).free
-    x0, y0, _, _ = record.task.world.bounds
-    x, y, yaw = world_to_map(record.task.frame, [(x0, y0, 0.0)])[0].tolist()
-    return GroundGrid(float(rollout.t[0]), record.cell, (x, y, yaw), np.where(free, FREE, OCCUPIED).astype(np.int8))
+    free = np.pad(rasterise(world, cell, inflate).free, ring)
+    corner = (world.bounds[0] - ring * cell, world.bounds[1] - ring * cell, 0.0)
+    x, y, yaw = world_to_map(rollout.record.task.frame, [corner])[0].tolist()
+    return GroundGrid(float(rollout.t[0]), cell, (x, y, yaw), np.where(free, FREE, OCCUPIED).astype(np.int8))
 
 
 def occupancy_maps(rollout: Rollout) -> Iterator[GroundGrid]:
-    """Yield a mapless robot's occupancy map at the start, every `PERIOD` and at the end, in the frame of its estimates."""
+    """Yield a mapless robot's occupancy map at the start, every `PERIOD` and at the end, in the map's frame."""
     from antdrive.views.map_reconstruction import MapReconstruction
 
     seen = MapReconstruction(rollout, resets=True, detections=False)
@@ -303,7 +315,9 @@ def occupancy_maps(rollout: Rollout) -> Iterator[GroundGrid]:
         part = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
         cells = np.where(occupied[part], OCCUPIED, np.where(free[part], FREE, UNKNOWN)).astype(np.int8)
         x, y, cell = *seen.map.origin, seen.map.cell
-        yield GroundGrid(at, cell, (x + cols[0] * cell, y + rows[0] * cell, 0.0), cells)
+        corner = (x + cols[0] * cell, y + rows[0] * cell, 0.0)
+        place = world_to_map(rollout.record.task.frame, [corner])[0].tolist()
+        yield GroundGrid(at, cell, (place[0], place[1], place[2]), cells)
 
 
 GAP = 0.005  # height of the body above the floor [m]
@@ -315,10 +329,8 @@ BODY_COLOUR, WHEEL_COLOUR = "0.16 0.44 0.72 1", "0.15 0.15 0.15 1"
 
 def wheel_places(robot: RobotSpec) -> dict[str, tuple[float, float, float]]:
     """Return the wheels' positions in the robot's frame: x, y and z [m] by link."""
-    return {
-        f"{side}_wheel": (0.0, sign * robot.track / 2, robot.wheel_radius)
-        for side, sign in (("left", 1), ("right", -1))
-    }
+    sides = zip(WHEEL_LINKS, (1, -1), strict=True)
+    return {link: (0.0, sign * robot.track / 2, robot.wheel_radius) for link, sign in sides}
 
 
 def description(robot: RobotSpec) -> str:
@@ -330,6 +342,8 @@ def description(robot: RobotSpec) -> str:
     origin = f'<origin xyz="{x!r} {y!r} {GAP + robot.height / 2!r}"/>'
     parts = [
         f'<robot name="{robot.name.translate(ESCAPES)}">',
+        f'<link name="{FOOTPRINT}"/>',
+        f'<joint name="base_joint" type="fixed"><parent link="{FOOTPRINT}"/><child link="{BASE}"/></joint>',
         f'<link name="{BASE}">',
         f"<visual>{origin}<geometry>{body}</geometry>{_colour('body', BODY_COLOUR)}</visual>",
         f"<collision>{origin}<geometry>{body}</geometry></collision>",
@@ -342,7 +356,7 @@ def description(robot: RobotSpec) -> str:
             f'<link name="{link}">',
             f"<visual>{lying}<geometry>{wheel}</geometry>{_colour('wheel', WHEEL_COLOUR)}</visual>",
             "</link>",
-            f'<joint name="{link}_joint" type="fixed"><parent link="{BASE}"/><child link="{link}"/>',
+            f'<joint name="{link}_joint" type="continuous"><parent link="{BASE}"/><child link="{link}"/><axis xyz="0 1 0"/>',
             f'<origin xyz="{" ".join(map(repr, place))}"/></joint>',
         ]
     return "\n".join([*parts, "</robot>"])

@@ -1,9 +1,8 @@
 """ROS topics and frames of an exported drive, and MCAP files that hold them, alone or in a rosbag2 folder.
 
-`map` is the frame of the source map. `odom` is the frame of the world, in which the robot drives; it equals `map` unless the
-world file sets the world's pose in its map. `base_link` is fixed to the robot, on the floor below the axle's centre, x
-forward. `mover_i` is fixed to mover i. `robot_map` is the frame of the robot's own occupancy map; its pose in `odom` changes
-with the error of the estimate.
+Frames follow REP 105. `map` is the frame of the source map. `odom` → `base_footprint` is odometry, continuous; `map` →
+`odom` corrects it, so that `map` → `base_footprint` is the localisation's estimate. `base_footprint` and `base_link` coincide,
+on the floor below the axle's centre, x forward. `ground_truth` is the robot's true pose in `map`, `mover_i` that of mover i.
 """
 
 from __future__ import annotations
@@ -23,7 +22,9 @@ from antdrive.base.types import Ints
 
 Payloads = Sequence[bytes | memoryview]
 
-MAP, ODOM, BASE, ESTIMATE, LIDAR, ROBOT_MAP = "map", "odom", "base_link", "estimate", "base_scan", "robot_map"
+MAP, ODOM, FOOTPRINT, BASE, LIDAR, TRUTH = "map", "odom", "base_footprint", "base_link", "base_scan", "ground_truth"
+WHEEL_LINKS = ("left_wheel", "right_wheel")
+WHEEL_JOINTS = tuple(f"{link}_joint" for link in WHEEL_LINKS)
 
 
 def mover_frame(index: int) -> str:

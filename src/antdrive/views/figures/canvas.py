@@ -26,6 +26,7 @@ from antdrive.views.colours import INK, MUTED, OUTCOME_LABELS, hexed
 from antdrive.views.scene import Scene
 
 SUFFIXES = (".png", ".pdf", ".svg")
+PRINTED = (".pdf", ".svg")  # of figures for a thesis
 NOTEBOOK_DPI = 90  # pixels per inch of figures in notebooks, at most
 
 _STYLE: Any = {
@@ -49,6 +50,7 @@ _STYLE: Any = {
     "legend.fontsize": 8.0,
     "svg.hashsalt": "antdrive",
     "pdf.compression": 6,
+    "pdf.fonttype": 42,  # TrueType; publishers refuse Type 3
 }
 
 

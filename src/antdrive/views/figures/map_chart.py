@@ -136,7 +136,7 @@ def draw_contact(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
     return drawn
 
 
-def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
+def draw_legend(axes: Any, handles: list[Any], scene: Scene, **place: Any) -> None:
     """Draw the map's legend above its upper left corner: `handles`, obstacles, movers and no-go area."""
     known = [Patch(fc=hexed(colours.OBSTACLE), label="obstacle" if scene.mapped else "obstacle, not on a map")]
     if scene.unseen.any():
@@ -146,7 +146,7 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
     if scene.has_no_go_area:
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in colours.ZONE)
         known.append(Patch(fc=pale, ec=hexed(colours.ZONE), lw=0.5, label=scene.no_go_label))
-    legend_above(axes, [*handles, *known], handlelength=1.6)
+    legend_above(axes, [*handles, *known], handlelength=1.6, **place)
 
 
 def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from antdrive.base.types import Floats, Ints
 from antdrive.runs.statistics.intervals import medians_by_world
-from antdrive.views.colours import INK, MUTED, hexed, planner_style
+from antdrive.views.colours import INK, MUTED, hexed, label_styles
 from antdrive.views.figures.canvas import colour_bar, sheet
 
 if TYPE_CHECKING:
@@ -37,8 +37,7 @@ def history_figure(
     """Draw the best path length so far by iteration for each planner: the median of its runs and their range."""
     with sheet(path, (6.4, 4.0), dpi) as figure:
         axes: Any = figure.add_subplot(label="history")
-        for name, runs in histories.items():
-            colour, dash = planner_style(name)
+        for (name, runs), (colour, _, dash) in zip(histories.items(), label_styles(list(histories)), strict=True):
             longest = max(len(run) for run in runs)
             best = np.array([np.pad(run.best, (0, longest - len(run)), mode="edge") for run in runs if len(run)])
             best = np.where(np.isfinite(best), best, np.nan)
@@ -68,7 +67,7 @@ def maps_figure(paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], pat
             axes: Any = figure.add_subplot(down, across, k + 1, label=title)
             axes.imshow(query.grid.free, cmap="gray", origin="lower", vmin=0, vmax=1, interpolation="nearest")
             for number, (name, plan) in enumerate(plans.items()):
-                colour = ("#1f4fd8", "#d81f1f", hexed(planner_style(name)[0]))[min(number, 2)]
+                colour = ("#1f4fd8", "#d81f1f", label_styles([name])[0].light)[min(number, 2)]
                 length = f"{plan.line_length:.2f}" if plan.solved else "no path"
                 line = np.empty((0, 2))
                 if plan.solved:
@@ -95,7 +94,7 @@ def ants_figure(
     dpi: float = 160,
 ) -> Figure:
     """Draw path length by number of ants: every seed, the mean and the paper's values."""
-    colour = hexed(planner_style(planner)[0])
+    colour = label_styles([planner])[0].light
     with sheet(path, (5.6, 4.0), dpi) as figure:
         axes: Any = figure.add_subplot(label="lengths")
         counts = sorted(lengths)
@@ -216,7 +215,7 @@ def _style(curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurv
     """Return colour and dashes: red and blue for single runs; a planner's second curve is darker and dotted."""
     if single:
         return ("#1f4fd8", "#d81f1f", "#222222")[min(number, 2)], "-"
-    colour, dash = planner_style(curve.planner)
+    colour, _, dash = label_styles([curve.planner])[0]
     if any(other.planner == curve.planner for other in among[:number]):
         dark = TWICE * sum(other.planner == curve.planner for other in among[:number])
         red, green, blue = (round((1 - dark) * part + dark * ink) for part, ink in zip(colour, INK, strict=True))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,13 +10,14 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 
 from antdrive.base.types import Floats
 from antdrive.runs.comparing import distinct, path_text
 from antdrive.sim.log.certificate import Certificate, in_metres
 from antdrive.sim.log.metrics import driven_length_m, tracking_error
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import BAD, CONTACT, GOOD, MUTED, OUTCOME_LABELS, ROUTE, SHELL, START, hexed, planner_style
+from antdrive.views.colours import BAD, CONTACT, GOOD, MUTED, OUTCOME_LABELS, ROUTE, SHELL, START, hexed, label_styles
 from antdrive.views.figures.canvas import (
     BELOW,
     colour_bar,
@@ -43,6 +44,9 @@ LIMITER_COLOURS = (
 )
 
 MOST_LIMITERS = 6  # per row of the legend
+LINE_POINTS = 400  # of a line of a comparison
+NAME_SIZE = 8.0  # of names beside lines [pt]
+NAME_SCALE = 400.0  # width of a comparison's map [pt]
 THEN, NOW = hexed(START), hexed(SHELL)
 
 
@@ -204,7 +208,7 @@ def _draw_checks(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
 
 
 def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None = None, *, dpi: float = 160) -> Figure:
-    """Draw the driven paths of several planners on one map, each in its planner's colour; bitwise identical drives are one line.
+    """Draw and name the driven paths of several planners on one map in their colours; identical drives are one line.
 
     Args:
         rollouts: the runs' logs, by planner
@@ -224,17 +228,41 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
         draw_map(axes, scene)
         handles: list[Any] = []
         drives = distinct(rollouts.items())
-        for over, same in zip(reversed(range(len(drives))), drives, strict=True):
-            name, rollout = same[0]
-            colour, dash = planner_style(name)
-            path = path_text((log.record.plan.length_m for _, log in same), driven_length_m(rollout))
-            label = f"{', '.join(name for name, _ in same)}: {path} m, {float(rollout.t[-1]):.1f} s"
-            width = 2.2 + 1.4 * over  # earlier lines are wider to stay visible below later ones
-            handles += axes.plot(
-                *rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=width, label=label, zorder=6
-            )
-        draw_legend(axes, handles, scene)
+        names = [same[0][0] for same in drives]
+        logs = [same[0][1] for same in drives]
+        styles = label_styles(names, [log.record.planner.name for log in logs])
+        lines = [log.pose[thinned(len(log.pose), LINE_POINTS), :2] for log in logs]
+        for same, log, line, style in zip(drives, logs, lines, styles, strict=True):
+            length = path_text((one.record.plan.length_m for _, one in same), driven_length_m(log))
+            alike = " (identical)" if len(same) > 1 else ""
+            label = f"{', '.join(name for name, _ in same)}{alike}: {length} m, {float(log.t[-1]):.1f} s"
+            handles += axes.plot(*line.T, color=style.light, ls=style.dash, lw=2.2, label=label, zorder=6)
+        if len(drives) > 1:
+            _name_lines(axes, names, lines, [style.light for style in styles])
+        draw_legend(axes, handles, scene, ncols=2)
     return figure
+
+
+def _name_lines(axes: Any, names: Sequence[str], lines: Sequence[Floats], colours: Sequence[str]) -> None:
+    """Write each name beside its line (N, 2), where the line lies far from the others and the name covers none."""
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    unit = (high[0] - low[0]) / NAME_SCALE  # a point of text [m]
+    taken: list[Floats] = []  # centres and half sizes of placed names
+    for k, (name, line, colour) in enumerate(zip(names, lines, colours, strict=True)):
+        others = np.vstack([other for number, other in enumerate(lines) if number != k])
+        half = unit * np.array([0.31 * NAME_SIZE * len(name) + 2, 0.6 * NAME_SIZE])
+        inner = line[len(line) // 12 : -len(line) // 12 or None : 4]
+        sides = np.array([(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]) * (half + 3 * unit)
+        at = (inner[:, None] + sides).reshape(-1, 2)
+        far = np.linalg.norm(inner[:, None] - others, axis=2).min(axis=1).repeat(len(sides))
+        covers = (np.abs(at[:, None] - np.vstack([others, line])) < half).all(axis=2).sum(axis=1)
+        clashes = sum((np.abs(at - centre) < half + size).all(axis=1).astype(int) for centre, size in taken)
+        outside = ((at - half < low) | (at + half > high)).any(axis=1)
+        best = int(np.argmin(1000 * (clashes + outside) + covers - far / (far.max() + unit)))
+        taken.append(np.array([at[best], half]))
+        edge = [withStroke(linewidth=2.4, foreground="white")]
+        style: dict[str, Any] = {"fontsize": NAME_SIZE, "weight": "bold", "path_effects": edge, "zorder": 8}
+        axes.text(*at[best], name, color=colour, ha="center", va="center", **style)
 
 
 def then_and_now(

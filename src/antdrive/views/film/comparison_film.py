@@ -16,7 +16,7 @@ from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
 from antdrive.runs.comparing import SameDrive, distinct, path_text
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, Colour, planner_style
+from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, Colour, label_styles
 from antdrive.views.film import overlay
 from antdrive.views.film.camera import Picture, turns
 from antdrive.views.film.film_options import ENCODERS, FilmInfo, FilmOptions
@@ -98,7 +98,10 @@ class SplitScreen:
         self._size = size
         self._corners = [((k % cols) * wide, (k // cols) * high) for k in range(len(rollouts))]
         room = (wide - 2, high - 2)
-        self._tiles = [Tile(same, camera, room, mark) for same in drives]
+        names = [log.record.planner.name for log in rollouts]
+        one_world = len({log.record.task.world.name for log in rollouts}) == 1
+        styles = label_styles([same[0][0] for same in drives] if one_world else names, names)
+        self._tiles = [Tile(same, style.colour, camera, room, mark) for same, style in zip(drives, styles, strict=True)]
 
     def frame(self, at: float) -> Picture:
         """Return the frame (H, W, 3) at a time of all runs [s]."""
@@ -119,13 +122,15 @@ class SplitScreen:
 class Tile:
     """Tile of one run: a header with its name and numbers, and the picture below."""
 
-    def __init__(self, same: SameDrive, camera: str, size: tuple[int, int], mark: Mark | None = None) -> None:
+    def __init__(
+        self, same: SameDrive, colour: Colour, camera: str, size: tuple[int, int], mark: Mark | None = None
+    ) -> None:
         rollout = same[0][1]
         self._unit, self._head = _head_of(size)
         self._rollout, self._size = rollout, (size[0], size[1] - self._head)
         self.shot = Shot(rollout, camera=camera, size=self._size, bare=True)
         self._names, self._mark = [name for name, _ in same], mark
-        self._colour = planner_style(rollout.record.planner.name)[0]
+        self._colour = colour
         self._outcome = rollout.outcome
         self._planned = [log.record.plan.length_m for _, log in same]  # [m]
         self._last: Picture | None = None  # the tile once the run is over

@@ -7,10 +7,10 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from antdrive.base.atomic import write_text
-from antdrive.base.errors import FieldError, input_error
+from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.files import known_suffix
 from antdrive.planners.user_code import record_name
 from antdrive.runs.campaigns.results import common_folder, read_runs
@@ -23,12 +23,16 @@ from antdrive.views.pages.tables import (
     WORDS,
     all_cells,
     allowance_cells,
+    chosen_tables,
     pair_cells,
     success_cells,
     success_note,
     write_csv,
     write_latex,
 )
+
+if TYPE_CHECKING:
+    from antdrive.views.colours import LabelStyle
 
 MARKDOWN_ROWS = 60  # per table
 MARKDOWN_FAILURES = 25  # listed failures
@@ -86,7 +90,7 @@ def _folders(folder: str | Path | Sequence[str | Path]) -> list[Path]:
 
 def report_campaign(
     folder: str | Path | Sequence[str | Path],
-    out: str | Path,
+    out: str | Path | None,
     *,
     title: str | None = None,
     metrics: Sequence[str] | None = None,
@@ -94,37 +98,53 @@ def report_campaign(
     planners: Sequence[str] = (),
     allow: Mapping[str, float] = MappingProxyType({}),
     where: Mapping[str, str] = MappingProxyType({}),
+    columns: Sequence[str] = (),
+    figures: str | Path | None = None,
 ) -> list[Path]:
-    """Write a campaign's report: a page, or its tables.
+    """Write a campaign's report, a page or its tables, or its charts.
 
     Args:
         folder: the campaign's folder, or several; the folder's name distinguishes equal configurations of several folders, as
             in "astar @today"
-        out: the file to write: .html, .md, .tex or .csv
+        out: the file to write: .html, .md, .tex or .csv; None: charts alone
         title: the report's title; default: the folders' names
         metrics: metrics to compare besides success; default: driven length, duration and planning time
         against: label of the planner to compare with all others; default: every pair
         planners: labels of the planners to include; default: all
         allow: largest loss against `against` that counts as not worse, such as {"success": 0.02}
         where: values of the runs to include, by column, such as {"noise": "1"}, "0,1" or, for numbers, "10..20"
+        columns: headings of the tables to write, in order; tables without all of them are left out; not for .html
+        figures: folder for the charts as PDF and SVG; None: none
 
     Returns:
         The written files; for .csv the second holds the pairs.
 
     Raises:
-        InputError: the folder holds no campaign, no finished run, or no such planner or metric; another suffix.
+        InputError: the folder holds no campaign, no finished run, or no such planner, metric or column; another suffix.
     """
-    target = Path(out)
-    check_suffix(target)
+    target = None if out is None else Path(out)
+    if target is not None:
+        suffix = check_suffix(target)
+    if columns and (target is None or suffix == ".html"):
+        raise InputError("--columns: applies to .md, .tex and .csv")
     summary = summarise_campaign(
         folder, title=title, metrics=metrics, against=against, planners=planners, allow=allow, where=where
     )
-    return write_campaign_report(summary, common_folder(_folders(folder)), target)
+    files = [] if target is None else write_campaign_report(summary, common_folder(_folders(folder)), target, columns)
+    if figures is not None:
+        from antdrive.views.pages.charts import campaign_charts, write_charts
+
+        charts = campaign_charts(summary, _styles(summary))
+        files += write_charts(charts, summary.paired.planners, Path(figures))
+    return files
 
 
-def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
-    """Write a campaign's report in the format of the file's suffix."""
-    return WRITERS[check_suffix(out)](summary, folder, out)
+def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path, columns: Sequence[str] = ()) -> list[Path]:
+    """Write a campaign's report in the format of the file's suffix, if given with these columns of its tables."""
+    try:
+        return WRITERS[check_suffix(out)](summary, folder, out, columns)
+    except FieldError as error:
+        raise InputError(f"--{error}") from None
 
 
 def check_suffix(out: Path) -> str:
@@ -132,23 +152,29 @@ def check_suffix(out: Path) -> str:
     return known_suffix(out, WRITERS)
 
 
-def _write_markdown(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
+def _write_markdown(summary: CampaignSummary, folder: Path, out: Path, columns: Sequence[str]) -> list[Path]:
     failures = [k for k, good in enumerate(summary.table.success) if not good]
     facts = {name: summary.table.texts(name) for name in ("world", "planner", "seed", "outcome", "reason")}
     facts["command"] = [command or "" for command in _own_commands(summary.table)]
     listed = [{name: texts[k] for name, texts in facts.items()} for k in failures[:MARKDOWN_FAILURES]]
-    tables = {"tables": all_cells(summary), "words": WORDS, "most": MARKDOWN_ROWS}
+    tables = {"tables": chosen_tables(all_cells(summary), columns), "words": WORDS, "most": MARKDOWN_ROWS}
     text = rendered("page.md.j2", **_common(summary), **tables, failures=listed, failed=len(failures))
     return [write_text(out, text)]
 
 
-def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
+def _styles(summary: CampaignSummary) -> list[LabelStyle]:
+    """Return the styles of a campaign's planners."""
     from antdrive.views.colours import label_styles
-    from antdrive.views.pages.charts import campaign_charts
 
     names = dict(zip(summary.table.texts("planner"), summary.table.texts("planner_name"), strict=True))
     planners = summary.paired.planners
-    styles = label_styles(planners, [names[label] or label for label in planners])
+    return label_styles(planners, [record_name(names[label]) or label for label in planners])
+
+
+def _write_page(summary: CampaignSummary, folder: Path, out: Path, columns: Sequence[str]) -> list[Path]:
+    from antdrive.views.pages.charts import campaign_charts
+
+    planners, styles = summary.paired.planners, _styles(summary)
     base = link_to(folder, out.parent) + "/"
     text = rendered(
         "page.html.j2",
@@ -236,11 +262,11 @@ def _common(summary: CampaignSummary) -> dict[str, Any]:
     return {"title": summary.title, "summary": summary, **parts}
 
 
-WRITERS: Mapping[str, Callable[[CampaignSummary, Path, Path], list[Path]]] = MappingProxyType(
+WRITERS: Mapping[str, Callable[[CampaignSummary, Path, Path, Sequence[str]], list[Path]]] = MappingProxyType(
     {
         ".html": _write_page,
         ".md": _write_markdown,
-        ".tex": lambda summary, _, out: write_latex(summary, out),
-        ".csv": lambda summary, _, out: write_csv(summary, out),
+        ".tex": lambda summary, _, out, columns: write_latex(summary, out, columns),
+        ".csv": lambda summary, _, out, columns: write_csv(summary, out, columns),
     }
 )

@@ -6,6 +6,7 @@ import io
 import math
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -17,7 +18,7 @@ from antdrive.base.types import Flags, Floats
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.success import StepCurve, distributions, performance_profiles
 from antdrive.views.colours import INK, MUTED, LabelStyle, hexed
-from antdrive.views.figures.canvas import new_figure, styled
+from antdrive.views.figures.canvas import PRINTED, new_figure, save_figure, styled
 from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics, measure_title
 
 WORST = 10_000.0  # right end of a profile, as a multiple of the best value
@@ -43,7 +44,8 @@ class Chart(NamedTuple):
 
     title: str  # heading
     note: str  # caption
-    svg: str  # picture
+    figure: Figure  # picture
+    svg: str  # the picture as an SVG element in the page's colours
 
 
 def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> list[Chart]:
@@ -67,6 +69,20 @@ def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> l
     return charts + _option_boxes(paired, styles)
 
 
+def write_charts(charts: Sequence[Chart], planners: Sequence[str], folder: Path) -> list[Path]:
+    """Write each chart as PDF and SVG with the planners' names, at the width of a text column."""
+    files: list[Path] = []
+    for chart in charts:
+        lines = {line.get_gid(): line for axes in chart.figure.axes for line in axes.lines if line.get_gid()}
+        if lines:
+            names = [planners[int(str(key).removeprefix("planner-"))] for key in lines]
+            with styled():
+                chart.figure.legend(list(lines.values()), names, loc="outside upper left", ncols=3)
+        stem = re.sub(r"[^a-z0-9]+", "-", chart.title.lower()).strip("-")
+        files += [save_figure(chart.figure, folder / f"{stem}{suffix}") for suffix in PRINTED]
+    return files
+
+
 def _profile(name: str, curves: Sequence[StepCurve], count: int, styles: Sequence[LabelStyle]) -> Chart:
     def draw(axes: Any) -> None:
         largest = max((float(curve.x[-1]) for curve in curves if len(curve.x)), default=1.0)
@@ -78,7 +94,7 @@ def _profile(name: str, curves: Sequence[StepCurve], count: int, styles: Sequenc
         f"Fraction of {count} instances (world, task, settings, seed; repetitions once) that a planner solves within x times "
         "the best planner's value. Failures count as unsolved. Higher is better."
     )
-    return Chart(f"Performance profile: {_plain(name)}", note, _drawn(draw, styles))
+    return _chart(f"Performance profile: {_plain(name)}", note, _drawn(draw), styles)
 
 
 def _distribution(name: str, curves: Sequence[StepCurve], count: int, styles: Sequence[LabelStyle]) -> Chart:
@@ -90,7 +106,7 @@ def _distribution(name: str, curves: Sequence[StepCurve], count: int, styles: Se
         axes.set(xlabel=measure_title(name), ylabel="fraction of instances")
 
     note = f"Fraction of {count} instances that a planner solves with at most x. Failures count as unsolved."
-    return Chart(f"Distribution: {_plain(name)}", note, _drawn(draw, styles))
+    return _chart(f"Distribution: {_plain(name)}", note, _drawn(draw), styles)
 
 
 def _steps(
@@ -103,6 +119,11 @@ def _steps(
         share = np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]])
         (line,) = axes.step(x, share, where="post", color=style.light, ls=style.dash, lw=1.6)
         line.set_gid(f"planner-{k}")
+    first = curves[0]
+    if len(curves) > 1 and all(
+        np.array_equal(first.x, one.x) and np.array_equal(first.fraction, one.fraction) for one in curves
+    ):
+        axes.text(0.5, 0.5, "all planners identical", ha="center", va="center", transform=axes.transAxes, fontsize=8)
     if log:
         axes.set_xscale("log")
         _plain_ticks(axes.xaxis, low, high)
@@ -141,8 +162,8 @@ def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[L
         f"{measure_title(name)} by {size}, on the {int(common.sum())} instances that every planner solved ({counts} "
         "from left to right). Box: quartiles and median; whiskers: within 1.5 times the box; dots: outliers."
     )
-    svg = _panels(groups, labels, list(paired.planners), styles, name, size)
-    return [Chart(f"By world size: {_plain(name)}", note, svg)]
+    figure = _panels(groups, labels, list(paired.planners), styles, name, size)
+    return [_chart(f"By world size: {_plain(name)}", note, figure, styles)]
 
 
 def _edges(sizes: Floats) -> Floats:
@@ -190,7 +211,7 @@ def _boxes_of_option(
             _value_scale(axes, np.concatenate(boxes))
 
         note = f"{measure_title(name)} of {planner} on the {int(common.sum())} instances solved with every {option}."
-        charts.append(Chart(f"{planner} by {option}: {_plain(name)}", note, _drawn(draw, styles)))
+        charts.append(_chart(f"{planner} by {option}: {_plain(name)}", note, _drawn(draw), styles))
     return charts
 
 
@@ -206,12 +227,12 @@ def _panels(
     styles: Sequence[LabelStyle],
     name: str,
     size: str,
-) -> str:
+) -> Figure:
     """Return a small box plot per planner, all with the same axes."""
     shown = min(len(planners), MOST_PANELS)
     columns = min(3, shown)
     rows = math.ceil(shown / columns)
-    with styled(), matplotlib.rc_context({"svg.fonttype": "none", "font.size": 7.5}):
+    with styled(), matplotlib.rc_context({"font.size": 7.5}):
         figure = new_figure(WIDTH, 0.6 + 1.15 * rows)
         figure.set_facecolor("none")
         grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
@@ -229,7 +250,7 @@ def _panels(
             axes.tick_params(axis="x", labelsize=6, labelbottom=k + columns >= shown)
         figure.supxlabel(size, fontsize=8)
         figure.supylabel(measure_title(name), fontsize=8)
-        return _svg(figure, styles)
+        return figure
 
 
 def _draw_boxes(axes: Any, groups: Sequence[Floats], colours: Sequence[str]) -> None:
@@ -271,14 +292,19 @@ def _plain_ticks(axis: Any, low: float, high: float, steps: tuple[float, ...] = 
     axis.set_minor_formatter(NullFormatter())
 
 
-def _drawn(draw: Any, styles: Sequence[LabelStyle]) -> str:
+def _chart(title: str, note: str, figure: Figure, styles: Sequence[LabelStyle]) -> Chart:
     with styled(), matplotlib.rc_context({"svg.fonttype": "none"}):
+        return Chart(title, note, figure, _svg(figure, styles))
+
+
+def _drawn(draw: Any) -> Figure:
+    with styled():
         figure = new_figure(WIDTH, HEIGHT)
         figure.set_facecolor("none")
         axes: Any = figure.add_subplot()
         axes.set_facecolor("none")
         draw(axes)
-        return _svg(figure, styles)
+        return figure
 
 
 def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:

@@ -18,7 +18,8 @@ from typing import Any
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import InputError
-from antdrive.base.files import known_suffix, open_regular
+from antdrive.base.files import file_name, known_suffix, open_regular
+from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 from antdrive.views.pages.rendering import json_column, link_to, page_data, rendered, shown
 from antdrive.views.pages.reported_runs import (
@@ -111,6 +112,30 @@ def write_report(
     name = title or (Path(given[0]).resolve().name if len(given) == 1 and not isinstance(given[0], Run) else "runs")
     write_text(target, _page(reported, shown(name)) if page else _text(reported, shown(name)))
     return len(reported)
+
+
+def write_run_figures(folders: Iterable[Path], out: Path) -> list[Path]:
+    """Write the overview of every drive below folders, and a comparison of each world's, as PDF and SVG."""
+    from antdrive.views.figures.canvas import PRINTED
+    from antdrive.views.figures.run_figures import comparison_figure, overview
+
+    files: list[Path] = []
+    cases: dict[tuple[str, int], dict[str, Rollout]] = {}
+    for log in [path for folder in folders for path in sorted(folder.rglob("rollout.npz"))]:
+        rollout = Rollout.load(log)
+        name, task = log.parent.name, rollout.record.task
+        stem = file_name("-".join(log.parent.parts[-2:]))
+        files += [out / f"{stem}-overview{suffix}" for suffix in PRINTED]
+        for path in files[-2:]:
+            overview(rollout, path)
+        cases.setdefault((task.world.name, rollout.record.seed), {})[name] = rollout
+    for (world, seed), drives in cases.items():
+        files += [out / file_name(f"{world}-{seed}-comparison{suffix}") for suffix in PRINTED if len(drives) > 1]
+        for path in files[-2:] if len(drives) > 1 else ():
+            comparison_figure(drives, path)
+    if not files:
+        raise InputError(f"{', '.join(map(str, folders))}: no logs (no rollout.npz) to draw")
+    return files
 
 
 def _page(runs: list[ReportedRun], title: str) -> str:

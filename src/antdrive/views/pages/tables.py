@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.atomic import atomic_write, write_text
+from antdrive.base.errors import FieldError
 from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.runs.statistics.success import PlannerSuccess
 from antdrive.views.pages.campaign_summary import CampaignSummary, measure_title
@@ -105,6 +106,34 @@ def all_cells(summary: CampaignSummary) -> list[TextTable]:
     return [success_cells(summary), outcome_cells(summary), *pairs, *allowed]
 
 
+def chosen_tables(tables: Sequence[TextTable], columns: Sequence[str]) -> list[TextTable]:
+    """Return the tables that have all of these columns, with these alone, in this order; all tables without columns.
+
+    Columns may leave out units and brackets: `share` stands for `share [%]`.
+
+    Raises:
+        FieldError: no table has all of the columns.
+    """
+    if not columns:
+        return list(tables)
+    found: list[TextTable] = []
+    for table in tables:
+        places = {_plain(heading): k for k, heading in enumerate(table.headings)}
+        picked = [places.get(_plain(column), -1) for column in columns]
+        if -1 not in picked:
+            rows = [tuple(row[k] for k in picked) for row in table.rows]
+            found.append(TextTable(table.title, tuple(table.headings[k] for k in picked), rows))
+    if not found:
+        have = "; ".join(dict.fromkeys(", ".join(map(_plain, table.headings)) for table in tables))
+        raise FieldError("columns", f"no table has {', '.join(columns)}; choose from {have}")
+    return found
+
+
+def _plain(heading: str) -> str:
+    """Return a heading without its unit."""
+    return re.sub(r"\s*[\[(][^\])]*[\])]", "", heading).strip().lower()
+
+
 def allowance_cells(summary: CampaignSummary) -> TextTable:
     """Return the planners' non-inferiority tests."""
     headings = ("planner", "against", "measure", "not worse", "allowed", "advantage", "95 % of all", "worlds", "needed")
@@ -127,7 +156,7 @@ def success_note(row: PlannerSuccess) -> str:
     return ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in outcomes)
 
 
-def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
+def write_csv(summary: CampaignSummary, out: Path, columns: Sequence[str] = ()) -> list[Path]:
     """Write plain numbers as CSV: fractions from 0 to 1, empty cells for missing values."""
     names = list(summary.medians)
     medians = [f"{name}{end}" for name in names for end in ("_median", "_low", "_high")]
@@ -140,6 +169,10 @@ def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
         counted = [row.planner, row.runs, row.elsewhere, row.counted, row.successes]
         ended = [row.outcomes.get(name, 0) for name in outcomes]
         lines.append([*counted, row.fraction, *row.interval, *row.over_worlds, *centres, *ended])
+    if columns:
+        (table,) = chosen_tables([TextTable("", tuple(lines[0]), [tuple(line) for line in lines[1:]])], columns)
+        _write_lines(out, [table.headings, *table.rows])
+        return [out]
     _write_lines(out, lines)
     pairs = [row for comparisons in summary.comparisons.values() for row in comparisons]
     if not pairs:
@@ -157,25 +190,29 @@ def _write_lines(path: Path, lines: Sequence[Sequence[Any]]) -> None:
         csv.writer(stream).writerows(["" if value != value else value for value in line] for line in lines)
 
 
-def write_latex(summary: CampaignSummary, out: Path) -> list[Path]:
-    """Write the tables as LaTeX."""
+def write_latex(summary: CampaignSummary, out: Path, columns: Sequence[str] = ()) -> list[Path]:
+    """Write the tables as LaTeX, each with a caption and a label."""
     lines = ["% antdrive report; needs \\usepackage{booktabs} and, for long tables, \\usepackage{longtable}"]
-    for table in all_cells(summary):
-        lines += ["", f"% {latex_text(table.title)}", *_latex_table(table)]
+    for table in chosen_tables(all_cells(summary), columns):
+        lines += ["", f"% {latex_text(table.title)}", *_latex_table(table, summary)]
     lines += ["", *(f"% {latex_text(note)}" for note in (*summary.sentences, *summary.notes))]
     return [write_text(out, "\n".join(lines).rstrip() + "\n")]
 
 
-def _latex_table(table: TextTable) -> list[str]:
+def _latex_table(table: TextTable, summary: CampaignSummary) -> list[str]:
     def line(cells: Sequence[str]) -> str:
         return " & ".join(latex_text(cell) for cell in cells) + r" \\"
 
     align = "".join("l" if heading in WORDS else "r" for heading in table.headings)
-    environment = "longtable" if len(table.rows) > LATEX_PAGE else "tabular"
-    head = [f"\\begin{{{environment}}}{{{align}}}", r"\toprule", line(table.headings), r"\midrule"]
-    if environment == "longtable":
-        head.append(r"\endhead")
-    return [*head, *(line(row) for row in table.rows), r"\bottomrule", f"\\end{{{environment}}}"]
+    counts = f"{len(summary.table)} runs in {len(summary.paired.worlds)} worlds"
+    caption = f"\\caption{{{latex_text(f'{table.title} ({summary.title}: {counts}).')}}}"
+    label = f"\\label{{tab:{re.sub('[^a-z0-9]+', '-', f'{summary.title} {table.title}'.lower()).strip('-')}}}"
+    head, body = [r"\toprule", line(table.headings), r"\midrule"], [*map(line, table.rows), r"\bottomrule"]
+    if len(table.rows) > LATEX_PAGE:
+        named = f"{caption}{label} \\\\"
+        return [f"\\begin{{longtable}}{{{align}}}", named, *head, r"\endhead", *body, r"\end{longtable}"]
+    inner = [f"\\begin{{tabular}}{{{align}}}", *head, *body, r"\end{tabular}"]
+    return [r"\begin{table}", r"\centering", caption, label, *inner, r"\end{table}"]
 
 
 def latex_text(text: str) -> str:

@@ -1,0 +1,143 @@
+"""Odometry of a logged drive, rebuilt from the seed's noise, with the covariances of the simulated errors.
+
+A log holds the estimates, which pose fixes or scans may have corrected. Odometry is what wheels and gyro alone measured.
+The covariances follow from the error models of `NoiseModel` and `DeadReckoning`, linearised along the odometry's path.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from antdrive.base.types import Floats
+from antdrive.robots.spec import SAMPLE_RATE, Noise, Odometry
+from antdrive.sim.log.rollout import Rollout
+
+
+@dataclass(frozen=True, eq=False)
+class LoggedOdometry:
+    """Odometry in each of a log's T rows. Covariances are 0 where no noise was simulated.
+
+    The covariance of estimates is that of pose fixes in steady state, otherwise that of dead reckoning; for scan matching
+    it is an upper bound.
+    """
+
+    pose: Floats  # x, y [m] and yaw [rad] in the frame odom, which begins as the world's frame (T, 3)
+    twist: Floats  # measured speed [m/s] and yaw rate [rad/s], constant in a control period (T, 2)
+    wheels: Floats  # rim speeds of the left and right wheel by their encoders [m/s] (T, 2)
+    pose_covariance: Floats  # (T, 3, 3)
+    twist_covariance: Floats  # (T, 2, 2)
+    estimate_covariance: Floats  # (T, 3, 3)
+
+
+def odometry_of(rollout: Rollout) -> LoggedOdometry:
+    """Return the odometry of a logged drive: its true motion where the drive simulated no odometry."""
+    if rollout.record.localisation != "true" and len(rollout.actuated):
+        return _rebuilt(rollout)
+    return _true(rollout)
+
+
+def _true(rollout: Rollout) -> LoggedOdometry:
+    """Return the true motion as odometry."""
+    none, wheels = np.zeros((len(rollout.t), 3, 3)), wheel_speeds(rollout.twist, rollout.record.robot.track)
+    return LoggedOdometry(rollout.pose, rollout.twist, wheels, none, none[:, :2, :2], none)
+
+
+def _rebuilt(rollout: Rollout) -> LoggedOdometry:
+    """Return the odometry that the seed's noise makes of the logged motion.
+
+    The imports load compiled code, which tables of exact drives do not need.
+    """
+    from antdrive.robots.control.pursuit import Twist
+    from antdrive.robots.noise import steady_errors
+    from antdrive.sim.driving.localising import Exact, localiser_of
+    from antdrive.sim.physics.engine import State
+
+    record, rows, track = rollout.record, len(rollout.t), rollout.record.robot.track
+    factor = 1.0 if record.sensing is None else record.sensing.odometry
+    period, per_tick = 1 / record.control_hz, max(1, record.physics_hz // record.control_hz)
+    start = record.task.start
+    localiser = localiser_of(record.localisation, record.robot, record.noise, factor, period, start, record.seed)
+    if isinstance(localiser, Exact):
+        return _true(rollout)
+    encoders, odometry = [], []
+    for row in range(0, rows - 1 + per_tick, per_tick):
+        at = min(row, rows - 1)
+        localiser.sense(State(*rollout.pose[at].tolist(), *rollout.twist[at].tolist()))
+        encoders.append(localiser.encoders)
+        odometry.append(localiser.odometry)
+        localiser.actuate(Twist(*rollout.command[min(row + 1, rows - 1)].tolist()))
+    twists = np.array([Twist(0.0, 0.0), *odometry[1:]])
+    turned = start[2] + np.cumsum(twists[:, 1] * period)
+    middle, way = turned - twists[:, 1] * period / 2, twists[:, 0] * period
+    ticks = np.column_stack(
+        [start[0] + np.cumsum(way * np.cos(middle)), start[1] + np.cumsum(way * np.sin(middle)), turned]
+    )
+    of_row = (np.arange(rows) + per_tick - 1) // per_tick  # the control period that ends at the row or after it
+    before = np.maximum(of_row - 1, 0)
+    elapsed = (np.arange(rows) - before * per_tick) / record.physics_hz
+    pose = _moved(ticks[before], twists[of_row], elapsed)
+    noise = record.robot.noise.scaled(record.noise)
+    gyro = None if record.localisation == "fixes" else Odometry().scaled(factor)
+    poses, samples = _covariances(twists, middle, noise, gyro, track, period)
+    believed = poses[of_row]
+    if gyro is None:
+        xy, yaw = steady_errors(noise, track)
+        believed = np.tile(np.diag([xy**2, xy**2, yaw**2]), (rows, 1, 1))
+    wheels = wheel_speeds(np.array(encoders), track)[of_row]
+    return LoggedOdometry(pose, twists[of_row], wheels, poses[of_row], samples[of_row], believed)
+
+
+def wheel_speeds(twist: Floats, track: float) -> Floats:
+    """Return the rim speeds of the left and right wheel (N, 2) [m/s] for twists (N, 2)."""
+    rim = twist[:, 1] * track / 2
+    return np.column_stack([twist[:, 0] - rim, twist[:, 0] + rim])
+
+
+def _moved(pose: Floats, twist: Floats, time: Floats) -> Floats:
+    """Return poses (N, 3) after driving with twists (N, 2) for times (N,) [s]."""
+    way, turn = twist[:, 0] * time, twist[:, 1] * time
+    middle = pose[:, 2] + turn / 2
+    return pose + np.column_stack([way * np.cos(middle), way * np.sin(middle), turn])
+
+
+def _covariances(
+    twists: Floats, middle: Floats, noise: Noise, gyro: Odometry | None, track: float, period: float
+) -> tuple[Floats, Floats]:
+    """Return the covariances of pose (K, 3, 3) and twist (K, 2, 2) after each control period.
+
+    Extended Kalman prediction of x, y, yaw, the slip of both wheels, and the gyro's constant errors: scale of the speed,
+    scale of the yaw rate, and bias.
+    """
+    from antdrive.robots.noise import SLIP_TIME
+
+    by_wheels = np.array([[0.5, 0.5], [-1 / track, 1 / track]])  # from rim speeds to a twist
+    keep = math.exp(-period / SLIP_TIME)
+    fade, fresh = np.array([1.0, 1.0, 1.0, keep, keep, 1.0, 1.0, 1.0]), np.zeros(8)
+    fresh[3:5] = noise.slip**2 * (1 - keep * keep)
+    first = np.zeros(8)
+    extra = np.zeros(2)
+    if gyro is not None:
+        first[5:] = gyro.speed_scale**2, gyro.yaw_scale**2, gyro.gyro_bias**2
+        extra = np.array([gyro.speed_noise, gyro.gyro_noise]) ** 2 / (SAMPLE_RATE * period)
+    covariance, poses, samples = np.diag(first), [], []
+    for (speed, rate), rim, heading in zip(twists.tolist(), wheel_speeds(twists, track), middle.tolist(), strict=True):
+        covariance = covariance * np.outer(fade, fade) + np.diag(fresh)
+        from_wheels = by_wheels * rim
+        if gyro is not None:
+            from_wheels[1] = 0.0  # the gyro measures the yaw rate
+        of_errors = np.column_stack([-from_wheels, [speed, 0.0], [0.0, rate], [0.0, 1.0]])
+        white = noise.encoder**2 * from_wheels @ from_wheels.T + np.diag(extra * (speed * speed, 1.0))
+        cos, sin = period * math.cos(heading), period * math.sin(heading)
+        moves = np.array([[cos, -speed * sin * period / 2], [sin, speed * cos * period / 2], [0.0, period]])
+        step = np.eye(8)
+        step[:2, 2] = -speed * sin, speed * cos
+        step[:3, 3:] = moves @ of_errors
+        covariance = step @ covariance @ step.T
+        covariance[:3, :3] += moves @ white @ moves.T
+        poses.append(covariance[:3, :3])
+        samples.append(of_errors @ covariance[3:, 3:] @ of_errors.T + white)
+    poses[0] = np.zeros((3, 3))  # the start is exact
+    return np.array(poses), np.array(samples)
