@@ -333,6 +333,7 @@ def test_every_figure_gives_its_axes_back_to_be_labelled_and_saved(made_up_drive
         save_figure(drawn, tmp_path / "a.bmp")
 
 
+@pytest.mark.slow
 def test_the_example_of_the_page_runs(tmp_path):
     page = Path(__file__).parents[3] / "docs" / "how-to" / "figures.md"
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
