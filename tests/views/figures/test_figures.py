@@ -378,6 +378,18 @@ def test_the_figure_shows_the_map_and_the_first_sights(log, tmp_path):
     assert (tmp_path / "sight.png").stat().st_size < 400_000
 
 
+def test_numbers_and_titles_of_sights_in_a_tall_world_overlap_nothing(made_up_drive):
+    figure = sight_figure(scanned(made_up_drive(size=(4.0, 12.0), obstacles=60), max_range=2.5))
+    figure.draw_without_rendering()
+    named = panels(figure)
+    numbers = [text.get_window_extent() for text in named["map"].texts]
+    assert len(numbers) == LISTED
+    assert not any(one.overlaps(other) for k, one in enumerate(numbers) for other in numbers[:k])
+    for name in ("explored area", "first detections"):
+        assert named[name]._left_title.get_window_extent().x1 < named[name].bbox.x1
+        assert all(text.get_window_extent().x1 <= figure.bbox.x1 for text in named[name].texts)
+
+
 def test_an_overview_calls_the_first_route_one_and_shows_all_of_it(log):
     away = replace(log, route=np.array([[1.0, 2.0], [2.0, -1.5], [5.0, 2.0]]))
     for figure in (overview(away), sight_figure(away)):

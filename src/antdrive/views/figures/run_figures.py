@@ -28,7 +28,7 @@ from antdrive.views.figures.canvas import (
     sheet,
     thinned,
 )
-from antdrive.views.figures.map_chart import draw_along, draw_contact, draw_driven, draw_legend, draw_map
+from antdrive.views.figures.map_chart import covering, draw_along, draw_contact, draw_driven, draw_legend, draw_map
 from antdrive.views.scene import Scene
 
 if TYPE_CHECKING:
@@ -255,10 +255,8 @@ def _name_lines(axes: Any, names: Sequence[str], lines: Sequence[Floats], colour
         sides = np.array([(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]) * (half + 3 * unit)
         at = (inner[:, None] + sides).reshape(-1, 2)
         far = np.linalg.norm(inner[:, None] - others, axis=2).min(axis=1).repeat(len(sides))
-        covers = (np.abs(at[:, None] - np.vstack([others, line])) < half).all(axis=2).sum(axis=1)
-        clashes = sum((np.abs(at - centre) < half + size).all(axis=1).astype(int) for centre, size in taken)
-        outside = ((at - half < low) | (at + half > high)).any(axis=1)
-        best = int(np.argmin(1000 * (clashes + outside) + covers - far / (far.max() + unit)))
+        cost = covering(at, half, (low, high), taken, np.vstack([others, line]))
+        best = int(np.argmin(cost - far / (far.max() + unit)))
         taken.append(np.array([at[best], half]))
         edge = [withStroke(linewidth=2.4, foreground="white")]
         style: dict[str, Any] = {"fontsize": NAME_SIZE, "weight": "bold", "path_effects": edge, "zorder": 8}
