@@ -33,6 +33,7 @@ from antdrive.views.figures.robot_figure import robot_figure
 from antdrive.views.figures.run_figures import certificate_figure, comparison_figure, overview, then_and_now
 from antdrive.views.figures.sight_figure import LISTED, sight_figure
 from antdrive.views.map_reconstruction import MapReconstruction
+from antdrive.views.scene import Scene
 from antdrive.worlds import Disc, Keyframed, Task, Wandering, World, rasterise
 from tests.made_up_drive import scanned, undriven
 from tests.records import changed
@@ -300,7 +301,13 @@ def test_a_certificate_is_drawn_with_its_verdict(made_up_drive, tmp_path, certif
 def test_several_planners_on_one_map(made_up_drive, tmp_path):
     one = made_up_drive()
     other = replace(one, pose=one.pose + [0, 0.2, 0])
-    picture = pixels(comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80))
+    figure = comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80)
+    named, scene = panels(figure)["map"], Scene.of(one)
+    assert named.get_legend().get_title().get_text() == "planner: planned → driven, time"
+    for name in (text for text in named.texts if text.get_text() in {"astar", "mmas"}):
+        gaps = np.hypot(*(scene.obstacles[:, :2] - name.get_position()).T) - scene.obstacles[:, 2]
+        assert gaps.min() > 0
+    picture = pixels(figure)
     for style in label_styles(["astar", "mmas"], [one.record.planner.name] * 2):
         assert near(picture, style.colour, 12) > 100
 
