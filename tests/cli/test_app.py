@@ -94,6 +94,7 @@ def test_a_stream_that_takes_nothing_is_one_line(line, code, says):
     assert in_a_shell(line) == (code, "", says)
 
 
+@pytest.mark.slow
 def test_a_result_is_not_lost_with_stderr_and_no_file_takes_a_streams_number(small, tmp_path):
     """A compiled library prints to number 1 or 2, whatever file that is."""
     line = f"$A run {small} --no-figures --json --out {tmp_path / 'r'}"

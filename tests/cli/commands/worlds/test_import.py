@@ -54,6 +54,7 @@ def _building():
     return ["".join(row) for row in rows]
 
 
+@pytest.mark.slow
 def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive, tmp_path):
     levels = [[{"#": 0, " ": 254, "?": 205}[mark] for mark in row] for row in _building()]
     text = "\n".join(" ".join(map(str, row)) for row in levels)
