@@ -8,7 +8,8 @@ import pytest
 from antdrive.base import InputError
 from antdrive.planners import load_planner
 from antdrive.sim import Perception, Scenario, plan, run
-from antdrive.sim.driving.replay import ROUNDING
+from antdrive.sim import rerun as rerun_module
+from antdrive.sim.driving.replay import ROUNDING, replay
 from antdrive.sim.log.record import PROOFS, Proof
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.recording import optima_of
@@ -243,3 +244,21 @@ def test_equal_arrays_excuse_no_rounding_of_the_record(small_run):
     check = replayed(replace(log, record=replace(log.record, plan=plan)))
     assert not check.exact
     assert [problem.split(":")[1] for problem in check.problems] == [" record.plan.length_m"]
+
+
+def test_the_larger_difference_of_replay_and_rerun_counts(small_run, monkeypatch):
+    log = small_run.rollout
+    opened = replace(replay(log), position=0.25, turn=0.5, twist=0.75)
+    monkeypatch.setattr(rerun_module, "replay", lambda rollout: opened)
+    check = replayed(log)
+    assert (check.position, check.turn, check.twist) == (0.25, 0.5, 0.75)
+
+
+def test_lists_of_other_lengths_do_not_differ_by_rounding():
+    assert rerun_module._within_rounding([1.0, 2.0], [1.0, 2.0 + 1e-6])
+    assert not rerun_module._within_rounding([1.0, 2.0], [1.0])
+
+
+@pytest.mark.parametrize(("length", "cut"), [(58, False), (59, True)])
+def test_long_values_are_cut_in_messages(length, cut):
+    assert rerun_module._short("x" * length).endswith("…") is cut

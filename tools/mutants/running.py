@@ -26,7 +26,7 @@ from tools.mutants.operators import Mutant
 
 SOURCE = "src/antdrive"  # the files of plans are named from here
 ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
-LEFT_OUT = (".*", "out", "examples", "benchmarks", "docs")
+LEFT_OUT = (".*", "out", "examples", "docs")
 LOADED = ("base/*.py", "worlds/*.py", "worlds/files/*.py", "planners/**/*.py", "robots/**/*.py", "sim/log/*.py",
           "sim/physics/*.py", "sim/sensing/*.py", "sim/driving/*.py", "sim/pipeline.py")  # fmt: skip
 LIBRARIES = ["pytest", "numpy", "yaml", "pydantic", "joblib", "pybullet", "numba"]

@@ -138,9 +138,11 @@ def test_a_planner_of_a_user_is_given_or_the_replay_is_refused(small_scenario, t
     assert "--planner FILE.py:CLASS" in out
 
 
-def test_a_planner_without_a_replay_is_refused(refused, small_run, tmp_path):
+def test_a_planner_without_a_replay_or_a_registered_one_is_refused(antdrive, refused, small_run, tmp_path):
     path = small_run.rollout.save(tmp_path / "rollout.npz")
     assert "--planner: only the replay plans; add --replay" in refused("verify", path, "--planner", "mine.py:Mine")
+    _, out, _ = antdrive("verify", path, "--replay", "--planner", small_run.scenario.planner_name)
+    assert "planner: write FILE.py:CLASS or MODULE:CLASS, got " in out
 
 
 def test_a_forged_optimum_needs_the_world_or_the_replay(antdrive, small_run, small, tmp_path):
@@ -167,6 +169,18 @@ def test_results_that_the_log_contradicts_are_named(antdrive, small_run, tmp_pat
         assert f"result.json: {key}: differs from the log" in antdrive("verify", tmp_path)[1]
     path.write_text(json.dumps({**result, "metrics": {**result["metrics"], "spl": 0.5}}))
     assert "result.json: metrics.spl: differs from the log" in antdrive("verify", tmp_path)[1]
+    rounded = {**result["metrics"], "duration_s": result["metrics"]["duration_s"] * (1 + 1e-12)}
+    path.write_text(json.dumps({**result, "metrics": rounded}))
+    assert antdrive("verify", tmp_path)[0] == 0
+
+
+def test_a_certified_drive_that_failed_is_no_success(antdrive, small_scenario, tmp_path):
+    timed_out = run(replace(small_scenario, time_limit=1.0))
+    assert timed_out.certificate.certified
+    timed_out.rollout.save(tmp_path / "rollout.npz")
+    result = {**json.loads(as_json(timed_out.as_dict())), "succeeded": True}
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    assert "result.json: succeeded: differs from the log" in antdrive("verify", tmp_path)[1]
 
 
 def test_unseen_cylinders_are_other_worlds_where_movers_avoid_them(small_run):

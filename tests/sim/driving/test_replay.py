@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from antdrive.sim import Scenario, certify, run
-from antdrive.sim.driving.replay import ROUNDING, replay
+from antdrive.sim.driving.replay import ROUNDING, ReplayCheck, offsets, replay
 from tests.records import changed
 
 
@@ -20,6 +20,29 @@ def test_a_genuine_log_replays_bit_for_bit(small_run):
     assert check.problems == ()
     assert (check.position, check.turn, check.twist) == (0.0, 0.0, 0.0)
     assert check.sentence == "replayed bit for bit"
+
+
+def test_speeds_count_as_poses_do_and_differences_have_no_sign(small_run):
+    log = driven(small_run)
+    twist = log.twist.copy()
+    twist[5, 0] += 1e-5
+    check = replay(replace(log, twist=twist))
+    assert not check.exact
+    assert check.twist == pytest.approx(1e-5, rel=1e-6)
+    assert offsets(log.pose, log.twist, replace(log, twist=twist))[2] == pytest.approx(1e-5, rel=1e-6)
+
+
+def test_only_values_within_rounding_are_listed():
+    check = ReplayCheck(False, 0.1, 0.0, 0.0, ("replay: something",), ("pose",))
+    assert check.sentence.startswith("differs: at most 0.1 m")
+    assert replace(check, problems=()).sentence.startswith("replayed within rounding (pose): at most")
+    assert replace(check, problems=(), rounded=()).sentence.startswith("replayed within rounding: at most")
+
+
+def test_a_log_with_a_command_for_each_row_replays(small_scenario):
+    log = driven(run(replace(small_scenario, noise=1.0, control_hz=240, time_limit=1.0)))
+    check = replay(log)
+    assert (check.exact, check.problems) == (True, ())
 
 
 def test_a_collided_log_replays_with_the_same_contacts(collided_run):
