@@ -156,6 +156,13 @@ def test_a_random_world_is_that_of_the_command_that_writes_it(tmp_path):
     )
 
 
+def test_the_command_of_a_test_has_its_start_and_goal(tmp_path):
+    case = only(tmp_path, "world: empty, planner: astar, start: [2, 1.5, -0.1], goal: [3, 4]")
+    assert run_command(case) == (
+        "antdrive run empty --planner astar --robot turtlebot --seed 0 --start 2.0,1.5,-0.1 --goal 3.0,4.0"
+    )
+
+
 def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "own_planners_of_a_test.py"

@@ -66,12 +66,14 @@ def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
     entry = case.entry
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
     word, settings = _planner_word(case, planner, anywhere), setting_words(case.given)
-    if entry.start is not None or entry.goal is not None or settings is None or word is None:
+    if settings is None or word is None:
         return None
     world, before = _world_words(case, anywhere)
     words = ["antdrive", "run", world, "--planner", word]
     words += [word for key, value in planner.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
     words += ["--robot", _shown_name(case, entry.robot, list_robots(), anywhere), "--seed", str(case.seed)]
+    ends = {"--start": entry.start, "--goal": entry.goal}
+    words += [word for key, at in ends.items() if at is not None for word in (key, ",".join(map(str, at)))]
     return before + shlex.join([*words, *settings])
 
 
