@@ -62,6 +62,7 @@ def test_a_wrong_word_is_one_line_that_names_the_help(refused, words, says):
     assert says in refused(*words)
 
 
+@pytest.mark.slow
 def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small, tmp_path):
     command = [sys.executable, "-m", "antdrive", "run", str(small), "--json", "--out", str(tmp_path / "r")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

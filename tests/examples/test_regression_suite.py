@@ -72,6 +72,7 @@ def test_baselines_are_small():
     assert all(path.stat().st_size <= 20_000 for path in (EXAMPLE / "baselines").rglob("*.json"))
 
 
+@pytest.mark.slow
 def test_its_workflow_calls_pytest_with_options_that_exist(checkout, variables):
     (job,) = yaml.safe_load((EXAMPLE / ".github" / "workflows" / "drives.yml").read_text())["jobs"].values()
     (words,) = [step["run"].split() for step in job["steps"] if step.get("run", "").startswith("pytest")]

@@ -98,6 +98,7 @@ def test_results_that_nobody_wants_end_the_workers():
         assert list(workers.results(abs, [-4, 5])) == [4, 5], "new ones come in their place"
 
 
+@pytest.mark.slow
 def test_results_come_in_the_order_of_the_items_from_the_same_processes():
     with Pool(2) as workers:
         assert list(workers.results(operator.neg, range(40))) == [-item for item in range(40)]

@@ -221,6 +221,7 @@ def test_without_drives():
 """
 
 
+@pytest.mark.slow
 def test_python_tests_are_accepted_and_checked_like_suites(antdrive, suite):
     """Beside a suite, a module without drives that cannot be imported, and the planner of another test."""
     (suite.parent / "test_accepted_here.py").write_text(PYTHON)

@@ -115,6 +115,7 @@ def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(antdrive, 
     assert (found["digest"], found["planner"]) == (row["digest"], "Mine")
 
 
+@pytest.mark.slow
 def test_runs_that_are_asked_for_again_count_as_missing(antdrive, campaign):
     antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
     _, out, _ = antdrive(

@@ -176,6 +176,7 @@ def test_a_killed_worker_and_a_killed_parent_change_nothing(tmp_path, undisturbe
     assert read_results(tmp_path).complete
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path, undisturbed):
     process = disturbed(tmp_path)
     with pytest.raises(InputError, match=r"another run \(process \d+\) is writing to this folder"):

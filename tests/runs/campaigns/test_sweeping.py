@@ -65,6 +65,7 @@ def test_runs_that_crashed_are_made_again_only_if_asked(tmp_path):
     assert (again.made, again.outcomes) == (1, {"succeeded": 4})
 
 
+@pytest.mark.slow
 def test_runs_of_a_planner_or_an_outcome_are_made_again(tmp_path):
     campaign = make_campaign({"worlds": "empty", "planners": ["astar", {"name": "as", "ants": [5, 6]}], "seeds": 2})
     expansion = expand(campaign)

@@ -69,6 +69,7 @@ def near(picture, colour, within=12):
     return int((np.abs(picture - np.array(colour)).max(axis=-1) < within).sum())
 
 
+@pytest.mark.slow
 def test_a_plan_has_all_kinds_of_figures_in_pixels_and_vectors(planned, tmp_path):
     made = plan_figures(*planned, ROBOT, tmp_path, name="as", suffixes=(".png", ".pdf"))
     kinds = {"plan", "tour", "history", "bars", "contours"}

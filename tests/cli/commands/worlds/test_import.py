@@ -9,6 +9,7 @@ import pytest
 from antdrive.worlds import load_task
 
 
+@pytest.mark.slow
 def test_a_gazebo_world_is_imported_and_driven(antdrive, tmp_path):
     (tmp_path / "one.world").write_text(
         "<sdf version='1.6'><world name='one'><model name='c'><static>1</static><pose>2 1 0 0 0 0</pose><link name='l'>"
@@ -106,6 +107,7 @@ def dynabarn(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_a_dynabarn_set_becomes_one_file_for_each_world(antdrive, dynabarn):
     code, out, _ = antdrive("worlds", "import", dynabarn("one", "a/b"), "-o", "worlds")
     assert code == 0
