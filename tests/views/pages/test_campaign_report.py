@@ -207,6 +207,21 @@ def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths
         assert words == (set() if different else {"identical to a"})
 
 
+def test_long_names_of_planners_stay_whole_and_apart(tmp_path):
+    names = [f"aco-han alpha={k} ants=10 iterations=100 cap=200" for k in range(3)]
+    columns = made_up_columns({name: Skill(1.0) for name in names}, worlds=4, seeds=2)
+    summary = summarise(RunTable(columns), title="t")
+    charts = campaign_charts(summary, label_styles(names))
+    chart = next(chart for chart in charts if chart.title.startswith("By world size"))
+    chart.figure.draw_without_rendering()
+    titles = [axes._left_title for axes in chart.figure.axes]
+    assert [title.get_text().replace("\n", " ") for title in titles] == names
+    boxes = [title.get_window_extent() for title in titles]
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+    page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0].read_text()
+    assert re.findall(r"([^{}]*){[^{}]*text-overflow", page) == [" #runs td, #runs th "]
+
+
 def test_charts_need_no_optional_columns():
     columns = made_up_columns({"a": Skill(0.0), "b": Skill(0.0)}, worlds=2, seeds=2)
     assert campaign_charts(summarise(RunTable(columns), title="t"), label_styles("ab", "ab")) == []

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -23,6 +24,7 @@ from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics
 
 WORST = 10_000.0  # right end of a profile, as a multiple of the best value
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
+TITLE = 24  # characters per line above a planner's box plots
 FEWEST = 3  # values per box
 MOST_PANELS = 24  # planners with box plots
 MOST_DOTS = 60  # outliers per box
@@ -249,10 +251,10 @@ def _panels(
                 axes.set_visible(False)
                 continue
             _draw_boxes(axes, groups[k], [styles[k].light] * len(labels))
-            axes.set_title(planners[k], fontsize=7.5, weight="normal", color=styles[k].light)
+            axes.set_title(fill(planners[k], TITLE), fontsize=7.5, weight="normal", color=styles[k].light)
             same = next(j for j in range(k + 1) if all(map(np.array_equal, groups[j], groups[k])))
             if same < k:
-                _write_identical(axes, f"identical to {planners[same]}")
+                _write_identical(axes, fill(f"identical to {planners[same]}", TITLE))
         everything = np.concatenate([np.concatenate(group) for group in groups[:shown]])
         _value_scale(grid.flat[0], everything, steps=(1, 3))
         for k, axes in enumerate(grid.flat[:shown]):
