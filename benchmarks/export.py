@@ -59,11 +59,12 @@ def by_command(log: Path, kind: str, target: Path) -> float:
 def messages(log: Path) -> tuple[int, int]:
     """Count the messages and scans in the bag of a log."""
     from antdrive.views.export.exporting import topics_of
+    from antdrive.views.export.robot_frames import frames_of_spec
     from antdrive.views.export.samples import DriveScans
 
     rollout = Rollout.load(log)
-    scans = DriveScans.of(rollout)
-    return sum(len(topic.stamps) for topic in topics_of(rollout, scans)), len(scans.rows)
+    scans, body = DriveScans.of(rollout), frames_of_spec(rollout.record.robot)
+    return sum(len(topic.stamps) for topic in topics_of(rollout, scans, body)), len(scans.rows)
 
 
 def rows(folder: Path, rounds: int, drives: int) -> Iterator[list[str]]:

@@ -90,6 +90,7 @@ def test_a_project_with_packages_of_the_same_names_imports_its_own(installed):
     assert all(Path(place).is_relative_to(project) for place in places.split())
 
 
+@pytest.mark.slow
 def test_a_project_with_packages_of_the_same_names_tests_its_drives(installed):
     """Kernels run as plain Python: the wheel's are not compiled."""
     python, project = installed

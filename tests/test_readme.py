@@ -56,6 +56,7 @@ def test_the_python_block_passes_mypy_strict(tmp_path):
     assert summary.startswith("Found 1 error in 1 file (checked 2 ")
 
 
+@pytest.mark.slow
 def test_the_commands_work(home, monkeypatch, capsys):
     lines = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
     commands = [(shlex.split(line.split("||")[0]), "||" in line) for line in lines if line.startswith("antdrive")]

@@ -36,6 +36,7 @@ def filled(tmp_path_factory):
     return folder, done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [b"\x80", None], ids=["cut short", "another class"])
 def test_a_damaged_entry_is_compiled_again(filled, tmp_path, damage):
     folder, printed = filled

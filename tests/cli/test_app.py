@@ -62,6 +62,7 @@ def test_a_wrong_word_is_one_line_that_names_the_help(refused, words, says):
     assert says in refused(*words)
 
 
+@pytest.mark.slow
 def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small, tmp_path):
     command = [sys.executable, "-m", "antdrive", "run", str(small), "--json", "--out", str(tmp_path / "r")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -94,6 +95,7 @@ def test_a_stream_that_takes_nothing_is_one_line(line, code, says):
     assert in_a_shell(line) == (code, "", says)
 
 
+@pytest.mark.slow
 def test_a_result_is_not_lost_with_stderr_and_no_file_takes_a_streams_number(small, tmp_path):
     """A compiled library prints to number 1 or 2, whatever file that is."""
     line = f"$A run {small} --no-figures --json --out {tmp_path / 'r'}"

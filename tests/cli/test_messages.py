@@ -49,8 +49,10 @@ compare runs
 compare slalon
 compare tight.yaml -p astar -p dijkstra
 export run.npz --to csv -o new --force
+export run.npz --to csv -o new --urdf cart.urdf
 export run.npz --to ros1 -o new --force
 export run.npz --to rosbag2 -o new --force
+export run.npz -o new.mcap --arg a=1
 falsify --method wise
 falsify -p mine.py:Mine
 falsify -p nobody

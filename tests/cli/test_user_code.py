@@ -114,6 +114,7 @@ def test_a_file_that_never_ends_or_exits_on_import_is_named(folder, code, words)
     assert said_in_one_line(process("plan", "empty", "--planner", "import.py:Mine"), "import.py", words)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "names", ["Exits Right", pytest.param("Endless Compiled Crashes Right", marks=pytest.mark.slow)]
 )

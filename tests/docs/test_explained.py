@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.planners import PLANNERS
-from tools.reference import described, weaknesses_of
+from tools.reference import meanings_of, weaknesses_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "explanation" / "planners"
@@ -57,7 +57,7 @@ def test_a_planner_knows_its_weaknesses_and_every_option_is_described(kind):
     wanted = {}
     for base in reversed(kind.__mro__):
         wanted |= attributes(inspect.getsource(base).split('"""')[1] if base.__module__.startswith("antdrive") else "")
-    assert described(kind) == wanted
+    assert meanings_of(kind) == wanted
 
 
 def test_the_lines_that_draw_pictures_are_python():

@@ -41,6 +41,7 @@ def run(words, folder, env):
     return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_its_tests_pass_and_use_every_baseline(checkout, variables):
     done = run(["pytest", "-q", "--drive-strict", "--drive-film=never", "--junitxml=junit.xml"], checkout, variables)
     assert done.returncode == 0, done.stdout
@@ -55,6 +56,7 @@ def test_its_tests_pass_and_use_every_baseline(checkout, variables):
     assert all(re.fullmatch("[0-9a-f]{64}", fact["drive.digest"]) for fact in driven)
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_planner_fails_its_tests(checkout, variables):
     planner = checkout / "courier.py"
     planner.write_text(planner.read_text().replace("if not moves[here] >> k & 1:", "if not query.grid.free[cell]:"))
@@ -70,6 +72,7 @@ def test_baselines_are_small():
     assert all(path.stat().st_size <= 20_000 for path in (EXAMPLE / "baselines").rglob("*.json"))
 
 
+@pytest.mark.slow
 def test_its_workflow_calls_pytest_with_options_that_exist(checkout, variables):
     (job,) = yaml.safe_load((EXAMPLE / ".github" / "workflows" / "drives.yml").read_text())["jobs"].values()
     (words,) = [step["run"].split() for step in job["steps"] if step.get("run", "").startswith("pytest")]

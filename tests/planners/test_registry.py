@@ -373,6 +373,7 @@ def printed(**environment):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_uncompiled_kernels_give_the_same_plans_without_a_warning():
     plain = printed(NUMBA_DISABLE_JIT="1")
     assert plain.count("SOLVED") >= 2 * len(PLANNERS) - 4  # potentials and ants may get stuck

@@ -94,6 +94,7 @@ def printed(script, *words):
     return {name: rest.split() for name, rest in lines}
 
 
+@pytest.mark.slow
 @needs_kernels
 @pytest.mark.parametrize("words", [SOON, pytest.param((*PLANNERS, *COLONIES), marks=pytest.mark.slow)], ids=len)
 def test_every_kernel_of_a_planner_is_loaded_before_the_clock_starts(words):

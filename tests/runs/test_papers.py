@@ -63,6 +63,7 @@ def test_a_recreated_map_depends_on_the_seed_alone():
     assert (one != other).any()
 
 
+@pytest.mark.slow
 def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "PC", (0.25,))
     monkeypatch.setattr(pictures, "PM", (0.1, 0.2))

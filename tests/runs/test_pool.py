@@ -32,6 +32,7 @@ def made(work, processes, runs=(), **watched):
         return [finished_of(one, watched.get("limit")).row for one in done]
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_process_twice_is_recorded_and_no_other_is_lost():
     rows = made(Deadly((3,)), 2)
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs())
@@ -48,6 +49,7 @@ def test_a_run_whose_process_dies_once_is_tried_again(tmp_path):
     assert attempts == {f"seed {seed}": 2 if seed == 2 else 1 for seed in range(8)}
 
 
+@pytest.mark.slow
 def test_a_run_that_does_not_end_is_ended_and_not_tried_again():
     rows = made(Endless((2,)), 2, limit=6.0)  # other runs stay below it on a busy machine
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs())
@@ -76,6 +78,7 @@ def test_workers_that_end_before_they_begin_end_the_campaign():
         made(Unloadable(), 1)
 
 
+@pytest.mark.slow
 def test_a_process_stays_with_a_world_while_there_is_one_for_each(tmp_path):
     path = tmp_path / "runs"
     assert len(made(Listing(str(path)), 2, jobs(worlds=2, seeds=30))) == 60
@@ -95,6 +98,7 @@ def test_results_that_nobody_wants_end_the_workers():
         assert list(workers.results(abs, [-4, 5])) == [4, 5], "new ones come in their place"
 
 
+@pytest.mark.slow
 def test_results_come_in_the_order_of_the_items_from_the_same_processes():
     with Pool(2) as workers:
         assert list(workers.results(operator.neg, range(40))) == [-item for item in range(40)]

@@ -173,4 +173,13 @@ Speed = Annotated[float, option("FACTOR", "Playback speed of the film.", panel="
 Vector = Annotated[bool, flag("Also write figures as PDF.", "--vector", panel="Output")]
 Figures = Annotated[bool, flag("Write figures.", "--figures/--no-figures", panel="Output")]
 Jobs = Annotated[int | None, option("NUMBER", "Processes.  [default: one per core]", min=1, max=256)]
+XacroArguments = Annotated[list[str] | None, option("NAME=VALUE", "Argument of a .xacro file. Repeatable.", "--arg")]
+RosPackages = Annotated[
+    list[str] | None,
+    option(
+        "NAME=FOLDER",
+        "Folder of a ROS package. Repeatable.  [default: folder NAME beside or above FILE]",
+        "--package",
+    ),
+]
 Json = Annotated[bool, flag("Print a single JSON object on stdout.", "--json", panel="Output")]

@@ -124,6 +124,7 @@ def test_a_broken_test_hides_no_other(antdrive, suite, jobs, small_run):
     assert code == 2, "of the worst: input is wrong"
 
 
+@pytest.mark.slow
 def test_a_test_that_kills_its_process_is_named(antdrive, suite):
     (suite.parent / "mine.py").write_text(
         "import os\nfrom antdrive.planners import AStar\nclass Deadly(AStar):\n    def plan(self, *_): os._exit(3)\n"
@@ -220,6 +221,7 @@ def test_without_drives():
 """
 
 
+@pytest.mark.slow
 def test_python_tests_are_accepted_and_checked_like_suites(antdrive, suite):
     """Beside a suite, a module without drives that cannot be imported, and the planner of another test."""
     (suite.parent / "test_accepted_here.py").write_text(PYTHON)

@@ -13,6 +13,7 @@ from antdrive import robots
 CATALOGUE = Path(robots.__path__[0]) / "catalog"
 
 
+@pytest.mark.slow
 def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive, small, tmp_path):
     words = ("--out", "c", "--film", "c.mp4", "--speed", "20")
     code, out, err = antdrive("compare", small, "-p", "astar", "-p", "tangent", *words, "--json")
@@ -52,6 +53,7 @@ def test_the_command_that_repeats_a_run_names_the_robot_as_it_was_given(antdrive
     assert antdrive(*command[1:], "--no-figures", "--out", "again")[0] == 0
 
 
+@pytest.mark.slow
 def test_planners_have_options_of_their_own_and_are_paired_over_worlds_and_seeds(antdrive, small):
     Path("other.yaml").write_text(small.read_text().replace("name: small", "name: other"))
     words = [

@@ -19,6 +19,7 @@ class Greedy(AStar):
 CARELESS = ["-r", "jackal", "--margin", "0", "--noise", "6", "--smoothing", "none"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["astar", "mine.py:Greedy", pytest.param("mine:Greedy", marks=pytest.mark.slow)])
 def test_failures_are_handed_over_as_a_suite(antdrive, planner):
     """Those of a planner of one's own, too: its class is found beside, by other processes as well."""

@@ -11,6 +11,7 @@ from antdrive.runs.margins.choice import MarginResult
 from antdrive.sim import Scenario
 
 
+@pytest.mark.slow
 def test_the_smallest_safe_margin_is_found(antdrive, small):
     code, out, err = antdrive("find-margin", small, "--seeds", "1", "--json", "-p", "astar", "--smoothing", "taut")
     facts = json.loads(out)

@@ -24,6 +24,7 @@ def test_a_log_is_filmed_again_from_another_camera(antdrive, small_run, tmp_path
     assert Path("top.mp4").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_the_margin_of_a_noisy_drive_is_broken_down_by_cause(antdrive, small):
     code, out, _ = antdrive("run", small, "--noise", "1", "--smoothing", "taut", "--out", "r", "--json")
     facts = json.loads(out)

@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
+import pytest
 
+
+@pytest.mark.slow
 def test_the_default_folder_is_never_that_of_another_repetition(antdrive):
     for seeds, kept in (("1", False), ("2", False), ("1", True)):
         code, shown, _ = antdrive("reproduce", "hasan", "--seeds", seeds)

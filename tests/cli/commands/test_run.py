@@ -5,6 +5,8 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from antdrive.base.atomic import folder_lock
 from antdrive.robots import list_robots
 from antdrive.worlds import Disc, Task, World, save_task
@@ -60,6 +62,7 @@ def test_a_run_without_a_path_removes_the_log_of_an_earlier_run(antdrive):
     assert not Path("r/rollout.npz").exists()
 
 
+@pytest.mark.slow
 def test_a_run_replaces_the_files_of_an_earlier_run_and_no_others(antdrive, small, tmp_path):
     antdrive(
         "run", small, "-p", "aco-han", "-s", "planner.ants=50", "-s", "planner.iterations=5", "--vector", "--out", "o"
@@ -69,6 +72,7 @@ def test_a_run_replaces_the_files_of_an_earlier_run_and_no_others(antdrive, smal
     assert {path.name for path in (tmp_path / "o").iterdir()} == {"result.json", "overview.png", "mine.txt"}
 
 
+@pytest.mark.slow
 def test_a_run_reports_replans_and_avoidance_which_can_be_switched_off(antdrive, tmp_path):
     world = tmp_path / "crossing.yaml"
     world.write_text(

@@ -20,6 +20,7 @@ def collided(collided_run, tmp_path):
     return rollout.save(tmp_path / "collided.npz")
 
 
+@pytest.mark.slow
 def test_a_failure_becomes_a_world_and_a_suite(antdrive, collided, tmp_path):
     other = tmp_path / "out" / "small-small" / "shrink.json"
     other.parent.mkdir(parents=True)
@@ -58,6 +59,7 @@ def test_a_log_of_a_planner_that_is_not_registered_cannot_be_shrunk(refused, sma
     assert f"{mine}: record.planner.name: 'mine' is not registered" in refused("shrink", mine)
 
 
+@pytest.mark.slow
 def test_a_planner_from_a_file_goes_with_the_suite(antdrive, tmp_path):
     """The planner of the test has its file beside the first suite; the suite of the small failure finds it there."""
     (tmp_path / "own.py").write_text("from antdrive.planners.graph.search import AStar\nclass Mine(AStar):\n    pass\n")
@@ -73,6 +75,7 @@ def test_a_planner_from_a_file_goes_with_the_suite(antdrive, tmp_path):
     assert case.entry.planner == {"file": "../../own.py", "name": "Mine"}
 
 
+@pytest.mark.slow
 def test_the_log_of_a_planner_from_a_file_is_shrunk_with_that_file(antdrive, refused, collided_run, tmp_path):
     (tmp_path / "own.py").write_text(
         "from dataclasses import dataclass\nfrom antdrive.planners.graph.search import AStar\n"
@@ -93,6 +96,7 @@ def test_the_log_of_a_planner_from_a_file_is_shrunk_with_that_file(antdrive, ref
     assert case.entry.planner == {"name": "../../own.py:Mine", "calm": 0.5}
 
 
+@pytest.mark.slow
 def test_a_test_that_fails_by_its_bound_is_shrunk_until_it_would_keep_it(antdrive, small):
     """The bound is on the route's length, which no drive changes: two runs of the test itself, and quick ones after it."""
     text = "{schema: 1, scenarios: {a: {world: small.yaml, planner: astar, expect: {spl: '>= 0.999'}}}}"
@@ -109,6 +113,7 @@ def test_a_test_that_fails_by_its_bound_is_shrunk_until_it_would_keep_it(antdriv
     assert case.entry.expect == {"outcome": "succeeded", "certified": True, "spl": "< 0.999"}
 
 
+@pytest.mark.slow
 def test_a_test_that_fails_by_its_baseline_is_shrunk_while_it_is_worse(antdrive, small, small_run):
     suite = small.parent / "a.drive.yaml"
     suite.write_text("{schema: 1, scenarios: {a: {world: small.yaml, planner: astar}}}")

@@ -36,6 +36,7 @@ def test_a_dry_run_says_how_many_runs_there_are_and_writes_nothing(antdrive, cam
     assert not Path("out").exists()
 
 
+@pytest.mark.slow
 def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive, campaign):
     code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
     assert code == 0
@@ -69,6 +70,7 @@ def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive, camp
     assert canonical_bytes("out") == made
 
 
+@pytest.mark.slow
 def test_options_mean_what_a_file_means(antdrive, campaign):
     words = ["--world", "*.yaml", "-p", "astar", "-p", "aco-han:ants=5,10"]
     campaign.rename("campaign.txt")
@@ -87,6 +89,7 @@ def test_what_robots_know_is_an_option(antdrive, campaign):
     assert json.loads(out)["counts"]["settings"] == 2
 
 
+@pytest.mark.slow
 def test_the_command_in_a_row_repeats_the_run(antdrive, campaign, monkeypatch):
     words = ["--tasks", "2", "--noise", "1", "--smoothing", "taut", "--margin", "0.05", "--seeds", "3,7"]
     antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "aco-han:ants=5:shortcut=true", *words)
@@ -98,6 +101,7 @@ def test_the_command_in_a_row_repeats_the_run(antdrive, campaign, monkeypatch):
     assert json.loads(Path("again/result.json").read_text())["digest"] == row["digest"]
 
 
+@pytest.mark.slow
 def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(antdrive, campaign, monkeypatch):
     lines = ["from dataclasses import dataclass", "from antdrive.planners import AStar", "@dataclass(frozen=True)"]
     Path("mine.py").write_text("\n".join([*lines, "class Mine(AStar):", "    width: int = 3", ""]))
@@ -111,6 +115,7 @@ def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(antdrive, 
     assert (found["digest"], found["planner"]) == (row["digest"], "Mine")
 
 
+@pytest.mark.slow
 def test_runs_that_are_asked_for_again_count_as_missing(antdrive, campaign):
     antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
     _, out, _ = antdrive(

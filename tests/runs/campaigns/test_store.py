@@ -40,6 +40,7 @@ def outcomes(folder):
     return {row["seed"]: row["outcome"] for row in read_results(folder).table.to_pylist()}
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(st.lists(st.tuples(st.integers(0, 5), st.sampled_from(["succeeded", "crashed"]), st.booleans()), max_size=15))
 def test_every_run_stands_once_and_a_crash_only_where_no_attempt_succeeded(tmp_path_factory, events):
@@ -155,6 +156,7 @@ def children(process):
     return [pid for pid in map(int, text.split()) if b"popen_loky" in Path(f"/proc/{pid}/cmdline").read_bytes()]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 def test_a_killed_worker_and_a_killed_parent_change_nothing(tmp_path, undisturbed):
     process = disturbed(tmp_path)
@@ -174,6 +176,7 @@ def test_a_killed_worker_and_a_killed_parent_change_nothing(tmp_path, undisturbe
     assert read_results(tmp_path).complete
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path, undisturbed):
     process = disturbed(tmp_path)
     with pytest.raises(InputError, match=r"another run \(process \d+\) is writing to this folder"):
@@ -189,6 +192,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path, undisturbed):
     assert canonical_bytes(tmp_path) == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_campaign_killed_at_any_step_goes_on(tmp_path):
     """A process dies before each change of its folder in turn, the folder's making included."""

@@ -54,6 +54,7 @@ def test_what_is_there_is_not_run_again(worlds):
     assert canonical_bytes("out") == before
 
 
+@pytest.mark.slow
 def test_runs_that_crashed_are_made_again_only_if_asked(tmp_path):
     campaign = make_campaign({"worlds": "empty", "planners": "astar", "seeds": 4})
     expansion = expand(campaign)
@@ -64,6 +65,7 @@ def test_runs_that_crashed_are_made_again_only_if_asked(tmp_path):
     assert (again.made, again.outcomes) == (1, {"succeeded": 4})
 
 
+@pytest.mark.slow
 def test_runs_of_a_planner_or_an_outcome_are_made_again(tmp_path):
     campaign = make_campaign({"worlds": "empty", "planners": ["astar", {"name": "as", "ants": [5, 6]}], "seeds": 2})
     expansion = expand(campaign)
@@ -120,6 +122,7 @@ def test_plain_data_may_be_numpys_tuples_ranges_and_paths(worlds):
     ]
 
 
+@pytest.mark.slow
 def test_processes_and_order_do_not_show_in_the_table(worlds):
     sweep(TWO_BY_TWO, "here", jobs=0)
     sweep(TWO_BY_TWO, "two", jobs=2)

@@ -104,6 +104,7 @@ def test_what_is_expected_of_a_success_that_fails_otherwise(small_run):
     assert expectation(refused) == {"outcome": "succeeded", "certified": False}
 
 
+@pytest.mark.slow
 def test_what_was_written_is_what_another_process_runs(small_run, tmp_path):
     suite = write_suite(tmp_path / "s.drive.yaml", [handed(name, small_run) for name in ("one", "two", "three")])
     world = tmp_path / "worlds" / "two.yaml"

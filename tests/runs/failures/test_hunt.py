@@ -164,6 +164,7 @@ class Crashes(AStar):
         return super().plan(query, rng)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_a_planner_that_raises_is_a_finding(jackal, tmp_path, monkeypatch, method):
     monkeypatch.setattr(hunting, "REHEARSED", 3)
@@ -183,6 +184,7 @@ def test_a_planner_that_raises_is_a_finding(jackal, tmp_path, monkeypatch, metho
     assert handed.small.scenario.task.world.obstacles == scenario_task(case).world.obstacles
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_shrinking_hands_over_what_was_found(found, tmp_path, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt

@@ -178,6 +178,7 @@ def test_a_success_cannot_be_shrunk(small_scenario):
         shrink(small_scenario)
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_same_result(fenced):
     alone, together = shrink(fenced), shrink(fenced, jobs=2)
     assert changeable(alone.scenario) == changeable(together.scenario)

@@ -134,6 +134,7 @@ def test_tasks_have_free_ends_and_a_path(task):
     assert passable(task, rasterise(task.world, task.cell, reach))
 
 
+@pytest.mark.slow
 def test_tasks_shrink_to_the_obstacle_that_matters():
     import hypothesis
 

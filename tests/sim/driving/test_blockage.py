@@ -71,6 +71,7 @@ def test_patience_restarts_when_the_mover_moves_on(turtlebot):
     assert 22.0 < done.rollout.t[-1] < 26.0
 
 
+@pytest.mark.slow
 def test_a_mover_that_moves_is_never_given_up_on(turtlebot):
     """It walks to and fro by 0.3 m, and the lane is closed all the time; the robot looks for a way every second."""
     restless = Keyframed(radius=0.3, keyframes=((0.0, 5.0, 0.6), (3.0, 5.3, 0.6)))

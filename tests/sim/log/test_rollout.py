@@ -189,8 +189,7 @@ def packed(content, path, kind=zipfile.ZIP_DEFLATED):
                 member.write(data)
 
 
-@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 29])
-def test_every_byte_around_the_contents_of_a_log_is_as_numpy_writes_it(every, saved, tmp_path):
+def test_every_byte_around_the_contents_of_a_log_is_as_numpy_writes_it(saved, tmp_path):
     """Only the system that wrote the archive may differ: nobody reads it."""
     raw, path = saved.read_bytes(), tmp_path / "changed.npz"
     with zipfile.ZipFile(saved) as archive:
@@ -200,13 +199,14 @@ def test_every_byte_around_the_contents_of_a_log_is_as_numpy_writes_it(every, sa
             systems.add(at + 5)
             at += 46 + len(info.filename)
     inside = {place for begin, size in contents for place in range(begin, begin + size)}
-    around = [place for place in range(len(raw)) if place not in inside | systems]
+    elsewhere = inside | systems
+    around = [place for place in range(len(raw)) if place not in elsewhere]
     assert len(around) > 1000
-    for place in around[::every]:
+    for place in around:
         path.write_bytes(raw[:place] + bytes([raw[place] ^ 1]) + raw[place + 1 :])
         with pytest.raises(InputError, match="not a rollout"):
             read_record(path)
-    for place in sorted(systems)[::every]:
+    for place in systems:
         path.write_bytes(raw[:place] + bytes([0]) + raw[place + 1 :])
         assert Rollout.load(path).digest == read_record(saved).digest
 

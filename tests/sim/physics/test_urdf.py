@@ -143,6 +143,7 @@ BESIDE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", BESIDE)
 def test_what_physics_touches_is_what_the_closed_form_touches(kind, jackal):
     """Posts all around a body that is not centred on the axle, 1 mm in it or 1 mm from it; distances agree within 0.1 mm."""

@@ -17,6 +17,7 @@ from antdrive.views.export.topics import message_types
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
+BODY = SimpleNamespace(scan="base_scan", scanner=np.eye(4))
 STAMPS = np.array([0, 1, 999_999_999, 12_345_678_901], dtype=np.int64)
 
 
@@ -105,7 +106,7 @@ def log_with_scans(beams, field_of_view):
 @pytest.mark.parametrize(("beams", "around", "step"), [(3, math.pi, math.pi / 2), (4, 2 * math.pi, math.pi / 2)])
 def test_scans(beams, around, step):
     log = log_with_scans(beams, around)
-    (topic,) = samples.scan_topics(log, DriveScans.of(log))
+    (topic,) = samples.scan_topics(log, DriveScans.of(log), BODY)
     ranges = (log.scans * 1e-3).astype(np.float32)
     ranges[0, :2] = np.inf, -np.inf  # REP 117: nothing in range, too near to measure
     expected = [
@@ -122,6 +123,6 @@ def test_scans(beams, around, step):
 def test_a_log_without_scans_has_no_topic_for_them():
     log = log_with_scans(3, math.pi)
     log.scans = np.empty((0, 0), dtype=np.uint16)
-    assert samples.scan_topics(log, DriveScans.of(log, again=False)) == []
+    assert samples.scan_topics(log, DriveScans.of(log, again=False), BODY) == []
     log.record.robot.lidar = None
-    assert samples.scan_topics(log, DriveScans.of(log)) == []
+    assert samples.scan_topics(log, DriveScans.of(log), BODY) == []

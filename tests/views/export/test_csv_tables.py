@@ -14,7 +14,7 @@ import pytest
 from antdrive.base.errors import InputError
 from antdrive.robots import Footprint
 from antdrive.views.export.exporting import export
-from antdrive.views.export.scenery import description
+from antdrive.views.export.robot_frames import description
 
 
 @pytest.fixture

@@ -33,6 +33,7 @@ from antdrive.views.figures.robot_figure import robot_figure
 from antdrive.views.figures.run_figures import certificate_figure, comparison_figure, overview, then_and_now
 from antdrive.views.figures.sight_figure import LISTED, sight_figure
 from antdrive.views.map_reconstruction import MapReconstruction
+from antdrive.views.scene import Scene
 from antdrive.worlds import Disc, Keyframed, Task, Wandering, World, rasterise
 from tests.made_up_drive import scanned, undriven
 from tests.records import changed
@@ -68,6 +69,7 @@ def near(picture, colour, within=12):
     return int((np.abs(picture - np.array(colour)).max(axis=-1) < within).sum())
 
 
+@pytest.mark.slow
 def test_a_plan_has_all_kinds_of_figures_in_pixels_and_vectors(planned, tmp_path):
     made = plan_figures(*planned, ROBOT, tmp_path, name="as", suffixes=(".png", ".pdf"))
     kinds = {"plan", "tour", "history", "bars", "contours"}
@@ -299,7 +301,13 @@ def test_a_certificate_is_drawn_with_its_verdict(made_up_drive, tmp_path, certif
 def test_several_planners_on_one_map(made_up_drive, tmp_path):
     one = made_up_drive()
     other = replace(one, pose=one.pose + [0, 0.2, 0])
-    picture = pixels(comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80))
+    figure = comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80)
+    named, scene = panels(figure)["map"], Scene.of(one)
+    assert named.get_legend().get_title().get_text() == "planner: planned → driven, time"
+    for name in (text for text in named.texts if text.get_text() in {"astar", "mmas"}):
+        gaps = np.hypot(*(scene.obstacles[:, :2] - name.get_position()).T) - scene.obstacles[:, 2]
+        assert gaps.min() > 0
+    picture = pixels(figure)
     for style in label_styles(["astar", "mmas"], [one.record.planner.name] * 2):
         assert near(picture, style.colour, 12) > 100
 
@@ -333,6 +341,7 @@ def test_every_figure_gives_its_axes_back_to_be_labelled_and_saved(made_up_drive
         save_figure(drawn, tmp_path / "a.bmp")
 
 
+@pytest.mark.slow
 def test_the_example_of_the_page_runs(tmp_path):
     page = Path(__file__).parents[3] / "docs" / "how-to" / "figures.md"
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
@@ -375,6 +384,18 @@ def test_the_figure_shows_the_map_and_the_first_sights(log, tmp_path):
     listed = {label.get_text() for label in named["first detections"].get_yticklabels()}
     assert listed <= {text.get_text() for text in named["map"].texts}
     assert (tmp_path / "sight.png").stat().st_size < 400_000
+
+
+def test_numbers_and_titles_of_sights_in_a_tall_world_overlap_nothing(made_up_drive):
+    figure = sight_figure(scanned(made_up_drive(size=(4.0, 12.0), obstacles=60), max_range=2.5))
+    figure.draw_without_rendering()
+    named = panels(figure)
+    numbers = [text.get_window_extent() for text in named["map"].texts]
+    assert len(numbers) == LISTED
+    assert not any(one.overlaps(other) for k, one in enumerate(numbers) for other in numbers[:k])
+    for name in ("explored area", "first detections"):
+        assert named[name]._left_title.get_window_extent().x1 < named[name].bbox.x1
+        assert all(text.get_window_extent().x1 <= figure.bbox.x1 for text in named[name].texts)
 
 
 def test_an_overview_calls_the_first_route_one_and_shows_all_of_it(log):

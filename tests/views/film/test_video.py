@@ -275,6 +275,7 @@ def test_a_film_goes_into_slow_motion_around_a_contact(crash):
     assert red[1] > 100, "the band is labelled SLOW"
 
 
+@pytest.mark.slow
 def test_frames_rendered_in_several_processes_equal_those_of_one(drive):
     setting = {"camera": "follow", "size": SIZE, "note": None, "speed": 1.0}
     times = frame_times(0.6, 20, 1.0)

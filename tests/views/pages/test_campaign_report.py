@@ -190,9 +190,12 @@ def test_charts_are_svg_with_a_curve_for_each_planner(summary):
     assert [chart.svg for chart in charts] == [chart.svg for chart in campaign_charts(summary, styles)]
 
 
-def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths():
+@pytest.mark.parametrize("different", [True, False])
+def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths(different):
     columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)}, worlds=6, seeds=2)
     columns["duration_s"] = columns["driven_length_m"] = columns["gap_to_grid_optimum"] = [None] * 24
+    if not different:
+        columns["plan_s"] = [0.1] * 24
     for areas, says in (([4.0, 9.0, 400.0], "area of the world"), ([4.0] * 3, "shortest path on the grid")):
         columns["area_m2"] = [areas[int(world[-1]) % 3] for world in columns["world"]]
         charts = campaign_charts(summarise(RunTable(columns), title="t", metrics=[]), label_styles("ab", "ab"))
@@ -200,6 +203,23 @@ def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths
         assert f"by {says}" in chart.note
         assert "12 instances" in chart.note
         assert ("(4, 4, 4 from" in chart.note) == ("area" in says)
+        words = {text.get_text() for axes in chart.figure.axes for text in axes.texts}
+        assert words == (set() if different else {"identical to a"})
+
+
+def test_long_names_of_planners_stay_whole_and_apart(tmp_path):
+    names = [f"aco-han alpha={k} ants=10 iterations=100 cap=200" for k in range(3)]
+    columns = made_up_columns({name: Skill(1.0) for name in names}, worlds=4, seeds=2)
+    summary = summarise(RunTable(columns), title="t")
+    charts = campaign_charts(summary, label_styles(names))
+    chart = next(chart for chart in charts if chart.title.startswith("By world size"))
+    chart.figure.draw_without_rendering()
+    titles = [axes._left_title for axes in chart.figure.axes]
+    assert [title.get_text().replace("\n", " ") for title in titles] == names
+    boxes = [title.get_window_extent() for title in titles]
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+    page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0].read_text()
+    assert re.findall(r"([^{}]*){[^{}]*text-overflow", page) == [" #runs td, #runs th "]
 
 
 def test_charts_need_no_optional_columns():

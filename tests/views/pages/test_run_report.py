@@ -336,6 +336,7 @@ def test_markdown_puts_failures_first_and_links_films(small_run, collided_run, t
     assert "Not in the table" not in text
 
 
+@pytest.mark.slow
 def test_runs_made_in_python_become_a_report_together_with_folders(small_run, collided_run, tmp_path):
     write_run(small_run, tmp_path / "runs" / "a")
     page = tmp_path / "page.html"

@@ -10,7 +10,7 @@ from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
-from antdrive.cli.console import file_lines, planning, print_error, show, table
+from antdrive.cli.console import file_lines, marked, planning, print_error, show, table
 from antdrive.cli.entrants import check_worlds, entrants_of, repeat_command
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, SUCCEEDED
 from antdrive.cli.options import argument, option
@@ -160,7 +160,8 @@ def _views(
 
 
 def _lines(compared: Comparison, files: Mapping[str, str]) -> Iterator[str]:
-    yield from table(compared.headings, compared.rows)
+    rows = ((*cells, marked(ended == "succeeded", ended)) for *cells, ended in compared.rows)
+    yield from table(compared.headings, rows)
     if len(compared.cases) > 1:
         yield f"differences from {compared.labels[0]} where both succeeded: median (minimum to maximum)"
         heads = ("planner", "succeeded", "pairs", *COMPARED.values())

@@ -1,5 +1,7 @@
 """`antdrive export`."""
 
+import functools
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -7,7 +9,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.cli import options
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import flag, option
-from antdrive.cli.parse import log_at
+from antdrive.cli.parse import log_at, pair
 
 
 def export_drive(
@@ -22,18 +24,44 @@ def export_drive(
             "--scans/--no-scans",
         ),
     ] = True,
+    urdf: Annotated[
+        Path | None,
+        option("FILE", "The robot's .urdf or .xacro, for description, frames and joints.  [default: generated]"),
+    ] = None,
+    left: Annotated[str | None, option("NAME", "Joint or link of its left driven wheel.")] = None,
+    right: Annotated[str | None, option("NAME", "Joint or link of its right driven wheel.")] = None,
+    arguments: options.XacroArguments = None,
+    packages: options.RosPackages = None,
     json: options.Json = False,
 ) -> None:
     """Export a drive to Foxglove, RViz or CSV.
 
     mcap and rosbag2 hold ROS 2 messages. They need antdrive[ros], but no ROS installation.
     """
+    from antdrive.robots import RobotSpec
+    from antdrive.robots.importing.model import checked_packages
     from antdrive.views.export.exporting import EXPORTS, export
+    from antdrive.views.export.robot_frames import RobotFrames, frames_of_spec, frames_of_urdf
 
     if force and to in EXPORTS and to != "mcap":
         raise InputError(f"--force: applies to --to mcap only; {to} writes a new folder")
+    details = {"left": left, "right": right, "arg": arguments, "package": packages}
+    if urdf is None and (key := next((key for key, value in details.items() if value), None)):
+        raise InputError(f"--{key}: needs --urdf FILE")
+    if urdf is not None and to == "csv":
+        raise InputError("--urdf: tables hold no robot; use --to mcap or --to rosbag2")
+    frames: Callable[[RobotSpec], RobotFrames] = frames_of_spec
+    if urdf is not None:
+        frames = functools.partial(
+            frames_of_urdf,
+            path=urdf,
+            left=left,
+            right=right,
+            arguments=dict(pair(word, "--arg") for word in arguments or ()),
+            packages=checked_packages(dict(pair(word, "--package") for word in packages or ())),
+        )
     try:
-        files = export(log_at(rollout), to, out, replace=force, scans=scans)
+        files = export(log_at(rollout), to, out, replace=force, scans=scans, frames=frames)
     except FieldError as error:
         raise InputError(f"--{error.key}: {error.problem}") from None
     written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}

@@ -80,17 +80,8 @@ def import_robot(
     ] = None,
     meshes: Annotated[Path | None, option("FOLDER", "Folder of the meshes.")] = None,
     without_meshes: Annotated[bool, flag("Omit missing meshes.", "--without-meshes")] = False,
-    arguments: Annotated[
-        list[str] | None, option("NAME=VALUE", "Argument of a .xacro file. Repeatable.", "--arg")
-    ] = None,
-    packages: Annotated[
-        list[str] | None,
-        option(
-            "NAME=FOLDER",
-            "Folder of a ROS package. Repeatable.  [default: folder NAME beside or above FILE]",
-            "--package",
-        ),
-    ] = None,
+    arguments: options.XacroArguments = None,
+    packages: options.RosPackages = None,
     json: options.Json = False,
 ) -> None:
     """Create a robot file from a differential-drive robot's URDF.

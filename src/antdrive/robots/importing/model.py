@@ -173,7 +173,8 @@ class UrdfModel:
     drive: dict[str, str]  # values of Gazebo's drive plugins by tag, without repeated tags
     other_drive: str  # a Gazebo plugin that drives other than differentially; empty without one
     missing_meshes: tuple[str, ...]
-    lidars: tuple[UrdfSensor, ...] = ()  # the lidars that Gazebo simulates
+    lidars: tuple[UrdfSensor, ...]  # the lidars that Gazebo simulates
+    text: str  # URDF, without xacro
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
         """Yield the joints from a link to the root."""
@@ -236,6 +237,7 @@ def read_model(
         _other_drive(root),
         missing_meshes,
         lidars,
+        ET.tostring(root, encoding="unicode"),
     )
 
 

@@ -27,6 +27,7 @@ class UrdfSensor:
     """A lidar of a URDF file."""
 
     name: str  # for messages
+    link: str  # its link
     place: Floats  # its link's frame in the root's frame (4, 4)
     element: ET.Element  # its <sensor>
 
@@ -34,7 +35,7 @@ class UrdfSensor:
 def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfSensor, ...]:
     """Return the lidars that Gazebo simulates."""
     return tuple(
-        UrdfSensor(f"sensor {sensor.get('name', 'without a name')} of link {link}", places[link], sensor)
+        UrdfSensor(f"sensor {sensor.get('name', 'without a name')} of link {link}", link, places[link], sensor)
         for gazebo in root.findall("gazebo")
         for sensor in gazebo.findall("sensor")
         if (link := gazebo.get("reference", "")) in places and sensor.get("type") in KINDS

@@ -222,15 +222,14 @@ def import_urdf(
         raise InputError(f"--footprint {footprint}: choose from {', '.join(KINDS)}")
     model = read_model(path, meshes=meshes, without_meshes=without_meshes, arguments=arguments, packages=packages)
     wheels = driven_wheels(model, left, right, given.get("wheel_radius"))
-    frame = _frame(wheels)
-    floor = min(wheel.centre[2] - wheel.radius for wheel in wheels)
+    frame, floor = planar_frame(wheels), floor_under(wheels)
     low = [piece for piece in model.pieces if piece.points[:, 2].min() - floor <= below]
     high = [piece for piece in model.pieces if piece.points[:, 2].min() - floor > below]
     if not {piece.link for piece in low} - {wheel.joint.child for wheel in wheels}:
         where = "" if math.isinf(below) else f" below {below:g} m"
         raise input_error(str(path), f"has no collision geometry{where} other than its wheels, so no footprint")
-    points = [_from_above(piece.points, frame) for piece in low]
-    outline = footprint_around(_with_wheels(points, wheels), footprint)
+    points = [from_above(piece.points, frame) for piece in low]
+    outline = footprint_around(with_wheels(points, wheels), footprint)
     names = sorted({piece.link for piece in low})
     kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
     what = f"{kind} around the collision geometry of {_few(names)} and the wheels"
@@ -241,7 +240,7 @@ def import_urdf(
         _robot_in(text, path, values),
         text,
         tuple(points),
-        tuple(_from_above(piece.points, frame) for piece in high),
+        tuple(from_above(piece.points, frame) for piece in high),
         model.missing_meshes,
     )
 
@@ -264,7 +263,7 @@ def _checked(given: Mapping[str, float]) -> dict[str, float]:
     return dict(given)
 
 
-def _frame(wheels: tuple[DrivenWheel, DrivenWheel]) -> Floats:
+def planar_frame(wheels: tuple[DrivenWheel, DrivenWheel]) -> Floats:
     """Return the robot's planar frame in the root's frame: origin, x and y as rows (3, 2)."""
     left, right = wheels
     across = (left.centre - right.centre)[:2]
@@ -272,11 +271,17 @@ def _frame(wheels: tuple[DrivenWheel, DrivenWheel]) -> Floats:
     return np.array([(left.centre[:2] + right.centre[:2]) / 2, (y[1], -y[0]), y])
 
 
-def _from_above(points: Floats, frame: Floats) -> Floats:
+def floor_under(wheels: tuple[DrivenWheel, DrivenWheel]) -> float:
+    """Return the floor's height in the root's frame [m]."""
+    return float(min(wheel.centre[2] - wheel.radius for wheel in wheels))
+
+
+def from_above(points: Floats, frame: Floats) -> Floats:
+    """Return points (N, 3) of the root's frame in top view, in the robot's frame (N, 2)."""
     return np.asarray((points[:, :2] - frame[0]) @ frame[1:].T)
 
 
-def _with_wheels(points: list[Floats], wheels: tuple[DrivenWheel, DrivenWheel]) -> list[tuple[float, float]]:
+def with_wheels(points: list[Floats], wheels: tuple[DrivenWheel, DrivenWheel]) -> list[tuple[float, float]]:
     """Return the points of all pieces and the corners of both wheels in top view."""
     half = float(np.linalg.norm(wheels[0].centre - wheels[1].centre)) / 2
     corners = [(float(x), float(y)) for piece in points for x, y in piece]

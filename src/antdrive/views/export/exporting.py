@@ -16,9 +16,11 @@ from antdrive.base.atomic import atomic_folder, atomic_write
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.files import require_new
 from antdrive.base.plane import world_to_map
+from antdrive.robots.spec import RobotSpec
 from antdrive.sim.driving.odometry import odometry_of
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
+from antdrive.views.export.robot_frames import RobotFrames, frames_of_spec
 from antdrive.views.export.samples import DriveScans, samples
 from antdrive.views.export.scenery import routes_of, scenery
 from antdrive.views.export.topics import Topic, metadata, write_mcap
@@ -30,7 +32,15 @@ MARGIN = 1.1  # shown extent relative to the world's
 ASPECT = 0.75  # minimum width over height of the scene's panel: a window of 1400 x 900 with an open side bar
 
 
-def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False, scans: bool = True) -> list[Path]:
+def export(
+    log: str | Path,
+    to: str,
+    path: str | Path,
+    *,
+    replace: bool = False,
+    scans: bool = True,
+    frames: Callable[[RobotSpec], RobotFrames] = frames_of_spec,
+) -> list[Path]:
     """Export a log atomically and return the written files or the folder."""
     if to not in EXPORTS:
         raise FieldError("to", f"unknown {to!r}; choose from {', '.join(EXPORTS)}")
@@ -41,13 +51,14 @@ def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False,
         kind = "; for one .mcap file use --to mcap" if target.suffix == ".mcap" else ""
         raise input_error(str(target), f"name a folder: {to} writes several files{kind}")
     require_new((target, target.with_suffix(LAYOUT)), replace=replace or to != "mcap")
-    return EXPORTS[to](Rollout.load(source), source, target, scans)
+    rollout = Rollout.load(source)
+    return EXPORTS[to](rollout, source, target, scans, frames(rollout.record.robot))
 
 
-def topics_of(rollout: Rollout, scans: DriveScans) -> list[Topic]:
+def topics_of(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topic]:
     """Return all topics of a drive. Static transforms come first, on /tf_static and on /tf."""
-    static, few = scenery(rollout)
-    many = samples(rollout, scans)
+    static, few = scenery(rollout, body)
+    many = samples(rollout, scans, body)
     moving = many[0]
     stamps = np.concatenate([static.stamps, moving.stamps])
     tf = Topic(moving.name, moving.kind, stamps, [*static.payloads, *moving.payloads])
@@ -68,31 +79,33 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
     }
 
 
-def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
+def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool, body: RobotFrames) -> list[Path]:
     layout = target.with_suffix(LAYOUT)
     with atomic_write(layout) as beside, atomic_write(target) as part:  # both files or neither
-        _write_bag(rollout, log, part, beside, again)
+        _write_bag(rollout, log, part, beside, again, body)
     return [target, layout]
 
 
-def _to_rosbag2(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
+def _to_rosbag2(rollout: Rollout, log: Path, target: Path, again: bool, body: RobotFrames) -> list[Path]:
     with atomic_folder(target) as folder:
         bag, beside = f"{target.name}.mcap", folder / f"{target.name}{LAYOUT}"
-        topics, notes = _write_bag(rollout, log, folder / bag, beside, again)
+        topics, notes = _write_bag(rollout, log, folder / bag, beside, again, body)
         (folder / "metadata.yaml").write_text(metadata(bag, topics, notes), encoding="utf-8")
     return [target]
 
 
-def _write_bag(rollout: Rollout, log: Path, bag: Path, layout: Path, again: bool) -> tuple[list[Topic], dict[str, str]]:
+def _write_bag(
+    rollout: Rollout, log: Path, bag: Path, layout: Path, again: bool, body: RobotFrames
+) -> tuple[list[Topic], dict[str, str]]:
     """Write a bag and its layout and return its topics and notes."""
     scans = DriveScans.of(rollout, again=again)
-    topics, notes = topics_of(rollout, scans), {"scans": scans.source}
+    topics, notes = topics_of(rollout, scans, body), {"scans": scans.source}
     write_mcap(bag, topics, attachments_of(rollout, log), notes)
     layout.write_text(json.dumps(foxglove_layout(rollout), indent=2) + "\n", encoding="utf-8")
     return topics, notes
 
 
-def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
+def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool, body: RobotFrames) -> list[Path]:
     with atomic_folder(target) as folder:
         write_tables(rollout, folder)
     return [target]
@@ -152,6 +165,6 @@ def _write_table(path: Path, heads: Sequence[str], lines: Iterable[Sequence[Any]
 
 
 #: Exporters by format.
-EXPORTS: Mapping[str, Callable[[Rollout, Path, Path, bool], list[Path]]] = MappingProxyType(
+EXPORTS: Mapping[str, Callable[[Rollout, Path, Path, bool, RobotFrames], list[Path]]] = MappingProxyType(
     {"mcap": _to_mcap, "rosbag2": _to_rosbag2, "csv": _to_csv}
 )

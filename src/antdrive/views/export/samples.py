@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -13,17 +14,8 @@ from antdrive.base.plane import relative_frame, world_to_map
 from antdrive.base.types import Floats, Ints
 from antdrive.sim.driving.odometry import LoggedOdometry, odometry_of
 from antdrive.sim.log.rollout import Rollout, ranges_of
-from antdrive.views.export.topics import (
-    FOOTPRINT,
-    LIDAR,
-    MAP,
-    ODOM,
-    TRUTH,
-    WHEEL_JOINTS,
-    Topic,
-    mover_frame,
-    nanoseconds,
-)
+from antdrive.views.export.robot_frames import RobotFrames
+from antdrive.views.export.topics import MAP, ODOM, TRUTH, Topic, mover_frame, nanoseconds
 
 HEADER = b"\x00\x01\x00\x00"  # CDR, little endian
 
@@ -76,11 +68,11 @@ class CdrLayout:
         self._constant += bytes(-(len(self._constant) - len(HEADER)) % size)
 
 
-def samples(rollout: Rollout, scans: DriveScans) -> list[Topic]:
+def samples(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topic]:
     """Return the topics with a message per row of a log or per scan."""
     stamps, frame, measured = nanoseconds(rollout.t), rollout.record.task.frame, odometry_of(rollout)
     truth, believed = world_to_map(frame, rollout.pose), world_to_map(frame, estimate_of(rollout))
-    frames = [(ODOM, FOOTPRINT), (MAP, ODOM), (MAP, TRUTH)]
+    frames = [(ODOM, body.base), (MAP, ODOM), (MAP, TRUTH)]
     frames += [(MAP, mover_frame(i)) for i in range(rollout.movers.shape[1])]
     still = np.zeros((*rollout.movers.shape[:2], 1))
     movers = world_to_map(frame, np.concatenate([rollout.movers, still], axis=2))
@@ -90,7 +82,7 @@ def samples(rollout: Rollout, scans: DriveScans) -> list[Topic]:
         transforms("/tf", stamps, frames, np.concatenate([robot, movers], axis=1)),
         odometry(
             "/odom",
-            (ODOM, FOOTPRINT),
+            (ODOM, body.base),
             stamps,
             measured.pose,
             measured.twist,
@@ -98,7 +90,7 @@ def samples(rollout: Rollout, scans: DriveScans) -> list[Topic]:
             measured.twist_covariance,
         ),
         odometry("/ground_truth/odom", (MAP, TRUTH), stamps, truth, rollout.twist, none, none[:, :2, :2]),
-        joint_states("/joint_states", stamps, rollout, measured),
+        joint_states("/joint_states", stamps, rollout, measured, body),
         twists("/cmd_vel", stamps, rollout.command),
         numbers("/clearance", "std_msgs/msg/Float64", "f8", stamps, rollout.clearance),
         numbers("/limiter", "std_msgs/msg/UInt8", "u1", stamps, rollout.limiter),
@@ -108,13 +100,13 @@ def samples(rollout: Rollout, scans: DriveScans) -> list[Topic]:
         covariance = turn @ measured.estimate_covariance @ turn.T
         topics.append(
             odometry(
-                "/estimate", (MAP, FOOTPRINT), stamps, believed, measured.twist, covariance, measured.twist_covariance
+                "/estimate", (MAP, body.base), stamps, believed, measured.twist, covariance, measured.twist_covariance
             )
         )
-    return [*topics, *scan_topics(rollout, scans)]
+    return [*topics, *scan_topics(rollout, scans, body)]
 
 
-def scan_topics(rollout: Rollout, scans: DriveScans) -> list[Topic]:
+def scan_topics(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topic]:
     """Return the topic of the lidar's scans; empty without scans.
 
     Ranges follow REP 117: +inf for nothing in range, -inf for objects too near to measure.
@@ -122,7 +114,10 @@ def scan_topics(rollout: Rollout, scans: DriveScans) -> list[Topic]:
     lidar = rollout.record.robot.lidar
     if lidar is None or not len(scans.rows):
         return []
-    first = float(lidar.angles[0]) - lidar.yaw
+    heading, upright = math.atan2(body.scanner[1, 0], body.scanner[0, 0]), body.scanner[2, 2] > 0
+    angles = (lidar.angles - heading) if upright else (heading - lidar.angles)[::-1]
+    middle = float(angles[0] + angles[-1]) / 2
+    first = float(angles[0]) - 2 * math.pi * round(middle / (2 * math.pi))
     values = {
         "angle_min": first,
         "angle_max": first + lidar.spacing * (lidar.beams - 1),
@@ -132,7 +127,8 @@ def scan_topics(rollout: Rollout, scans: DriveScans) -> list[Topic]:
         "range_min": lidar.min_range,
         "range_max": lidar.max_range,
     }
-    return [laser_scans("/scan", nanoseconds(rollout.t[scans.rows]), scans.ranges, values)]
+    ranges = scans.ranges if upright else scans.ranges[:, ::-1]
+    return [laser_scans("/scan", body.scan, nanoseconds(rollout.t[scans.rows]), ranges, values)]
 
 
 def estimate_of(rollout: Rollout) -> Floats:
@@ -140,18 +136,18 @@ def estimate_of(rollout: Rollout) -> Floats:
     return rollout.estimate if len(rollout.estimate) else rollout.pose
 
 
-def joint_states(topic: str, stamps: Ints, rollout: Rollout, measured: LoggedOdometry) -> Topic:
+def joint_states(topic: str, stamps: Ints, rollout: Rollout, measured: LoggedOdometry, body: RobotFrames) -> Topic:
     """Return angles [rad] and speeds [rad/s] of the wheels as their encoders measured them."""
     layout = CdrLayout()
     _header(layout, "")
     layout.length(2)
-    for joint in WHEEL_JOINTS:
+    for joint in body.joints:
         layout.text(joint)
     for name in ("position", "velocity"):
         layout.length(2)
         layout.number(name, "f8", 2)
     layout.length(0)
-    speeds = measured.wheels / rollout.record.robot.wheel_radius
+    speeds = measured.wheels / rollout.record.robot.wheel_radius * body.signs
     steps = np.diff(rollout.t, prepend=rollout.t[:1])[:, None]
     values = {"position": np.cumsum(speeds * steps, axis=0), "velocity": speeds}
     return Topic(topic, "sensor_msgs/msg/JointState", stamps, layout.messages(_stamp_values(stamps) | values))
@@ -207,10 +203,12 @@ def numbers(topic: str, kind: str, number: str, stamps: Ints, values: Any) -> To
     return Topic(topic, kind, stamps, layout.messages({"data": values}))
 
 
-def laser_scans(topic: str, stamps: Ints, ranges: npt.NDArray[np.floating], values: dict[str, float]) -> Topic:
+def laser_scans(
+    topic: str, frame: str, stamps: Ints, ranges: npt.NDArray[np.floating], values: dict[str, float]
+) -> Topic:
     """Return scans of a planar lidar."""
     layout = CdrLayout()
-    _header(layout, LIDAR)
+    _header(layout, frame)
     for name in values:
         layout.number(name, "f4")
     beams = ranges.shape[1]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,19 +11,9 @@ import numpy.typing as npt
 
 from antdrive.base.plane import world_to_map
 from antdrive.base.types import Floats, Pose
-from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.topics import (
-    BASE,
-    FOOTPRINT,
-    LIDAR,
-    MAP,
-    WHEEL_LINKS,
-    Topic,
-    message_types,
-    mover_frame,
-    nanoseconds,
-)
+from antdrive.views.export.robot_frames import RobotFrames, quaternion
+from antdrive.views.export.topics import MAP, Topic, message_types, mover_frame, nanoseconds
 from antdrive.views.scene import Scene, contact_point
 from antdrive.worlds.world import World
 
@@ -34,12 +23,12 @@ TOUCHED, GOAL, WALL = (0.9, 0.0, 0.5, 1.0), (0.2, 0.7, 0.3, 0.4), (0.3, 0.32, 0.
 FLAT, LINE, SPOT = 0.01, 0.05, 0.1  # height of the goal, width of a line, size of a contact [m]
 
 
-def scenery(rollout: Rollout) -> tuple[Topic, list[Topic]]:
+def scenery(rollout: Rollout, body: RobotFrames) -> tuple[Topic, list[Topic]]:
     """Return the static transforms, sent at the first row, and the other topics with few messages."""
     start = float(rollout.t[0])
-    static = _message("/tf_static", "tf2_msgs/msg/TFMessage", [start], [_static(rollout)], latched=True)
+    static = _message("/tf_static", "tf2_msgs/msg/TFMessage", [start], [_static(body, start)], latched=True)
     latched: dict[str, tuple[str, Any]] = {
-        "/robot_description": ("std_msgs/msg/String", _text(description(rollout.record.robot))),
+        "/robot_description": ("std_msgs/msg/String", _text(body.text)),
         "/obstacles": ("visualization_msgs/msg/MarkerArray", _markers(_standing(rollout))),
     }
     if rollout.movers.shape[1]:
@@ -55,14 +44,8 @@ def _message(name: str, kind: str, times: Sequence[float], contents: Iterable[An
     return Topic(name, kind, nanoseconds(times), payloads, latched)
 
 
-def _static(rollout: Rollout) -> Any:
+def _static(body: RobotFrames, start: float) -> Any:
     """Return the static transforms."""
-    robot, start = rollout.record.robot, float(rollout.t[0])
-    placed = [(FOOTPRINT, BASE, (0.0, 0.0, 0.0), 0.0)]
-    placed += [(BASE, link, place, 0.0) for link, place in wheel_places(robot).items()]
-    lidar = robot.lidar
-    if lidar is not None:
-        placed.append((BASE, LIDAR, (lidar.x, lidar.y, lidar.height), lidar.yaw))
     return _of(
         "tf2_msgs/msg/TFMessage",
         transforms=[
@@ -72,11 +55,13 @@ def _static(rollout: Rollout) -> Any:
                 child_frame_id=child,
                 transform=_of(
                     "geometry_msgs/msg/Transform",
-                    translation=_of("geometry_msgs/msg/Vector3", x=at[0], y=at[1], z=at[2]),
-                    rotation=_turn(heading),
+                    translation=_of(
+                        "geometry_msgs/msg/Vector3", **dict(zip("xyz", place[:3, 3].tolist(), strict=True))
+                    ),
+                    rotation=_of("geometry_msgs/msg/Quaternion", **dict(zip("xyzw", quaternion(place), strict=True))),
                 ),
             )
-            for parent, child, at, heading in placed
+            for parent, child, place in body.links
         ],
     )
 
@@ -318,60 +303,3 @@ def occupancy_maps(rollout: Rollout) -> Iterator[GroundGrid]:
         corner = (x + cols[0] * cell, y + rows[0] * cell, 0.0)
         place = world_to_map(rollout.record.task.frame, [corner])[0].tolist()
         yield GroundGrid(at, cell, (place[0], place[1], place[2]), cells)
-
-
-GAP = 0.005  # height of the body above the floor [m]
-WHEEL_WIDTH = 0.3  # in wheel radii
-#: XML escapes of attributes. The standard library's function loads all of urllib.
-ESCAPES = {ord(c): f"&#{ord(c)};" for c in '&<>"\n\r\t'}
-BODY_COLOUR, WHEEL_COLOUR = "0.16 0.44 0.72 1", "0.15 0.15 0.15 1"
-
-
-def wheel_places(robot: RobotSpec) -> dict[str, tuple[float, float, float]]:
-    """Return the wheels' positions in the robot's frame: x, y and z [m] by link."""
-    sides = zip(WHEEL_LINKS, (1, -1), strict=True)
-    return {link: (0.0, sign * robot.track / 2, robot.wheel_radius) for link, sign in sides}
-
-
-def description(robot: RobotSpec) -> str:
-    """Return the robot's shape as URDF. The root link's frame is on the floor, below the axle's centre.
-
-    The body is the footprint, a cylinder or its bounding box; the wheels are inside.
-    """
-    body, x, y = _body(robot)
-    origin = f'<origin xyz="{x!r} {y!r} {GAP + robot.height / 2!r}"/>'
-    parts = [
-        f'<robot name="{robot.name.translate(ESCAPES)}">',
-        f'<link name="{FOOTPRINT}"/>',
-        f'<joint name="base_joint" type="fixed"><parent link="{FOOTPRINT}"/><child link="{BASE}"/></joint>',
-        f'<link name="{BASE}">',
-        f"<visual>{origin}<geometry>{body}</geometry>{_colour('body', BODY_COLOUR)}</visual>",
-        f"<collision>{origin}<geometry>{body}</geometry></collision>",
-        "</link>",
-    ]
-    wheel = f'<cylinder radius="{robot.wheel_radius!r}" length="{WHEEL_WIDTH * robot.wheel_radius!r}"/>'
-    lying = f'<origin rpy="{math.pi / 2!r} 0 0"/>'
-    for link, place in wheel_places(robot).items():
-        parts += [
-            f'<link name="{link}">',
-            f"<visual>{lying}<geometry>{wheel}</geometry>{_colour('wheel', WHEEL_COLOUR)}</visual>",
-            "</link>",
-            f'<joint name="{link}_joint" type="continuous"><parent link="{BASE}"/><child link="{link}"/><axis xyz="0 1 0"/>',
-            f'<origin xyz="{" ".join(map(repr, place))}"/></joint>',
-        ]
-    return "\n".join([*parts, "</robot>"])
-
-
-def _body(robot: RobotSpec) -> tuple[str, float, float]:
-    """Return the body's geometry and its centre x, y [m] in the robot's frame; a polygon becomes its bounding box."""
-    foot, height = robot.footprint, robot.height
-    if foot.is_disc or len(foot.corners) == 1:
-        x, y = foot.corners[0] if foot.corners else (0.0, 0.0)
-        return f'<cylinder radius="{foot.rounding!r}" length="{height!r}"/>', x, y
-    xmin, ymin, xmax, ymax = foot.bounds
-    size = f"{xmax - xmin!r} {ymax - ymin!r} {height!r}"
-    return f'<box size="{size}"/>', (xmin + xmax) / 2, (ymin + ymax) / 2
-
-
-def _colour(name: str, rgba: str) -> str:
-    return f'<material name="{name}"><color rgba="{rgba}"/></material>'

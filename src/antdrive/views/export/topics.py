@@ -22,9 +22,7 @@ from antdrive.base.types import Ints
 
 Payloads = Sequence[bytes | memoryview]
 
-MAP, ODOM, FOOTPRINT, BASE, LIDAR, TRUTH = "map", "odom", "base_footprint", "base_link", "base_scan", "ground_truth"
-WHEEL_LINKS = ("left_wheel", "right_wheel")
-WHEEL_JOINTS = tuple(f"{link}_joint" for link in WHEEL_LINKS)
+MAP, ODOM, TRUTH = "map", "odom", "ground_truth"
 
 
 def mover_frame(index: int) -> str:

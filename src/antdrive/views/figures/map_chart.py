@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -147,6 +148,19 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene, **place: Any) -> No
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in colours.ZONE)
         known.append(Patch(fc=pale, ec=hexed(colours.ZONE), lw=0.5, label=scene.no_go_label))
     legend_above(axes, [*handles, *known], handlelength=1.6, **place)
+
+
+def covering(
+    at: Floats, half: Floats, limits: tuple[Floats, Floats], taken: Sequence[Floats], points: Floats
+) -> Floats:
+    """Return how much a label of half size (2,) [m] covers at each place (N, 2) [m].
+
+    Covered points (M, 2) [m] count 1; another label (centre and half size, `taken`) and the edge of the map (`limits`) 1000.
+    """
+    covered = (np.abs(at[:, None] - points) < half).all(axis=2).sum(axis=1)
+    clashes = sum((np.abs(at - centre) < half + size).all(axis=1).astype(int) for centre, size in taken)
+    outside = ((at - half < limits[0]) | (at + half > limits[1])).any(axis=1)
+    return np.asarray(1000.0 * (clashes + outside) + covered)
 
 
 def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:

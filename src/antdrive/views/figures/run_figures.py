@@ -28,7 +28,7 @@ from antdrive.views.figures.canvas import (
     sheet,
     thinned,
 )
-from antdrive.views.figures.map_chart import draw_along, draw_contact, draw_driven, draw_legend, draw_map
+from antdrive.views.figures.map_chart import covering, draw_along, draw_contact, draw_driven, draw_legend, draw_map
 from antdrive.views.scene import Scene
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ LIMITER_COLOURS = (
 MOST_LIMITERS = 6  # per row of the legend
 LINE_POINTS = 400  # of a line of a comparison
 NAME_SIZE = 8.0  # of names beside lines [pt]
+MOST_AVOIDED = 100  # obstacles that names of lines avoid
 NAME_SCALE = 400.0  # width of a comparison's map [pt]
 THEN, NOW = hexed(START), hexed(SHELL)
 
@@ -238,15 +239,20 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
             label = f"{', '.join(name for name, _ in same)}{alike}: {length} m, {float(log.t[-1]):.1f} s"
             handles += axes.plot(*line.T, color=style.light, ls=style.dash, lw=2.2, label=label, zorder=6)
         if len(drives) > 1:
-            _name_lines(axes, names, lines, [style.light for style in styles])
-        draw_legend(axes, handles, scene, ncols=2)
+            _name_lines(axes, scene, names, lines, [style.light for style in styles])
+        heading: dict[str, Any] = {"title": "planner: planned → driven, time", "alignment": "left", "title_fontsize": 8}
+        draw_legend(axes, handles, scene, ncols=2, **heading)
     return figure
 
 
-def _name_lines(axes: Any, names: Sequence[str], lines: Sequence[Floats], colours: Sequence[str]) -> None:
+def _name_lines(axes: Any, scene: Scene, names: Sequence[str], lines: Sequence[Floats], colours: Sequence[str]) -> None:
     """Write each name beside its line (N, 2), where the line lies far from the others and the name covers none."""
-    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    low, high = np.reshape(scene.bounds, (2, 2))
     unit = (high[0] - low[0]) / NAME_SCALE  # a point of text [m]
+    turns = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    rims = np.concatenate([np.zeros((1, 2)), np.stack([np.cos(turns), np.sin(turns)], axis=1)])
+    bodies = scene.obstacles[:: len(scene.obstacles) // MOST_AVOIDED + 1]
+    avoided = (bodies[:, None, :2] + bodies[:, None, 2:3] * rims).reshape(-1, 2)
     taken: list[Floats] = []  # centres and half sizes of placed names
     for k, (name, line, colour) in enumerate(zip(names, lines, colours, strict=True)):
         others = np.vstack([other for number, other in enumerate(lines) if number != k])
@@ -255,10 +261,8 @@ def _name_lines(axes: Any, names: Sequence[str], lines: Sequence[Floats], colour
         sides = np.array([(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]) * (half + 3 * unit)
         at = (inner[:, None] + sides).reshape(-1, 2)
         far = np.linalg.norm(inner[:, None] - others, axis=2).min(axis=1).repeat(len(sides))
-        covers = (np.abs(at[:, None] - np.vstack([others, line])) < half).all(axis=2).sum(axis=1)
-        clashes = sum((np.abs(at - centre) < half + size).all(axis=1).astype(int) for centre, size in taken)
-        outside = ((at - half < low) | (at + half > high)).any(axis=1)
-        best = int(np.argmin(1000 * (clashes + outside) + covers - far / (far.max() + unit)))
+        cost = covering(at, half, (low, high), taken, np.vstack([others, line, avoided]))
+        best = int(np.argmin(cost - far / (far.max() + unit)))
         taken.append(np.array([at[best], half]))
         edge = [withStroke(linewidth=2.4, foreground="white")]
         style: dict[str, Any] = {"fontsize": NAME_SIZE, "weight": "bold", "path_effects": edge, "zorder": 8}

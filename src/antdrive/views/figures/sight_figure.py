@@ -10,17 +10,23 @@ from matplotlib.collections import PatchCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
+from matplotlib.patheffects import withStroke
 
+from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, sightings
 from antdrive.views.colours import BAD, BEAM, GOOD, HATCH, HIT, INK, MOVER, MUTED, OBSTACLE, PALE, ROUTE, SHELL, hexed
-from antdrive.views.figures.canvas import draw_title, frame_map, legend_above, map_size, sheet
-from antdrive.views.figures.map_chart import draw_map
+from antdrive.views.figures.canvas import draw_title, frame_map, legend_above, map_size, sheet, thinned
+from antdrive.views.figures.map_chart import covering, draw_map
 from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders
 from antdrive.views.scene import Scene
 
 LISTED = 14  # obstacles with the closest approaches, whose first detections are drawn
 CURVE = 160  # points of the curve of explored area
+NARROW = 4.5  # maps of less width have a legend of two columns [inches]
+MAP_LABELS = 0.6  # size of the labels beside and below a map [inches]
+NUMBER_SIZE = 7.0  # of obstacles' numbers [pt]
+NUMBER_REACH = (8.0, 14.0, 20.0, 28.0, 38.0)  # of numbers from small obstacles [pt]
 
 
 def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
@@ -53,19 +59,20 @@ def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float
     with sheet(path, (wide + 5.4, high + 0.9), dpi) as figure:
         areas = figure.add_gridspec(2, 2, width_ratios=[wide, 5.0], height_ratios=[1.0, 1.6])
         chart: Any = figure.add_subplot(areas[:, 0], label="map")
-        _draw_known(chart, scene, rollout, seen, listed)
+        _draw_known(chart, scene, rollout, seen, ncols=2 if wide < NARROW else 3)
         frame_map(chart, shown)
+        _number_obstacles(chart, scene, rollout, listed, 72 * (np.array([wide, high]) - MAP_LABELS))
         curve: Any = figure.add_subplot(areas[0, 1], label="explored area")
         curve.plot(moments, explored, color=hexed(BEAM), lw=1.8)
         curve.set(title="explored area [m²]", ylim=(0, None), xlim=(0, max(float(rollout.t[-1]), 1e-3)))
-        curve.set_title(f"{explored[-1]:.1f} m² at the end", loc="right", fontsize=9, weight="normal")
+        curve.text(moments[-1], explored[-1], f"  {explored[-1]:.1f}", va="center", fontsize=8)
         _draw_detections(figure.add_subplot(areas[1, 1], sharex=curve, label="first detections"), rollout, listed)
         draw_title(figure, f"{scene.name}   ·   occupancy map of {scene.robot.name}", rollout.outcome)
     return figure
 
 
-def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: MapReconstruction, listed: list[Sighting]) -> None:
-    """Draw the occupancy map over the world, routes and driven path, and the numbers of the listed obstacles."""
+def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: MapReconstruction, **legend: Any) -> None:
+    """Draw the occupancy map over the world, routes and driven path."""
     draw_map(axes, scene, floor=False)
     x0, y0, x1, y1 = scene.bounds
     high, wide = seen.seen.shape
@@ -87,10 +94,6 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: MapReconstructi
         drawn = axes.plot(*line.T, **style, alpha=0.35 if k else 0.7, zorder=4.7 if k else 4.8)
         handles += [] if k else drawn
     handles += axes.plot(*rollout.pose[::8, :2].T, color=hexed(SHELL), lw=2.2, label="driven path", zorder=5)
-    for sight in listed:
-        x, y, _, _ = scene.obstacles[sight.obstacle]
-        colour = hexed(BAD) if sight.touched else "white"
-        axes.text(x, y, sight.obstacle, color=colour, ha="center", va="center", fontsize=7, weight="bold", zorder=7)
     axes.set(xlim=limits[0], ylim=limits[1])
     known = [
         Patch(fc=hexed(OBSTACLE), label="detected obstacle"),
@@ -100,12 +103,40 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: MapReconstructi
     ]
     if scene.mover_radii:
         known.append(Patch(fc=hexed(MOVER), label=scene.movers_label))
-    legend_above(axes, [*handles, *known], handlelength=1.6)
+    legend_above(axes, [*handles, *known], handlelength=1.6, **legend)
+
+
+def _number_obstacles(axes: Any, scene: Scene, rollout: Rollout, listed: list[Sighting], size: Floats) -> None:
+    """Write the listed obstacles' numbers into them or, if too small, beside them; the map has a size (2,) [pt]."""
+    unit = (np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1) / size).max()  # a point of text [m]
+    low, high = np.reshape(scene.bounds, (2, 2))
+    turns = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    around = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    avoided = np.vstack([rollout.pose[thinned(len(rollout.pose)), :2], scene.obstacles[:, :2]])
+    taken: list[Floats] = []
+    for sight in listed:
+        centre, radius = scene.obstacles[sight.obstacle, :2], scene.obstacles[sight.obstacle, 2]
+        half = unit * NUMBER_SIZE * np.array([0.36 * len(str(sight.obstacle)) + 0.1, 0.55])
+        style: dict[str, Any] = {"fontsize": NUMBER_SIZE, "weight": "bold", "ha": "center", "va": "center", "zorder": 7}
+        colour = hexed(BAD if sight.touched else INK)
+        inside = np.linalg.norm(half) < radius and (low < centre - half).all() and (centre + half < high).all()
+        if inside and not sight.touched:
+            axes.text(*centre, sight.obstacle, color="white", **style)
+            taken.append(np.array([centre, half]))
+            continue
+        reaches = radius + unit * np.array(NUMBER_REACH)
+        at = centre + (reaches[:, None, None] * around).reshape(-1, 2)
+        nearest = reaches.repeat(len(around)) / (reaches[-1] + unit)
+        best = at[int(np.argmin(covering(at, half, (low, high), taken, avoided) + nearest))]
+        taken.append(np.array([best, half]))
+        axes.plot(*np.stack([centre, best], axis=1), color=colour, lw=0.6, zorder=6)
+        edge = [withStroke(linewidth=2, foreground="white")]
+        axes.text(*best, sight.obstacle, color=colour, path_effects=edge, **style)
 
 
 def _draw_detections(axes: Any, rollout: Rollout, listed: list[Sighting]) -> None:
     """Draw a bar for each listed obstacle, from its first detection to the robot's closest approach."""
-    axes.set(title="first detection to closest approach, by obstacle", xlabel="time [s]")
+    axes.set(title="first detection to closest approach", xlabel="time [s]", ylabel="obstacle")
     for row, sight in enumerate(listed):
         colour = hexed(BAD if sight.touched else GOOD if np.isfinite(sight.seen_at) else MUTED)
         start = min(sight.seen_at, sight.nearest_at)

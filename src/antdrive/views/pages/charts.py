@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -23,6 +24,7 @@ from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics
 
 WORST = 10_000.0  # right end of a profile, as a multiple of the best value
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
+TITLE = 24  # characters per line above a planner's box plots
 FEWEST = 3  # values per box
 MOST_PANELS = 24  # planners with box plots
 MOST_DOTS = 60  # outliers per box
@@ -123,11 +125,16 @@ def _steps(
     if len(curves) > 1 and all(
         np.array_equal(first.x, one.x) and np.array_equal(first.fraction, one.fraction) for one in curves
     ):
-        axes.text(0.5, 0.5, "all planners identical", ha="center", va="center", transform=axes.transAxes, fontsize=8)
+        _write_identical(axes, "all planners identical")
     if log:
         axes.set_xscale("log")
         _plain_ticks(axes.xaxis, low, high)
     axes.set(xlim=(low, high), ylim=(-0.02, 1.02))
+
+
+def _write_identical(axes: Any, words: str) -> None:
+    size = 0.9 * matplotlib.rcParams["font.size"]
+    axes.text(0.5, 0.97, words, ha="center", va="top", transform=axes.transAxes, fontsize=size)
 
 
 def _thinned(x: Floats, share: Floats, low: float, high: float, log: bool) -> tuple[Floats, Floats]:
@@ -206,6 +213,8 @@ def _boxes_of_option(
 
         def draw(axes: Any, name: str = name, boxes: list[Floats] = boxes) -> None:
             _draw_boxes(axes, boxes, [styles[k].light for k in mine])
+            if all(np.array_equal(boxes[0], box) for box in boxes):
+                _write_identical(axes, f"identical for every {option}")
             axes.set(xlabel=option, ylabel=measure_title(name))
             axes.set_xticks(range(1, len(values) + 1), values)
             _value_scale(axes, np.concatenate(boxes))
@@ -242,7 +251,10 @@ def _panels(
                 axes.set_visible(False)
                 continue
             _draw_boxes(axes, groups[k], [styles[k].light] * len(labels))
-            axes.set_title(planners[k], fontsize=7.5, weight="normal", color=styles[k].light)
+            axes.set_title(fill(planners[k], TITLE), fontsize=7.5, weight="normal", color=styles[k].light)
+            same = next(j for j in range(k + 1) if all(map(np.array_equal, groups[j], groups[k])))
+            if same < k:
+                _write_identical(axes, fill(f"identical to {planners[same]}", TITLE))
         everything = np.concatenate([np.concatenate(group) for group in groups[:shown]])
         _value_scale(grid.flat[0], everything, steps=(1, 3))
         for k, axes in enumerate(grid.flat[:shown]):

@@ -18,6 +18,7 @@ def test_a_world_exported_to_gazebo_comes_back_the_same(antdrive):
     assert load_task("s.yaml") == load_task("slalom")
 
 
+@pytest.mark.slow
 def test_a_world_exported_to_maps_comes_back_with_its_task(antdrive):
     code, out, _ = antdrive("worlds", "export", "slalom", "-o", "m.map", "--resolution", "0.25", "--json")
     assert (code, json.loads(out)["files"]) == (0, {"map": "m.map", "problem": "m.map.scen"})

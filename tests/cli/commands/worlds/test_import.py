@@ -9,6 +9,7 @@ import pytest
 from antdrive.worlds import load_task
 
 
+@pytest.mark.slow
 def test_a_gazebo_world_is_imported_and_driven(antdrive, tmp_path):
     (tmp_path / "one.world").write_text(
         "<sdf version='1.6'><world name='one'><model name='c'><static>1</static><pose>2 1 0 0 0 0</pose><link name='l'>"
@@ -54,6 +55,7 @@ def _building():
     return ["".join(row) for row in rows]
 
 
+@pytest.mark.slow
 def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive, tmp_path):
     levels = [[{"#": 0, " ": 254, "?": 205}[mark] for mark in row] for row in _building()]
     text = "\n".join(" ".join(map(str, row)) for row in levels)
@@ -105,6 +107,7 @@ def dynabarn(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_a_dynabarn_set_becomes_one_file_for_each_world(antdrive, dynabarn):
     code, out, _ = antdrive("worlds", "import", dynabarn("one", "a/b"), "-o", "worlds")
     assert code == 0

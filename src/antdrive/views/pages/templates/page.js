@@ -37,6 +37,7 @@
     else if (name === "test") found.append(text(name, row) === "–" ? "" : make("span", text(name, row), "badge hit"));
     else if (name === "planner") found.append(chip(text(name, row)), text(name, row));
     else found.textContent = shown(name, row);
+    found.title = found.textContent;
     return found;
   };
   const gap = (rows) => { const line = make("tr", undefined, "gap"), filler = make("td"); filler.colSpan = data.shown.length; line.style.height = filler.style.height = `${rows * HEIGHT}px`; line.append(filler); return line; };
