@@ -117,13 +117,5 @@ def write_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str,
     from antdrive.views.film.video import film
 
     several = len(logs) > 1
-    info = compare_film(logs, path, **options) if several else film(logs[0], path, note=caption(logs[0]), **options)
+    info = compare_film(logs, path, **options) if several else film(logs[0], path, **options)
     return {"file": str(info.path), "frames": info.frames, "size": list(info.size), "fps": info.fps}
-
-
-def caption(log: Rollout) -> str:
-    """Return a film's line about the certificate."""
-    from antdrive.sim.log.certificate import certify
-
-    c = certify(log)
-    return f"certified: never closer than {c.bound:.3f} m" if c.certified else "not certified collision-free"

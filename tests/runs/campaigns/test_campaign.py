@@ -158,7 +158,50 @@ def test_bad_problems_are_named_or_skipped(tmp_path):
 def test_the_floor_of_random_tasks_is_stated():
     campaign = {"worlds": ["slalom", "empty"], "planners": ["astar"], "tasks": {"random": 1}}
     (remark,) = expand(make_campaign(campaign)).remarks
-    assert re.match(r"random tasks are drawn from \d\d% \(world slalom\) to 100% of the floor", remark)
+    assert re.match(r"random tasks are drawn from \d\d% \(world slalom\) to 100% of the connected floor", remark)
+
+
+def test_random_tasks_on_a_map_need_no_problem_and_lie_on_its_largest_ground(tmp_path):
+    block = 100  # cells; discs cover its rim and leave it hollow
+    wide = "." * (block + 6)
+    rows = (
+        [wide] * 3
+        + ["..." + "@" * block + "..."] * block
+        + [wide] * 3
+        + ["@" * (block + 6), "....." + "@" * (block + 1)]
+    )
+    text = "\n".join(["type octile", f"height {len(rows)}", f"width {block + 6}", "map", *rows])
+    (tmp_path / "ring.map").write_text(text + "\n")
+    campaign = {"worlds": [{"import": "ring.map"}], "planners": ["astar"], "tasks": {"random": 4}}
+    expansion = expand(make_campaign(campaign, tmp_path))
+    assert len(expansion.jobs) == 4 * len({job.seed for job in expansion.jobs})
+    for job in expansion.jobs:
+        task = job.case.place.task
+        assert task.world.bounds == (0.0, 2.0, block + 6.0, block + 8.0)
+        for x, y in (task.start[:2], task.goal):
+            assert not (3 < x < block + 3 and 5 < y < block + 5), "not in the hollow"
+    assert expansion.remarks == (
+        "random tasks are drawn from 100% of the connected floor: where the largest robot gets with its margin",
+    )
+    with pytest.raises(InputError, match="start and goal: missing"):
+        expand(make_campaign(campaign | {"tasks": "own"}, tmp_path))
+
+
+def test_a_map_without_ground_is_refused(tmp_path):
+    (tmp_path / "w.map").write_text("type octile\nheight 1\nwidth 3\nmap\n.@.\n")
+    campaign = {"worlds": [{"import": "w.map"}], "planners": ["astar"], "tasks": {"random": 1}}
+    with pytest.raises(InputError, match=r"w\.map: map: has no two connected free cells"):
+        expand(make_campaign(campaign, tmp_path))
+
+
+def test_the_floor_counts_only_where_the_largest_robot_gets(tmp_path):
+    rooms = [Disc(5.0, y, 0.5) for y in (0.5, 1.5, 2.5, 3.5)]  # a passage of 0.3 m between two rooms
+    task = Task(World("rooms", (0.0, 0.0, 10.0, 4.3), tuple(rooms)), (1.0, 1.0, 0.0), (3.0, 2.0))
+    save_task(task, tmp_path / "rooms.yaml")
+    campaign = {"worlds": ["rooms.yaml"], "planners": ["astar"], "tasks": {"random": 1}}
+    (remark,) = expand(make_campaign(campaign, tmp_path)).remarks
+    share = int(re.search(r"(\d+)%", remark)[1])
+    assert 30 <= share < 50, "one room of two"
 
 
 def test_worlds_of_one_name_are_called_by_their_files(tmp_path):

@@ -19,10 +19,11 @@ from antdrive.sim.scenario import Scenario
 from antdrive.views.colours import OUTCOME_LABELS
 from antdrive.views.film import film_options, overlay, playback, prelude, video
 from antdrive.views.film.comparison_film import SplitScreen, compare_film
+from antdrive.views.film.compositor import has_glow
 from antdrive.views.film.overlay import Layout, _entry_width, banner, legend_entries, legend_rows
 from antdrive.views.film.prelude import field_levels, plan_again, planning_frames
-from antdrive.views.film.shot import Shot
-from antdrive.views.film.text import text_width
+from antdrive.views.film.shot import Shot, caption
+from antdrive.views.film.text import pill, text_width
 from antdrive.views.film.video import film, film_failures, frame_times, render_frames, still
 from antdrive.views.scene import Scene
 from antdrive.worlds import Disc, Task, World, rasterise
@@ -286,9 +287,22 @@ def test_frames_rendered_in_several_processes_equal_those_of_one(drive):
     assert all((a == b).all() for a, b in zip(shared, alone, strict=True))
 
 
+def test_the_certificate_appears_with_the_outcome_at_the_end(drive, monkeypatch):
+    words = []
+    monkeypatch.setattr(overlay, "pill", lambda *given: words.append(given) or pill(*given))
+    shot = Shot(drive, camera="top", size=SIZE)
+    shot.frame(0.0)
+    assert "certified" not in str(words)
+    shot.last_frame()
+    assert caption(drive) in str(words)
+
+
 def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
     for size, found in (((30.0, 22.0), True), ((4.0, 3.0), False)):
         shot = Shot(made_up_drive(size=size, obstacles=0), camera="top", size=SIZE)
+        assert has_glow(shot.scene, shot._camera) == found
+        entries = legend_entries(shot.scene, 0.5, 0.02, glow=found)
+        assert ("robot" in {entry.text for entry in entries}) == found
         compositor, pose = shot._compositor, shot.playback.pose(0.5)
         px, py = (round(value) for value in compositor.pixel(*pose[:2]))
         tinted = compositor.frame(pose).astype(int) - compositor.backdrop.pixels

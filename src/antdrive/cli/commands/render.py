@@ -11,7 +11,6 @@ from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives
 from antdrive.cli.parse import log_at
 from antdrive.cli.parse import size as parse_size
-from antdrive.views.run_folder import caption
 
 
 def render(
@@ -39,7 +38,7 @@ def render(
     from antdrive.sim.log.rollout import Rollout
 
     logs = [Rollout.load(log_at(path)) for path in rollouts]
-    shape = {} if size is None else {"size": parse_size(size)}
+    shape: dict[str, Any] = {} if size is None else {"size": parse_size(size)}
     one_frame = at is not None or out.suffix.lower() == ".png"
     if len(logs) > 1 and one_frame:
         raise InputError(f"--out {out}: several rollouts need a film format")
@@ -47,7 +46,7 @@ def render(
     if one_frame:
         from antdrive.views.film.video import still
 
-        still(logs[0], out, at, camera=camera, **shape, note=caption(logs[0]))
+        still(logs[0], out, at, camera=camera, **shape)
         facts: dict[str, Any] = {"file": str(out), "frames": 1}
     else:
         facts = film_drives(logs, out, camera=camera, **shape, fps=fps, speed=speed, prelude=prelude)

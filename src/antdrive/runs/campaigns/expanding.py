@@ -98,7 +98,7 @@ def _remarks(tasks: Sequence[NamedTask], skipped: Sequence[str]) -> Iterator[str
     if floors:
         least, most = min(floors, key=floors.__getitem__), max(floors.values())
         share = f"{floors[least]:.0%}" if len(floors) == 1 else f"{floors[least]:.0%} (world {least}) to {most:.0%}"
-        yield f"random tasks are drawn from {share} of the floor: where the largest robot fits with its margin"
+        yield f"random tasks are drawn from {share} of the connected floor: where the largest robot gets with its margin"
 
 
 def _count_tasks(tasks: Sequence[NamedTask]) -> dict[str, int]:

@@ -25,7 +25,9 @@ from antdrive.runs.campaigns.job import NamedTask, PlannerVariant
 from antdrive.sim.forms import option_text, seed_list
 from antdrive.sim.log.record import canonical_hash, settings_of
 from antdrive.worlds import Disc, Grid, Task, World, list_worlds, load_task, load_tasks, rasterise
+from antdrive.worlds.formats.cellmap import connected
 from antdrive.worlds.formats.importing import import_file
+from antdrive.worlds.formats.movingai import movingai_ends
 from antdrive.worlds.generators.generate import generated
 
 OWN = "own"  # name of a world's default task
@@ -125,9 +127,12 @@ def _imported(
     problems = _problems(campaign, place, entry)
     suffix = "".join(f" {key}={option_text(value)}" for key, value in entry.items())
     options = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+    drawn = isinstance(campaign.tasks, RandomTasks) and problems == [None] and not {"start", "goal"} & set(entry)
     for path in _files(campaign, (*place, "import"), pattern, ""):
         for problem in problems:
             try:
+                if drawn and path.suffix.lower() == ".map":
+                    options["start"], options["goal"] = movingai_ends(path, entry.get("resolution", 1.0))
                 tasks = import_file(path, barn=barn, problem=problem, **options)
             except FieldError as error:
                 raise campaign.error((*place, error.key), error.problem) from None
@@ -295,9 +300,12 @@ def _drawn(
     rng = np.random.default_rng([request.seed, content])
     cell = max(entry.get("cell") or world.task.cell for entry in campaign.settings)
     grid = rasterise(world.task.world, cell, inflate)
-    free = np.argwhere(grid.moves > 0)
-    floor = len(free) / max(1, int(np.count_nonzero(rasterise(world.task.world, cell, 0.0).moves)))
-    for number in range(request.random):
+    fits, floor = grid.moves > 0, rasterise(world.task.world, cell, 0.0).moves > 0
+    inside = connected(floor, [grid.cell_at(*end[:2]) for end in (world.task.start, world.task.goal)])
+    floor = inside if inside.any() else floor  # a converted map is hollow where it is blocked
+    free = np.argwhere(fits & floor)
+    tasks: list[Task] = []
+    for _ in range(request.random):
         task = _draw(rng, grid, free, request.min_distance, world.task, robots, unseen) if len(free) else None
         if task is None:
             problem = (
@@ -305,8 +313,12 @@ def _drawn(
                 f"{world.world} for a robot of radius {inflate:.3g} m with its margin; use a smaller min_distance"
             )
             raise campaign.error(("tasks",), problem)
+        tasks.append(task)
+    reached = connected(fits, [grid.cell_at(*task.start[:2]) for task in tasks])
+    share = int(np.count_nonzero(reached & floor)) / max(1, int(np.count_nonzero(floor)))
+    for number, task in enumerate(tasks):
         name = f"random-{request.seed}-{number}"
-        yield dataclasses.replace(world, name=name, task=task, catalogue=None, floor=floor)
+        yield dataclasses.replace(world, name=name, task=task, catalogue=None, floor=share)
 
 
 def _draw(

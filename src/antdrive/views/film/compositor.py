@@ -239,9 +239,9 @@ class Compositor:
             place = np.array([pose[0] + off.real, pose[1] + off.imag, pose[2]])
             shape = np.array([(xmax - xmin) / 2 - foot.rounding, (ymax - ymin) / 2 - foot.rounding, foot.rounding])
         self._draw_shadow(frame, place, shape, tall)
-        wide = round(2 * foot.radius / self.camera.pixel)
-        if wide < 0.05 * frame.shape[1]:
+        if has_glow(self.scene, self.camera):
             px, py = self.pixel(pose[0], pose[1], tall / 2)
+            wide = round(2 * foot.radius / self.camera.pixel)
             halo = glow(2 * wide + round(0.02 * frame.shape[1]), colours.SHELL)
             put(frame, halo, px - len(halo) / 2, py - len(halo) / 2)
         for (x, y), radius in zip(movers, self.scene.mover_radii, strict=True):
@@ -287,6 +287,11 @@ class Compositor:
         """Draw bodies within a box and blend them into the frame."""
         image, depth, seg = draw_solids(solids, self.camera, box, self.fine, self._light)
         kernels.put_bodies(frame, image, depth, seg, self.backdrop.depth, box[0], box[1], self.fine, HIDDEN_OPACITY)
+
+
+def has_glow(scene: Scene, camera: Camera) -> bool:
+    """Return whether the robot is so small in the picture that a glow surrounds it."""
+    return round(2 * scene.robot.footprint.radius / camera.pixel) < 0.05 * camera.size[0]
 
 
 def drawn_height(scene: Scene) -> float:

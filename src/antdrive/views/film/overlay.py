@@ -168,7 +168,7 @@ _WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
 class LegendEntry(NamedTuple):
     """Line of the legend."""
 
-    kind: str  # of the sample: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot` or `scale`
+    kind: str  # of the sample: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot`, `halo` or `scale`
     colour: colours.Colour  # of the sample
     text: str  # its meaning
     width: float = 0.0  # of a scale bar [px]
@@ -184,6 +184,7 @@ def legend_entries(
     beams: bool = False,
     own_map: bool = False,
     tracked: bool = False,
+    glow: bool = False,
 ) -> list[LegendEntry]:
     """Return the legend's entries, one for each kind of object in the picture."""
     if planning:
@@ -194,6 +195,8 @@ def legend_entries(
     else:
         speeds = f"speed, 0 to {scene.robot.max_speed:.3g} m/s"
         entries = [LegendEntry("ramp", colours.INK, speeds), LegendEntry("dash", colours.ROUTE, "planned route")]
+    if glow:
+        entries.append(LegendEntry("halo", colours.SHELL, "robot"))
     if replans:
         entries.append(LegendEntry("dot", colours.ROUTE, "replan"))
     if scene.has_no_go_area:
@@ -305,6 +308,9 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
             draw.line([(at - high, y + high), (at + high, y - high)], fill=colour, width=max(1, size // 9))
     elif kind == "dot":
         draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=colour)
+    elif kind == "halo":
+        pale = tuple(round(255 + (c - 255) * 0.16) for c in colour)
+        draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=pale, outline=colour)
     else:  # a scale bar
         line = max(1, size // 7)
         draw.line([(x, y), (x + entry.width, y)], fill=colour, width=line)
@@ -312,8 +318,8 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
             draw.line([(end, y - 0.35 * size), (end, y + 0.35 * size)], fill=colour, width=line)
 
 
-def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "") -> Sprite:
-    """Draw the outcome as a sentence with its reason, for the end of a film, at most 0.86 of `room` wide [px].
+def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "", certificate: str = "") -> Sprite:
+    """Draw the outcome as a sentence with its reason and certificate, for the end of a film, at most 0.86 of `room` wide [px].
 
     The reason of a stuck robot replaces the general sentence.
     """
@@ -325,5 +331,7 @@ def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "") -> Spr
     while size > 8 and text_width(text, size, True) > 0.86 * room:
         size -= 1
     small = min(size, round(REASON_FONT * layout.unit))
-    lines = wrapped(reason, round(0.86 * room) - 2 * round(0.75 * size), small, most=MOST_REASONS)
+    within = round(0.86 * room) - 2 * round(0.75 * size)
+    lines = wrapped(reason, within, small, most=MOST_REASONS)
+    lines += wrapped(certificate, within, small, most=1)
     return pill(text, size, colour, lines, small)

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from antdrive.base.types import Floats
+from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colours import CONTACT, GOAL, OUTCOME_LABELS, ROUTE, START, Colour
 from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film import overlay
 from antdrive.views.film.camera import Camera, Picture, camera_for
-from antdrive.views.film.compositor import Compositor, drawn_height
+from antdrive.views.film.compositor import Compositor, drawn_height, has_glow
 from antdrive.views.film.film_options import FilmOptions
 from antdrive.views.film.ground import grid_step
 from antdrive.views.film.lidar_view import BeamPainter, OwnMapPainter
@@ -33,7 +34,7 @@ class Shot:
     def __init__(self, rollout: Rollout, *, planning: bool = False, bare: bool = False, **options: Any) -> None:
         self.options = FilmOptions(**options)
         size, note, speed = self.options.size, self.options.note, self.options.speed
-        self.playback = Playback(rollout)
+        self._rollout, self.playback = rollout, Playback(rollout)
         self.slow_motion = self.playback.slow_motion(speed)
         self._flash = FLASH * speed
         self.scene = scene = Scene.of(rollout)
@@ -57,8 +58,6 @@ class Shot:
         self._replan_caption = REPLAN_CAPTION * speed
         self._route, self._replans_shown = rollout.route, 0
         self._legend_width = 0 if self._legend is None else self._legend.shape[1] + 2 * self._layout.unit  # [px]
-        room = max(size[0] - self._legend_width, size[0] // 2)
-        self._banner = overlay.banner(self.outcome, self._layout, room, rollout.record.reason)
         self.shown = 0.0  # end of the trail [s]
         self._add_labels()
         if self.playback.replans or self._fan:
@@ -75,6 +74,7 @@ class Shot:
             self._layout = layout
             self._camera = self._aim(rollout, (size[0], size[1] - (0 if bare else layout.height)))
             step, pixel = grid_step(self._camera), self._camera.pixel
+            shows["glow"] = not planning and has_glow(self.scene, self._camera)
             entries = overlay.legend_entries(self.scene, step, pixel, planning=planning, replans=replans, **shows)
             legend = overlay.legend_rows(entries, layout)
             self._legend = None if rows or bare else overlay.legend_card(entries, layout)
@@ -88,15 +88,16 @@ class Shot:
         return self._with_band(self.view(at), at, overlay.SLOWED if slow else overlay.DRIVING)
 
     def last_frame(self) -> Picture:
-        """Return the frame (H, W, 3) at the run's end, with the outcome as a sentence."""
+        """Return the frame (H, W, 3) at the run's end, with the outcome as a sentence and the certificate."""
         at = self.playback.duration
         view = self.view(at, last=True)
-        unit = self._layout.unit
+        unit, room = self._layout.unit, max(view.shape[1] - self._legend_width, view.shape[1] // 2)
+        verdict = overlay.banner(self.outcome, self._layout, room, self._rollout.record.reason, caption(self._rollout))
         robot_high = self._compositor.pixel(*self.playback.pose(at)[:2])[1] < 0.4 * view.shape[0]
-        low = robot_high or self._legend_width + self._banner.shape[1] > view.shape[1]
-        top = view.shape[0] - self._banner.shape[0] - round(1.2 * unit) if low else round(1.2 * unit)
-        left = max((view.shape[1] - self._banner.shape[1]) // 2, 0 if low else self._legend_width)
-        put(view, self._banner, left, top)
+        low = robot_high or self._legend_width + verdict.shape[1] > view.shape[1]
+        top = view.shape[0] - verdict.shape[0] - round(1.2 * unit) if low else round(1.2 * unit)
+        left = max((view.shape[1] - verdict.shape[1]) // 2, 0 if low else self._legend_width)
+        put(view, verdict, left, top)
         return self._with_band(view, at, OUTCOME_LABELS[self.outcome])
 
     def planning_frame(self, values: overlay.Values, grid: Grid, levels: Floats, path: Floats) -> Picture:
@@ -219,6 +220,14 @@ class Shot:
         edge, tint = (0.75, 0.0) if last else (fresh, 0.25 * fresh)
         if edge > 0:
             kernels.flash(view, np.array(CONTACT, dtype=np.float64), 0.9 * self._layout.unit, edge, tint)
+
+
+def caption(log: Rollout) -> str:
+    """Return a film's line about the certificate; empty if the robot has not driven."""
+    if not len(log.t):
+        return ""
+    c = certify(log)
+    return f"certified: never closer than {c.bound:.3f} m" if c.certified else "not certified collision-free"
 
 
 def _put_above(view: Picture, sprite: Sprite, x: float, bottom: float) -> None:

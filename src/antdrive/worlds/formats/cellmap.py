@@ -7,7 +7,7 @@ a world, a cell is blocked if a disc reaches into it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -29,6 +29,7 @@ REACHABLE_DONE, DISTANCES_DONE = 0.1, 0.5  # progress after the flood fill and a
 SLACK = 1e-9  # added to discs' radii against rounding; smaller overlaps are ignored [m]
 CORNER = (math.sqrt(2.0) - 1.0) / 2.0  # overhang of the disc around one cell [cells]
 CAP = 32  # largest depth of a disc's centre in blocked cells [half cells]; deeper ones save few discs
+MOST_EROSIONS = 20  # for the start and goal of the largest ground [cells]
 TOLERANCE = 0.25  # default goal tolerance of a map's task [m]
 
 Cells = npt.NDArray[np.bool_]
@@ -254,16 +255,50 @@ def file_task(
         raise input_error(str(file), str(error)) from None
 
 
-def _reachable(cells: CellMap, start: Pose, goal: Point) -> tuple[CellMap, bool]:
-    """Return the part of a map connected to the start or the goal, and whether the two are connected."""
+def connected(free: Cells, ends: Iterable[tuple[int, int]]) -> Cells:
+    """Return the free cells (R, C) 4-connected to any of the given cells (row, col)."""
     from antdrive.worlds.formats import _kernels_cover as kernels
 
+    reached = np.zeros(free.shape, dtype=np.bool_)
+    for row, col in ends:
+        kernels.flood(free, row, col, reached)
+    return reached
+
+
+def largest_ground(cells: CellMap) -> tuple[Pose, Point]:
+    """Return a start and a goal on the largest connected part of a map, far from blocked cells.
+
+    Raises:
+        InputError: no two free cells are connected.
+    """
+    left, largest = cells.free.copy(), np.zeros(cells.free.shape, dtype=np.bool_)
+    while np.count_nonzero(left) > np.count_nonzero(largest):
+        row, col = divmod(int(np.argmax(left)), left.shape[1])
+        part = connected(left, [(row, col)])
+        left &= ~part
+        largest = max(largest, part, key=np.count_nonzero)
+    if np.count_nonzero(largest) < 2:
+        raise input_error("map", "has no two connected free cells")
+    for _ in range(MOST_EROSIONS):
+        inner = largest & ~_beside(~largest)
+        if np.count_nonzero(inner) < 2:
+            break
+        largest = inner
+    spots = np.argwhere(largest)
+    goal = spots[np.argmax(np.abs(spots - spots[0]).sum(axis=1))]
+    (x, y), (goal_x, goal_y) = (
+        ((np.array([spot[1], spot[0]]) + 0.5) * cells.resolution + cells.origin).tolist() for spot in (spots[0], goal)
+    )
+    return (x, y, math.atan2(goal_y - y, goal_x - x)), (goal_x, goal_y)
+
+
+def _reachable(cells: CellMap, start: Pose, goal: Point) -> tuple[CellMap, bool]:
+    """Return the part of a map connected to the start or the goal, and whether the two are connected."""
     here, there = _free_cell(cells, "start", start[0], start[1]), _free_cell(cells, "goal", goal[0], goal[1])
-    reached = np.zeros(cells.free.shape, dtype=np.bool_)
-    kernels.flood(cells.free, *here, reached)
+    reached = connected(cells.free, [here])
     joined = bool(reached[there])
-    kernels.flood(cells.free, *there, reached)
-    return _cropped(CellMap(reached, cells.resolution, cells.origin)), joined
+    used = reached if joined else connected(cells.free, [here, there])
+    return _cropped(CellMap(used, cells.resolution, cells.origin)), joined
 
 
 def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:

@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.atomic import atomic_write, write_text
-from antdrive.base.errors import input_error
+from antdrive.base.errors import InputError, input_error
 from antdrive.base.files import read_bytes
 from antdrive.base.types import Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
-from antdrive.worlds.formats.cellmap import CellMap, cell_map, file_task
+from antdrive.worlds.formats.cellmap import CellMap, cell_map, file_task, largest_ground
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import Task
 
@@ -109,6 +109,18 @@ def import_movingai_task(
     return file_task(
         file, cells, start, goal, source=source, overhang=overhang, cell=cell, goal_tolerance=goal_tolerance
     )
+
+
+def movingai_ends(path: str | os.PathLike[str], resolution: float = 1.0) -> tuple[Pose, Point]:
+    """Return a start and a goal for `import_movingai_task`, on the largest connected ground of a `.map` file.
+
+    Raises:
+        InputError: the file is invalid, or no two free cells are connected.
+    """
+    try:
+        return largest_ground(CellMap(_read_cells(path), resolution))
+    except InputError as error:
+        raise error if str(error).startswith(os.fspath(path)) else input_error(os.fspath(path), str(error)) from None
 
 
 def _problem_beside(file: Path, number: int) -> MapProblem:
