@@ -242,7 +242,9 @@ def test_python_tests_are_accepted_and_checked_like_suites(antdrive, suite):
     code, out, _ = antdrive("check", "test_accepted_here.py::test_named", *words[3:-1])
     assert (code, out.splitlines()[0]) == (1, "test_accepted_here.py::test_named: FAILED")
     assert "  changed since the baseline: world" in out
-    assert antdrive("accept", "test_accepted_here.py::test_named", *words[3:-1])[1].splitlines() == [
+    (results := suite.parent.parent / "results elsewhere").mkdir()  # pytest takes no root from it
+    elsewhere = ("--film", "never", "--results", results)
+    assert antdrive("accept", "test_accepted_here.py::test_named", *elsewhere)[1].splitlines() == [
         "test_accepted_here.py::test_named: renewed", "1 of 1 passed",
     ]  # fmt: skip
 

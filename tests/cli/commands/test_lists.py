@@ -67,6 +67,7 @@ def test_show_reports_whether_a_robot_can_cross(antdrive, tmp_path):
     assert "passable           yes" in out
     assert (tmp_path / "gate.png").exists()
     assert not json.loads(antdrive("worlds", "show", "no-path", "--json")[1])["passable"]
+    assert "; antdrive plan says why\n" in antdrive("worlds", "show", "no-path")[1]
 
 
 @pytest.mark.parametrize("words", [["forest", "--set", "count=8"], ["barn", "--set", "fill=0.2"]])

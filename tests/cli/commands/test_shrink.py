@@ -132,3 +132,6 @@ def test_a_test_that_fails_by_its_baseline_is_shrunk_while_it_is_worse(antdrive,
 def test_the_folder_of_a_run_stands_for_its_log(refused, small_run, tmp_path):
     small_run.rollout.save(tmp_path / "run" / "rollout.npz")
     assert "small: this run does not fail" in refused("shrink", "run")
+    (tmp_path / "none").mkdir()
+    (tmp_path / "none" / "result.json").touch()
+    assert "none: contains no rollout.npz; its run ended before the robot drove" in refused("shrink", "none")

@@ -156,6 +156,31 @@ def test_a_random_world_is_that_of_the_command_that_writes_it(tmp_path):
     )
 
 
+def test_the_command_of_a_test_has_its_start_and_goal(tmp_path):
+    case = only(tmp_path, "world: empty, planner: astar, start: [2, 1.5, -0.1], goal: [3, 4]")
+    assert run_command(case) == (
+        "antdrive run empty --planner astar --robot turtlebot --seed 0 --start 2.0,1.5,-0.1 --goal 3.0,4.0"
+    )
+
+
+def test_a_test_drives_a_task_of_its_world(tmp_path):
+    (tmp_path / "mine.yaml").write_text(
+        "{schema: 1, bounds: [0, 0, 5, 4], start: [1, 1, 0], goal: [4, 3], tasks: [{name: dock, goal: [2, 3]}]}\n"
+    )
+    case = only(tmp_path, "world: mine.yaml, planner: astar, task: dock, start: [1, 2, 0]")
+    task = scenario_of(case).task
+    assert (task.start, task.goal) == ((1, 2, 0), (2, 3))
+    assert run_command(case).endswith("--seed 0 --task dock --start 1.0,2.0,0.0")
+    for words, message in (
+        ("world: mine.yaml, task: docks", "mine.yaml: no task 'docks'; did you mean dock?"),
+        ("world: empty, task: dock", "no task 'dock'; the world has no named tasks"),
+        ("world: {generate: forest}, task: dock", "task: a random world has no named tasks"),
+    ):
+        with pytest.raises(InputError) as caught:
+            scenario_of(only(tmp_path, f"{words}, planner: astar"))
+        assert message in str(caught.value)
+
+
 def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "own_planners_of_a_test.py"

@@ -106,7 +106,7 @@ def _lines(hunt: "Hunt", reported: "list[Reproducer]", folder: Path, filmed: boo
     from antdrive.runs.failures.reproducers import SUITE
 
     ended = "interrupted after" if hunt.interrupted else "after"
-    runs = f"{hunt.runs} runs ({hunt.driven} with a path on the grid)"
+    runs = f"{hunt.runs} runs (the robot drove in {hunt.driven})"
     yield f"{ended} {runs}: {len(hunt.findings)} failures, {len(hunt.distinct)} distinct"
     if reported:
         rows = (

@@ -11,6 +11,7 @@ from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, show, this_command, working
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
+from antdrive.cli.parse import log_at
 from antdrive.cli.scenario_options import with_chosen_margin
 from antdrive.views.run_folder import fingerprint, write_result, write_run
 
@@ -116,8 +117,7 @@ def _of_a_log(words: str, planner: str | None) -> "Scenario":
 
     if words.endswith(SUFFIX):
         raise InputError(f"{words}: is a suite; name one of its tests: {words}::SCENARIO")
-    if (log := Path(words) / "rollout.npz").is_file():
-        words = str(log)
+    words = str(log_at(Path(words)))
     try:
         return rebuilt(read_record(words), planner)
     except InputError as error:

@@ -97,7 +97,8 @@ def show_world(
     if any(shown.frame):
         for key, pose in {"start": shown.start, "goal": shown.goal}.items():
             said[f"{key} in its map"] = world_to_map(shown.frame, [pose])[0].round(4).tolist()
-    said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m"
+    reason = "" if passable else "; antdrive plan says why"
+    said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m{reason}"
     said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
     lines = [f"{key:18} {value}" for key, value in said.items()]
     lines += [f"start for {name} {overlap}" for name, overlap in starts.items() if overlap]

@@ -57,7 +57,7 @@ def drive_python_tests(
     import pytest
 
     options = ["-p", PLUGIN, "--continue-on-collection-errors", *UPDATES[update]]
-    options += ["--drive-film", results.films, "--drive-results", str(results.folder.resolve())]
+    options += ["--drive-film", results.films, f"--drive-results={results.folder.resolve()}"]
     if importlib.util.find_spec("xdist") is not None:
         options += ["-n", "0"]  # results stay in this process
     compile_once()

@@ -45,10 +45,12 @@ def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = with_c
 
 
 def task_of(case: SuiteCase) -> Task:
-    """Return the world of a test, with the world's own start and goal."""
-    world = case.entry.world
+    """Return the task of a test, without the test's own start and goal."""
+    world, name = case.entry.world, case.entry.task
     if isinstance(world, str):
-        return load_task(world_path(case, world))
+        return load_task(world_path(case, world), name)
+    if name is not None:
+        raise case.error("task", "a random world has no named tasks")
     options = dict(world)
     kind, seed = options.pop("generate", None), options.pop("seed", 0)
     if not isinstance(kind, str):
@@ -66,12 +68,15 @@ def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
     entry = case.entry
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
     word, settings = _planner_word(case, planner, anywhere), setting_words(case.given)
-    if entry.start is not None or entry.goal is not None or settings is None or word is None:
+    if settings is None or word is None:
         return None
     world, before = _world_words(case, anywhere)
     words = ["antdrive", "run", world, "--planner", word]
     words += [word for key, value in planner.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
     words += ["--robot", _shown_name(case, entry.robot, list_robots(), anywhere), "--seed", str(case.seed)]
+    words += [] if entry.task is None else ["--task", entry.task]
+    ends = {"--start": entry.start, "--goal": entry.goal}
+    words += [word for key, at in ends.items() if at is not None for word in (key, ",".join(map(str, at)))]
     return before + shlex.join([*words, *settings])
 
 

@@ -54,11 +54,12 @@ class CaseEntry(BaseModel):
         description="a world file relative to the suite, a world of the catalogue, or {generate: forest, seed: 7} with the "
         "generator's options",
     )
+    task: str | None = Field(None, description="one of the world's tasks; by default its own start and goal")
     start: list[float] | None = Field(
-        None, min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians; by default the world's"
+        None, min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians; by default the task's"
     )
     goal: list[float] | None = Field(
-        None, min_length=2, max_length=2, description="write [x, y] in metres; by default the world's"
+        None, min_length=2, max_length=2, description="write [x, y] in metres; by default the task's"
     )
     robot: str = Field("turtlebot", description="a robot file relative to the suite, or a robot of the catalogue")
     planner: TextOrMapping = Field(
