@@ -239,6 +239,13 @@ def test_a_wrong_plan_is_an_outcome_and_is_not_driven(antdrive, small, faulty):
     assert "mine returned an invalid plan (cells: step 1 from " in out
 
 
+def test_a_plan_names_an_own_planner_as_drives_do(antdrive, small):
+    Path("own.py").write_text("from antdrive.planners import AStar\nclass Own(AStar): pass\n")
+    code, out, err = antdrive("plan", small, "-p", "own.py:Own")
+    assert (code, err) == (0, "")
+    assert out.startswith("small: Own found a path\n")
+
+
 def test_the_help_explains_the_exit_codes(antdrive):
     words = " ".join(antdrive("--help")[1].split())
     for code in ("0: success", "1: failed drive", "2: invalid input", "3: planner error", "--debug"):

@@ -124,10 +124,11 @@ def test_notes_state_the_limits_of_the_tables(tmp_path):
     assert any("Drives of b do not depend on the seed." in note for note in few.notes)
 
 
-def table_of(planners, worlds, seeds=4):
+def table_of(planners, worlds, seeds=4, against=None):
     """Planners, each faster than the next in every world."""
     skills = {name: Skill(1.0, 1.0 + 0.3 * k) for k, name in enumerate(planners)}
-    return summarise(made_up_runs(skills, worlds=worlds, seeds=seeds), title="t", metrics=["duration_s"])
+    runs = made_up_runs(skills, worlds=worlds, seeds=seeds)
+    return summarise(runs, title="t", metrics=["duration_s"], against=against)
 
 
 @pytest.mark.parametrize(
@@ -246,6 +247,14 @@ def test_a_sentence_states_each_measure_with_size_interval_tests_correction_and_
         f"solved, 95 % interval {low} to {high} (bootstrap over worlds); Wilcoxon's signed rank test p "
         f"{probability(row.p_holm)}, permutation test over worlds p = {probability(row.p_worlds_holm)} (Holm, 3 pairs)."
     )
+
+
+def test_against_a_planner_a_sentence_states_each_of_its_pairs():
+    stated = [quote for quote in table_of("ABCD", 7, against="C").sentences if quote.startswith("duration, ")]
+    assert [quote.split(":")[0] for quote in stated] == [
+        f"duration, {pair}" for pair in ("A minus C", "B minus C", "C minus D")
+    ]
+    assert all(quote.endswith("(Holm, 3 pairs).") for quote in stated)
 
 
 @pytest.mark.parametrize(

@@ -39,13 +39,13 @@ def plan(
 
     scenario = setup.scenario(ends.of(world), given)
     compile_once()
-    with planning(f"planning with {setup.planner}"), keep_best():
+    with planning(f"planning with {scenario.planner_name}"), keep_best():
         grid, answer = make_plan(scenario)
     files: dict[str, str] = {}
     if out is not None:
         from antdrive.views.figures.plan_figures import plan_figures
 
-        named: dict[str, Any] = {"name": setup.planner, "suffixes": suffixes(vector)}
+        named: dict[str, Any] = {"name": scenario.planner_name, "suffixes": suffixes(vector)}
         with folder_lock(out):
             made = plan_figures(scenario.task, grid, answer, scenario.robot, out, **named)
         files = {name: str(path) for name, path in made.items()}
@@ -68,14 +68,12 @@ def plan(
         "cells": answer.cells.tolist(),
         "files": files,
     }
-    show(json, facts, _lines(setup.planner, scenario, grid, answer, files))
+    show(json, facts, _lines(scenario, grid, answer, files))
     return answer.solved
 
 
-def _lines(
-    planner: str, scenario: "Scenario", grid: "Grid", answer: "PlanResult", files: Mapping[str, str]
-) -> Iterator[str]:
-    yield f"{scenario.task.world.name}: {planner} {answer.status.value}" + in_brackets(answer.reason)
+def _lines(scenario: "Scenario", grid: "Grid", answer: "PlanResult", files: Mapping[str, str]) -> Iterator[str]:
+    yield f"{scenario.task.world.name}: {scenario.planner_name} {answer.status.value}" + in_brackets(answer.reason)
     if len(answer.cells):
         length, count = answer.line_length, len(answer.cells)
         yield f"  length {length:.3f} m over {count} cells, {answer.work} {answer.work_unit}"

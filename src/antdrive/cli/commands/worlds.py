@@ -115,7 +115,7 @@ def generate_world(
         list[str] | None,
         option(
             "KEY=VALUE",
-            "Generator option, such as count=20 (forest) or fill=0.25 (barn). Repeatable.",
+            "Generator option, such as radius=0.2,0.5 (forest) or fill=0.25 (barn). Repeatable.",
             "--set",
             "-s",
         ),

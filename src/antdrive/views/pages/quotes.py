@@ -11,22 +11,13 @@ from antdrive.views.pages.rendering import percent, percents, probability, short
 
 
 def quotes(paired: PairedRuns, title: str, rows: Sequence[PairedComparison]) -> Iterator[str]:
-    """Yield a sentence about the pair with the smallest p of a measure's table."""
+    """Yield a sentence about each pair with the reference planner; of all pairs, about the one with the smallest p."""
     tested = _tested(rows)
     if not tested:
         return
-    row = min(tested, key=lambda one: one.decisive_p)
-    tests = [
-        "exact McNemar test" if row.measure == SUCCESS else "Wilcoxon's signed rank test",
-        "permutation test over worlds",
-    ]
-    found = [
-        f"{test} p {_equals(p)}"
-        for test, p in zip(tests, (row.p_holm, row.p_worlds_holm), strict=True)
-        if not math.isnan(p)
-    ]
-    over = f"n = {_counted(row.pairs, 'pair')} in {_counted(row.worlds, 'world')}"
-    yield f"{_effect(paired, title, row, over)}; {', '.join(found)} (Holm, {_counted(len(tested), 'pair')})."
+    shared = set.intersection(*({row.first, row.second} for row in tested))
+    for row in tested if shared else [min(tested, key=lambda one: one.decisive_p)]:
+        yield _sentence(paired, title, row, len(tested))
 
 
 def disagreements(tables: Mapping[str, Sequence[PairedComparison]]) -> Iterator[str]:
@@ -49,6 +40,21 @@ def disagreements(tables: Mapping[str, Sequence[PairedComparison]]) -> Iterator[
 
 def _tested(rows: Sequence[PairedComparison]) -> list[PairedComparison]:
     return [row for row in rows if not math.isnan(row.decisive_p)]
+
+
+def _sentence(paired: PairedRuns, title: str, row: PairedComparison, tested: int) -> str:
+    """Return the size of the difference with its interval, tests and correction."""
+    tests = [
+        "exact McNemar test" if row.measure == SUCCESS else "Wilcoxon's signed rank test",
+        "permutation test over worlds",
+    ]
+    found = [
+        f"{test} p {_equals(p)}"
+        for test, p in zip(tests, (row.p_holm, row.p_worlds_holm), strict=True)
+        if not math.isnan(p)
+    ]
+    over = f"n = {_counted(row.pairs, 'pair')} in {_counted(row.worlds, 'world')}"
+    return f"{_effect(paired, title, row, over)}; {', '.join(found)} (Holm, {_counted(tested, 'pair')})."
 
 
 def _effect(paired: PairedRuns, title: str, row: PairedComparison, over: str) -> str:
