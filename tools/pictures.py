@@ -31,7 +31,6 @@ from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.video import STILLS, film, still
 from antdrive.views.pages.run_report import write_report
-from antdrive.views.run_folder import caption
 from antdrive.worlds import list_worlds, load_task
 from antdrive.worlds.generators.generate import generated
 from antdrive.worlds.trajectories import Trajectories
@@ -65,7 +64,7 @@ def hero(path: Path) -> None:
     """Film a mapless drive among movers."""
     settings = {"map": "none", "localisation": "matching", "noise": 1.0, "seed": 1}
     log = drive("plaza-moving", "dstar-lite", robot="jackal", **settings)
-    film(log, path, camera="follow", size=(800, 450), fps=10, speed=1.2, note=caption(log))
+    film(log, path, camera="follow", size=(800, 450), fps=10, speed=1.2)
 
 
 def worlds(path: Path) -> None:
@@ -102,13 +101,13 @@ def plaza(path: Path) -> None:
     """Render a robot among movers just after a replan."""
     log = drive("plaza-moving", "dstar-lite")
     replanned = next(replan.t for replan in log.record.replans if replan.t > 3.0)
-    still(log, path, replanned + 0.3, size=SIZE, note=caption(log))
+    still(log, path, replanned + 0.3, size=SIZE)
 
 
 def unknown(path: Path) -> None:
     """Render a mapless robot's occupancy map."""
     log = drive("forest", "astar", robot="jackal", map="none", localisation="matching", noise=1.0, seed=1)
-    still(log, path, 3.2, size=(960, 540), note=caption(log))
+    still(log, path, 3.2, size=(960, 540))
 
 
 def pheromone(path: Path) -> None:

@@ -60,7 +60,17 @@ READERS = {
     "robots import dae.urdf -o new.yaml": "body.dae",
 }
 #: Commands that read no file of the user.
-NO_FILES = {"planners", "schema", "warm", "reproduce", "worlds list", "worlds generate", "robots list", "robots print"}
+NO_FILES = {
+    "planners",
+    "controller",
+    "schema",
+    "warm",
+    "reproduce",
+    "worlds list",
+    "worlds generate",
+    "robots list",
+    "robots print",
+}
 URDF = Path(__file__).parents[1] / "robots" / "importing" / "urdf" / "waffle.urdf"
 AROUND = {
     "campaign.yaml": "schema: 1\nworlds: [{import: camp/w.sdf, start: [0, 0, 0], goal: [1, 1]}]\nplanners: [astar]\n",

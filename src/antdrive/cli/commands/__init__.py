@@ -38,15 +38,17 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "sweep": Command(
             "sweep", "sweep", "Run a campaign: every combination of its settings.", resumes=True, plans=True
         ),
-        "barn": Command(
-            "barn", "barn", "Drive the BARN Challenge worlds and print the results table.", resumes=True, plans=True
-        ),
+        "barn": Command("barn", "barn", "Drive the BARN Challenge worlds, or score a log.", resumes=True, plans=True),
         "render": Command("render", "render", "Render films of logged drives from any camera."),
         "report": Command("report", "report", "Write a report on many runs or on a campaign."),
         "export": Command("export", "export_drive", "Export a drive to Foxglove, RViz or CSV."),
         "verify": Command("verify", "verify", "Re-certify drives from their logs alone."),
-        "check": Command("check", "check", "Run suites and compare the drives with their baselines.", plans=True),
-        "accept": Command("check", "accept", "Run suites and save the drives as baselines.", plans=True),
+        "check": Command(
+            "check", "check", "Run suites or Python tests, and compare the drives with their baselines.", plans=True
+        ),
+        "accept": Command(
+            "check", "accept", "Run suites or Python tests, and save the drives as baselines.", plans=True
+        ),
         "margin": Command("margin", "margin", "Break down a drive's safety margin by cause."),
         "find-margin": Command(
             "find_margin", "find_margin", "Find the smallest margin at which all drives are safe.", plans=True

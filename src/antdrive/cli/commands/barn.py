@@ -45,7 +45,9 @@ def barn(
     json: options.Json = False,
     **given: Any,
 ) -> bool:
-    """Drive the BARN Challenge worlds, or score a log of the challenge, and print the results table.
+    """Drive the BARN Challenge worlds, or score a log.
+
+    Prints the results table beside published scores.
 
     Repeat the command to resume it. Exit code 0: all runs are done, or the log has 10 trials of each of the 50 public worlds,
     whatever their outcomes.

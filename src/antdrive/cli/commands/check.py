@@ -36,7 +36,7 @@ def check(
     strict: Annotated[bool, flag("Fail on unused baselines.", "--strict")] = False,
     json: options.Json = False,
 ) -> int:
-    """Run suites, and Python tests with the fixture `drive`, and compare the drives with their baselines.
+    """Run suites or Python tests, and compare the drives with their baselines.
 
     Exit code 0: every drive meets its suite's expectations and is no worse than its baseline.
     """
@@ -58,7 +58,7 @@ def accept(
     film: Film = "failed",
     json: options.Json = False,
 ) -> int:
-    """Run suites, and Python tests with the fixture `drive`, and save the drives as baselines.
+    """Run suites or Python tests, and save the drives as baselines.
 
     A drive that misses its test's expectations is rejected, with log, figures and film. Exit code 0: every drive was accepted.
     """
