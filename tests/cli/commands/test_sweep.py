@@ -108,7 +108,7 @@ def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(antdrive, 
     code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "mine.py:Mine:width=4", "--json")
     assert (code, json.loads(out)["succeeded"]) == (0, 1)
     (row,) = read_results("out").table.to_pylist()
-    assert row["planner"] == "mine.py:Mine width=4"
+    assert row["planner"] == "Mine width=4"
     monkeypatch.chdir("out")
     antdrive(*shlex.split(row["command"])[1:], "--no-figures", "--out", "again")
     found = json.loads(Path("again/result.json").read_text())
