@@ -69,6 +69,7 @@ class Offered(SphinxDirective):
             self.env.note_dependency(str(importlib.import_module(module).__file__))
             sentence, described = describe(package, name, module)
             role = f":py:obj:`{name} <{package}.{name}>`" if described else f":doc:`{name}`"
+            role = f"``{name}``" if name.startswith("__") else role  # no page describes it
             table += [f"   * - {role}", f"     - {sentence}"]
             entries += [] if package in self.env.config.antdrive_index_only else described
         also = self.options.get("also", "").split()

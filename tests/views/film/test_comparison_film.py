@@ -111,7 +111,7 @@ def test_a_film_from_above_has_no_empty_ground_beside_the_worlds(drives, high, c
     wide, tall = seen / shot._camera.size
     assert tall > 0.8
     assert wide > 0.8 or shot._camera.size[0] < LEAST_TILE
-    assert fitting_size(logs, "oblique") == FULL
+    assert fitting_size(logs, "follow") == FULL
 
 
 def test_a_film_without_a_size_fits_its_worlds(drives, tmp_path):

@@ -18,7 +18,8 @@ from antdrive.runs.comparing import SameDrive, distinct, path_text
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, Colour, label_styles
 from antdrive.views.film import overlay
-from antdrive.views.film.camera import Picture, turns
+from antdrive.views.film.camera import Picture, camera_for, turns
+from antdrive.views.film.compositor import drawn_height
 from antdrive.views.film.film_options import ENCODERS, FilmInfo, FilmOptions
 from antdrive.views.film.prelude import has_field, planning_stages, still_camera
 from antdrive.views.film.shot import Shot
@@ -196,17 +197,27 @@ def _title(log: Rollout, one_world: bool) -> str:
 
 
 def fitting_size(rollouts: Sequence[Rollout], camera: str) -> tuple[int, int]:
-    """Return the film size that shows the worlds at the scale of `FULL`, without empty ground around them in top view."""
-    if camera != "top":
+    """Return the film size that shows the worlds at the scale of `FULL`, without empty ground above, below or beside them."""
+    if camera == "follow":
         return FULL
     extents = [_extent(log) for log in rollouts]
     cols, rows = _tiling(rollouts, camera, FULL)
     full = (FULL[0] // cols - 2, FULL[1] // rows - 2)
     scale, head = _scale(extents, full), _head_of(full)[1]
+    if camera == "oblique":
+        high = head + max(_height(log, (full[0], full[1] - head)) for log in rollouts) / FILLED
+        return FULL[0], _even(rows * (high + 2), FULL[1])
     shapes = [shape[::-1] if turns(shape[0] / shape[1], (full[0], full[1] - head)) else shape for shape in extents]
     need = [max(sides) * scale / FILLED + 2 for sides in zip(*shapes, strict=True)]
     wide, high = max(need[0], LEAST_TILE), need[1] + head
     return _even(cols * wide, FULL[0]), _even(rows * high, FULL[1])
+
+
+def _height(log: Rollout, view: tuple[int, int]) -> float:
+    """Return the height of a world in an oblique view of this size [px]."""
+    low, high = Scene.of(log).region(np.vstack([log.pose[:, :2], log.route]))
+    corners = np.array([(x, y, 0.0) for x in (low[0], high[0]) for y in (low[1], high[1])])
+    return float(np.ptp(camera_for("oblique", low, high, drawn_height(Scene.of(log)), view).pixels(corners)[:, 1]))
 
 
 def _even(length: float, most: int) -> int:
