@@ -9,7 +9,8 @@ from antdrive.robots import load_robot
 from antdrive.robots.noise import NoiseModel
 from antdrive.robots.spec import Noise
 from antdrive.sim import run
-from antdrive.sim.driving.odometry import odometry_of, wheel_speeds
+from antdrive.sim.driving.odometry import odometry_of
+from antdrive.sim.log.consistency import wheel_speeds
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ from antdrive.sim.log.streams import random_stream
 from antdrive.sim.sensing.dead_reckoning import DeadReckoning
 
 if TYPE_CHECKING:
+    from antdrive.sim.log.record import DriveRecord
     from antdrive.sim.physics.engine import State
 
 
@@ -124,7 +125,6 @@ def localiser_of(
     kind: str, robot: RobotSpec, noise: float, odometry: float, period: float, start: Pose, seed: int
 ) -> Exact | Fixes:
     """Create the localiser of a drive."""
-
     if kind in ("odometry", "matching"):
         return Reckoned(robot, noise, period, start, seed, Odometry().scaled(odometry))
     levels = robot.noise.scaled(noise)
@@ -132,3 +132,10 @@ def localiser_of(
         return Exact()
     localiser = {"true": TruePose, "fixes": Fixes}[kind]
     return localiser(levels, robot.track, period, start, random_stream(seed, "noise"))
+
+
+def logged_localiser(record: DriveRecord) -> Exact | Fixes:
+    """Create the localiser of a logged drive."""
+    odometry = 1.0 if record.sensing is None else record.sensing.odometry
+    period, start = 1 / record.control_hz, record.task.start
+    return localiser_of(record.localisation, record.robot, record.noise, odometry, period, start, record.seed)

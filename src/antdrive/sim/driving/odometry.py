@@ -13,6 +13,7 @@ import numpy as np
 
 from antdrive.base.types import Floats
 from antdrive.robots.spec import SAMPLE_RATE, Noise, Odometry
+from antdrive.sim.log.consistency import wheel_speeds
 from antdrive.sim.log.rollout import Rollout
 
 
@@ -52,14 +53,14 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
     """
     from antdrive.robots.control.pursuit import Twist
     from antdrive.robots.noise import steady_errors
-    from antdrive.sim.driving.localising import Exact, localiser_of
+    from antdrive.sim.driving.localising import Exact, logged_localiser
     from antdrive.sim.physics.engine import State
 
     record, rows, track = rollout.record, len(rollout.t), rollout.record.robot.track
     factor = 1.0 if record.sensing is None else record.sensing.odometry
     period, per_tick = 1 / record.control_hz, max(1, record.physics_hz // record.control_hz)
     start = record.task.start
-    localiser = localiser_of(record.localisation, record.robot, record.noise, factor, period, start, record.seed)
+    localiser = logged_localiser(record)
     if isinstance(localiser, Exact):
         return _true(rollout)
     encoders, odometry = [], []
@@ -88,12 +89,6 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
         believed = np.tile(np.diag([xy**2, xy**2, yaw**2]), (rows, 1, 1))
     wheels = wheel_speeds(np.array(encoders), track)[of_row]
     return LoggedOdometry(pose, twists[of_row], wheels, poses[of_row], samples[of_row], believed)
-
-
-def wheel_speeds(twist: Floats, track: float) -> Floats:
-    """Return the rim speeds of the left and right wheel (N, 2) [m/s] for twists (N, 2)."""
-    rim = twist[:, 1] * track / 2
-    return np.column_stack([twist[:, 0] - rim, twist[:, 0] + rim])
 
 
 def _moved(pose: Floats, twist: Floats, time: Floats) -> Floats:

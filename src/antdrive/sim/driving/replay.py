@@ -22,7 +22,7 @@ from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import Twist
 from antdrive.sim.driving.drive import drive, no_scan
-from antdrive.sim.driving.localising import Exact, localiser_of
+from antdrive.sim.driving.localising import Exact, logged_localiser
 from antdrive.sim.driving.parts import Decider, Ending, Step
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.survey import MoverTracking, Scans, SimulatedLidar, Survey, reset_ticks
@@ -100,10 +100,7 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     if record.exploring and not len(rollout.scans):
         yield "replay: a log without a map must have scans"
         return
-    odometry = 1.0 if record.sensing is None else record.sensing.odometry
-    localiser = localiser_of(
-        record.localisation, record.robot, record.noise, odometry, 1 / record.control_hz, record.task.start, record.seed
-    )
+    localiser = logged_localiser(record)
     if localiser.noisy and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
         yield "replay: actuated and estimate are missing; required with noise"
         localiser = Exact()

@@ -290,7 +290,7 @@ def _check_speeds(rollout: Rollout, end: int) -> Iterator[str]:
     """Check that measured speeds and their changes are within the robot's limits, except for slip."""
     record, robot, twist = rollout.record, rollout.record.robot, rollout.twist[:end]
     more = SIGMAS * robot.noise.slip * record.noise
-    wheels = _wheels(twist, robot.track)
+    wheels = wheel_speeds(twist, robot.track)
     limits = (
         ("forward speed", "m/s", np.abs(twist[:, 0]), robot.max_speed),
         ("yaw rate", "rad/s", np.abs(twist[:, 1]), robot.max_yaw_rate + more * robot.max_speed * 2 / robot.track),
@@ -355,7 +355,7 @@ def _check_actuated(rollout: Rollout, end: int) -> Iterator[str]:
     delayed = np.concatenate([np.zeros((min(late, rows), 2)), rollout.command[: max(0, rows - late)]])
     if rows > late:
         delayed[: late + 1] = 0.0
-    found, meant = (_wheels(values[:end], robot.track) for values in (rollout.actuated, delayed))
+    found, meant = (wheel_speeds(values[:end], robot.track) for values in (rollout.actuated, delayed))
     wrong = np.abs(found - meant) > SIGMAS * noise.slip * np.abs(meant) + EXACT
     if wrong.any():
         yield f"actuated: not the delayed command with the wheels' slip, at row {int(wrong.any(axis=1).argmax())}"
@@ -436,8 +436,7 @@ def _check_unfixed_estimate(rollout: Rollout) -> Iterator[str]:
         yield f"estimate: farther off the pose than odometry drifts, from t = {rollout.t[int(wrong.argmax())]:.3f} s"
 
 
-def _wheels(twist: Floats, track: float) -> Floats:
-    """Return the speeds of the left and right wheel over the floor (T, 2) [m/s]."""
-
+def wheel_speeds(twist: Floats, track: float) -> Floats:
+    """Return the rim speeds of the left and right wheel (N, 2) [m/s] for twists (N, 2)."""
     rim = twist[:, 1] * track / 2
     return np.stack([twist[:, 0] - rim, twist[:, 0] + rim], axis=1)
