@@ -16,13 +16,13 @@ def list_all(json: options.Json = False) -> None:
     """List the robots in the catalogue."""
     from antdrive.robots import list_robots, load_robot, robot_to_dict
 
-    specs = {summary_of(path): load_robot(name) for name, path in list_robots().items()}
+    specs = [(load_robot(name), summary_of(path)) for name, path in list_robots().items()]
     rows = (
         (spec.name, f"{spec.radius:.3f}", f"{spec.max_speed:g}", f"{spec.max_acceleration:g}", about)
-        for about, spec in specs.items()
+        for spec, about in specs
     )
     heads = ("robot", "radius m", "m/s", "m/s2", "about")
-    facts = {spec.name: {**robot_to_dict(spec), "about": about} for about, spec in specs.items()}
+    facts = {spec.name: {**robot_to_dict(spec), "about": about} for spec, about in specs}
     show(json, facts, [*table(heads, rows), "details: antdrive robots NAME, antdrive robots show NAME"])
 
 

@@ -20,7 +20,7 @@ from annotated_types import Interval
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError
-from antdrive.base.records import attributes_of, require_ranges
+from antdrive.base.records import meanings_of, require_ranges
 from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
@@ -332,7 +332,7 @@ class ControllerOption(NamedTuple):
 
 def controller_options() -> Mapping[str, ControllerOption]:
     """Return the controller's options by name."""
-    meanings, hints = attributes_of(PurePursuit.__doc__), get_type_hints(PurePursuit, include_extras=True)
+    meanings, hints = meanings_of(PurePursuit), get_type_hints(PurePursuit, include_extras=True)
     options = {}
     for one in fields(PurePursuit):
         marks = getattr(hints[one.name], "__metadata__", ())

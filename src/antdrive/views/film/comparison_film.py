@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
+from antdrive.base.types import Floats
 from antdrive.runs.comparing import SameDrive, distinct, path_text
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, Colour, label_styles
@@ -215,7 +216,7 @@ def fitting_size(rollouts: Sequence[Rollout], camera: str) -> tuple[int, int]:
 
 def _height(log: Rollout, view: tuple[int, int]) -> float:
     """Return the height of a world in an oblique view of this size [px]."""
-    low, high = Scene.of(log).region(np.vstack([log.pose[:, :2], log.route]))
+    low, high = _region(log)
     corners = np.array([(x, y, 0.0) for x in (low[0], high[0]) for y in (low[1], high[1])])
     return float(np.ptp(camera_for("oblique", low, high, drawn_height(Scene.of(log)), view).pixels(corners)[:, 1]))
 
@@ -245,9 +246,14 @@ def _tiling(rollouts: Sequence[Rollout], camera: str, size: tuple[int, int]) -> 
     return cols, -(-count // cols)
 
 
+def _region(log: Rollout) -> tuple[Floats, Floats]:
+    """Return the lower and the upper corner of the ground that a view of a run shows [m]."""
+    return Scene.of(log).region(np.vstack([log.pose[:, :2], log.route]))
+
+
 def _extent(log: Rollout) -> tuple[float, float]:
     """Return width and height of the ground that a top view of a run shows [m]."""
-    low, high = Scene.of(log).region(np.vstack([log.pose[:, :2], log.route]))
+    low, high = _region(log)
     wide, tall = (high - low).tolist()
     return wide, tall
 

@@ -7,12 +7,12 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
+from antdrive.base.version import __version__
 from antdrive.runs.statistics.intervals import Interval
 
 NONE = "–"
@@ -165,7 +165,7 @@ def rendered(template: str, **content: Any) -> str:
         autoescape=jinja2.select_autoescape(["html.j2"]),
     )
     environment.filters |= {"md": markdown_text, "fence": fence_for}
-    text = environment.get_template(template).render(**{**NO_PARTS, **content}, version=metadata.version("antdrive"))
+    text = environment.get_template(template).render(**{**NO_PARTS, **content}, version=__version__)
     return ACTING.sub(" ", text)
 
 
