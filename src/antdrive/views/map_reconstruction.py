@@ -10,7 +10,7 @@ import numpy.typing as npt
 from antdrive.base.plane import relative_frame
 from antdrive.base.types import Flags, Floats, Pose
 from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of, reset_ticks, turning_room
-from antdrive.sim.log.rollout import Rollout, ranges_of
+from antdrive.sim.log.rollout import Rollout, estimates_of, ranges_of
 from antdrive.sim.log.sights import lidar_of, meet
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import SKIN
@@ -107,7 +107,7 @@ class MapReconstruction:
         return np.asarray((away <= SKIN).any(axis=1))  # NaN for beams without a hit
 
     def _estimate(self, row: int) -> Pose:
-        poses = self._rollout.estimate if len(self._rollout.estimate) else self._rollout.pose
+        poses = estimates_of(self._rollout)
         x, y, yaw = poses[row].tolist()
         return x, y, yaw
 

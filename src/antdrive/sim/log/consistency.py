@@ -17,7 +17,7 @@ from antdrive.base.types import Floats
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
 from antdrive.sim.log.ending import false_endings
 from antdrive.sim.log.record import DECISION
-from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.rollout import Rollout, estimates_of
 from antdrive.worlds.route import end_reach, longest_line
 
 NEAR = 1.5  # largest distance from a route's end to a point with room [cells]
@@ -212,7 +212,7 @@ def _check_replans(rollout: Rollout) -> Iterator[str]:
     record, near = rollout.record, NEAR * rollout.record.cell
     if record.replans and record.replanning is None:
         yield "record.replans: must be empty, since record.replanning is null"
-    seen = rollout.estimate if len(rollout.estimate) else rollout.pose
+    seen = estimates_of(rollout)
     for i, replan in enumerate(record.replans):
         if replan.t > rollout.t[-1] + 1 / record.control_hz:
             yield f"record.replans[{i}].t: {replan.t:g} s is after the end of the drive, {rollout.t[-1]:g} s"

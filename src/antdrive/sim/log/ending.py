@@ -17,7 +17,7 @@ import numpy.typing as npt
 from antdrive.base.plane import arc_lengths
 from antdrive.base.types import Floats, Point
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.rollout import Rollout, estimates_of
 
 Rows: TypeAlias = npt.NDArray[np.int64]
 
@@ -105,7 +105,7 @@ def _check_arrival(rollout: Rollout) -> Iterator[str]:
     """Check that the robot did not stand at the goal in an earlier control period."""
     task, end = rollout.record.task, len(rollout.t) - 1
     stop = int(rollout.contacts[0, 0]) if len(rollout.contacts) else end
-    estimate, tolerance = _estimates(rollout), task.goal_tolerance - ROUNDING
+    estimate, tolerance = estimates_of(rollout), task.goal_tolerance - ROUNDING
     period = _rows_per_period(rollout)
     slow = np.flatnonzero(np.abs(rollout.twist[:stop]).max(axis=1) < STOPPED_SPEED)
     for row in slow[(slow > 0) & (slow % period == 0)].tolist():
@@ -181,7 +181,7 @@ def _ends_by_itself(rollout: Rollout) -> bool:
     """
     if len(rollout.t) == 1:
         return False
-    record, here = rollout.record, _estimates(rollout)[-1]
+    record, here = rollout.record, estimates_of(rollout)[-1]
     if math.dist(here[:2], record.task.goal) <= record.task.goal_tolerance + ROUNDING:
         return True
     return not record.exploring and _at_route_end(rollout)
@@ -189,7 +189,7 @@ def _ends_by_itself(rollout: Rollout) -> bool:
 
 def _at_route_end(rollout: Rollout) -> bool:
     """Return whether the robot got to the end of its last route, which leads to the goal, and stands nearby."""
-    task, cell, places = rollout.record.task, rollout.record.cell, _estimates(rollout)[:, :2]
+    task, cell, places = rollout.record.task, rollout.record.cell, estimates_of(rollout)[:, :2]
     rows, route = rollout.legs()[-1]
     near = places[rows][np.hypot(*(places[rows] - route[-1]).T) <= BESIDE_END]
     if math.dist(route[-1], task.goal) > max(task.goal_tolerance, NEAR_GOAL * cell) or not len(near):
@@ -224,7 +224,7 @@ def _sums_to_end(values: npt.NDArray[np.bool_]) -> Rows:
 
 def _progress(rollout: Rollout, rows: Rows) -> float:
     """Return how far the robot got from the first of the rows, or along its routes if that is less [m]."""
-    places = _estimates(rollout)[:, :2]
+    places = estimates_of(rollout)[:, :2]
     straight = float(np.hypot(*(places[rows] - places[rows[0]]).T).max())
     gains = [0.0]
     for leg, route in rollout.legs():
@@ -245,11 +245,6 @@ def _arcs(route: Floats, places: Floats) -> Floats:
         nearer = off < best
         best[nearer], arcs[nearer] = off[nearer], (arc + share * math.dist(a, b))[nearer]
     return arcs
-
-
-def _estimates(rollout: Rollout) -> Floats:
-    """Return the estimated poses (T, 3): those of the log, or the poses of a perfect robot."""
-    return rollout.estimate if len(rollout.estimate) else rollout.pose
 
 
 def _rows_per_period(rollout: Rollout) -> int:

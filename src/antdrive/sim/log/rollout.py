@@ -500,3 +500,8 @@ def scans_logged(taken: Iterable[tuple[int, Floats]], per_tick: int, rows: int) 
         "scans": millimetres(np.array([ranges for _, ranges in kept]) if kept else np.empty((0, 0))),
         "scan_rows": np.array([row for row, _ in kept], dtype=np.int32),
     }
+
+
+def estimates_of(rollout: Rollout) -> Floats:
+    """Return the estimated pose in each row, x, y [m] and yaw [rad] (T, 3): the true one of a perfect robot."""
+    return rollout.estimate if len(rollout.estimate) else rollout.pose

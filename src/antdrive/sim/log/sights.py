@@ -17,7 +17,7 @@ from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.log import _kernels_sights as kernels
 from antdrive.sim.log.record import finite_or_none
-from antdrive.sim.log.rollout import Rollout, ranges_of
+from antdrive.sim.log.rollout import Rollout, estimates_of, ranges_of
 
 PASSED = 0.5  # the robot passes objects within this distance of its surface [m]
 CELL = 0.1  # side of the cells of observed ground [m]
@@ -157,7 +157,7 @@ def tracked_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
     Tracks lie in the frame of the estimates and are transformed to the true poses.
     """
     rows = rollout.tracks[:, 0].astype(np.int64)
-    believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
+    believed, true = estimates_of(rollout)[rows], rollout.pose[rows]
     places = transform_points(rollout.tracks[:, 2:4].astype(np.float64), relative_frame(believed, true))
     return [
         rows[np.hypot(*(places - rollout.movers[rows, j]).T) <= mover.radius]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from antdrive.base.plane import relative_frame, world_to_map
 from antdrive.base.types import Floats, Ints
 from antdrive.sim.driving.odometry import LoggedOdometry, odometry_of
-from antdrive.sim.log.rollout import Rollout, ranges_of
+from antdrive.sim.log.rollout import Rollout, estimates_of, ranges_of
 from antdrive.views.export.robot_frames import RobotFrames
 from antdrive.views.export.topics import MAP, ODOM, TRUTH, Topic, mover_frame, nanoseconds
 
@@ -71,7 +71,7 @@ class CdrLayout:
 def samples(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topic]:
     """Return the topics with a message per row of a log or per scan."""
     stamps, frame, measured = nanoseconds(rollout.t), rollout.record.task.frame, odometry_of(rollout)
-    truth, believed = world_to_map(frame, rollout.pose), world_to_map(frame, estimate_of(rollout))
+    truth, believed = world_to_map(frame, rollout.pose), world_to_map(frame, estimates_of(rollout))
     frames = [(ODOM, body.base), (MAP, ODOM), (MAP, TRUTH)]
     frames += [(MAP, mover_frame(i)) for i in range(rollout.movers.shape[1])]
     still = np.zeros((*rollout.movers.shape[:2], 1))
@@ -129,11 +129,6 @@ def scan_topics(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[
     }
     ranges = scans.ranges if upright else scans.ranges[:, ::-1]
     return [laser_scans("/scan", body.scan, nanoseconds(rollout.t[scans.rows]), ranges, values)]
-
-
-def estimate_of(rollout: Rollout) -> Floats:
-    """Return the robot's estimated pose in each row, x, y [m] and yaw [rad] (N, 3): the true one without noise."""
-    return rollout.estimate if len(rollout.estimate) else rollout.pose
 
 
 def joint_states(topic: str, stamps: Ints, rollout: Rollout, measured: LoggedOdometry, body: RobotFrames) -> Topic:
