@@ -54,6 +54,7 @@ class Query:
         unreachable: why no free cell connects to the start or the goal; empty if both connect
         motions: the motions of the movers, for space-time planners
         start_time: departure time on the clock of the motions [s]
+        start_label: the start's node on a grid with turns
 
     Raises:
         ValueError: a cell lies outside the grid. For a blocked cell, planners return `NO_PATH`.
@@ -66,6 +67,7 @@ class Query:
     unreachable: str = ""
     motions: tuple[MoverMotion, ...] = ()
     start_time: float = 0.0
+    start_label: int = -1
 
     def __post_init__(self) -> None:
         rows, cols = self.grid.shape
@@ -79,19 +81,38 @@ class Query:
 
         If an end has no such cell, `unreachable` gives the reason and planners return `NO_PATH`.
         """
+        if grid.turns:
+            return cls._turning(grid, task)
         from antdrive.worlds.geometry import point_clearance  # imports the compiler
 
         own, room = point_clearance(task.world, [task.start[:2], task.goal]).tolist()
         start, can_leave = _entrance(grid, task, task.start[:2], math.inf, own)
         # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal tolerance.
-        # The allowance covers the distance between the stopping point and the cell's centre.
-        within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
-        goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within, room)
-        ends = {"the start": can_leave, "the goal": can_arrive}
-        unreachable = "; ".join(
-            f"no free cell near {end} can be reached from it" for end, usable in ends.items() if not usable
-        )
-        return cls(grid, start, goal, task, unreachable)
+        within = math.inf if room >= grid.inflate else _within(task)
+        goal, can_arrive = _entrance(grid, task, task.goal, within, room)
+        return cls(grid, start, goal, task, _unreachable({"the start": can_leave, "the goal": can_arrive}))
+
+    @classmethod
+    def _turning(cls, grid: Grid, task: Task) -> Query:
+        """Build the query for a task on a grid with turns: the goal becomes a reachable cell within its tolerance."""
+        from antdrive.planners.entrances import ends
+
+        node, goal = ends(grid, task, _within(task))
+        cols = grid.shape[1]
+        start = divmod(int(grid.turns.cell[node]), cols) if node >= 0 else grid.cell_at(*task.start[:2])
+        to = divmod(goal, cols) if goal >= 0 else grid.cell_at(*task.goal)
+        unreachable = _unreachable({"the start": node >= 0, "the goal": goal >= 0})
+        return cls(grid, start, to, task, unreachable, start_label=node)
+
+    @property
+    def start_node(self) -> int:
+        """The start as a node of the grid's graph."""
+        return self.start_label if self.grid.turns else self.start[0] * self.grid.shape[1] + self.start[1]
+
+    @property
+    def goal_cell(self) -> int:
+        """The goal as a flat cell."""
+        return self.goal[0] * self.grid.shape[1] + self.goal[1]
 
     @property
     def blocked_end(self) -> str | None:
@@ -102,6 +123,19 @@ class Query:
             if not self.grid.free[cell]:
                 return f"the {key} cell ({cell[0]}, {cell[1]}) is blocked"
         return None
+
+
+def _within(task: Task) -> float:
+    """Return the farthest centre of a cell from the goal at which a robot may stop [m].
+
+    The allowance covers the distance between the stopping point and the cell's centre.
+    """
+    return task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
+
+
+def _unreachable(ends: Mapping[str, bool]) -> str:
+    """Return why ends are unusable; empty if all are usable."""
+    return "; ".join(f"no free cell near {end} can be reached from it" for end, usable in ends.items() if not usable)
 
 
 def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -> tuple[Cell, bool]:
@@ -295,6 +329,7 @@ class Capabilities:
         own_replanner: has a method `replanner(query, rng)`; other planners plan from scratch after every change
         cell_by_cell: has a method `agent(query, rng)` for driving; for other planners the robot follows the route
         deterministic: draws no random numbers, so every seed gives the same plan
+        turns: plans on grids with turns, for the robot's footprint; other planners plan for the disc around it
     """
 
     complete: bool = True
@@ -304,6 +339,7 @@ class Capabilities:
     own_replanner: bool = False
     cell_by_cell: bool = False
     deterministic: bool = False
+    turns: bool = False
 
 
 @runtime_checkable

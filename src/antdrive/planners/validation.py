@@ -204,7 +204,9 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
     bits = _bits()[tuple(np.clip(steps, -1, 1).T + 1)]
     bits[(np.abs(steps) > 1).any(axis=1)] = 8
     invalid = bits == 8
-    if not off_grid:
+    if grid.turns and not invalid.any():
+        invalid |= ~_turns_along(query, cells, bits)
+    elif not off_grid:
         invalid |= grid.moves[tuple(cells[:-1].T)].astype(np.int64) >> bits & 1 == 0
     if invalid.any():
         k = int(invalid.argmax())
@@ -214,6 +216,18 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
     if not off_grid and not _same(result.cost, cost):
         return f"cost: {result.cost:.9g} m, but the cells are {cost:.9g} m long"
     return ""
+
+
+def _turns_along(query: Query, cells: Any, bits: Any) -> Any:
+    """Return which moves along cells the turns of a grid allow, up to the first that they do not (N - 1,)."""
+    turns, cols, node = query.grid.turns, query.grid.shape[1], query.start_node
+    allowed = np.ones(len(bits), dtype=np.bool_)
+    for n, (k, (row, col)) in enumerate(zip(bits.tolist(), cells[1:].tolist(), strict=True)):
+        if not int(turns.moves[node]) >> k & 1:
+            allowed[n] = False
+            break
+        node = int(turns.label[row * cols + col, k])
+    return allowed
 
 
 def check_step(query: Query, cell: Cell, to: Any) -> str:

@@ -1,4 +1,5 @@
 from .clearance import footprint_clearance as footprint_clearance
+from .clearance import outline_of as outline_of
 from .clearance import overlap_at as overlap_at
 from .control.avoidance import Avoidance as Avoidance
 from .control.avoidance import AvoidanceState as AvoidanceState

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from antdrive.base import Floats, Pose
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds import Disc, World
+from antdrive.worlds.headings import Outline
 
 WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
 
@@ -35,6 +36,18 @@ def kernel_shape(footprint: Footprint) -> tuple[Floats, Floats]:
     """Return a footprint for kernels: half length, half width and rounding (3,), and corners (K, 2) [m]."""
     shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
     return shape, np.array(footprint.corners, dtype=np.float64).reshape(-1, 2)
+
+
+def outline_of(footprint: Footprint, margin: float) -> Outline:
+    """Return a footprint with a margin as the outline of plans; without corners for a disc around the axle.
+
+    Args:
+        footprint: the robot's footprint
+        margin: clearance on all sides [m]
+    """
+    a, b, box = footprint.half_length, footprint.half_width, footprint.corners
+    corners = () if footprint.is_disc else box or ((a, b), (-a, b), (-a, -b), (a, -b))
+    return Outline(np.array(corners, dtype=np.float64).reshape(-1, 2), footprint.rounding + margin)
 
 
 def footprint_distances(world: World, spec: RobotSpec, poses: npt.ArrayLike) -> Floats:

@@ -114,6 +114,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
         usual_margin=s.usual_margin,
         cell=s.planning_cell,
         smoothing=s.driven_smoothing,
+        footprint=s.footprint,
         hz=s.control_hz,
         seed=s.seed,
         motions=s.trajectories.motions if s.timed else (),

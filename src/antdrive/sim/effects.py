@@ -53,6 +53,17 @@ def on_other_routes(s: Scenario, key: str) -> str:
     return ""
 
 
+def with_one_shape(s: Scenario, key: str) -> str:
+    """Return a reason for a robot that is a disc, and for a planner that plans for the disc."""
+    from antdrive.planners import capabilities_of
+
+    if s.robot.footprint.is_disc:
+        return f"{s.robot.name} is a disc"
+    if s.footprint != "auto" and not capabilities_of(s.planner).turns:
+        return f"{s.planner_label} plans for the disc around the robot"
+    return ""
+
+
 def without_movers(s: Scenario, key: str) -> str:
     """Return a reason for a world without movers, in which the robot looks for none."""
     return "" if s.moving else "the world has no movers"

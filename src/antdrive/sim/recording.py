@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from antdrive.base.caches import Keyed, cached
 from antdrive.planners import AStar, PlanResult, Query, Tangent
 from antdrive.sim.driving.plants import Drive
-from antdrive.sim.driving.routes import by_contents, grid_of
+from antdrive.sim.driving.routes import by_contents, grid_of, outlined_grid_of
 from antdrive.sim.log.record import (
     ComponentRecord,
     DriveRecord,
@@ -27,6 +27,7 @@ from antdrive.worlds import Grid, Route, Task
 from antdrive.worlds.world import by_geometry
 
 if TYPE_CHECKING:
+    from antdrive.robots import RobotSpec
     from antdrive.sim.compose import Parts
     from antdrive.sim.scenario import Scenario
 
@@ -37,13 +38,14 @@ def rollout_of(
     """Assemble the log of a scenario's drive, with its time limit [s] and its wall time [s]."""
     record = DriveRecord(
         **configuration_of(s, parts, grid, answer),
-        plan=_plan_record(s, grid, answer),
+        plan=_plan_record(s, parts.guide.shape, grid, answer),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
         replans=tuple(parts.guide.log),
         limiters=parts.limiters,
         margin_choice=s.chosen.record if s.chosen is not None else None,
         inflate=s.inflate,
         time_limit=limit,
+        shape=parts.guide.shape,
         outcome=log.outcome,
         reason=log.reason,
         versions=versions(),
@@ -81,8 +83,8 @@ def configuration_of(s: Scenario, parts: Parts, grid: Grid, answer: PlanResult) 
     }
 
 
-def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
-    grid_optimum, euclidean_optimum = optima_of(s.task, grid.cell, s.inflate)
+def _plan_record(s: Scenario, shape: str, grid: Grid, answer: PlanResult) -> PlanRecord:
+    grid_optimum, euclidean_optimum = optima_of(s.task, grid.cell, s.robot, s.planned_margin, shape)
     return PlanRecord(
         cost_m=finite_or_none(answer.cost),
         length_m=answer.line_length,
@@ -93,23 +95,38 @@ def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
     )
 
 
-def optima_of(task: Task, cell: float, inflate: float) -> tuple[float | None, float | None]:
+def optima_of(
+    task: Task, cell: float, robot: RobotSpec, margin: float, shape: str = "disc"
+) -> tuple[float | None, float | None]:
     """Return the lengths of the shortest path on a task's grid and among its inflated discs [m]; None without one.
+
+    For a footprint, the second is a lower bound: that of the largest disc within it.
 
     Args:
         task: the true world, with start and goal
         cell: side of the grid cells [m]
-        inflate: distance kept between the robot's centre and every surface [m]
+        robot: the robot
+        margin: clearance that plans keep on top of the shape [m]
+        shape: the shape that plans keep clear, disc or footprint
     """
-    return _optima(by_contents(grid_of(by_geometry(task.world), cell, inflate), task))
+    world, foot = by_geometry(task.world), robot.footprint
+    if shape == "disc":
+        grid = by_contents(grid_of(world, cell, robot.radius + margin), task)
+        return _on_grid(grid), _among_discs(grid)
+    inner = by_contents(grid_of(world, cell, foot.inner_radius + margin), task)
+    return _on_grid(by_contents(outlined_grid_of(world, cell, foot, margin), task)), _among_discs(inner)
 
 
 @cached(64)
-def _optima(asked: Keyed[tuple[Grid, Task]]) -> tuple[float | None, float | None]:
-    """Return the lengths of the shortest path on the grid and among the inflated discs [m]; both searches are deterministic."""
-    query, rng = Query.between(*asked.value), random_stream(0, "optimum")
-    on_grid, free = AStar().plan(query, rng), Tangent().plan(query, rng)
-    return finite_or_none(on_grid.cost), finite_or_none(free.line_length)
+def _on_grid(asked: Keyed[tuple[Grid, Task]]) -> float | None:
+    """Return the length of the shortest path on the grid [m]; the search is deterministic."""
+    return finite_or_none(AStar().plan(Query.between(*asked.value), random_stream(0, "optimum")).cost)
+
+
+@cached(64)
+def _among_discs(asked: Keyed[tuple[Grid, Task]]) -> float | None:
+    """Return the length of the shortest path among the inflated discs [m]; the search is deterministic."""
+    return finite_or_none(Tangent().plan(Query.between(*asked.value), random_stream(0, "optimum")).line_length)
 
 
 def versions() -> dict[str, str]:

@@ -137,6 +137,12 @@ class Scenario(Settings):
         if self.map == "given" and self.localisation == "matching":
             raise FieldError("localisation", "matching: needs map none, since scans are matched to the occupancy map")
         can = capabilities_of(self.planner)
+        if self.footprint == "exact" and not can.turns and not self.robot.footprint.is_disc:
+            raise FieldError(
+                "footprint",
+                f"exact: {self.planner_label} plans for the disc around the robot; `antdrive planners` lists those that plan "
+                "for its footprint",
+            )
         if self.map == "none" and can.needs_motions:
             raise FieldError(
                 "map", f"none: {self.planner_label} needs ground-truth motions of movers, which a mapless robot lacks"

@@ -32,6 +32,7 @@ LOCALISATIONS = ("fixes", "odometry", "matching", "true")
 SMOOTHINGS = ("none", "taut", "clearance")
 #: Default smoothing of planners under comparison: others turn different plans into one route.
 COMPARED_SMOOTHING = "none"
+FOOTPRINTS = ("auto", "disc", "exact")
 PHYSICS_HZ = (60, 10_000)  # slower physics makes the robot jerk
 SLOWEST_CONTROL = 10  # [Hz]
 
@@ -111,8 +112,25 @@ class Settings:
     cell: Annotated[
         float | None,
         Gt(0),
-        Setting("side of a grid cell [m]", "Planner", "METRES", usual="the world's own; at most 0.05 without a map"),
+        Setting(
+            "side of a grid cell [m]",
+            "Planner",
+            "METRES",
+            usual="the world's own; at most 0.05 without a map, and for footprints",
+        ),
     ] = None
+    footprint: Annotated[
+        str,
+        Setting(
+            "the shape that plans keep clear: disc (the circle around the robot), exact (its footprint, which turns on the "
+            "spot and drives straight), or auto (the disc unless that way is over 10 % longer, or there is none)",
+            "Planner",
+            "auto|disc|exact",
+            choices=FOOTPRINTS,
+            since=2,
+            idle=effects.with_one_shape,
+        ),
+    ] = "auto"
     map: Annotated[
         str,
         Setting(

@@ -5,15 +5,19 @@ Cells are (row, col), rows along +y; cell (0, 0) is at the world's lower-left co
 
 from __future__ import annotations
 
+import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.types import Floats, Point
-from antdrive.worlds import _kernels
+from antdrive.worlds import _kernels, _kernels_turns
+from antdrive.worlds._kernels_turns import MoveGraph
+from antdrive.worlds.headings import Outline, _kernels_headings
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import World
 
@@ -21,16 +25,71 @@ from antdrive.worlds.world import World
 DIRECTIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 
 
+def _none(*shape: int, dtype: npt.DTypeLike = np.int32) -> npt.NDArray[Any]:
+    made = np.empty(shape, dtype=dtype)
+    made.setflags(write=False)
+    return made
+
+
+#: The outline of a disc, which has no heading.
+DISC = Outline(_none(0, 2, dtype=np.float64), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """Labels of turns of an oriented outline; empty for a disc, which turns everywhere.
+
+    A node is a label of a cell: a maximal run of its eight headings joined by free turns on the spot. Moves are driven facing
+    ahead, so move k needs heading k.
+
+    Attributes:
+        outline: the robot's outline, with its margin
+        cell: flat cell of each node (N,), read-only
+        label: node of each flat cell and heading, -1 where it is not free (R * C, 8), read-only
+        moves: bit k is set where the node may make the move `DIRECTIONS[k]` (N,), read-only
+    """
+
+    outline: Outline = DISC
+    cell: npt.NDArray[np.int32] = field(default_factory=functools.partial(_none, 0))
+    label: npt.NDArray[np.int32] = field(default_factory=functools.partial(_none, 0, 8))
+    moves: npt.NDArray[np.uint8] = field(default_factory=functools.partial(_none, 0, dtype=np.uint8))
+
+    def __bool__(self) -> bool:
+        return len(self.cell) > 0
+
+    @classmethod
+    def of(cls, outline: Outline, bits: npt.NDArray[np.uint16], able: npt.NDArray[np.uint8]) -> Turns:
+        """Label the free headings of each cell.
+
+        Args:
+            outline: the robot's outline, with its margin
+            bits: free headings (bits 0 to 7), and free turns to the next heading (bits 8 to 15) (R, C)
+            able: clear moves, one bit per direction (R, C)
+        """
+        count = _kernels_turns.count_labels(bits.ravel())
+        cell, label = np.empty(count, dtype=np.int32), np.empty((bits.size, 8), dtype=np.int32)
+        moves = np.zeros(count, dtype=np.uint8)
+        _kernels_turns.number_labels(bits.ravel(), able.ravel(), cell, label, moves)
+        for array in (cell, label, moves):
+            array.setflags(write=False)
+        return cls(outline, cell, label, moves)
+
+
+#: The turns of a disc.
+NO_TURNS = Turns()
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Free cells and allowed moves, for a robot of radius `inflate`.
 
     Attributes:
-        free: whether the robot, centred on the cell, touches nothing (R, C), read-only
-        moves: bit k is set where the move `DIRECTIONS[k]` is allowed (R, C), read-only
+        free: whether the robot, centred on the cell, touches nothing (R, C), read-only; with turns, at some heading
+        moves: bit k is set where the move `DIRECTIONS[k]` is allowed (R, C), read-only; with turns, for some label
         cell: side of a cell [m]
         origin: centre of cell (0, 0), x and y [m]
         inflate: the robot's radius plus the margin [m]
+        turns: labels of turns; empty for a disc
     """
 
     free: npt.NDArray[np.bool_]
@@ -38,6 +97,13 @@ class Grid:
     cell: float = 1.0
     origin: Point = (0.0, 0.0)
     inflate: float = 0.0
+    turns: Turns = NO_TURNS
+
+    @property
+    def graph(self) -> MoveGraph:
+        """Nodes and their moves, for compiled code."""
+        turns = self.turns
+        return MoveGraph(turns.moves if turns else self.moves.ravel(), turns.cell, turns.label, self.shape[1])
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -112,17 +178,21 @@ class Grid:
         return cls(free, moves, cell, origin, inflate)
 
 
-def rasterise(world: World, cell: float, inflate: float = 0.0) -> Grid:
+def rasterise(world: World, cell: float, inflate: float = 0.0, outline: Outline = DISC) -> Grid:
     """Rasterise a world for a robot of a given size.
 
     A cell is free if a disc of radius `inflate` at its centre has no contact. A move is allowed if both cells are
     free, the disc swept along it has no contact (exact segment-disc distance), and, for a diagonal, both orthogonal
     neighbours are free.
 
+    For an oriented outline, a cell has labels of turns. A move is allowed if the outline, facing ahead, has no contact in
+    both cells and between them.
+
     Args:
         world: the obstacles and walls; movers do not count
         cell: side of a cell [m]
         inflate: the robot's radius plus the margin [m]
+        outline: the robot's outline with its margin; without corners the robot is the disc
 
     Raises:
         InputError: the cell size is not positive or cuts the world into too many cells.
@@ -140,5 +210,13 @@ def rasterise(world: World, cell: float, inflate: float = 0.0) -> Grid:
     closed = np.zeros((rows, cols), dtype=np.uint8)
     x0, y0 = world.bounds[0] + cell / 2, world.bounds[1] + cell / 2
     bounds = np.asarray(world.bounds, dtype=np.float64)
+    if len(outline.corners):
+        bits, able = np.empty((rows, cols), dtype=np.uint16), np.empty((rows, cols), dtype=np.uint8)
+        _kernels_headings.heading_bits(world.discs, bounds, x0, y0, cell, *outline, bits)
+        _kernels_headings.clear_moves(world.discs, bounds, x0, y0, cell, *outline, bits, able)
+        free = (bits & 0xFF) > 0
+        free.setflags(write=False)
+        able.setflags(write=False)
+        return Grid(free, able, cell, (x0, y0), inflate, Turns.of(outline, bits, able))
     _kernels.rasterise(world.discs, bounds, x0, y0, cell, inflate, free, closed)
     return Grid._finish(free, closed, cell, (x0, y0), inflate)

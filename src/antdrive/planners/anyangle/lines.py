@@ -120,13 +120,13 @@ def _shortest_beside(query: Query, line: Floats) -> Cells:
     from antdrive.planners.anyangle import _kernels_lines
     from antdrive.planners.graph import _kernels_search
 
-    (r0, c0), (r1, c1) = line[[0, -1]].astype(int).tolist()
-    moves, width = query.grid.moves, 1.0
+    moves, width, graph = query.grid.moves, 1.0, query.grid.graph
+    start, goal = (row * graph.cols + col for row, col in line[[0, -1]].astype(int).tolist())
     while True:
         within = width < max(query.grid.shape)
         near = _kernels_lines.corridor_moves(moves, line, width) if within else moves
         near.setflags(write=False)  # the search is compiled for read-only moves, like a grid's
-        cells, _, _, _ = _kernels_search.shortest_path(near, r0, c0, r1, c1, True)
+        cells, _, _, _ = _kernels_search.shortest_path(graph._replace(mask=near.ravel()), start, goal, True)
         if len(cells) or not within:
             return np.asarray(cells, dtype=np.int32)
         width *= 2.0

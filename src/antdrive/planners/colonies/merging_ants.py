@@ -145,6 +145,8 @@ class MergingAnts(MaxMinAnts):
         """Return the shortest path on `graph` over the arcs of these `tours` and of the `best` one."""
         from antdrive.planners.colonies import _kernels_colony
         from antdrive.planners.graph import _kernels_search
+        from antdrive.worlds._kernels_turns import MoveGraph
+        from antdrive.worlds.grid import NO_TURNS
 
         moves = np.zeros_like(graph.mask)
         for walks in (tours, best):
@@ -154,7 +156,7 @@ class MergingAnts(MaxMinAnts):
         moves.setflags(write=False)  # the search is compiled for read-only moves, like a grid's
         cols = graph.shape[1]
         cells, straight, diagonal, _ = _kernels_search.shortest_path(
-            moves.reshape(graph.shape), *divmod(graph.start, cols), *divmod(graph.goal, cols), True
+            MoveGraph(moves, NO_TURNS.cell, NO_TURNS.label, cols), graph.start, graph.goal, True
         )
         if not len(cells):
             return None

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled, inline, kernel
+from antdrive.worlds._kernels_turns import MoveGraph, after_move, before_move, cell_of
 
 # Path costs are a + b sqrt(2) with integers a and b. Different costs in one search differ by far more than this;
 # rounding errors are far smaller.
@@ -49,61 +52,61 @@ def octile(rows: int, cols: int) -> float:
 
 
 @kernel
-def traced(mark: Array, offset: Array, cols: int, start: int, goal: int) -> tuple[Array, int]:
-    """Return the path (N, 2) along the moves by which cells were entered, and its number of diagonal steps."""
+def traced(graph: MoveGraph, mark: Array, start: int, last: int) -> tuple[Array, int]:
+    """Return the path (N, 2) along the moves by which nodes were entered, and its number of diagonal steps."""
     n = 1
-    i = goal
+    i = last
     while i != start:
-        i -= offset[mark[i] & 7]
+        i = before_move(graph, i, mark[i] & 7)
         n += 1
     cells = np.empty((n, 2), dtype=np.int32)
     diagonal = 0
-    i = goal
+    i = last
     for step in range(n - 1, -1, -1):
-        cells[step, 0] = i // cols
-        cells[step, 1] = i % cols
+        here = cell_of(graph, i)
+        cells[step, 0] = here // graph.cols
+        cells[step, 1] = here % graph.cols
         if step > 0:
             diagonal += mark[i] & 1
-            i -= offset[mark[i] & 7]
+            i = before_move(graph, i, mark[i] & 7)
     return cells, diagonal
 
 
 @kernel
-def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bool) -> tuple[Array, int, int, int]:
-    """Return the shortest path (N, 2), empty without one; its straight and diagonal steps; the expanded cells.
+def shortest_path(graph: MoveGraph, start: int, goal: int, informed: bool) -> tuple[Array, int, int, int]:
+    """Return the shortest path (N, 2), empty without one; its straight and diagonal steps; the expanded nodes.
 
-    A* with the octile heuristic if `informed`, else Dijkstra's algorithm. Cells may leave a bucket out of order, so a
-    closed cell is reopened if its cost drops, and the search ends only when nothing cheaper is open.
+    From a start node to any node of the goal cell. A* with the octile heuristic if `informed`, else Dijkstra's algorithm.
+    Nodes may leave a bucket out of order, so a closed node is reopened if its cost drops, and the search ends only when
+    nothing cheaper is open.
 
     The open list is inlined in the loop for speed, as most planners use this search.
     """
-    rows, cols = moves.shape
-    mask = moves.ravel()
-    offset = np.empty(8, dtype=np.int64)
-    for k in range(8):
-        offset[k] = DROW[k] * cols + DCOL[k]
-    start, goal = r0 * cols + c0, r1 * cols + c1
-
-    mark = np.zeros(rows * cols, dtype=np.uint8)
-    cost = np.empty(rows * cols, dtype=np.float64)  # only read where seen
+    mask, cols = graph.mask, graph.cols
+    turning = len(graph.cell) > 0
+    r1, c1 = goal // cols, goal % cols
+    mark = np.zeros(len(mask), dtype=np.uint8)
+    cost = np.empty(len(mask), dtype=np.float64)  # only read where seen
     head = np.full(BUCKETS, -1, dtype=np.int32)
     entry_cell = np.empty(1024, dtype=np.int32)
     entry_next = np.empty(1024, dtype=np.int32)
     entries, spare = 0, -1  # the number of entries, and the first reusable one
 
-    origin = octile(r1 - r0, c1 - c0) if informed else 0.0
+    here = cell_of(graph, start)
+    origin = octile(r1 - here // cols, c1 - here % cols) if informed else 0.0
     mark[start] = SEEN
     cost[start] = 0.0
     entry_cell[0], entry_next[0] = start, -1
     head[0], entries = 0, 1
     waiting, bucket, expanded = 1, 0, 0
+    last: Any = np.int64(-1)
     limit = np.inf
 
     while waiting > 0:
         slot = bucket & (BUCKETS - 1)
         entry = head[slot]
         if entry < 0:
-            if mark[goal] & CLOSED:
+            if last >= 0:
                 break
             bucket += 1
             continue
@@ -111,29 +114,31 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
         entry_next[entry] = spare
         spare = entry
         waiting -= 1
-        i = np.int64(entry_cell[entry])
+        i: Any = np.int64(entry_cell[entry])
         if mark[i] & CLOSED:
             continue
         mark[i] |= CLOSED
         g = cost[i]
-        if i == goal:
-            limit = g - TIE
+        here = cell_of(graph, i)
+        if here == goal:
+            if g < limit:
+                limit, last = g - TIE, i
             continue
-        row = i // cols
-        col = i - row * cols
+        row = here // cols
+        col = here - row * cols
         if limit < np.inf:  # the goal is closed; finish its bucket
             h = octile(r1 - row, c1 - col) if informed else 0.0
             if g + h >= limit:
                 continue
         expanded += 1
-        entered = mark[i] & 7
         todo = mask[i]
-        if i != start:
-            todo &= ~SHUNNED[entered, mask[i - offset[entered]]]
+        if i != start and not turning:
+            entered = mark[i] & 7
+            todo &= ~SHUNNED[entered, mask[before_move(graph, i, entered)]]
         for k in range(8):
             if not todo & (1 << k):
                 continue
-            j = i + offset[k]
+            j = after_move(graph, i, k)
             g_new = g + (SQRT2 if k & 1 else 1.0)
             if mark[j] & SEEN and g_new >= cost[j] - TIE:
                 continue
@@ -155,30 +160,29 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
             head[slot] = entry
             waiting += 1
 
-    if not mark[goal] & SEEN:
+    if last < 0:
         return np.empty((0, 2), dtype=np.int32), 0, 0, expanded
-    cells, diagonal = traced(mark, offset, cols, start, goal)
+    cells, diagonal = traced(graph, mark, start, last)
     return cells, len(cells) - 1 - diagonal, diagonal, expanded
 
 
 @kernel
-def connected(moves: Array, r0: int, c0: int, r1: int, c1: int) -> bool:
-    """Return whether allowed moves lead from one cell to another, by a flood fill."""
-    rows, cols = moves.shape
-    mask = moves.ravel()
-    start, goal = r0 * cols + c0, r1 * cols + c1
-    seen = np.zeros(rows * cols, dtype=np.uint8)
-    stack = np.empty(rows * cols, dtype=np.int32)
+def connected(graph: MoveGraph, start: int, goal: int) -> bool:
+    """Return whether allowed moves lead from a node to a cell, by a flood fill."""
+    seen = np.zeros(len(graph.mask), dtype=np.uint8)
+    stack = np.empty(len(graph.mask), dtype=np.int32)
     stack[0], size = start, 1
     seen[start] = 1
-    while size > 0 and not seen[goal]:
+    while size > 0:
         size -= 1
-        i = np.int64(stack[size])
+        i: Any = np.int64(stack[size])
+        if cell_of(graph, i) == goal:
+            return True
         for k in range(8):
-            if mask[i] & (1 << k):
-                j = i + DROW[k] * cols + DCOL[k]
+            if graph.mask[i] & (1 << k):
+                j = after_move(graph, i, k)
                 if not seen[j]:
                     seen[j] = 1
                     stack[size] = j
                     size += 1
-    return bool(seen[goal])
+    return False

@@ -23,7 +23,7 @@ class Dijkstra(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(deterministic=True)
+        return Capabilities(deterministic=True, turns=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return shortest(query, informed=False)
@@ -43,7 +43,7 @@ class AStar(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(deterministic=True)
+        return Capabilities(deterministic=True, turns=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return shortest(query, informed=True)
@@ -57,7 +57,7 @@ def shortest(query: Query, *, informed: bool = True) -> PlanResult:
     from antdrive.planners.graph import _kernels_search  # imported here because it loads the compiler
 
     cells, straight, diagonal, expanded = _kernels_search.shortest_path(
-        query.grid.moves, *query.start, *query.goal, informed
+        query.grid.graph, query.start_node, query.goal_cell, informed
     )
     if not len(cells):
         return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work=expanded)
@@ -69,4 +69,4 @@ def reachable(query: Query) -> bool:
     """Return whether allowed moves lead from the start to the goal."""
     from antdrive.planners.graph import _kernels_search
 
-    return bool(_kernels_search.connected(query.grid.moves, *query.start, *query.goal))
+    return bool(_kernels_search.connected(query.grid.graph, query.start_node, query.goal_cell))

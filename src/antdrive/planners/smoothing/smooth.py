@@ -28,6 +28,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import polyline_length, segment_lengths
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath
 from antdrive.planners.plan import PlanResult
+from antdrive.planners.smoothing.sweeps import smooth_lines
 from antdrive.worlds import Grid, Route, Task, World, point_clearance, segment_clearance
 
 if TYPE_CHECKING:
@@ -131,6 +132,8 @@ def smooth(
             raise FieldError(key, f"must be at least 0, got {value:g}")
     if not (math.isfinite(bulge) and bulge > 0):
         raise FieldError("bulge", f"must be greater than 0, got {bulge:g}")
+    if grid.turns:
+        return smooth_lines(plan, grid, task, kind)
     line = route_along(plan, grid, task)
     if kind == "none":
         return line

@@ -17,7 +17,7 @@ import numpy as np
 
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
-from antdrive.robots import TrackedPath, Twist
+from antdrive.robots import TrackedPath, Twist, outline_of
 from antdrive.robots.control.pursuit import unsorted_obstacles
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
@@ -92,6 +92,11 @@ class Exploration(RouteGuide):
         return self._routes.plan_error
 
     @property
+    def shape(self) -> str:
+        """The shape that plans kept clear: footprint once one did, else disc."""
+        return self._routes.shape
+
+    @property
     def may_wait(self) -> bool:
         """Whether the robot may stay in place: it has no path and tries again, or it makes a scan turn."""
         return self.lost or self.scan_turning
@@ -121,13 +126,18 @@ class Exploration(RouteGuide):
     # ---- plans
 
     def plan(self, pose: Pose, avoided: Sequence[Disc] = ()) -> tuple[Grid, PlanResult]:
-        """Plan on the map from a pose, with less margin where no path exists otherwise; return grid and plan."""
+        """Plan on the map from a pose; return grid and plan.
+
+        Where no path exists otherwise, plan with less margin, in larger bounds, and for the footprint.
+        """
         straight = math.dist(pose[:2], self._task.goal)
         best: tuple[Grid, PlanResult] | None = None
-        for growth in GROWTH:
+        for outlined, growth in (
+            (shape, growth) for shape in self._routes.shapes for growth in GROWTH[: 1 if shape else 2]
+        ):
             for share in MARGINS:
                 task = self._known(pose, self._bounds(growth, pose))
-                grid = self._grid(task, share * self._routes.margin)
+                grid = self._grid(task, share * self._routes.margin, outlined=outlined)
                 answer = self._routes.around(task, grid, avoided)
                 if answer.status is PlanStatus.INVALID:
                     return grid, answer
@@ -141,8 +151,9 @@ class Exploration(RouteGuide):
         assert best is not None
         return best
 
-    def _grid(self, task: Task, margin: float) -> Grid:
-        return rasterise(task.world, self._routes.cell, self._robot.radius + margin)
+    def _grid(self, task: Task, margin: float, *, outlined: bool = False) -> Grid:
+        cell, inflate = self._routes.cell, self._robot.radius + margin
+        return rasterise(task.world, cell, inflate, *[outline_of(self._robot.footprint, margin)] * outlined)
 
     def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""

@@ -122,6 +122,11 @@ class Guide(Protocol):
         return ""
 
     @property
+    def shape(self) -> str:
+        """The shape that plans kept clear: footprint once one did, else disc."""
+        return "disc"
+
+    @property
     def blocked(self) -> str:
         """Description of the mover that blocks every route, once the robot's patience is over; else empty."""
         return ""

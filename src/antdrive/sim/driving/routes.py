@@ -13,6 +13,7 @@ import numpy.typing as npt
 from antdrive.base import Bounds
 from antdrive.base.caches import Keyed, bits, cached
 from antdrive.planners import (
+    AStar,
     Planner,
     PlanResult,
     PlanStatus,
@@ -27,7 +28,7 @@ from antdrive.planners import (
     smooth,
 )
 from antdrive.planners.plan import Cell
-from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
+from antdrive.robots import Footprint, PurePursuit, RobotSpec, TrackedPath, outline_of
 from antdrive.sim.driving.blockage import closed_cells, with_obstacles
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
 from antdrive.sim.driving.parts import RouteGuide
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
     from antdrive.sim.driving.movers_ahead import Zone
 
 
+LONGER = 1.1  # the disc's way may be this much longer than the footprint's
+FINE = 0.05  # largest cell of plans for a footprint [m]
 KEPT = 4  # replanners kept for repair: two margins for each of two bounds
 
 
@@ -52,6 +55,7 @@ class RoutePlanner:
     Attributes:
         rng: the random stream of replans
         plan_error: error of the planner's first invalid plan; empty if all plans were valid
+        shape: footprint once a plan kept the footprint clear; else disc
     """
 
     planner: Planner  # finds the paths
@@ -63,6 +67,7 @@ class RoutePlanner:
     usual_margin: float  # the default for robot, noise and smoothing [m]
     cell: float  # side of the grid cells [m]
     smoothing: str  # how plans become routes
+    footprint: str  # the shape that plans keep clear: disc, exact, or auto
     hz: int  # control periods per second
     seed: int  # the seed of the drive's random numbers
     motions: tuple[MoverMotion, ...] = ()  # motions of the movers, for space-time planners
@@ -70,6 +75,7 @@ class RoutePlanner:
 
     def __post_init__(self) -> None:
         self.plan_error = ""
+        self.shape = "disc"
         self.restart()
 
     def restart(self) -> None:
@@ -81,6 +87,40 @@ class RoutePlanner:
     def inflate(self) -> float:
         """Distance that plans keep between the robot's centre and every surface [m]."""
         return self.robot.radius + self.margin
+
+    @property
+    def turns(self) -> bool:
+        """Whether plans may keep the footprint clear instead of the disc."""
+        can = self.footprint != "disc" and not self.robot.footprint.is_disc
+        return can and capabilities_of(self.planner).turns
+
+    @property
+    def shapes(self) -> tuple[bool, ...]:
+        """The shapes to plan for in turn, until there is a path: the disc (False), the footprint (True)."""
+        return {"disc": (False,), "auto": (False, True), "exact": (True,)}[self.footprint if self.turns else "disc"]
+
+    def chosen_grid(self) -> Grid:
+        """Return the grid of the first plan.
+
+        With footprint `auto` it is the disc's, unless its shortest path is longer than the footprint's by more than `LONGER`.
+        """
+        world = by_geometry(self.task.world)
+        disc = grid_of(world, self.cell, self.inflate)
+        if not self.turns:
+            return disc
+        if self.footprint == "auto":
+            length = self._shortest(disc)
+            inner = self.robot.footprint.inner_radius + self.margin
+            # No path of the footprint is shorter than that of the disc within it.
+            if length <= LONGER * self._shortest(grid_of(world, self.cell, inner)):
+                return disc
+        outlined = outlined_grid_of(world, min(self.cell, FINE), self.robot.footprint, self.margin)
+        chooses = self.footprint == "exact" or self._shortest(outlined) * LONGER < length
+        return outlined if chooses else disc
+
+    def _shortest(self, grid: Grid) -> float:
+        """Return the length of the shortest path on a grid [m]."""
+        return AStar().plan(Query.between(grid, self.task), random_stream(0, "optimum")).cost
 
     def query(self, grid: Grid, task: Task, start_time: float = 0.0) -> Query:
         """Return the planner's query at a time [s]."""
@@ -95,6 +135,8 @@ class RoutePlanner:
     def checked(self, query: Query, answer: PlanResult) -> PlanResult:
         """Return the answer if it is valid; else note the error and return an invalid plan."""
         plan = checked(query, answer)
+        if plan.solved and query.grid.turns:
+            self.shape = "footprint"
         if plan.status is PlanStatus.INVALID:
             self.plan_error = self.plan_error or plan.reason
         return plan
@@ -159,10 +201,15 @@ class OneRoute(RouteGuide):
         """Why the planner's plan is invalid; empty if it is valid."""
         return self._routes.plan_error
 
+    @property
+    def shape(self) -> str:
+        """The shape that plans kept clear."""
+        return self._routes.shape
+
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start; report no path if the start is too narrow to follow it."""
         routes = self._routes
-        grid = grid_of(by_geometry(routes.task.world), routes.cell, routes.inflate)
+        grid = routes.chosen_grid()
         plan = routes.plan(routes.query(grid, routes.task), random_stream(routes.seed, "planner"), routes.planner_label)
         if plan.status is PlanStatus.NO_PATH:
             return grid, dataclasses.replace(plan, reason=no_path_reason(routes, grid, plan.reason))
@@ -213,6 +260,12 @@ class OneRoute(RouteGuide):
         )
 
 
+@cached(4)
+def outlined_grid_of(world: Keyed[World], cell: float, footprint: Footprint, margin: float) -> Grid:
+    """Rasterise a world for a footprint with a margin."""
+    return rasterise(world.value, cell, footprint.radius + margin, outline_of(footprint, margin))
+
+
 @cached(16)
 def grid_of(world: Keyed[World], cell: float, inflate: float) -> Grid:
     """Rasterise a world."""
@@ -222,7 +275,8 @@ def grid_of(world: Keyed[World], cell: float, inflate: float) -> Grid:
 def by_contents(grid: Grid, task: Task) -> Keyed[tuple[Grid, Task]]:
     """Return a grid and a task as a cache key over their bits: cells, numbers, walls and static cylinders."""
     numbers = bits(grid.cell, *grid.origin, grid.inflate, *task.start, *task.goal, task.goal_tolerance)
-    cells = grid.shape, grid.free.tobytes(), grid.moves.tobytes()
+    turns = grid.turns.label.tobytes(), grid.turns.outline.corners.tobytes(), grid.turns.outline.reach
+    cells = grid.shape, grid.free.tobytes(), grid.moves.tobytes(), turns
     return Keyed((grid, task), (numbers, cells, by_geometry(task.world)))
 
 

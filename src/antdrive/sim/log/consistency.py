@@ -14,6 +14,7 @@ import numpy as np
 
 from antdrive.base.plane import arc_lengths, polyline_length, wrap_angle
 from antdrive.base.types import Floats
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
 from antdrive.sim.log.ending import false_endings
 from antdrive.sim.log.record import DECISION
@@ -80,16 +81,17 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
     """
     record = rollout.record
     points = _spaced(route)
-    own = min(record.inflate, float(_room(rollout, route[:1])[0])) if name == "route" else -math.inf
+    keeps, what, room = record.inflate, "inflation", _room
+    if record.shape == "footprint":
+        keeps, what, room = record.margin, "margin", _room_of_footprint
+    rooms = room(rollout, points)
+    own = min(keeps, float(rooms[0])) if name == "route" else -math.inf
     leaving = np.hypot(*(points - route[0]).T) <= end_reach(record.inflate, record.cell)
-    needed = np.where(leaving, own, record.inflate)
-    room = _room(rollout, points)
-    worst = int((room - needed).argmin())
-    if not room[worst] >= needed[worst] - ROUTE_SLACK:
-        start = f", its start has {own:.3g} m" if leaving[worst] and own < record.inflate else ""
-        yield (
-            f"{name}: leads {room[worst]:.3g} m past an obstacle; the plan's inflation is {record.inflate:.3g} m{start}"
-        )
+    needed = np.where(leaving, own, keeps)
+    worst = int((rooms - needed).argmin())
+    if not rooms[worst] >= needed[worst] - ROUTE_SLACK:
+        start = f", its start has {own:.3g} m" if leaving[worst] and own < keeps else ""
+        yield f"{name}: leads {rooms[worst]:.3g} m past an obstacle; the plan's {what} is {keeps:.3g} m{start}"
 
 
 def _spaced(route: Floats) -> Floats:
@@ -110,6 +112,28 @@ def _room(rollout: Rollout, points: Floats) -> Floats:
         gaps = np.hypot(some[:, :1] - discs[:, 0], some[:, 1:] - discs[:, 1]) - discs[:, 2]
         room[rows] = np.minimum(room[rows], gaps.min(axis=1, initial=math.inf))
     return np.asarray(room)
+
+
+def _room_of_footprint(rollout: Rollout, points: Floats) -> Floats:
+    """Return the distances of the footprint, facing along points (N, 2) [m], from known static obstacles (N,) [m].
+
+    At corners it may face either way, and at the first points backwards, as a route's begin may be driven.
+    """
+    record = rollout.record
+    steps = np.diff(points, axis=0)
+    ahead = np.arctan2(steps[:, 1], steps[:, 0])
+    before, after = np.append(ahead[:1], ahead), np.append(ahead, ahead[-1:])
+    behind = np.hypot(*(points - points[0]).T) <= end_reach(record.inflate, record.cell)
+    rooms = [
+        footprint_clearance(record.task.world, record.robot.footprint, np.column_stack([points, yaw]))
+        for yaw in (
+            before,
+            after,
+            np.where(behind, after + math.pi, after),
+            np.where(behind, record.task.start[2], after),
+        )
+    ]
+    return np.asarray(np.max(rooms, axis=0))
 
 
 def _check_cells(rollout: Rollout) -> Iterator[str]:

@@ -48,6 +48,9 @@ MAX_MARGIN = 1000.0
 
 MARGIN_ROUNDING = 1e-9  # [m]
 
+#: Shapes that plans keep clear.
+SHAPES = ("disc", "footprint")
+
 #: Trigger of replans by planners that decide cell by cell.
 DECISION = "decision"
 
@@ -270,6 +273,7 @@ class DriveRecord:
         sensing: knowledge of the world and of the pose; omitted for a given map and pose fixes
         settings: settings without another key, by name; omitted where all have their defaults
         times: wall-clock times, not covered by the digest
+        shape: shape that the first plan keeps clear: disc, or footprint; omitted for the disc
         digest: SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
     Raises:
@@ -306,6 +310,7 @@ class DriveRecord:
     margin_choice: MarginRecord | None = dataclasses.field(default=None, metadata=LATER)
     sensing: SensingRecord | None = dataclasses.field(default=None, metadata=LATER)
     settings: Mapping[str, Any] | None = dataclasses.field(default=None, metadata=LATER | CHOSEN)
+    shape: str = dataclasses.field(default="disc", metadata=LATER | REPLAYED)
     digest: str | None = dataclasses.field(default=None, metadata=LOGGED)
 
     def __post_init__(self) -> None:
@@ -322,6 +327,8 @@ class DriveRecord:
         for key in ("cell", "time_limit"):
             if not getattr(self, key) > 0:
                 raise FieldError(key, f"must be greater than 0, got {getattr(self, key)!r:.40}")
+        if self.shape not in SHAPES:
+            raise FieldError("shape", f"must be one of {', '.join(SHAPES)}, got {self.shape!r:.40}")
         for key, value in (self.settings or {}).items():
             if key not in SETTINGS or self.held(key):
                 raise FieldError(f"settings.{key}", "unknown key; a later version of antdrive may have written it")
