@@ -18,6 +18,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.base.types import Floats
 
+ROUNDING = 1e-9  # tolerance of an arc length [m]
 DETOUR = 3.0  # largest excess of an any-angle planner's line over its path of cells [cells]
 
 
@@ -85,11 +86,14 @@ class Route:
         object.__setattr__(self, "xy", xy)
         if self.turns is not None and np.abs(self.turns).max() >= 2 * math.pi:
             raise FieldError("turns", f"must be less than a full turn, got {np.abs(self.turns).max():g}")
-        if self.backwards_until and (self.turns is None or self.backwards_until not in self.arc):
-            raise FieldError(
-                "backwards_until",
-                f"must be the arc length of a point of a route with turns, got {self.backwards_until:g}",
-            )
+        if self.backwards_until:
+            nearest = self.arc[np.abs(self.arc - self.backwards_until).argmin()].item()
+            if self.turns is None or not abs(nearest - self.backwards_until) <= ROUNDING:
+                raise FieldError(
+                    "backwards_until",
+                    f"must be the arc length of a point of a route with turns, got {self.backwards_until:g}",
+                )
+            object.__setattr__(self, "backwards_until", nearest)
 
     @functools.cached_property
     def arc(self) -> Floats:

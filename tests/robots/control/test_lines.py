@@ -140,3 +140,8 @@ def test_invalid_turns_are_named(key, value):
 def test_equal_points_keep_the_turn_of_the_last_one():
     route = Route([(0, 0), (0, 0), (1, 0)], turns=[0.0, 0.5, 0.0])
     assert route.turns.tolist() == [0.5, 0.0]
+
+
+def test_the_backward_part_ends_exactly_at_a_point():
+    route = Route([(0, 0), (-0.3, 0.1), (2, 2)], turns=np.zeros(3), backwards_until=math.hypot(0.3, 0.1) + 1e-12)
+    assert route.backwards_until == route.arc[1]
