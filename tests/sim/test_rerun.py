@@ -232,7 +232,7 @@ def test_the_world_refuses_another_optimum(key, value, small_run):
 
 def test_optima_are_those_of_the_recorded_world(seen):
     record = seen.record
-    assert optima_of(record.task, record.cell, record.inflate) == (
+    assert optima_of(record.task, record.cell, record.robot, record.margin) == (
         record.plan.grid_optimum_m,
         record.plan.euclidean_optimum_m,
     )

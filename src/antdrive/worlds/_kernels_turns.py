@@ -64,7 +64,7 @@ def count_labels(bits: Array) -> int:
 
 @kernel
 def number_labels(bits: Array, able: Array, cell: Array, label: Array, mask: Array) -> None:
-    """Number the labels of each cell, and fill the moves of each node.
+    """Give the labels of each cell their nodes, and each node its moves.
 
     A label is a maximal run of free headings joined by free turns. A cell's first label is the node of the cell's number;
     others have the next numbers after all cells.
