@@ -10,6 +10,7 @@ from antdrive.planners import load_planner
 from antdrive.sim import Perception, Scenario, plan, run
 from antdrive.sim import rerun as rerun_module
 from antdrive.sim.driving.replay import ROUNDING, replay
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import PROOFS, Proof
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.recording import optima_of
@@ -122,7 +123,8 @@ def test_every_derived_key_of_the_record_is_compared(key, seen):
         with_other = replace(seen.record.replans[0], solved=False, route=())
         record = replace(seen.record, replans=(with_other, *seen.record.replans[1:]))
     else:
-        value = type(logged).STUCK if key == "outcome" else other(logged)
+        choices = {"outcome": Outcome.STUCK, "shape": "footprint"}
+        value = choices[key] if key in choices else other(logged)
         record = rewritten(seen.record, key, value)
     again = replace(seen, record=record)
     assert f"record.{key}" in [found.name for found in mismatches(again, seen) if not found.rounded]

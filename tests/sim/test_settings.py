@@ -18,6 +18,7 @@ WRITTEN: dict[str, tuple[Any, Any, list[str] | None]] = {
     "noise": (0.5, 0.5, ["--noise", "0.5"]),
     "margin": (0.1, "0.1", ["--margin", "0.1"]),
     "cell": (0.2, 0.2, ["--cell", "0.2"]),
+    "footprint": ("disc", "disc", ["--footprint", "disc"]),
     "map": ("none", "none", ["--map", "none"]),
     "localisation": ("matching", "matching", ["--localisation", "matching"]),
     "odometry": (2.0, 2.0, ["--odometry", "2.0"]),

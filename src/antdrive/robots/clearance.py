@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds import Disc, World
-from antdrive.worlds.headings import Outline
+
+if TYPE_CHECKING:
+    from antdrive.worlds.headings import Outline
 
 WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
 
@@ -45,6 +49,8 @@ def outline_of(footprint: Footprint, margin: float) -> Outline:
         footprint: the robot's footprint
         margin: clearance on all sides [m]
     """
+    from antdrive.worlds.headings import Outline  # imports the compiler
+
     a, b, box = footprint.half_length, footprint.half_width, footprint.corners
     corners = () if footprint.is_disc else box or ((a, b), (-a, b), (-a, -b), (a, -b))
     return Outline(np.array(corners, dtype=np.float64).reshape(-1, 2), footprint.rounding + margin)
