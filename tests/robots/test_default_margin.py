@@ -6,7 +6,7 @@ import itertools
 import pytest
 
 from antdrive.robots import PurePursuit, list_robots, load_robot
-from antdrive.robots.default_margin import LEAST, RESERVE, STEP, default_margin
+from antdrive.robots.default_margin import LEAST, RESERVE, STEP, default_margin, line_margin
 from antdrive.robots.spec import Noise
 from antdrive.runs.margins.choice import predicted_loss
 from antdrive.runs.margins.loss import loss_on_course
@@ -86,3 +86,12 @@ def test_a_default_and_the_same_number_are_one_drive(small_scenario):
         forged = dataclasses.replace(log.record.controller, settings=wrong)
         assert not has_default(dataclasses.replace(log.record, controller=forged))
     assert not has_default(run(small_scenario).rollout.record), "3 cm without noise go without saying"
+
+
+@pytest.mark.parametrize("name", ["jackal", "husky", "warehouse"])
+def test_the_margin_of_lines_grows_with_noise_from_the_least(name):
+    robot, controller = load_robot(name), PurePursuit()
+    margins = [line_margin(robot, controller, noise) for noise in (0.0, 0.5, 1.0, 2.0)]
+    assert margins == sorted(margins)
+    assert margins[0] == LEAST
+    assert margins[1] < margins[3]
