@@ -114,7 +114,7 @@ class Scene:
     def no_go_label(self) -> str:
         """Legend of the no-go area."""
         if self.outlined:
-            return f"no-go area for the robot's footprint\n(margin = {self.inflate:.3g} m)"
+            return f"no-go area for the footprint\n(margin = {self.inflate:.3g} m)"
         return f"no-go area for the robot's centre\n(radius + margin = {self.inflate:.2f} m)"
 
     @property

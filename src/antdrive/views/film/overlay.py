@@ -161,7 +161,7 @@ def _metres(value: float) -> str:
 
 #: Legend of the grey band around obstacles.
 NO_GO = "no-go area for the robot's centre (radius + margin)"
-NO_GO_OUTLINED = "no-go area for the robot's footprint (margin)"
+NO_GO_OUTLINED = "no-go area for the footprint (margin)"
 
 _WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
 
