@@ -54,7 +54,7 @@ def test_the_reason_names_a_robot_wider_than_the_gate(turtlebot):
 def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_need(jackal, centre):
     """A robot of 0.9 x 0.6 m before a door of 0.95 m."""
     robot = replace(jackal, name="cart", footprint=Footprint.rectangle(0.9, 0.6, centre))
-    reason = run(gate(robot, 0.95, cell=0.05)).reason
+    reason = run(gate(robot, 0.95, cell=0.05, footprint="disc")).reason
     assert reason.startswith("no path for a disc of 0.")
     assert (
         "the widest disc that passes has a radius of 0.475 m, at (3.00, 2.00), between obstacles[0] at (3, 2.725)"
@@ -64,11 +64,21 @@ def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_n
         "plans use the disc of cart; its rectangle of 0.9 x 0.6 m needs 0.66 m of the 0.95 m straight ahead"
     )
     assert len(reason) < 350
-    assert run(gate(robot, 0.62, cell=0.05)).reason.endswith("needs 0.66 m of the 0.62 m straight ahead")
+    assert run(gate(robot, 0.95, cell=0.05)).succeeded, "the footprint passes"
+    narrow = run(gate(robot, 0.62, cell=0.05)).reason
+    assert "on cells of 0.05 m, nor for its rectangle of 0.9 x 0.6 m; " in narrow
+    assert narrow.endswith("; its rectangle of 0.9 x 0.6 m needs 0.66 m of the 0.62 m straight ahead")
+    exact = run(gate(robot, 0.62, cell=0.05, footprint="exact")).reason
+    assert exact == "no path for its rectangle of 0.9 x 0.6 m with a margin of 0.03 m on cells of 0.05 m"
+
+
+def test_a_planner_for_discs_names_one_for_footprints(jackal):
+    robot = replace(jackal, footprint=Footprint.rectangle(0.9, 0.6))
+    assert run(gate(robot, 0.95, planner="tangent")).reason.endswith("; astar plans for the footprint")
 
 
 def test_a_margin_that_would_do_is_named_for_a_rectangle_too(jackal):
-    reason = run(gate(jackal, 0.7, cell=0.05)).reason
+    reason = run(gate(jackal, 0.7, cell=0.05, footprint="disc")).reason
     assert reason.endswith("its rectangle of 0.508 x 0.43 m needs 0.49 m of the 0.7 m straight ahead; "
                            "a margin below 0.0172 m leaves a way on fine cells")  # fmt: skip
 

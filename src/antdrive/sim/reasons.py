@@ -13,6 +13,7 @@ from antdrive.worlds import Grid, Task, rasterise
 from antdrive.worlds.passage import feasible, widest_passage
 
 if TYPE_CHECKING:
+    from antdrive.robots import RobotSpec
     from antdrive.sim.driving.routes import RoutePlanner
 
 FINER = (2, 4, 8)  # cells are tried this many times smaller
@@ -23,10 +24,16 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
     """Explain why a planner found no path: its reason, the disc that does not fit, and a remedy."""
     robot = s.robot
     disc = f"a disc of {s.inflate:.3g} m (radius {robot.radius:.3g} + margin {s.margin:.3g})"
+    if grid.turns:
+        disc = f"{_shape(robot)} with a margin of {grid.turns.outline.reach - robot.footprint.rounding:.3g} m"
     if reachable(Query.between(grid, s.task)):
         says = f": {said}" if said else ""
         return f"{s.planner_label} found no path for {disc}{says}; astar finds one on these cells of {grid.cell:g} m"
     start = f"no path for {disc} on cells of {grid.cell:g} m"
+    if grid.turns:
+        return start
+    if s.turns:
+        start += f", nor for {_shape(robot)}"
     if feasible(s.task, s.inflate):
         finer = next((grid.cell / k for k in FINER if _has_path(s.task, grid.cell / k, s.inflate)), None)
         return f"{start}; there is one on {f'cells of {finer:g} m' if finer else 'finer cells'}"
@@ -58,13 +65,18 @@ def _what_it_takes(s: RoutePlanner, passes: float) -> str:
         helps += ", but noise may then cause contacts; --margin auto measures its effect"
     if foot.is_disc:
         return helps or "this robot does not fit through"
-    xmin, ymin, xmax, ymax = foot.bounds
-    shape = f"its {'rectangle' if foot.box else 'outline'} of {xmax - xmin:.3g} x {ymax - ymin:.3g} m"
-    needs = ymax - ymin + 2 * s.margin
-    return (
-        f"plans use the disc of {robot.name}; {shape} needs {needs:.3g} m of the {2 * passes:.3g} m straight ahead"
-        f"{'; ' * bool(helps)}{helps}"
-    )
+    _, ymin, _, ymax = foot.bounds
+    needs = f"{_shape(robot)} needs {ymax - ymin + 2 * s.margin:.3g} m of the {2 * passes:.3g} m straight ahead"
+    if not s.turns:
+        others = "" if s.footprint == "disc" else "; astar plans for the footprint"
+        needs = f"plans use the disc of {robot.name}; {needs}{others}"
+    return f"{needs}{'; ' * bool(helps)}{helps}"
+
+
+def _shape(robot: RobotSpec) -> str:
+    """Return the name and size of a robot's footprint."""
+    xmin, ymin, xmax, ymax = robot.footprint.bounds
+    return f"its {'rectangle' if robot.footprint.box else 'outline'} of {xmax - xmin:.3g} x {ymax - ymin:.3g} m"
 
 
 def _has_path(task: Task, cell: float, inflate: float) -> bool:

@@ -38,14 +38,14 @@ def rollout_of(
     """Assemble the log of a scenario's drive, with its time limit [s] and its wall time [s]."""
     record = DriveRecord(
         **configuration_of(s, parts, grid, answer),
-        plan=_plan_record(s, parts.guide.shape, grid, answer),
+        plan=_plan_record(s, parts.guide.footprint_margin, grid, answer),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
         replans=tuple(parts.guide.log),
         limiters=parts.limiters,
         margin_choice=s.chosen.record if s.chosen is not None else None,
         inflate=s.inflate,
         time_limit=limit,
-        shape=parts.guide.shape,
+        footprint_margin=parts.guide.footprint_margin,
         outcome=log.outcome,
         reason=log.reason,
         versions=versions(),
@@ -83,8 +83,8 @@ def configuration_of(s: Scenario, parts: Parts, grid: Grid, answer: PlanResult) 
     }
 
 
-def _plan_record(s: Scenario, shape: str, grid: Grid, answer: PlanResult) -> PlanRecord:
-    grid_optimum, euclidean_optimum = optima_of(s.task, grid.cell, s.robot, s.planned_margin, shape)
+def _plan_record(s: Scenario, footprint_margin: float | None, grid: Grid, answer: PlanResult) -> PlanRecord:
+    grid_optimum, euclidean_optimum = optima_of(s.task, grid.cell, s.robot, s.planned_margin, footprint_margin)
     return PlanRecord(
         cost_m=finite_or_none(answer.cost),
         length_m=answer.line_length,
@@ -96,7 +96,7 @@ def _plan_record(s: Scenario, shape: str, grid: Grid, answer: PlanResult) -> Pla
 
 
 def optima_of(
-    task: Task, cell: float, robot: RobotSpec, margin: float, shape: str = "disc"
+    task: Task, cell: float, robot: RobotSpec, margin: float, footprint_margin: float | None = None
 ) -> tuple[float | None, float | None]:
     """Return the lengths of the shortest path on a task's grid and among its inflated discs [m]; None without one.
 
@@ -106,15 +106,15 @@ def optima_of(
         task: the true world, with start and goal
         cell: side of the grid cells [m]
         robot: the robot
-        margin: clearance that plans keep on top of the shape [m]
-        shape: the shape that plans keep clear, disc or footprint
+        margin: clearance of plans on top of the robot's radius [m]
+        footprint_margin: clearance of plans that keep the footprint clear [m]; None for those of the disc
     """
     world, foot = by_geometry(task.world), robot.footprint
-    if shape == "disc":
+    if footprint_margin is None:
         grid = by_contents(grid_of(world, cell, robot.radius + margin), task)
         return _on_grid(grid), _among_discs(grid)
-    inner = by_contents(grid_of(world, cell, foot.inner_radius + margin), task)
-    return _on_grid(by_contents(outlined_grid_of(world, cell, foot, margin), task)), _among_discs(inner)
+    inner = by_contents(grid_of(world, cell, foot.inner_radius + footprint_margin), task)
+    return _on_grid(by_contents(outlined_grid_of(world, cell, foot, footprint_margin), task)), _among_discs(inner)
 
 
 @cached(64)

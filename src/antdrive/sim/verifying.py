@@ -112,7 +112,7 @@ def wrong_optima(record: DriveRecord) -> Iterator[str]:
     from antdrive.sim.recording import optima_of
 
     try:
-        computed = optima_of(record.task, record.cell, record.robot, record.margin, record.shape)
+        computed = optima_of(record.task, record.cell, record.robot, record.margin, record.footprint_margin)
     except ValueError as error:  # the grid has too many cells
         yield f"record.{error}"
         return

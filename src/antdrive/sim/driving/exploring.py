@@ -92,9 +92,9 @@ class Exploration(RouteGuide):
         return self._routes.plan_error
 
     @property
-    def shape(self) -> str:
-        """The shape that plans kept clear: footprint once one did, else disc."""
-        return self._routes.shape
+    def footprint_margin(self) -> float | None:
+        """Clearance of plans that keep the footprint clear [m]; None while all keep the disc clear."""
+        return self._routes.footprint_margin
 
     @property
     def may_wait(self) -> bool:
@@ -152,8 +152,10 @@ class Exploration(RouteGuide):
         return best
 
     def _grid(self, task: Task, margin: float, *, outlined: bool = False) -> Grid:
-        cell, inflate = self._routes.cell, self._robot.radius + margin
-        return rasterise(task.world, cell, inflate, *[outline_of(self._robot.footprint, margin)] * outlined)
+        """Return the grid for the disc or for the footprint."""
+        robot, cell = self._robot, self._routes.cell
+        outline = [outline_of(robot.footprint, margin)] if outlined else []
+        return rasterise(task.world, cell, robot.radius + margin, *outline)
 
     def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""

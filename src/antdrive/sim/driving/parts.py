@@ -122,9 +122,9 @@ class Guide(Protocol):
         return ""
 
     @property
-    def shape(self) -> str:
-        """The shape that plans kept clear: footprint once one did, else disc."""
-        return "disc"
+    def footprint_margin(self) -> float | None:
+        """Clearance of plans that keep the footprint clear [m]; None while all keep the disc clear."""
+        return None
 
     @property
     def blocked(self) -> str:

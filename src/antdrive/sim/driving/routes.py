@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -55,7 +56,7 @@ class RoutePlanner:
     Attributes:
         rng: the random stream of replans
         plan_error: error of the planner's first invalid plan; empty if all plans were valid
-        shape: footprint once a plan kept the footprint clear; else disc
+        footprint_margin: margin of the first plan that kept the footprint clear [m]; None while there is none
     """
 
     planner: Planner  # finds the paths
@@ -64,6 +65,7 @@ class RoutePlanner:
     robot: RobotSpec  # drives the routes
     controller: PurePursuit  # follows them
     margin: float  # clearance on top of the robot's radius [m]
+    outline_margins: tuple[float, ...]  # clearances of plans for the footprint, in turn until there is a path [m]
     usual_margin: float  # the default for robot, noise and smoothing [m]
     cell: float  # side of the grid cells [m]
     smoothing: str  # how plans become routes
@@ -75,7 +77,7 @@ class RoutePlanner:
 
     def __post_init__(self) -> None:
         self.plan_error = ""
-        self.shape = "disc"
+        self.footprint_margin: float | None = None
         self.restart()
 
     def restart(self) -> None:
@@ -108,15 +110,16 @@ class RoutePlanner:
         disc = grid_of(world, self.cell, self.inflate)
         if not self.turns:
             return disc
-        if self.footprint == "auto":
-            length = self._shortest(disc)
-            inner = self.robot.footprint.inner_radius + self.margin
-            # No path of the footprint is shorter than that of the disc within it.
-            if length <= LONGER * self._shortest(grid_of(world, self.cell, inner)):
-                return disc
-        outlined = outlined_grid_of(world, min(self.cell, FINE), self.robot.footprint, self.margin)
-        chooses = self.footprint == "exact" or self._shortest(outlined) * LONGER < length
-        return outlined if chooses else disc
+        length = self._shortest(disc) if self.footprint == "auto" else math.inf
+        inner = self.robot.footprint.inner_radius + self.outline_margins[-1]
+        # No path of the footprint is shorter than that of the disc within it.
+        if length <= LONGER * self._shortest(grid_of(world, self.cell, inner)) < math.inf:
+            return disc
+        for margin in self.outline_margins:
+            outlined = outlined_grid_of(world, min(self.cell, FINE), self.robot.footprint, margin)
+            if self._shortest(outlined) * LONGER < length:
+                return outlined
+        return disc if self.footprint == "auto" else outlined
 
     def _shortest(self, grid: Grid) -> float:
         """Return the length of the shortest path on a grid [m]."""
@@ -135,8 +138,8 @@ class RoutePlanner:
     def checked(self, query: Query, answer: PlanResult) -> PlanResult:
         """Return the answer if it is valid; else note the error and return an invalid plan."""
         plan = checked(query, answer)
-        if plan.solved and query.grid.turns:
-            self.shape = "footprint"
+        if plan.solved and query.grid.turns and self.footprint_margin is None:
+            self.footprint_margin = query.grid.turns.outline.reach - self.robot.footprint.rounding
         if plan.status is PlanStatus.INVALID:
             self.plan_error = self.plan_error or plan.reason
         return plan
@@ -204,9 +207,9 @@ class OneRoute(RouteGuide):
         return self._routes.plan_error
 
     @property
-    def shape(self) -> str:
-        """The shape that plans kept clear."""
-        return self._routes.shape
+    def footprint_margin(self) -> float | None:
+        """Clearance of plans that keep the footprint clear [m]; None while all keep the disc clear."""
+        return self._routes.footprint_margin
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start; report no path if the start is too narrow to follow it."""

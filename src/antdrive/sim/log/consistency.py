@@ -82,8 +82,8 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
     record = rollout.record
     points = _spaced(route)
     keeps, what, room = record.inflate, "inflation", _room
-    if record.shape == "footprint":
-        keeps, what, room = record.margin, "margin", _room_of_footprint
+    if record.footprint_margin is not None:
+        keeps, what, room = record.footprint_margin, "margin", _room_of_footprint
     rooms = room(rollout, points)
     own = min(keeps, float(rooms[0])) if name == "route" else -math.inf
     leaving = np.hypot(*(points - route[0]).T) <= end_reach(record.inflate, record.cell)

@@ -48,9 +48,6 @@ MAX_MARGIN = 1000.0
 
 MARGIN_ROUNDING = 1e-9  # [m]
 
-#: Shapes that plans keep clear.
-SHAPES = ("disc", "footprint")
-
 #: Trigger of replans by planners that decide cell by cell.
 DECISION = "decision"
 
@@ -273,7 +270,8 @@ class DriveRecord:
         sensing: knowledge of the world and of the pose; omitted for a given map and pose fixes
         settings: settings without another key, by name; omitted where all have their defaults
         times: wall-clock times, not covered by the digest
-        shape: shape that the first plan keeps clear: disc, or footprint; omitted for the disc
+        footprint_margin: clearance of plans that keep the robot's footprint clear [m]; omitted where all plans keep the disc
+            around the robot clear
         digest: SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
     Raises:
@@ -310,7 +308,7 @@ class DriveRecord:
     margin_choice: MarginRecord | None = dataclasses.field(default=None, metadata=LATER)
     sensing: SensingRecord | None = dataclasses.field(default=None, metadata=LATER)
     settings: Mapping[str, Any] | None = dataclasses.field(default=None, metadata=LATER | CHOSEN)
-    shape: str = dataclasses.field(default="disc", metadata=LATER | REPLAYED)
+    footprint_margin: float | None = dataclasses.field(default=None, metadata=LATER | REPLAYED)
     digest: str | None = dataclasses.field(default=None, metadata=LOGGED)
 
     def __post_init__(self) -> None:
@@ -327,8 +325,10 @@ class DriveRecord:
         for key in ("cell", "time_limit"):
             if not getattr(self, key) > 0:
                 raise FieldError(key, f"must be greater than 0, got {getattr(self, key)!r:.40}")
-        if self.shape not in SHAPES:
-            raise FieldError("shape", f"must be one of {', '.join(SHAPES)}, got {self.shape!r:.40}")
+        if self.footprint_margin is not None and not 0 <= self.footprint_margin <= MAX_MARGIN:
+            raise FieldError(
+                "footprint_margin", f"must be at least 0 and at most {MAX_MARGIN:g}, got {self.footprint_margin}"
+            )
         for key, value in (self.settings or {}).items():
             if key not in SETTINGS or self.held(key):
                 raise FieldError(f"settings.{key}", "unknown key; a later version of antdrive may have written it")
@@ -350,6 +350,11 @@ class DriveRecord:
         """Driven world: the task's, with the unseen cylinders after the known ones."""
         world = self.task.world
         return dataclasses.replace(world, obstacles=world.obstacles + self.unseen) if self.unseen else world
+
+    @property
+    def shape(self) -> str:
+        """The shape that plans kept clear: footprint if any did, else disc."""
+        return "disc" if self.footprint_margin is None else "footprint"
 
     @classmethod
     def held(cls, setting: str) -> bool:
