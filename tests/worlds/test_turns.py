@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import PlanStatus, Query, check_plan, load_planner
+from antdrive.planners import PlanStatus, Query, check_plan, load_planner, replanner_for
 from antdrive.worlds import DIRECTIONS, Disc, Task, World, rasterise
 from antdrive.worlds.headings import Outline, free_headings, sweep_clearance
 
@@ -145,3 +145,35 @@ def test_a_turn_that_is_not_free_is_no_plan():
     back = type(plan)(status=PlanStatus.SOLVED, cells=cells, cost=0.3)
     problem = check_plan(Query(grid, (row, 10), (row, 11), start_label=start), back)
     assert problem == f"cells: step 2 from ({row}, 12) to ({row}, 11) is no allowed move"
+
+
+def test_blocked_cells_lose_the_moves_into_and_out_of_them(made):
+    _, grid, label, edges = made
+    rng, cols = np.random.default_rng(5), grid.shape[1]
+    blocked = rng.random(grid.shape) < 0.15
+    left = grid.without(blocked)
+    assert left.free.tolist() == (grid.free & ~blocked).tolist()
+    kept = {
+        node: [(k, to) for k, to in moves if not blocked[node[0]] and not blocked[to[0]]]
+        for node, moves in edges.items()
+    }
+    for i in range(grid.free.size):
+        at = divmod(i, cols)
+        union = {k for k in range(8) if any(move == k for move, _ in kept.get((at, label[at, k]), ()))}
+        assert {k for k in range(8) if int(left.moves[at]) >> k & 1} == union
+    found = 0
+    for (r0, c0), (r1, c1) in rng.choice(np.argwhere(left.free), (40, 2)).tolist():
+        k = next(k for k in range(8) if grid.turns.label[r0 * cols + c0, k] >= 0)
+        query = Query(left, (r0, c0), (r1, c1), start_label=int(grid.turns.label[r0 * cols + c0, k]))
+        plan = load_planner("astar").plan(query, rng)
+        assert plan.cost == pytest.approx(0.2 * shortest(kept, ((r0, c0), label[(r0, c0), k]), (r1, c1)))
+        assert check_plan(query, plan) == ""
+        found += plan.solved
+    assert 5 < found < 40
+
+
+def test_replanners_by_cells_refuse_turns(made):
+    _, grid, *_ = made
+    at = tuple(np.argwhere(grid.free)[0].tolist())
+    with pytest.raises(ValueError, match="query: has a grid with turns"):
+        replanner_for(load_planner("astar"), Query(grid, at, at), np.random.default_rng(0))

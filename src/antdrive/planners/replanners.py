@@ -28,9 +28,11 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
     any-angle planners. Planners that need discs or motions have none.
 
     Raises:
-        ValueError: the planner needs discs or motions.
+        ValueError: the planner needs discs or motions, or the grid has turns.
         PlannerError: the planner raised an exception.
     """
+    if query.grid.turns:
+        raise FieldError("query", "has a grid with turns; replanners know cells, not headings")
     can = capabilities_of(planner)
     for needed, what in ((can.needs_world, "the world's discs"), (can.needs_motions, "known motions")):
         if needed:

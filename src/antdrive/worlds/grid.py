@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -73,6 +73,16 @@ class Turns:
         for array in (cell, label, moves):
             array.setflags(write=False)
         return cls(outline, cell, label, moves)
+
+    def without(self, blocked: npt.NDArray[np.bool_]) -> Turns:
+        """Return the turns without the moves out of or into some cells (R, C)."""
+        cols, shut = blocked.shape[1], blocked.ravel()
+        moves = np.where(shut[self.cell], 0, self.moves).astype(np.uint8)
+        for k, (row, col) in enumerate(DIRECTIONS):
+            nodes = np.flatnonzero(moves >> k & 1)
+            moves[nodes[shut[self.cell[nodes] + row * cols + col]]] &= ~np.uint8(1 << k)
+        moves.setflags(write=False)
+        return replace(self, moves=moves)
 
 
 #: The turns of a disc.
@@ -142,6 +152,16 @@ class Grid:
         row = math.floor((y - self.origin[1]) / self.cell + 0.5)
         col = math.floor((x - self.origin[0]) / self.cell + 0.5)
         return min(max(row, 0), rows - 1), min(max(col, 0), cols - 1)
+
+    def without(self, blocked: npt.NDArray[np.bool_]) -> Grid:
+        """Return a grid with turns with some of its cells (R, C) blocked."""
+        turns = self.turns.without(blocked)
+        moves = np.zeros(blocked.size, dtype=np.uint8)
+        np.bitwise_or.at(moves, turns.cell, turns.moves)
+        free, moves = self.free & ~blocked, moves.reshape(self.shape)
+        free.setflags(write=False)
+        moves.setflags(write=False)
+        return replace(self, free=free, moves=moves, turns=turns)
 
     def _repr_html_(self) -> str:
         from antdrive.worlds.svg import card, cells_svg

@@ -18,9 +18,9 @@ from antdrive.planners import (
     capabilities_of,
     load_planner,
 )
-from antdrive.robots import Twist
+from antdrive.robots import Footprint, Twist
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, certify, run
-from antdrive.sim.compose import compose
+from antdrive.sim.compose import compose, route_planner
 from antdrive.sim.driving.replanning import CellByCell
 from antdrive.sim.driving.rules import MAX_LAG, KeepToSchedule, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
@@ -388,3 +388,21 @@ def test_capabilities_of_another_type_are_the_planners_error():
 def test_a_planner_that_raises_on_the_way_is_named():
     with pytest.raises(PlannerError, match=r"planner WrongLater raised KeyError: 'later' \(test_replanning.py:"):
         run(Scenario.of(MOVING, WrongLater(raises=True)))
+
+
+def test_a_plan_for_a_footprint_keeps_away_from_movers_in_its_way(turtlebot):
+    hall = changed(TASK, "world", movers=(PLUG,))
+    routes = route_planner(
+        Scenario.of(
+            hall, "astar", replace(turtlebot, footprint=Footprint(half_length=0.3, half_width=0.15)), footprint="exact"
+        )
+    )
+    grid = routes.chosen_grid()
+    assert grid.turns
+    mover = Disc(4.0, 3.0, 0.45)
+    for discs, crosses in (((), 3.0), ((mover,), 5.0)):
+        plan = routes.around(hall, grid, discs)
+        assert plan.solved
+        at = grid.xy(plan.cells)
+        y = at[np.abs(at[:, 0] - 4.0).argmin(), 1]
+        assert abs(y - crosses) < 1.0

@@ -161,6 +161,8 @@ class RoutePlanner:
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
             return self.plan(query, self.rng)
         closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
+        if grid.turns:  # a replanner knows cells, not the robot's heading
+            return self.plan(dataclasses.replace(query, grid=grid.without(closed)), self.rng)
         with planner_errors(self.planner):
             # Without a map, movers change so many cells that repair is no faster than a new search.
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
