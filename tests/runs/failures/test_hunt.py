@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import AStar, Query, load_planner
+from antdrive.robots import outline_of
 from antdrive.runs.failures import failure as failing
 from antdrive.runs.failures import hunt as hunting
 from antdrive.runs.failures import reproducers
@@ -36,6 +37,7 @@ from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.sim.log.margin import CAUSES
 from antdrive.worlds import Disc, World, rasterise
+from antdrive.worlds.grid import DISC
 from antdrive.worlds.passage import feasible
 
 PLACES = st.tuples(st.integers(-5, 5), st.integers(-5, 5))
@@ -102,7 +104,9 @@ def test_every_finding_fails_again_and_leaves_room(found):
         scenario = finding.scenario
         done = run(scenario)
         assert (failure_of(done), Attempt(done.scenario, done).fingerprint) == (finding.failure, finding.fingerprint)
-        grid = rasterise(scenario.task.world, 0.02, scenario.inflate)
+        kept = done.rollout.record.footprint_margin
+        outline = DISC if kept is None else outline_of(scenario.robot.footprint, kept)
+        grid = rasterise(scenario.task.world, 0.02, scenario.inflate, outline)
         plan = load_planner("dijkstra").plan(Query.between(grid, scenario.task), np.random.default_rng(0))
         assert plan.solved, "a fine grid has a path with the clearance that the set-up claims"
 
