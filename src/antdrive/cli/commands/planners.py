@@ -18,7 +18,7 @@ def planners(
     json: options.Json = False,
 ) -> None:
     """List the planners, or describe some with their options."""
-    from antdrive.planners import describe, list_planners
+    from antdrive.planners import capabilities_of, describe, list_planners
 
     known = list_planners()
     for name in names or ():
@@ -28,6 +28,7 @@ def planners(
     facts = {
         name: {
             "about": describe(planner),
+            "plans_for": "footprint" if capabilities_of(planner).turns else "disc",
             "options": {key: plain(value) for key, value in _options(planner).items()},
             "meanings": meanings_of(type(planner)),
         }
@@ -37,13 +38,14 @@ def planners(
 
 
 def _list(facts: Mapping[str, Any]) -> Iterator[str]:
-    yield from table(("planner", "about"), ((name, one["about"]) for name, one in facts.items()))
-    yield "options: antdrive planners NAME"
+    rows = ((name, one["plans_for"], one["about"]) for name, one in facts.items())
+    yield from table(("planner", "plans for", "about"), rows)
+    yield "Planners for the footprint also plan for the disc around the robot; options: antdrive planners NAME"
 
 
 def _details(facts: Mapping[str, Any]) -> Iterator[str]:
     for name, one in facts.items():
-        yield f"{name}: {one['about']}"
+        yield f"{name}: {one['about']} Plans for the {one['plans_for']}."
         rows = [(key, str(value), one["meanings"].get(key, "")) for key, value in one["options"].items()]
         yield from table(("option", "default", "meaning"), rows) if rows else ("  no options",)
 
