@@ -40,7 +40,8 @@ def planners(
 def _list(facts: Mapping[str, Any]) -> Iterator[str]:
     rows = ((name, one["plans_for"], one["about"]) for name, one in facts.items())
     yield from table(("planner", "plans for", "about"), rows)
-    yield "footprint: or the disc, by --footprint; options: antdrive planners NAME"
+    yield "footprint: or the disc, by --footprint"
+    yield "options: antdrive planners NAME"
 
 
 def _details(facts: Mapping[str, Any]) -> Iterator[str]:
