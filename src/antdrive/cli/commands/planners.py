@@ -38,9 +38,14 @@ def planners(
 
 
 def _list(facts: Mapping[str, Any]) -> Iterator[str]:
-    rows = ((name, one["plans_for"], one["about"]) for name, one in facts.items())
-    yield from table(("planner", "plans for", "about"), rows)
-    yield "footprint: or the disc, by --footprint"
+    yield from table(("planner", "about"), ((name, one["about"]) for name, one in facts.items()))
+    yield ""
+    shapes = {"footprint": "disc or footprint", "disc": "disc"}
+    rows = (
+        (words, ", ".join(name for name, one in facts.items() if one["plans_for"] == shape))
+        for shape, words in shapes.items()
+    )
+    yield from table(("plan for", "planners"), rows)
     yield "options: antdrive planners NAME"
 
 
