@@ -51,7 +51,8 @@ def _list(facts: Mapping[str, Any]) -> Iterator[str]:
 
 def _details(facts: Mapping[str, Any]) -> Iterator[str]:
     for name, one in facts.items():
-        yield f"{name}: {one['about']} Plans for the {one['plans_for']}."
+        yield f"{name}: {one['about']}"
+        yield f"  plans for the {one['plans_for']}"
         rows = [(key, str(value), one["meanings"].get(key, "")) for key, value in one["options"].items()]
         yield from table(("option", "default", "meaning"), rows) if rows else ("  no options",)
 
