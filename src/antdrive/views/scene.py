@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,9 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Task, World
+
+if TYPE_CHECKING:
+    from antdrive.worlds import Grid
 
 MIN_JUMP = 0.05  # minimum distance between two rows that counts as a jump of a mover [m]
 PLANNED_TRACK = 30.0  # duration of the movers' tracks in a plan's figure [s]
@@ -32,10 +35,11 @@ class Scene:
     start: Pose  # x, y [m] and heading [rad]
     goal: Point  # x, y [m]
     goal_tolerance: float  # largest distance from the goal at which the robot may stop [m]
-    inflate: float  # planned distance from obstacles: the robot's radius plus the margin [m]
-    margin: float  # the part of `inflate` beyond the robot's radius [m]
+    inflate: float  # planned distance of the robot's centre, or of its footprint, from obstacles [m]
+    margin: float  # the part of `inflate` beyond the robot's radius, or beyond its footprint [m]
     robot: RobotSpec  # the robot's specification
     mapped: bool = True  # whether the robot had a map
+    outlined: bool = False  # whether the plan keeps the footprint clear, and not the disc around it
     mover_radii: tuple[float, ...] = ()  # one per mover [m]
     movers: tuple[
         Point, ...
@@ -52,8 +56,9 @@ class Scene:
             record.task,
             record.robot,
             unseen=np.arange(len(world.obstacles)) >= len(world.obstacles) - len(record.unseen),
-            inflate=record.inflate,
-            margin=record.margin,
+            inflate=record.inflate if record.footprint_margin is None else record.footprint_margin,
+            margin=record.margin if record.footprint_margin is None else record.footprint_margin,
+            outlined=record.footprint_margin is not None,
             mapped=not record.exploring,
             mover_radii=tuple(mover.radius for mover in world.movers),
             movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
@@ -62,10 +67,11 @@ class Scene:
         )
 
     @classmethod
-    def planned(cls, task: Task, robot: RobotSpec, inflate: float, *, mapped: bool = True) -> Scene:
+    def planned(cls, task: Task, robot: RobotSpec, grid: Grid, *, mapped: bool = True) -> Scene:
         """Return the scene of a plan without a drive."""
         # The motion of wandering movers depends on the run's seed.
         shown = [mover for mover in task.world.movers if not isinstance(mover, Wandering)]
+        margin = grid.turns.outline.reach - robot.footprint.rounding if grid.turns else grid.inflate - robot.radius
         trajectories = Trajectories.of(dataclasses.replace(task.world, movers=tuple(shown)), task.start[:2])
         positions = trajectories.positions(np.arange(0.0, PLANNED_TRACK, 0.05))
         return cls._in(
@@ -73,8 +79,9 @@ class Scene:
             task,
             robot,
             unseen=np.zeros(len(task.world.obstacles), dtype=np.bool_),
-            inflate=inflate,
-            margin=max(0.0, inflate - robot.radius),
+            inflate=margin if grid.turns else grid.inflate,
+            margin=max(0.0, margin),
+            outlined=bool(grid.turns),
             mapped=mapped,
             mover_radii=tuple(trajectories.radii.tolist()),
             movers=tuple((x, y) for x, y in positions[0].tolist()),
@@ -106,6 +113,8 @@ class Scene:
     @property
     def no_go_label(self) -> str:
         """Legend of the no-go area."""
+        if self.outlined:
+            return f"no-go area for the footprint\n(margin = {self.inflate:.3g} m)"
         return f"no-go area for the robot's centre\n(radius + margin = {self.inflate:.2f} m)"
 
     @property

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 
 FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in colours.FIELD_STOPS])
+SWEPT = 0.02  # motion of the farthest corner between two drawn footprints [m]
 MANY = 1000  # cylinders; larger numbers are drawn without edges
 SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in colours.SPEED_STOPS])
 
@@ -86,7 +87,7 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
     """Draw the footprint's outline at a pose, with a line from its centre along the heading."""
     x, y, yaw = pose
     foot = scene.robot.footprint
-    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    turn = _rotation(yaw)
     ahead = turn @ [foot.reach(0.0) if foot.corners else foot.half_length + foot.rounding, 0.0]
     style: dict[str, Any] = {"fc": (1, 1, 1, 0.55), "ec": hexed(colour), "lw": 1.3, "zorder": zorder}
     if foot.is_disc:
@@ -94,6 +95,24 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
     else:
         axes.add_patch(Polygon(np.array(foot.outline()) @ turn.T + [x, y], **style))
     axes.plot([x, x + ahead[0]], [y, y + ahead[1]], color=hexed(colour), lw=1.3, zorder=zorder)
+
+
+def _rotation(yaw: float) -> Floats:
+    return np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+
+
+def _draw_swept(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
+    """Draw the area that the footprint swept where plans keep it clear, and return its legend handle."""
+    if not scene.outlined:
+        return []
+    pose, outline = rollout.pose, np.array(scene.robot.footprint.outline())
+    moved = np.hypot(*np.diff(pose[:, :2], axis=0).T) + scene.robot.footprint.radius * np.abs(np.diff(pose[:, 2]))
+    whole = np.floor(np.concatenate([[0.0], np.cumsum(moved)]) / SWEPT)
+    rows = np.unique(whole, return_index=True)[1]
+    bodies = [Path(outline @ _rotation(yaw).T + [x, y], closed=False) for x, y, yaw in pose[rows].tolist()]
+    pale = tuple(1 - 0.25 * (1 - channel / 255) for channel in colours.SHELL)
+    axes.add_collection(PathCollection(bodies, facecolor=pale, edgecolor="none", zorder=1.4))
+    return [Patch(fc=pale, label="area swept")]
 
 
 def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: Floats | None) -> None:
@@ -108,6 +127,7 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
             drawn = axes.plot(*line.T, **{**style, "lw": 0.7, "alpha": 0.45}, label="new routes", zorder=4.7)
             handles += drawn if k == 0 else []
     if len(rollout.t) > 1:
+        handles += _draw_swept(axes, scene, rollout)
         keep, fastest = thinned(len(rollout.t)), scene.robot.max_speed
         style = {"cmap": SPEEDS, "norm": Normalize(0, fastest), "lw": 2.6, "capstyle": "round"}
         lines = draw_along(axes, rollout.pose[keep, :2], np.abs(rollout.twist[keep[:-1], 0]), **style)

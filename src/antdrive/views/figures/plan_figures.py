@@ -63,7 +63,7 @@ def plan_figure(
     Raises:
         InputError: a suffix other than .png, .pdf and .svg.
     """
-    scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
+    scene = Scene.planned(task, robot, grid, mapped=mapped)
     cells, line = (grid.xy(plan.cells), grid.xy(plan.line)) if len(plan.cells) else (np.empty((0, 2)),) * 2
     shown = scene.map_bounds(line)
     iterations = len(plan.history)
@@ -179,7 +179,7 @@ def contours_figure(
     task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path | None = None, *, mapped: bool = True
 ) -> Figure:
     """Draw the contours of a planner's field on the map, with the planned path."""
-    scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
+    scene = Scene.planned(task, robot, grid, mapped=mapped)
     assert plan.field is not None
     values = np.where(grid.free, np.asarray(plan.field, dtype=np.float64), np.nan)
     x = grid.origin[0] + grid.cell * np.arange(grid.shape[1])

@@ -161,6 +161,7 @@ def _metres(value: float) -> str:
 
 #: Legend of the grey band around obstacles.
 NO_GO = "no-go area for the robot's centre (radius + margin)"
+NO_GO_OUTLINED = "no-go area for the footprint (margin)"
 
 _WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
 
@@ -200,7 +201,7 @@ def legend_entries(
     if replans:
         entries.append(LegendEntry("dot", colours.ROUTE, "replan"))
     if scene.has_no_go_area:
-        entries.append(LegendEntry("zone", colours.ZONE, NO_GO))
+        entries.append(LegendEntry("zone", colours.ZONE, NO_GO_OUTLINED if scene.outlined else NO_GO))
     if scene.unseen.any():
         entries.append(LegendEntry("dot", colours.UNSEEN, scene.unseen_label))
     if beams:
