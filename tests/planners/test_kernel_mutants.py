@@ -118,7 +118,7 @@ def test_the_goal_pulls_along_the_moves_that_lead_to_it():
     """The pull is the cosine between a move and the direction to the goal; 0 for moves away from it or not allowed."""
     grid = Grid.from_free(np.random.default_rng(6).random((6, 7)) >= 0.1)
     actual = np.full((42, 8), np.nan)
-    goal_pull(grid.moves.ravel(), 7, 2, 4, actual)
+    goal_pull(grid.moves.ravel(), grid.turns.cell, 7, 2, 4, actual)
     for (r, c), k in itertools.product(np.ndindex(6, 7), range(8)):
         to, step = np.array([2.0 - r, 4.0 - c]), np.array(DIRECTIONS[k], dtype=float)
         allowed = grid.moves[r, c] >> k & 1 and to.any()

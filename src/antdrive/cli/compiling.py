@@ -119,11 +119,16 @@ def _compile(planners: Sequence[str] | None) -> None:
 
 
 def _plan_with(names: Sequence[str]) -> None:
-    from antdrive.planners import PLANNERS
+    from antdrive.planners import PLANNERS, capabilities_of
+    from antdrive.robots import Footprint
     from antdrive.sim.pipeline import plan
 
+    oblong = replace(_scenario().robot, footprint=Footprint(half_length=0.2, half_width=0.15))
     for name in names:
-        plan(replace(_scenario(), planner=PLANNERS[name]))
+        one = replace(_scenario(), planner=PLANNERS[name])
+        plan(one)
+        if capabilities_of(one.planner).turns:
+            plan(replace(one, robot=oblong, footprint="exact"))
 
 
 def _drive_and_film() -> None:

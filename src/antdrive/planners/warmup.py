@@ -53,7 +53,7 @@ def load_kernels(planner: WarmsUp, query: Query) -> None:
     """Plan on a tiny grid, once per process, planner and options."""
     shorter = planner.for_warmup()
     writeable = query.grid.free.flags.writeable
-    kind = (bool(query.motions), query.task is not None, writeable)
+    kind = (bool(query.motions), query.task is not None, writeable, bool(query.grid.turns))
     key = f"{type(shorter).__module__}.{shorter!r} {kind}"
     if key in _loaded:
         return
@@ -68,14 +68,19 @@ def _warm_up(planner: WarmsUp, query: Query) -> None:
     planner.plan(query, np.random.default_rng(0))
 
 
-def tiny_query(query_type: type[Query], motions: bool, task: bool, writeable: bool = False) -> Query:
+def tiny_query(
+    query_type: type[Query], motions: bool, task: bool, writeable: bool = False, turns: bool = False
+) -> Query:
     """Build a query on 12 x 12 cells around a cylinder, with the same types as queries of worlds."""
     from antdrive.worlds import Cruising, Disc, Task, Trajectories, World, rasterise
+    from antdrive.worlds.grid import DISC
+    from antdrive.worlds.headings import Outline
 
+    oblong = Outline(np.array([(0.3, -0.1), (0.3, 0.1), (-0.1, 0.1), (-0.1, -0.1)]), 0.02)
     mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))
     world = World("tiny", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),), movers=(mover,))
     made = Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25)
-    grid = rasterise(world, made.cell, 0.2)
+    grid = rasterise(world, made.cell, 0.2, oblong if turns else DISC)
     if writeable:
         grid = dataclasses.replace(grid, free=grid.free.copy(), moves=grid.moves.copy())
     query = query_type.between(grid, made)

@@ -84,10 +84,8 @@ def test_moves_are_chosen_in_proportion_to_their_weights():
     count = 40_000
     seeds = np.random.default_rng(1).bit_generator.random_raw(count).astype(np.uint64)
     cells, sizes = np.zeros((count, 2), dtype=np.int32), np.zeros(count, dtype=np.int64)
-    _kernels_colony.walk_ants(
-        weights, graph.mask, graph.offset, 4, 0, 1, 0.0, False, seeds, cells, sizes, np.zeros(count)
-    )
-    went = np.array([(cells[:, 1] == 4 + step).mean() for step in graph.offset])
+    _kernels_colony.walk_ants(weights, graph.mask, graph.to, 4, 0, 1, 0.0, False, seeds, cells, sizes, np.zeros(count))
+    went = np.array([(cells[:, 1] == 4 + step).mean() for step in graph.to])
     np.testing.assert_allclose(went, weights[4] / weights[4].sum(), atol=0.01)
     assert went[[2, 5]].max() == 0
 
@@ -189,7 +187,7 @@ def test_a_tour_cut_short_has_allowed_moves_and_is_never_longer(seed):
         assert after.lengths[a] <= before.lengths[a] + 1e-9
         places = [old.index(cell) for cell in new]
         assert places == sorted(places)
-        near = [{i + int(graph.offset[k]) for k in range(8) if int(graph.mask[i]) >> k & 1} for i in new]
+        near = [{i + int(graph.to[k]) for k in range(8) if int(graph.mask[i]) >> k & 1} for i in new]
         for here, there, reach in zip(places, places[1:], near, strict=False):
             assert there == max(p for p in range(here + 1, len(old)) if old[p] in reach)
 

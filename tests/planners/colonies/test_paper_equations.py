@@ -88,7 +88,7 @@ def test_lee2008_13(form, east):
     field = planner.potential(Query(Grid.from_free(np.ones((1, 3))), (0, 0), (0, 2)))
     trail, out, unseen = np.array([2.0, 1.0, math.sqrt(3)]), np.zeros(8), np.zeros((1, 1), dtype=np.uint8)
     drawn = planner.attractions(ROW, field)
-    total = _kernels_pfaco.cumulate(1, 0, trail, drawn, ROW.mask, ROW.offset, unseen, True, 2.0, out)
+    total = _kernels_pfaco.cumulate(1, 0, trail, drawn, ROW.mask, ROW.to, unseen, True, 2.0, out)
     assert out[EAST] == pytest.approx(3.0 * east)  # alpha is 2
     assert total - out[EAST] == pytest.approx(4.0)
 

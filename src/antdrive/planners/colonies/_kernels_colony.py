@@ -1,6 +1,7 @@
 """Compiled ants: arrays in, arrays out, no validation.
 
-Cells are flat indices. The table `weights` (cells, 8) of float32 holds the attraction of each move, 0 where the
+Nodes are flat cells; on a grid with turns, its nodes. `to` leads from node to node by each move: offsets (8,), or with turns a
+table (nodes, 8). The table `weights` (nodes, 8) of float32 holds the attraction of each move, 0 where the
 move is not allowed. It encodes all rules of a colony and is filled once per iteration, so `walk_ants` serves every
 colony.
 """
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel
+from antdrive.worlds._kernels_turns import MoveGraph, after_move
 
 MIN_WEIGHT = 1e-30  # relative to the largest weight of a cell; within float32, so allowed moves keep a weight
 UNIT = np.float32(1.0 / 16777216.0)
@@ -38,12 +40,65 @@ def offsets(cols: int) -> Array:
 
 
 @kernel
-def walk_length(walk: Array, size: int, cols: int) -> float:
+def after(to: Array, i: Any, k: int) -> Any:
+    """Return the node that move k leads to from node i."""
+    return i + to[k] if to.ndim == 1 else np.int64(to[i, k])
+
+
+@kernel
+def table_of(graph: MoveGraph, kept: Array, goal: int, mask: Array, to: Array) -> None:
+    """Fill the moves `mask` (nodes,) and the table `to` (nodes, 8) of a grid with turns, for walks among the `kept` nodes.
+
+    All nodes of the goal's cell become its first. A move that is not allowed leads nowhere.
+    """
+    for i in range(len(mask)):
+        mask[i] = 0
+        for k in range(8):
+            to[i, k] = i
+            if graph.mask[i] >> k & 1:
+                j = after_move(graph, i, k)
+                if kept[j]:
+                    mask[i] |= 1 << k
+                    to[i, k] = goal if graph.cell[j] == goal else j
+
+
+@kernel
+def move_between(to: Array, i: int, j: int) -> int:
+    """Return the move from node i to node j by a table (nodes, 8); 8 without one."""
+    for k in range(8):
+        if to[i, k] == j:
+            return k
+    return 8
+
+
+@kernel
+def nodes_along(to: Array, cols: int, start: int, cells: Array) -> Array:
+    """Return the nodes (N,) of a walk along cells (N, 2)."""
+    walk = np.empty(len(cells), dtype=np.int32)
+    walk[0] = start
+    for s in range(1, len(cells)):
+        up, right = cells[s, 0] - cells[s - 1, 0], cells[s, 1] - cells[s - 1, 1]
+        for k in range(8):
+            if DROW[k] == up and DCOL[k] == right:
+                walk[s] = after(to, np.int64(walk[s - 1]), k)
+    return walk
+
+
+@kernel
+def step_length(to: Array, i: int, j: int) -> float:
+    """Return the length of the move from node i to node j [cells]."""
+    if to.ndim == 2:
+        return SQRT2 if move_between(to, i, j) & 1 else 1.0
+    return 1.0 if abs(j - i) == 1 or abs(j - i) == to[2] else SQRT2
+
+
+@kernel
+def walk_length(walk: Array, size: int, to: Array) -> float:
     """Return the length of a walk [cells]."""
     straight, diagonal = 0, 0
     for s in range(size - 1):
         step = abs(walk[s + 1] - walk[s])
-        if step == 1 or step == cols:
+        if (step == 1 or step == to[2]) if to.ndim == 1 else not move_between(to, walk[s], walk[s + 1]) & 1:
             straight += 1
         else:
             diagonal += 1
@@ -54,7 +109,7 @@ def walk_length(walk: Array, size: int, cols: int) -> float:
 def walk_ants(
     weights: Array,
     mask: Array,
-    offset: Array,
+    to: Array,
     start: int,
     goal: int,
     limit: int,
@@ -75,7 +130,7 @@ def walk_ants(
     The eight moves are unrolled and summed in pairs. A loop is 1 to 2 % slower; its order of summation would
     round differently and change plans.
     """
-    pad = offset[1]  # the longest move, so cells around the grid can be read without a check
+    pad = to[1] if to.ndim == 1 else 0  # the longest move, so cells around the grid can be read without a check
     visited = np.zeros(len(mask) + 2 * pad, dtype=np.int32)  # number of the last ant at each cell, from 1
     again = np.float32(revisit)
     taken = 0
@@ -88,24 +143,24 @@ def walk_ants(
         i: Any = start
         left = limit
         while i != goal and left > 0:
-            w0 = weights[i, 0] * np.float32(visited[i + offset[0] + pad] != ant)
-            w1 = weights[i, 1] * np.float32(visited[i + offset[1] + pad] != ant)
-            w2 = weights[i, 2] * np.float32(visited[i + offset[2] + pad] != ant)
-            w3 = weights[i, 3] * np.float32(visited[i + offset[3] + pad] != ant)
-            w4 = weights[i, 4] * np.float32(visited[i + offset[4] + pad] != ant)
-            w5 = weights[i, 5] * np.float32(visited[i + offset[5] + pad] != ant)
-            w6 = weights[i, 6] * np.float32(visited[i + offset[6] + pad] != ant)
-            w7 = weights[i, 7] * np.float32(visited[i + offset[7] + pad] != ant)
+            w0 = weights[i, 0] * np.float32(visited[after(to, i, 0) + pad] != ant)
+            w1 = weights[i, 1] * np.float32(visited[after(to, i, 1) + pad] != ant)
+            w2 = weights[i, 2] * np.float32(visited[after(to, i, 2) + pad] != ant)
+            w3 = weights[i, 3] * np.float32(visited[after(to, i, 3) + pad] != ant)
+            w4 = weights[i, 4] * np.float32(visited[after(to, i, 4) + pad] != ant)
+            w5 = weights[i, 5] * np.float32(visited[after(to, i, 5) + pad] != ant)
+            w6 = weights[i, 6] * np.float32(visited[after(to, i, 6) + pad] != ant)
+            w7 = weights[i, 7] * np.float32(visited[after(to, i, 7) + pad] != ant)
             if again > ZERO:
                 m = mask[i]
-                w0 = again if m & 1 and visited[i + offset[0] + pad] == ant else w0
-                w1 = again if m & 2 and visited[i + offset[1] + pad] == ant else w1
-                w2 = again if m & 4 and visited[i + offset[2] + pad] == ant else w2
-                w3 = again if m & 8 and visited[i + offset[3] + pad] == ant else w3
-                w4 = again if m & 16 and visited[i + offset[4] + pad] == ant else w4
-                w5 = again if m & 32 and visited[i + offset[5] + pad] == ant else w5
-                w6 = again if m & 64 and visited[i + offset[6] + pad] == ant else w6
-                w7 = again if m & 128 and visited[i + offset[7] + pad] == ant else w7
+                w0 = again if m & 1 and visited[after(to, i, 0) + pad] == ant else w0
+                w1 = again if m & 2 and visited[after(to, i, 1) + pad] == ant else w1
+                w2 = again if m & 4 and visited[after(to, i, 2) + pad] == ant else w2
+                w3 = again if m & 8 and visited[after(to, i, 3) + pad] == ant else w3
+                w4 = again if m & 16 and visited[after(to, i, 4) + pad] == ant else w4
+                w5 = again if m & 32 and visited[after(to, i, 5) + pad] == ant else w5
+                w6 = again if m & 64 and visited[after(to, i, 6) + pad] == ant else w6
+                w7 = again if m & 128 and visited[after(to, i, 7) + pad] == ant else w7
             p0, p1, p2, p3 = w0 + w1, w2 + w3, w4 + w5, w6 + w7
             q0, q1 = p0 + p1, p2 + p3
             total = q0 + q1
@@ -134,13 +189,13 @@ def walk_ants(
             last = spin >= wa
             if (wb if last else wa) <= ZERO:  # rounding chose a forbidden move: spin again
                 continue
-            i += offset[4 * upper + 2 * second + last]
+            i = after(to, i, 4 * upper + 2 * second + last)
             visited[i + pad] = ant
             walk[n] = i
             n += 1
         taken += limit - left
         sizes[a] = n if i == goal else 0
-        lengths[a] = walk_length(walk, n, offset[2]) if i == goal else np.inf
+        lengths[a] = walk_length(walk, n, to) if i == goal else np.inf
     return taken
 
 
@@ -159,7 +214,7 @@ def summarise(lengths: Array) -> tuple[int, float, int]:
 
 @kernel
 def cut_loops(
-    walks: Array, sizes: Array, mask: Array, offset: Array, tours: Array, tour_sizes: Array, lengths: Array
+    walks: Array, sizes: Array, mask: Array, to: Array, tours: Array, tour_sizes: Array, lengths: Array
 ) -> None:
     """Write walk a without loops to row a of `tours`: cells between two visits of a cell are dropped."""
     place = np.full(len(mask), -1, dtype=np.int32)
@@ -178,11 +233,11 @@ def cut_loops(
         for s in range(n):
             place[tours[a, s]] = -1
         tour_sizes[a] = n
-        lengths[a] = walk_length(tours[a], n, offset[2]) if n else np.inf
+        lengths[a] = walk_length(tours[a], n, to) if n else np.inf
 
 
 @kernel
-def cut_one_short(walk: Array, size: int, mask: Array, offset: Array, first: int, place: Array, tour: Array) -> int:
+def cut_one_short(walk: Array, size: int, mask: Array, to: Array, first: int, place: Array, tour: Array) -> int:
     """Write the walk cut short to `tour`: from each cell straight to the neighbour that comes last in the walk.
 
     Returns the size of the tour. A tour is never longer than its walk: a move of length at most sqrt(2) replaces at
@@ -199,23 +254,23 @@ def cut_one_short(walk: Array, size: int, mask: Array, offset: Array, first: int
         onward = first + s + 1
         for k in range(8):
             if mask[i] & (1 << k):
-                onward = max(onward, place[i + offset[k]])
+                onward = max(onward, place[after(to, i, k)])
         s = onward - first
     return n
 
 
 @kernel
 def cut_short(
-    walks: Array, sizes: Array, mask: Array, offset: Array, tours: Array, tour_sizes: Array, lengths: Array
+    walks: Array, sizes: Array, mask: Array, to: Array, tours: Array, tour_sizes: Array, lengths: Array
 ) -> None:
     """Write walk a cut short to row a of `tours`."""
     place = np.full(len(mask), -1, dtype=np.int64)
     first: Any = np.int64(0)  # a literal 0 would compile `cut_one_short` a second time
     for a in range(len(sizes)):
-        n = cut_one_short(walks[a], sizes[a], mask, offset, first, place, tours[a])
+        n = cut_one_short(walks[a], sizes[a], mask, to, first, place, tours[a])
         first += sizes[a]
         tour_sizes[a] = n
-        lengths[a] = walk_length(tours[a], n, offset[2]) if n else np.inf
+        lengths[a] = walk_length(tours[a], n, to) if n else np.inf
 
 
 @kernel
@@ -244,27 +299,35 @@ def deposit_on_cells(trail: Array, walks: Array, sizes: Array, amounts: Array) -
                 trail[i] += amounts[a]
 
 
-@inline
-def row_and_move(i: Any, j: Any, row: Any, cols: int) -> tuple[Any, Any]:
-    """Return the row of cell j, and the move to j from its neighbour i in row `row`."""
-    next_row = j // cols
+@kernel
+def first_row(to: Array, i: Any) -> Any:
+    """Return the row of node i for `row_and_move`, which tables do without."""
+    return i // to[2] if to.ndim == 1 else i
+
+
+@kernel
+def row_and_move(i: Any, j: Any, row: Any, to: Array) -> tuple[Any, Any]:
+    """Return the row of node j, and the move to j from its neighbour i in row `row`."""
+    if to.ndim == 2:
+        return row, move_between(to, i, j)
+    next_row = j // to[2]
     up = next_row - row
-    right = j - i - up * cols
+    right = j - i - up * to[2]
     move = 2 - right if up == 1 else (6 + right if up == -1 else 2 - 2 * right)
     return next_row, move
 
 
 @kernel
-def deposit_on_arcs(trail: Array, cols: int, walks: Array, sizes: Array, amounts: Array) -> None:
-    """Add amounts[a] to each arc that walk a uses; `trail` is (cells, 8)."""
+def deposit_on_arcs(trail: Array, to: Array, walks: Array, sizes: Array, amounts: Array) -> None:
+    """Add amounts[a] to each arc that walk a uses; `trail` is (nodes, 8)."""
     for a in range(len(sizes)):
         if sizes[a] == 0:
             continue
         i = np.int64(walks[a, 0])
-        row = i // cols
+        row = first_row(to, i)
         for s in range(1, sizes[a]):
             j = np.int64(walks[a, s])
-            row, k = row_and_move(i, j, row, cols)
+            row, k = row_and_move(i, j, row, to)
             trail[i, k] += amounts[a]
             i = j
 
@@ -280,7 +343,7 @@ def deposit_in_passing(trail: Array, walks: Array, sizes: Array, amounts: Array,
 
 @kernel
 def strongest(trail: Array, out: Array) -> None:
-    """Set out[i] to the strongest trail that leaves cell i; `trail` is (cells, 8)."""
+    """Set out[i] to the strongest trail that leaves cell i; `trail` is (nodes, 8)."""
     for i in range(len(out)):
         most = trail[i, 0]
         for k in range(1, 8):
@@ -311,16 +374,16 @@ def _power(trail: float, alpha: float) -> float:
 
 
 @kernel
-def union_moves(walks: Array, sizes: Array, cols: int, moves: Array) -> None:
+def union_moves(walks: Array, sizes: Array, to: Array, moves: Array) -> None:
     """Set in moves[i] the bit of every move that a walk makes from cell i."""
     for a in range(len(sizes)):
         if sizes[a] == 0:
             continue
         i = np.int64(walks[a, 0])
-        row = i // cols
+        row = first_row(to, i)
         for s in range(1, sizes[a]):
             j = np.int64(walks[a, s])
-            row, k = row_and_move(i, j, row, cols)
+            row, k = row_and_move(i, j, row, to)
             moves[i] |= 1 << k
             i = j
 
@@ -335,7 +398,8 @@ def _octile(rows: int, cols: int) -> float:
 @kernel
 def detour_weights(
     mask: Array,
-    offset: Array,
+    to: Array,
+    cell: Array,
     cols: int,
     start: int,
     goal: int,
@@ -348,28 +412,31 @@ def detour_weights(
     """Set weights[i, k] to exp(-greed * detour), with detour the excess length of the path through move k.
 
     The length of the path from a cell to the goal is that over open ground plus `lane_pull` times the distance to a
-    lane: a parallel to the line from start to goal, offset by `lane` cells. `to_goal` (cells,) is working memory.
+    lane: a parallel to the line from start to goal, offset by `lane` cells. `to_goal` (nodes,) is working memory.
     """
-    r0, c0, r1, c1 = start // cols, start % cols, goal // cols, goal % cols
+    from_cell = cell[start] if len(cell) else start
+    r0, c0, r1, c1 = from_cell // cols, from_cell % cols, goal // cols, goal % cols
     distance = max(math.hypot(r1 - r0, c1 - c0), 1.0)
     across_row, across_col = (c0 - c1) / distance, (r1 - r0) / distance
     for i in range(len(mask)):
-        row, col = i // cols, i % cols
+        here = cell[i] if len(cell) else i
+        row, col = here // cols, here % cols
         aside = (row - r0) * across_row + (col - c0) * across_col
         to_goal[i] = _octile(r1 - row, c1 - col) + lane_pull * abs(aside - lane)
     for i in range(len(mask)):
         for k in range(8):
             weights[i, k] = 0.0
             if mask[i] & (1 << k):
-                detour = (SQRT2 if k & 1 else 1.0) + to_goal[i + offset[k]] - to_goal[i]
+                detour = (SQRT2 if k & 1 else 1.0) + to_goal[after(to, i, k)] - to_goal[i]
                 weights[i, k] = math.exp(-greed * detour)
 
 
 @kernel
-def goal_pull(mask: Array, cols: int, r1: int, c1: int, out: Array) -> None:
-    """Set out[i, k] to the cosine between move k and the direction from cell i to the goal, at least 0."""
+def goal_pull(mask: Array, cell: Array, cols: int, r1: int, c1: int, out: Array) -> None:
+    """Set out[i, k] to the cosine between move k and the direction from node i to the goal, at least 0."""
     for i in range(len(mask)):
-        dr, dc = r1 - i // cols, c1 - i % cols
+        here = cell[i] if len(cell) else i
+        dr, dc = r1 - here // cols, c1 - here % cols
         distance = math.hypot(dr, dc)
         for k in range(8):
             out[i, k] = 0.0
@@ -390,7 +457,7 @@ def fixed_pull(mask: Array, dr: float, dc: float, out: Array) -> None:
 def attracted_weights(
     trail: Array,
     mask: Array,
-    offset: Array,
+    to: Array,
     omega: Array,
     attraction: float,
     shares: bool,
@@ -404,9 +471,9 @@ def attracted_weights(
             total = 0.0
             for k in range(8):
                 if mask[i] & (1 << k):
-                    total += trail[i + offset[k]]
+                    total += trail[after(to, i, k)]
             scale = 1.0 / total if total > 0.0 else 0.0
         for k in range(8):
             weights[i, k] = 0.0
             if mask[i] & (1 << k):
-                weights[i, k] = max(min_weight, trail[i + offset[k]] * scale + attraction * omega[i, k])
+                weights[i, k] = max(min_weight, trail[after(to, i, k)] * scale + attraction * omega[i, k])

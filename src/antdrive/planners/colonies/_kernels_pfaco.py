@@ -7,24 +7,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from antdrive.planners.colonies._kernels_colony import cut_one_short, next_random, walk_length
+from antdrive.planners.colonies._kernels_colony import after, cut_one_short, next_random, step_length, walk_length
 from antdrive.worlds._kernels import SQRT2, Array, inline, kernel
 
 LISTED, ENTRIES = 0, 1  # indices of `Ranking.counts`
 
 
 class Graph(NamedTuple):
-    """The ants' graph; cells are flat indices.
+    """The ants' graph, as `ColonyGraph`.
 
     Attributes:
-        mask: the allowed moves of each cell, one bit per direction (cells,)
-        offset: the index offset of each of the eight moves (8,)
-        start: the start cell
-        goal: the goal cell
+        mask: the allowed moves of each node, one bit per direction (nodes,)
+        to: the index offset of each of the eight moves (8,), or the node that it leads to (nodes, 8)
+        start: the start node
+        goal: the goal node
     """
 
     mask: Array
-    offset: Array
+    to: Array
     start: int
     goal: int
 
@@ -172,7 +172,7 @@ def cumulate(
     trail: Array,
     heuristic: Array,
     mask: Array,
-    offset: Array,
+    to: Array,
     visited: Array,
     tabu: bool,
     alpha: float,
@@ -182,7 +182,7 @@ def cumulate(
     total = 0.0
     for k in range(8):
         if mask[i] & (1 << k):
-            j = i + offset[k]
+            j = after(to, np.int64(i), k)
             if not (tabu and visited[ant, j >> 3] & (1 << (j & 7))):
                 total += _power(trail[j], alpha) * heuristic[i, k]  # eq. 13
         out[k] = total
@@ -203,11 +203,11 @@ def draw(cumulated: Array, state: Any, total: float) -> int:
 def cut_walk_short(ant: int, ants: Ants, graph: Graph, first: int, place: Array, tour: Array) -> None:
     """Cut an ant's walk short; `first`, `place` and `tour` are those of `cut_one_short`."""
     walk = ants.walks[ant]
-    size = cut_one_short(walk, ants.sizes[ant], graph.mask, graph.offset, first, place, tour)
+    size = cut_one_short(walk, ants.sizes[ant], graph.mask, graph.to, first, place, tour)
     for s in range(size):
         walk[s] = tour[s]
     ants.sizes[ant] = size
-    ants.lengths[ant] = walk_length(tour, size, graph.offset[2])
+    ants.lengths[ant] = walk_length(tour, size, graph.to)
 
 
 @kernel
@@ -268,7 +268,7 @@ def run_colony(
     number of arrivals.
     """
     # Arrays are unpacked here, as the loop below runs once per step of every ant.
-    mask, offset, goal = graph.mask, graph.offset, graph.goal
+    mask, to, goal = graph.mask, graph.to, graph.goal
     states, walks, sizes, taken = ants.states, ants.walks, ants.sizes, ants.taken
     lengths, visited = ants.lengths, ants.visited
     alpha, limit, tabu = rules.alpha, rules.limit, rules.tabu
@@ -283,14 +283,14 @@ def run_colony(
         for ant in range(len(states)):
             size = sizes[ant]
             i: Any = np.int64(walks[ant, size - 1])
-            total = cumulate(i, ant, trail, heuristic, mask, offset, visited, tabu, alpha, cumulated)
+            total = cumulate(i, ant, trail, heuristic, mask, to, visited, tabu, alpha, cumulated)
             taken[ant] += 1
             steps += 1
             if total > 0.0:
                 state = next_random(states[ant])
                 states[ant] = state
                 k = draw(cumulated, state, total)
-                i += offset[k]
+                i = after(to, i, k)
                 visited[ant, i >> 3] |= 1 << (i & 7)
                 walks[ant, size] = i
                 sizes[ant] = size + 1
@@ -304,7 +304,7 @@ def run_colony(
                     arrived += 1
                     if lengths[ant] < shortest - 1e-9 or not tabu:
                         size = copy_without_loops(walks[ant], size, last, tour)
-                        length = walk_length(tour, size, offset[2])
+                        length = walk_length(tour, size, to)
                         if length < shortest - 1e-9:
                             shortest, new = length, size
                             best[:size] = tour[:size]
@@ -313,8 +313,8 @@ def run_colony(
                     continue
             elif rules.backtrack and size > 1 and taken[ant] < limit:
                 sizes[ant] = size - 1
-                back = np.int64(walks[ant, size - 2])
-                lengths[ant] -= 1.0 if abs(i - back) == 1 or abs(i - back) == offset[2] else SQRT2
+                back: Any = np.int64(walks[ant, size - 2])
+                lengths[ant] -= step_length(to, back, i)
                 continue
             leave(ant, graph.start, ants)
             ended += 1

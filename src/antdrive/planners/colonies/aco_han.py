@@ -88,9 +88,10 @@ class AcoHan(Colony):
         cols = graph.shape[1]
         row, col = divmod(graph.goal, cols)
         if self.form == "equation":
-            _kernels_colony.goal_pull(graph.mask, cols, row, col, omega)
+            _kernels_colony.goal_pull(graph.mask, graph.turns.cell, cols, row, col, omega)
         else:
-            rows_ahead, cols_ahead = row - graph.start // cols, col - graph.start % cols
+            from_row, from_col = graph.cell_of(graph.start)
+            rows_ahead, cols_ahead = row - from_row, col - from_col
             distance = math.hypot(rows_ahead, cols_ahead)
             _kernels_colony.fixed_pull(graph.mask, rows_ahead / distance, cols_ahead / distance, omega)
         return omega
@@ -111,7 +112,7 @@ class AcoHan(Colony):
 
         by_fraction = self.form == "equation"
         _kernels_colony.attracted_weights(
-            trail, graph.mask, graph.offset, heuristic, self.attraction, by_fraction, self.min_weight, weights
+            trail, graph.mask, graph.to, heuristic, self.attraction, by_fraction, self.min_weight, weights
         )
 
     def update(self, trail: Floats, state: IterationState) -> None:

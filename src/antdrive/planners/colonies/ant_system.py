@@ -121,7 +121,7 @@ class AntSystem(Colony):
         if self.ranks is not None:
             amounts = amounts * ranked(tours.lengths, self.ranks)
         _kernels_colony.evaporate(trail.ravel(), self.evaporation)  # eq. 2, first term
-        _kernels_colony.deposit_on_arcs(trail, state.graph.shape[1], tours.cells, tours.sizes, amounts)  # eq. 2-3
+        _kernels_colony.deposit_on_arcs(trail, state.graph.to, tours.cells, tours.sizes, amounts)  # eq. 2-3
 
     def amounts(self, state: IterationState) -> Floats:
         """Return the deposit per arc of each ant of `state` (ants,): Q / L_k, 0 if the ant did not arrive."""
@@ -319,8 +319,7 @@ class MaxMinAnts(AntSystem):
         _kernels_colony.evaporate(trail.ravel(), self.evaporation)
         one = self.depositor(state)
         if one is not None:
-            cols = state.graph.shape[1]
-            _kernels_colony.deposit_on_arcs(trail, cols, one.cells, one.sizes, self.deposit / one.lengths)
+            _kernels_colony.deposit_on_arcs(trail, state.graph.to, one.cells, one.sizes, self.deposit / one.lengths)
         _kernels_colony.clamp(trail.ravel(), tau_min, tau_max)
 
     def depositor(self, state: IterationState) -> Walks | None:

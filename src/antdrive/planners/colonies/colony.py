@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,52 +19,89 @@ from antdrive.base.errors import require
 from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Query
 
+if TYPE_CHECKING:  # importing a grid loads the compiler
+    from antdrive.worlds.grid import Turns
+
 Flat = npt.NDArray[np.int32]  # flat cell indices
-Weights = npt.NDArray[np.float32]  # (cells, 8)
-Heuristic = npt.NDArray[np.floating[Any]]  # (cells, 8)
+Weights = npt.NDArray[np.float32]  # (nodes, 8)
+Heuristic = npt.NDArray[np.floating[Any]]  # (nodes, 8)
 
 
 @dataclass(frozen=True, eq=False)
 class ColonyGraph:
-    """The ants' graph for compiled code; cells are flat indices."""
+    """The ants' graph for compiled code: its nodes are flat cells, or on a grid with turns the grid's nodes."""
 
-    mask: npt.NDArray[np.uint8]  # the allowed moves of each cell, one bit per direction (cells,)
-    offset: npt.NDArray[np.int64]  # flat index offset of each of the eight moves (8,)
+    mask: npt.NDArray[np.uint8]  # the allowed moves of each node, one bit per direction (nodes,)
+    to: npt.NDArray[np.integer[Any]]  # flat index offset of each move (8,); with turns the node it leads to (nodes, 8)
     shape: tuple[int, int]  # rows and columns of the grid
-    start: int  # the start cell
-    goal: int  # the goal cell
+    start: int  # the start node
+    goal: int  # the goal cell, which is a single node
+    turns: Turns  # the labels of turns of the grid
 
     @classmethod
     def of(cls, query: Query) -> ColonyGraph:
         """Build the graph of a query's grid."""
         from antdrive.planners.colonies import _kernels_colony
+        from antdrive.worlds import _kernels_turns
 
-        cols = query.grid.shape[1]
-        return cls(
-            mask=query.grid.moves.ravel(),
-            offset=_kernels_colony.offsets(cols),
-            shape=query.grid.shape,
-            start=query.start[0] * cols + query.start[1],
-            goal=query.goal[0] * cols + query.goal[1],
-        )
+        grid, goal = query.grid, query.goal_cell
+        mask, to = grid.moves.ravel(), _kernels_colony.offsets(grid.shape[1])
+        if grid.turns:  # some moves cannot be taken back, so ants keep to nodes that lead to the goal
+            kept = _kernels_turns.leads_to(grid.graph, np.array([goal]))
+            mask, to = np.empty(len(kept), dtype=np.uint8), np.empty((len(kept), 8), dtype=np.int32)
+            _kernels_colony.table_of(grid.graph, kept, goal, mask, to)
+            mask.setflags(write=False)  # as a grid's
+        return cls(mask, to, grid.shape, query.start_node, goal, grid.turns)
+
+    def cell_of(self, node: int) -> tuple[int, int]:
+        """Return the (row, col) of a node."""
+        return divmod(int(self.turns.cell[node]) if self.turns else node, self.shape[1])
 
     def cells(self, walk: Flat) -> npt.NDArray[np.int32]:
         """Return the cells of a walk as (row, col), (N, 2)."""
-        return np.stack(np.divmod(walk, self.shape[1]), axis=1).astype(np.int32)
+        flat = self.turns.cell[walk] if self.turns else walk
+        return np.stack(np.divmod(flat, self.shape[1]), axis=1).astype(np.int32)
+
+    def walk(self, cells: npt.NDArray[np.int32]) -> Flat:
+        """Return the nodes (N,) of a walk from the start along cells (N, 2)."""
+        from antdrive.planners.colonies import _kernels_colony
+
+        return np.asarray(_kernels_colony.nodes_along(self.to, self.shape[1], self.start, cells))
+
+    def draw(self, trail: Floats, out: Floats) -> Floats:
+        """Fill and return `out` (R, C) with the strongest trail of each cell's nodes, for trails on arcs of the outgoing arcs.
+
+        Args:
+            trail: trails on nodes (nodes,) or arcs (nodes, 8)
+            out: the array to fill (R, C)
+        """
+        nodes = trail
+        if trail.ndim == 2:
+            from antdrive.planners.colonies import _kernels_colony
+
+            nodes = np.empty(len(trail)) if self.turns else out.ravel()
+            _kernels_colony.strongest(trail, nodes)
+        out.ravel()[:] = nodes[: out.size]
+        np.maximum.at(out.ravel(), self.turns.cell, nodes[: len(self.turns.cell)])
+        return out
+
+    def of_nodes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return the value of each node's cell (nodes,), from those of the cells (R, C)."""
+        return values.ravel()[self.turns.cell] if self.turns else values.ravel()
 
     def at_neighbours(self, values: Floats) -> Floats:
-        """Return `values` (cells,) at the target of each move, (cells, 8); -inf where the move is not allowed."""
+        """Return `values` (nodes,) at the target of each move, (nodes, 8); -inf where the move is not allowed."""
         out = np.full((len(self.mask), 8), -np.inf)
         for k in range(8):
             (here,) = np.nonzero(self.mask >> k & 1)
-            out[here, k] = values[here + self.offset[k]]
+            out[here, k] = values[self.to[here, k] if self.turns else here + self.to[k]]
         return out
 
-    def distance_to(self, cell: int) -> Floats:
-        """Return the straight-line distance from every cell to one cell [cells], (cells,)."""
+    def distance_to(self, node: int) -> Floats:
+        """Return the straight-line distance from every node to one [cells], (nodes,)."""
         rows, cols = np.indices(self.shape)
-        row, col = divmod(cell, self.shape[1])
-        return np.asarray(np.hypot(rows - row, cols - col).ravel())
+        row, col = self.cell_of(node)
+        return self.of_nodes(np.asarray(np.hypot(rows - row, cols - col)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,15 +223,15 @@ class Colony(IterativePlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner. Ants that die in dead ends may miss an existing path."""
-        return Capabilities(iterative=True, complete=self.backtrack or self.revisit > 0)
+        return Capabilities(iterative=True, complete=self.backtrack or self.revisit > 0, turns=True)
 
-    def default_steps(self, rows: int, cols: int) -> int:
-        """Return the step limit of an ant on a grid of `rows` x `cols` if `max_steps` is None.
+    def default_steps(self, nodes: int) -> int:
+        """Return the step limit of an ant on a graph of some nodes if `max_steps` is None.
 
-        One step per cell, but at least 100 and at most 20 000. Ants that backtrack get two steps per cell,
+        One step per node, but at least 100 and at most 20 000. Ants that backtrack get two steps per node,
         one in and one out, which suffices for every ant to reach the goal.
         """
-        return 2 * rows * cols if self.backtrack else min(max(100, rows * cols), 20_000)
+        return 2 * nodes if self.backtrack else min(max(100, nodes), 20_000)
 
     @property
     def kinds(self) -> tuple[int, ...]:
@@ -203,11 +240,11 @@ class Colony(IterativePlanner):
 
     @abc.abstractmethod
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
-        """Return the trails on `graph` before the first iteration: on cells (cells,) or on arcs (cells, 8)."""
+        """Return the trails on `graph` before the first iteration: on cells (nodes,) or on arcs (nodes, 8)."""
 
     @abc.abstractmethod
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
-        """Return eta of each move of `graph` (cells, 8) for `choice_weights`; it does not depend on the trails."""
+        """Return eta of each move of `graph` (nodes, 8) for `choice_weights`; it does not depend on the trails."""
 
     @abc.abstractmethod
     def choice_weights(
@@ -222,9 +259,9 @@ class Colony(IterativePlanner):
 
         Args:
             graph: the ants' graph
-            trail: the current trails, on cells (cells,) or on arcs (cells, 8)
+            trail: the current trails, on cells (nodes,) or on arcs (nodes, 8)
             heuristic: the result of `heuristic_values`
-            weights: the table to fill (cells, 8); 0 for moves that are not allowed
+            weights: the table to fill (nodes, 8); 0 for moves that are not allowed
             context: the kind of ant, and a random number for rules that draw one per iteration
         """
 
@@ -233,7 +270,7 @@ class Colony(IterativePlanner):
         """Evaporate and deposit on `trail` in place after an iteration.
 
         Args:
-            trail: the trails, on cells (cells,) or on arcs (cells, 8)
+            trail: the trails, on cells (nodes,) or on arcs (nodes, 8)
             state: the iteration, with its tours
         """
 
@@ -287,7 +324,7 @@ class Colony(IterativePlanner):
                     best_cells, best_number = graph.cells(best.cells[0]), number
                 state = IterationState(number, graph, walks, tours, daemon_tour, best, number - best_number, rng)
                 self.update(trail, state)
-                _draw_field(trail, picture)
+                graph.draw(trail, picture)
                 yield Iteration(
                     cells=best_cells,
                     best=math.inf if best is None else cell * float(best.lengths[0]),
@@ -315,7 +352,7 @@ class TourConstruction:
     @classmethod
     def of(cls, planner: Colony, graph: ColonyGraph) -> TourConstruction:
         """Allocate the arrays of a colony on a graph."""
-        limit = planner.max_steps or planner.default_steps(*graph.shape)
+        limit = planner.max_steps or planner.default_steps(len(graph.mask))
         # Without revisits, an ant visits each cell at most once.
         room = 1 + (limit if planner.revisit else min(limit, len(graph.mask)))
         weights = tuple(np.zeros((len(graph.mask), 8), dtype=np.float32) for _ in planner.kinds)
@@ -341,7 +378,7 @@ class TourConstruction:
             _kernels_colony.walk_ants(
                 self.weights[kind],
                 self.graph.mask,
-                self.graph.offset,
+                self.graph.to,
                 self.graph.start,
                 self.graph.goal,
                 self.limit,
@@ -377,15 +414,5 @@ def cut_short(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Wal
 
 def _cut(kernel: Callable[..., None], walks: Walks, graph: ColonyGraph, out: Walks | None) -> Walks:
     tours = Walks.allocate(*walks.cells.shape) if out is None else out
-    kernel(walks.cells, walks.sizes, graph.mask, graph.offset, tours.cells, tours.sizes, tours.lengths)
+    kernel(walks.cells, walks.sizes, graph.mask, graph.to, tours.cells, tours.sizes, tours.lengths)
     return tours
-
-
-def _draw_field(trail: Floats, out: Floats) -> None:
-    """Fill `out` (R, C) with the trail of each cell; for trails on arcs, the strongest outgoing arc."""
-    if trail.ndim == 1:
-        out.ravel()[:] = trail
-    else:
-        from antdrive.planners.colonies import _kernels_colony
-
-        _kernels_colony.strongest(trail, out.ravel())

@@ -120,7 +120,7 @@ class MergingAnts(MaxMinAnts):
         if context.kind == 0:
             super().choice_weights(graph, trail, heuristic, weights)
         else:
-            distance = math.dist(*(divmod(cell, graph.shape[1]) for cell in (graph.start, graph.goal)))
+            distance = math.dist(graph.cell_of(graph.start), graph.cell_of(graph.goal))
             lane = self.lane_spread * distance * (2.0 * context.uniform - 1.0)
             self._detour_weights(graph, weights, self.lane_pull, lane)
 
@@ -129,7 +129,8 @@ class MergingAnts(MaxMinAnts):
 
         _kernels_colony.detour_weights(
             graph.mask,
-            graph.offset,
+            graph.to,
+            graph.turns.cell,
             graph.shape[1],
             graph.start,
             graph.goal,
@@ -146,21 +147,19 @@ class MergingAnts(MaxMinAnts):
         from antdrive.planners.colonies import _kernels_colony
         from antdrive.planners.graph import _kernels_search
         from antdrive.worlds._kernels_turns import MoveGraph
-        from antdrive.worlds.grid import NO_TURNS
 
         moves = np.zeros_like(graph.mask)
         for walks in (tours, best):
             if walks is not None:
-                _kernels_colony.union_moves(walks.cells, walks.sizes, graph.shape[1], moves)
+                _kernels_colony.union_moves(walks.cells, walks.sizes, graph.to, moves)
         moves &= graph.mask  # the best tour may predate the last change of the grid
         moves.setflags(write=False)  # the search is compiled for read-only moves, like a grid's
-        cols = graph.shape[1]
         cells, straight, diagonal, _ = _kernels_search.shortest_path(
-            MoveGraph(moves, NO_TURNS.cell, NO_TURNS.label, cols), graph.start, graph.goal, True
+            MoveGraph(moves, graph.turns.cell, graph.turns.label, graph.shape[1]), graph.start, graph.goal, True
         )
         if not len(cells):
             return None
-        walk = (cells[:, 0] * cols + cells[:, 1]).astype(np.int32)
+        walk = graph.walk(cells)
         length = straight + math.sqrt(2.0) * diagonal
         return Walks(walk[np.newaxis], np.array([len(walk)]), np.array([length]))
 
@@ -172,8 +171,8 @@ class MergingAnts(MaxMinAnts):
         """Return whether the best tour of `state` has settled or is as short as over open ground."""
         if state.best is None:
             return False
-        cols = state.graph.shape[1]
-        (r0, c0), (r1, c1) = divmod(state.graph.start, cols), divmod(state.graph.goal, cols)
+        graph = state.graph
+        (r0, c0), (r1, c1) = graph.cell_of(graph.start), graph.cell_of(graph.goal)
         low, high = sorted((abs(r1 - r0), abs(c1 - c0)))
         over_open_ground = high - low + math.sqrt(2.0) * low
         enough = min(self.settled, max(20, round(0.6 * float(state.best.lengths[0]))))

@@ -103,11 +103,11 @@ class MaxMinDStar(GridPlanner):
             closed = kernels.close_gates(query.grid.free, moves, *query.start, *query.goal)
             moves.setflags(write=False)
             gated = dataclasses.replace(graph, mask=moves.ravel())
-            work = kernels.propagate(gated.mask, graph.offset, graph.start, graph.goal, retained, pheromone)
+            work = kernels.propagate(gated.mask, graph.to, graph.start, graph.goal, retained, pheromone)
             if math.isfinite(pheromone[graph.start]):
                 return gated, pheromone, work, notes
             notes.append(f"reopened {closed} gate cells; without them there is no path")
-        work += kernels.propagate(graph.mask, graph.offset, graph.start, graph.goal, retained, pheromone)
+        work += kernels.propagate(graph.mask, graph.to, graph.start, graph.goal, retained, pheromone)
         return graph, pheromone, work, notes
 
     def walk(self, graph: ColonyGraph, pheromone: Floats) -> tuple[Flat, str]:
@@ -123,7 +123,7 @@ class MaxMinDStar(GridPlanner):
         size, note = 0, ""
         for circles, (alpha, beta) in enumerate(self.exponents()):
             size = kernels.descend(
-                graph.mask, graph.offset, graph.shape[1], graph.start, graph.goal, alpha, beta, pheromone, walk
+                graph.mask, graph.to, graph.shape[1], graph.start, graph.goal, alpha, beta, pheromone, walk
             )
             if circles:
                 note = f"the ant went in circles {circles} times: {self.describe_exponents(alpha, beta)}"
@@ -212,7 +212,7 @@ class PheromoneAgent(SteppingAgent):
         graph = self._graph
         return int(
             self._kernels.decide(
-                mask, graph.offset, graph.shape[1], here, graph.goal, self._alpha, self._beta, self._pheromone
+                mask, graph.to, graph.shape[1], here, graph.goal, self._alpha, self._beta, self._pheromone
             )
         )
 
@@ -231,9 +231,7 @@ class PheromoneAgent(SteppingAgent):
         retained = 1.0 - self._planner.evaporation
         for graph in (self._graph, ColonyGraph.of(self._query)):
             pheromone, mask = np.empty_like(self._pheromone), self._open_moves(graph, blocked)
-            self.stats.propagated += int(
-                self._kernels.propagate(mask, graph.offset, here, graph.goal, retained, pheromone)
-            )
+            self.stats.propagated += int(self._kernels.propagate(mask, graph.to, here, graph.goal, retained, pheromone))
             if math.isfinite(pheromone[here]):
                 self._graph, self._pheromone = graph, pheromone
                 self._forget_visits(here)

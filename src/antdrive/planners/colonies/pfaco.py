@@ -129,29 +129,29 @@ class PotentialFieldAnts(IterativePlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner. Ants that restart in dead ends may miss an existing path."""
-        return Capabilities(iterative=True, complete=self.backtrack)
+        return Capabilities(iterative=True, complete=self.backtrack, turns=True)
 
     def potential(self, query: Query) -> Floats:
-        """Return the field that ants climb (cells,), above 0 where free: eq. 9 by `field`, lowered by eq. 11."""
+        """Return the field that ants climb (nodes,), above 0 where free: eq. 9 by `field`, lowered by eq. 11."""
         from antdrive.planners.colonies import _kernels_pfaco
 
         graph = ColonyGraph.of(query)
-        near = _kernels_pfaco.obstacle_distance(query.grid.free, math.floor(self.influence)).ravel()
-        near = np.clip(near, 1.0, self.influence)
+        near = _kernels_pfaco.obstacle_distance(query.grid.free, math.floor(self.influence))
+        near = np.clip(graph.of_nodes(near), 1.0, self.influence)
         away = graph.distance_to(graph.start if self.field == "start" else graph.goal)
         distance = away if self.field == "start" else away.max() - away
         climb = 0.5 * self.attraction * distance**2  # eq. 9
         climb -= 0.5 * self.repulsion * (1.0 / near - 1.0 / self.influence) ** 2  # eq. 11
-        free = query.grid.free.ravel()
+        free = graph.of_nodes(query.grid.free)
         # The lowest free cell must still attract a little.
         return np.where(free, climb - climb[free].min() + 0.5 * self.attraction, 0.0)
 
     def attractions(self, graph: ColonyGraph, field: Floats) -> Floats:
-        """Return U_ij of eq. 13 for each move of `graph` (cells, 8); 0 where the move is not allowed.
+        """Return U_ij of eq. 13 for each move of `graph` (nodes, 8); 0 where the move is not allowed.
 
         Args:
             graph: the ants' graph
-            field: the potential (cells,)
+            field: the potential (nodes,)
         """
         there, here, least = graph.at_neighbours(field), field[:, None], 0.5 * self.attraction
         allowed = np.isfinite(there)
@@ -165,10 +165,10 @@ class PotentialFieldAnts(IterativePlanner):
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
         """Run the ants without end, and rebuild the pheromone whenever it converges."""
         field = self.potential(query)
-        free = query.grid.free.ravel()
+        graph = ColonyGraph.of(query)
+        free = graph.of_nodes(query.grid.free)
         trail = self.mix * rng.random(len(field)) + (1 - self.mix) * field / field.max()  # eq. 14
         trail = np.where(free, np.maximum(trail, self.min_pheromone), 0.0)
-        graph = ColonyGraph.of(query)
         drawn, pool = self.attractions(graph, field), AntPool.of(self, graph, rng)
         total = math.inf
         while True:
@@ -193,8 +193,8 @@ class PotentialFieldAnts(IterativePlanner):
         """Reset converged pheromone: at random, from the best tenth of the list, or from all of it (section IV-B).
 
         Args:
-            trail: the pheromone, changed in place (cells,)
-            free: whether each cell is free (cells,)
+            trail: the pheromone, changed in place (nodes,)
+            free: whether each cell is free (nodes,)
             stage: the stage, which selects the rule
             pool: the ants, for their ranking list
             rng: the source of random numbers, for stage 1
@@ -284,7 +284,7 @@ class AntPool:
         size, self.shortest, steps, arrived = _kernels_pfaco.run_colony(
             trail,
             heuristic,
-            _kernels_pfaco.Graph(graph.mask, graph.offset, graph.start, graph.goal),
+            _kernels_pfaco.Graph(graph.mask, graph.to, graph.start, graph.goal),
             rules,
             self.ants,
             self.ranking,
@@ -306,5 +306,5 @@ class AntPool:
             iteration_mean=cell * float(arrivals.mean()) if len(arrivals) else math.inf,
             arrived=len(arrivals),
             work=steps,
-            field=trail.reshape(self.graph.shape),
+            field=self.graph.draw(trail, np.empty(self.graph.shape)),
         )
