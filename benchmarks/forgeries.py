@@ -112,6 +112,7 @@ def more_drives(only: Collection[str] = ()) -> dict[str, Rollout]:
         "tangent, taut": of(planner="tangent", smoothing="taut"),
         "ants, noise": of(planner="aco-han", noise=1.0, seed=7, options={"iterations": 5}),
         "genetic, raw": of(planner="ga-han", smoothing="none", seed=2),
+        "footprint kept clear": of(robot="jackal", footprint="exact", noise=1.0),
         "polygon off the axle": of(robot=off_axle, noise=1.0),
         "taut, noise": of(smoothing="taut", noise=1.0, seed=9),
         "husky": of(robot="husky", noise=1.0, margin=0.05),

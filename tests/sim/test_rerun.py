@@ -7,6 +7,7 @@ import pytest
 
 from antdrive.base import InputError
 from antdrive.planners import load_planner
+from antdrive.robots import Footprint, load_robot
 from antdrive.sim import Perception, Scenario, plan, run
 from antdrive.sim import rerun as rerun_module
 from antdrive.sim.driving.replay import ROUNDING, replay
@@ -19,6 +20,10 @@ from antdrive.sim.verifying import wrong_optima
 from tests.records import changed
 
 KINDS = {
+    "footprint": {
+        "footprint": "exact",
+        "robot": replace(load_robot("turtlebot"), footprint=Footprint.rectangle(0.4, 0.3)),
+    },
     "noise": {"noise": 1.0, "seed": 4},
     "odometry": {"localisation": "odometry", "time_limit": 4.0},
     "plain": {},

@@ -59,7 +59,11 @@ def all_drives(drives):
     """Drives that have every array and every key between them."""
     choice = MarginRecord(loss_m=0.0, reserve_m=0.01, probability=0.01, drives=80)
     chosen = changed(drives["jackal, noise"], "record", margin_choice=choice)
-    found = {**drives, **more_drives(["mapless, matching, lidar", "ants, noise"]), "chosen margin": chosen}
+    found = {
+        **drives,
+        **more_drives(["mapless, matching, lidar", "ants, noise", "footprint kept clear"]),
+        "chosen margin": chosen,
+    }
     POOL[:] = [log.record.as_dict() for log in found.values()]
     return found
 

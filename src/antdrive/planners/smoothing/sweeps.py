@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,12 +44,15 @@ def smooth_lines(plan: PlanResult, grid: Grid, task: Task, kind: str) -> Route:
     """
     outline = grid.turns.outline
     line, backwards = _planned(plan, grid, task, outline)
-    if kind != "none":
-        for _ in range(PASSES):
-            line = _shortened(_divided(line), backwards, task, outline)
+    lead = int(backwards)  # straights that stay: a lead backwards
+    for _ in range(PASSES if kind != "none" and len(line.headings) > lead else 0):
+        rest = _Line(line.points[lead:], line.headings[lead:])
+        rest = _shortened(_divided(rest), line.headings[0] if backwards else task.start[2], task, outline)
+        line = _Line([*line.points[:lead], *rest.points], [*line.headings[:lead], *rest.headings])
     before = [task.start[2], *line.headings]
+    leaving = outline_at(task, outline)
     turns = [
-        _turn(point, was, heading, task, outline if k > 1 else outline_at(task, outline))
+        _turn(point, was, heading, task, [outline] if k > 1 else [outline, leaving])
         for k, (point, was, heading) in enumerate(zip(line.points, before, line.headings, strict=False))
     ]
     first = math.dist(*line.points[:2]) if backwards else 0.0
@@ -70,7 +74,7 @@ def _planned(plan: PlanResult, grid: Grid, task: Task, outline: Outline) -> tupl
                 not headings or math.isfinite(clear_turn(at, headings[0], leaving, task.world))
             ):
                 break
-        if not math.isfinite(heading):
+        else:  # an estimated pose may overlap obstacles
             backwards, heading = False, _heading(start[:2], points[0])
         points, headings = [start[:2], *points], [heading, *headings]
     if math.dist(points[-1], goal) > NEAR:
@@ -103,14 +107,10 @@ def _divided(line: _Line) -> _Line:
     return _Line([*points, line.points[-1]], headings)
 
 
-def _shortened(line: _Line, backwards: bool, task: Task, outline: Outline) -> _Line:
-    """Return the line with each stretch replaced by the longest clear straight found from its begin."""
+def _shortened(line: _Line, heading: float, task: Task, outline: Outline) -> _Line:
+    """Return the line, begun at a heading, with each stretch replaced by the longest clear straight found from its begin."""
     points, headings = line.points, line.headings
-    kept, faces = [points[0]], []
-    heading, i = task.start[2], 0
-    if backwards:  # the lead stays
-        i = next(k for k in range(1, len(points)) if k == len(headings) or headings[k] != headings[0])
-        kept, faces, heading = [points[0], points[i]], [headings[0]], headings[0]
+    kept, faces, i = [points[0]], [], 0
     while i < len(points) - 1:
         count = _reach(line, i, heading, task, outline)
         j = i + count
@@ -154,10 +154,10 @@ def _merged(points: list[Point], headings: list[float]) -> _Line:
     return _Line([points[0], *(points[k] for k in keep), points[-1]], [headings[0], *(headings[k] for k in keep)])
 
 
-def _turn(at: Point, was: float, heading: float, task: Task, outline: Outline) -> float:
-    """Return the clear turn at a point, or the shorter one where the estimated pose leaves neither clear."""
-    turn = clear_turn((*at, was), heading, outline, task.world)
-    return turn if math.isfinite(turn) else float(wrap_angle(heading - was))
+def _turn(at: Point, was: float, heading: float, task: Task, outlines: Sequence[Outline]) -> float:
+    """Return the turn at a point that is clear for the first outline possible, or the shorter one without any."""
+    turns = (clear_turn((*at, was), heading, outline, task.world) for outline in outlines)
+    return next(filter(math.isfinite, turns), float(wrap_angle(heading - was)))
 
 
 def _heading(a: Point, b: Point) -> float:

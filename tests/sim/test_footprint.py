@@ -1,0 +1,83 @@
+"""Drives through a door that only the robot's footprint passes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from antdrive.base import FieldError
+from antdrive.planners import load_planner
+from antdrive.robots import load_robot
+from antdrive.sim import Rollout, Scenario, certify, run
+from antdrive.sim.log.rollout import FORMS
+from antdrive.sim.rerun import replayed
+from antdrive.worlds import Disc, Task, World
+
+#: Width of a door that the footprint passes and the disc around the robot does not [m].
+DOORS = {"jackal": 0.62, "warehouse": 0.84}
+
+
+def door(width):
+    """A hall of two rooms, with a door of a given width between them."""
+    ends = [*np.arange(3.0 + width / 2 + 0.1, 6.0, 0.2), *np.arange(3.0 - width / 2 - 0.1, 0.0, -0.2)]
+    world = World("door", (0.0, 0.0, 6.0, 6.0), tuple(Disc(3.0, float(y), 0.1) for y in ends))
+    return Task(world, (1.2, 2.8, 0.3), (4.8, 3.2), cell=0.1)
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """Runs by robot and noise."""
+    runs = {}
+
+    def one(robot, noise):
+        if (robot, noise) not in runs:
+            runs[robot, noise] = run(Scenario.of(door(DOORS[robot]), "astar", robot, noise=noise, seed=2))
+        return runs[robot, noise]
+
+    return one
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("robot", DOORS)
+def test_a_footprint_passes_a_door_that_its_disc_does_not(driven, robot, noise):
+    made = driven(robot, noise)
+    record = made.rollout.record
+    assert made.succeeded
+    assert certify(made.rollout).certified
+    assert 0 < record.footprint_margin < DOORS[robot] / 2 - load_robot(robot).footprint.inner_radius
+    assert not run(replace(made.scenario, footprint="disc")).succeeded
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_a_saved_drive_of_a_footprint_is_driven_again_bit_for_bit(driven, noise, tmp_path):
+    driven("jackal", noise).rollout.save(tmp_path / "run.npz")
+    loaded = Rollout.load(tmp_path / "run.npz")
+    check = replayed(loaded)
+    assert (check.exact, check.problems) == (True, ())
+    assert certify(loaded).certified
+
+
+def test_an_exact_footprint_is_recorded(driven):
+    made = driven("jackal", 0.0)
+    exact = run(replace(made.scenario, footprint="exact"))
+    assert exact.rollout.record.settings["footprint"] == "exact"
+    assert "footprint" not in (made.rollout.record.settings or {})
+    assert exact.rollout.record.footprint_margin == made.rollout.record.footprint_margin
+    assert np.array_equal(exact.rollout.pose, made.rollout.pose)
+
+
+def test_in_open_ground_auto_takes_the_disc_bit_for_bit(jackal):
+    drives = [run(Scenario.of(door(3.0), "astar", jackal, footprint=shape)).rollout for shape in ("auto", "disc")]
+    assert drives[0].record.footprint_margin is None
+    for name in FORMS:
+        assert getattr(drives[0], name).tobytes() == getattr(drives[1], name).tobytes()
+
+
+def test_exact_needs_a_planner_for_footprints(jackal):
+    with pytest.raises(FieldError, match=r"^footprint: exact: .* plans for the disc around the robot; [^\n]*$"):
+        Scenario.of(door(3.0), load_planner("aco-han"), jackal, footprint="exact")
+
+
+def test_a_disc_has_no_choice_of_shape(turtlebot):
+    notes = Scenario.of(door(3.0), "astar", turtlebot, footprint="exact").idle_settings({"footprint"})
+    assert notes == {"footprint": "turtlebot is a disc"}
