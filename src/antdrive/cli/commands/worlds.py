@@ -71,7 +71,7 @@ def show_world(
     json: options.Json = False,
     **settings: Any,
 ) -> None:
-    """Describe a world, check whether a robot can cross it, and state which share of its floor the robot reaches."""
+    """Describe a world and check whether a robot can cross it."""
     from antdrive.base.plane import world_to_map
     from antdrive.planners import Query, load_planner, reachable
     from antdrive.robots import list_robots, load_robot, overlap_at
