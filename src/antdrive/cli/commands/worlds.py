@@ -14,7 +14,9 @@ from antdrive.cli.scenario_options import Ends, random_world
 
 if TYPE_CHECKING:
     from antdrive.worlds import Task
+    from antdrive.worlds.coverage import Coverage
 
+MOST_DOORS = 12  # listed at most
 MANY = 5000  # cylinders; planning takes seconds beyond this
 UNITS = {
     "frame": " m, m, rad",
@@ -75,6 +77,7 @@ def show_world(
     from antdrive.robots import list_robots, load_robot, overlap_at
     from antdrive.robots.default_margin import LEAST
     from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
+    from antdrive.worlds.coverage import coverage
 
     margin = LEAST if settings["margin"] is None else settings["margin"]
     if margin == "auto":
@@ -86,13 +89,17 @@ def show_world(
     known = {name: load_robot(name) for name in list_robots()}
     starts = {each.name: overlap_at(shown.world, each, shown.start) for each in (*known.values(), spec)}
     passable = not starts[spec.name] and query.blocked_end is None and reachable(query)
+    covered = coverage(shown.world, grid, shown.start[:2])
     if out is not None:
         import numpy as np
 
         from antdrive.views.figures.plan_figures import plan_figure
 
-        plan_figure(shown, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
+        plan_figure(
+            shown, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out, covered=covered
+        )
     facts = {"passable": passable, "robot": spec.name, "margin": margin, "starts": starts, "tasks": named}
+    facts["coverage"] = _coverage_facts(covered)
     said = {key + UNITS.get(key, ""): "-" if value is None else value for key, value in _facts(shown).items()}
     if any(shown.frame):
         for key, pose in {"start": shown.start, "goal": shown.goal}.items():
@@ -101,15 +108,34 @@ def show_world(
     said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m{reason}"
     said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
     lines = [f"{key:18} {value}" for key, value in said.items()]
+    lines += _coverage_lines(covered)
     lines += [f"start for {name} {overlap}" for name, overlap in starts.items() if overlap]
     lines += [f"{'tasks':18} {', '.join(named)}"] if named else []
     lines += [] if out is None else file_lines({"figure": out})
     show(json, {**task_to_dict(shown), **facts}, lines)
 
 
+def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
+    """Return a robot's share of the floor, rooms and doors as plain values."""
+    doors = [{"width": door.width, "at": list(door.at), "passed": door.passed} for door in covered.doors]
+    rooms = {"rooms": covered.room_count, "rooms_reached": len(covered.rooms_reached)}
+    return {"share": covered.share, **rooms, "doors": doors}
+
+
+def _coverage_lines(covered: "Coverage") -> list[str]:
+    """Say what a robot reaches, and name the narrowest doors that it does not pass."""
+    shut = [door for door in covered.doors if not door.passed]
+    rooms = f"{len(covered.rooms_reached)} of {covered.room_count} rooms"
+    doors = f", {len(covered.doors) - len(shut)} of {len(covered.doors)} doors" if covered.doors else ""
+    lines = [f"{'floor reached':18} {covered.share:.0%} of where a point gets: {rooms}{doors}"]
+    for door in shut[:MOST_DOORS]:
+        lines.append(f"{'door not passed':18} {door.width:.2f} m wide at ({door.at[0]:.2f}, {door.at[1]:.2f})")
+    return lines + ([f"{'':18} and {len(shut) - MOST_DOORS} more"] if len(shut) > MOST_DOORS else [])
+
+
 @options.with_settings(("seed",))
 def generate_world(
-    kind: Annotated[str, argument("KIND", "forest (Han's rule) or barn (cellular automaton).")],
+    kind: Annotated[str, argument("KIND", "forest (Han's rule), barn (cellular automaton) or office.")],
     out: Annotated[Path, option("FILE", "World file to write.")],
     settings: Annotated[
         list[str] | None,

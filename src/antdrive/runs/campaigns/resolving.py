@@ -25,7 +25,7 @@ from antdrive.runs.campaigns.job import NamedTask, PlannerVariant
 from antdrive.sim.forms import option_text, seed_list
 from antdrive.sim.log.record import canonical_hash, settings_of
 from antdrive.worlds import Disc, Grid, Task, World, list_worlds, load_task, load_tasks, rasterise
-from antdrive.worlds.formats.cellmap import connected
+from antdrive.worlds.coverage import reached_cells, share_of
 from antdrive.worlds.formats.importing import import_file
 from antdrive.worlds.formats.movingai import movingai_ends
 from antdrive.worlds.generators.generate import generated
@@ -300,10 +300,10 @@ def _drawn(
     rng = np.random.default_rng([request.seed, content])
     cell = max(entry.get("cell") or world.task.cell for entry in campaign.settings)
     grid = rasterise(world.task.world, cell, inflate)
-    fits, floor = grid.moves > 0, rasterise(world.task.world, cell, 0.0).moves > 0
-    inside = connected(floor, [grid.cell_at(*end[:2]) for end in (world.task.start, world.task.goal)])
-    floor = inside if inside.any() else floor  # a converted map is hollow where it is blocked
-    free = np.argwhere(fits & floor)
+    bare = rasterise(world.task.world, cell)
+    inside = reached_cells(bare, (world.task.start[:2], world.task.goal))
+    floor = inside if inside.any() else bare.moves > 0  # a converted map is hollow where it is blocked
+    free = np.argwhere((grid.moves > 0) & floor)
     tasks: list[Task] = []
     for _ in range(request.random):
         task = _draw(rng, grid, free, request.min_distance, world.task, robots, unseen) if len(free) else None
@@ -314,8 +314,7 @@ def _drawn(
             )
             raise campaign.error(("tasks",), problem)
         tasks.append(task)
-    reached = connected(fits, [grid.cell_at(*task.start[:2]) for task in tasks])
-    share = int(np.count_nonzero(reached & floor)) / max(1, int(np.count_nonzero(floor)))
+    share = share_of(reached_cells(grid, [task.start[:2] for task in tasks]), floor)
     for number, task in enumerate(tasks):
         name = f"random-{request.seed}-{number}"
         yield dataclasses.replace(world, name=name, task=task, catalogue=None, floor=share)

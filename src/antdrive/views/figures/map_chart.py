@@ -19,11 +19,13 @@ from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, legend_a
 from antdrive.views.scene import Scene, contact_point
 
 if TYPE_CHECKING:
+    from antdrive.worlds.coverage import Coverage
     from antdrive.worlds.grid import Grid
 
 
 FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in colours.FIELD_STOPS])
 SWEPT = 0.02  # motion of the farthest corner between two drawn footprints [m]
+MOST_LABELS = 24  # doors; more are drawn without their widths
 MANY = 1000  # cylinders; larger numbers are drawn without edges
 SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in colours.SPEED_STOPS])
 
@@ -69,6 +71,38 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
     axes.add_patch(Circle(scene.goal, scene.goal_tolerance, fc=pale_goal, ec=hexed(colours.GOAL), lw=1.4, zorder=4))
     axes.plot(*scene.goal, marker="+", ms=7, mew=1.4, color=hexed(colours.GOAL), zorder=7)
     _draw_robot(axes, scene, scene.start, colours.START, 4.0)
+
+
+def draw_coverage(axes: Any, grid: Grid, covered: Coverage) -> list[Any]:
+    """Draw the reached floor, the rooms not reached and the doors with their widths; return the legend's handles."""
+    missed = covered.floor & ~np.isin(covered.rooms, list(covered.rooms_reached))
+    x, y = (np.asarray(grid.origin) - grid.cell / 2).tolist()
+    rows, cols = grid.shape
+    place = (x, x + cols * grid.cell, y, y + rows * grid.cell)
+    handles: list[Any] = []
+    for cells, colour, label in (
+        (covered.reached & covered.floor, colours.GOOD, "reached"),
+        (missed, colours.DOUBT, "room not reached"),
+    ):
+        if cells.any():
+            tint = (*(channel / 255 for channel in colour), 0.34)
+            layer = np.zeros((rows, cols, 4))
+            layer[cells] = tint
+            axes.imshow(layer, origin="lower", extent=place, interpolation="nearest", zorder=1.5)
+            handles.append(Patch(facecolor=hexed(colour), alpha=0.34, label=label))
+    few = len(covered.doors) <= MOST_LABELS
+    for passed, colour, label in ((True, colours.GOOD, "door passed"), (False, colours.BAD, "door not passed")):
+        doors = [door for door in covered.doors if door.passed == passed]
+        style = {"color": hexed(colour), "ms": 6, "mec": "white", "mew": 0.6, "ls": "none", "zorder": 8}
+        if doors:
+            at = np.array([door.at for door in doors])
+            handles += axes.plot(*at.T, "o" if passed else "X", label=label, **style)
+        for door in doors if few else ():
+            note = axes.annotate(
+                f"{door.width:.2f}", door.at, (5, 4), textcoords="offset points", fontsize=7.5, color=hexed(colour)
+            )
+            note.set(zorder=9, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8})
+    return handles
 
 
 def _circles(centres: Floats, radii: Floats) -> list[Path]:

@@ -15,13 +15,14 @@ from matplotlib.figure import Figure
 from antdrive.base.types import Floats
 from antdrive.views.colours import BAD, MUTED, ROUTE, SHELL, START, hexed
 from antdrive.views.figures.canvas import colour_bar, draw_title, endings, frame_map, legend_above, map_size, sheet
-from antdrive.views.figures.map_chart import FIELD, draw_field, draw_legend, draw_map
+from antdrive.views.figures.map_chart import FIELD, draw_coverage, draw_field, draw_legend, draw_map
 from antdrive.views.figures.paper_figures import history_figure
 from antdrive.views.scene import Scene
 
 if TYPE_CHECKING:
     from antdrive.planners.plan import History, PlanResult
     from antdrive.robots.spec import RobotSpec
+    from antdrive.worlds.coverage import Coverage
     from antdrive.worlds.grid import Grid
     from antdrive.worlds.world import Task
 
@@ -44,6 +45,7 @@ def plan_figure(
     path: str | Path | None = None,
     *,
     mapped: bool = True,
+    covered: Coverage | None = None,
     dpi: float = 160,
 ) -> Figure:
     """Draw a plan on the map, over the planner's field, with path lengths by iteration of an iterative planner.
@@ -55,6 +57,7 @@ def plan_figure(
         robot: the robot to draw at the start
         path: the file to write; its suffix selects PNG, PDF or SVG; None: no file
         mapped: whether the robot has a map
+        covered: what the robot reaches, drawn below the path
         dpi: pixels per inch
 
     Returns:
@@ -78,7 +81,7 @@ def plan_figure(
         if plan.field is not None:
             draw_field(figure, chart, grid, plan.field)
         draw_map(chart, scene, floor=plan.field is None)
-        handles: list[Any] = []
+        handles: list[Any] = [] if covered is None else draw_coverage(chart, grid, covered)
         if len(plan.cells):
             handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
             handles += chart.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)

@@ -199,8 +199,67 @@ def barn(
     )
 
 
+#: Widths of an office's doors [m].
+OFFICE_DOORS = (0.85, 0.85, 0.85, 0.85, 0.95, 0.95, 0.95, 0.95, 1.2, 2.0)
+
+
+def office(
+    rng: np.random.Generator,
+    doors: tuple[float, ...] = OFFICE_DOORS,
+    *,
+    corridor: float = 3.0,
+    radius: float = 0.1,
+    name: str = "office",
+) -> Task:
+    """Generate an office of 40 x 25 m: ten rooms along a corridor, each with one door at a random place.
+
+    The walls are cylinders that overlap. The task leads from the corridor into the room with the widest door.
+
+    Args:
+        rng: the source of randomness
+        doors: the doors' widths [m], in random order
+        corridor: the corridor's width [m]
+        radius: the cylinders' radius [m]
+        name: the world's name
+
+    Raises:
+        FieldError: an argument is out of its range.
+    """
+    if not all(0 < width <= 5 for width in doors):
+        raise FieldError("doors", f"must be greater than 0 and at most 5, got {min(doors):g} to {max(doors):g}")
+    if not 1 <= corridor <= 10:
+        raise FieldError("corridor", f"must be at least 1 and at most 10, got {corridor:g}")
+    if not 0.02 <= radius <= 0.2:
+        raise FieldError("radius", f"must be at least 0.02 and at most 0.2, got {radius:g}")
+    (width, height), side = (40.0, 25.0), 40.0 / (len(doors) / 2)
+    low, high = (height - corridor) / 2, (height + corridor) / 2
+    widths = rng.permutation(doors)
+    points: list[tuple[float, float]] = []
+    goal = (0.0, 0.0)
+    for number, door in enumerate(widths.tolist()):
+        left, upper = number // 2 * side, number % 2 == 1
+        wall = high + radius if upper else low - radius
+        first = left + rng.uniform(1.0, side - 1.0 - door)
+        for begin, end in ((left, first - radius), (first + door + radius, left + side)):
+            points += [(x, wall) for x in _row(begin, end, radius)]
+        if left:
+            span = (high + 3 * radius, height) if upper else (0.0, low - 3 * radius)
+            points += [(left, y) for y in _row(*span, radius)]
+        if door == max(doors):
+            goal = (left + side / 2, (height + high) / 2 if upper else low / 2)
+    discs = tuple(Disc(round(x, 4), round(y, 4), radius) for x, y in dict.fromkeys(points))
+    world = World(name, (0.0, 0.0, width, height), discs, f"{len(doors)} rooms along a corridor of {corridor:g} m")
+    return Task(world, (1.5, height / 2, 0.0), (round(goal[0], 4), goal[1]), 0.25, 0.05)
+
+
+def _row(begin: float, end: float, radius: float) -> list[float]:
+    """Return the centres of overlapping cylinders from begin to end."""
+    count = 2 + math.ceil((end - begin) / (1.5 * radius))
+    return [begin + (end - begin) * k / (count - 1) for k in range(count)]
+
+
 #: The generators by name.
-GENERATORS: Mapping[str, Callable[..., Task]] = MappingProxyType({"forest": forest, "barn": barn})
+GENERATORS: Mapping[str, Callable[..., Task]] = MappingProxyType({"forest": forest, "barn": barn, "office": office})
 
 
 def generate(

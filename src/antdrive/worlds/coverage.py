@@ -1,0 +1,163 @@
+"""The share of a floor that a robot reaches, with the floor's rooms and doors.
+
+Rooms are separated at local minima of clearance: the critical points of S. Thrun, *Learning metric-topological maps for
+indoor mobile robot navigation*, Artificial Intelligence 99, 1998.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.types import Point
+from antdrive.worlds import _kernels_coverage
+from antdrive.worlds.geometry import point_clearance
+from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
+from antdrive.worlds.world import World
+
+Cells = npt.NDArray[np.bool_]
+
+NARROW = 0.7  # a door's clearance is at most this fraction of the maximum in both rooms; 0.707 at crossing corridors
+LEAST_ROOM = 1.0  # a room is larger [m²]
+OPPOSITE = -0.5  # cosine of the angle between the directions to a door's two sides
+
+
+@dataclass(frozen=True)
+class Door:
+    """A narrow passage between two rooms."""
+
+    width: float  # distance between its two obstacles [m]
+    at: Point  # its middle [m]
+    rooms: tuple[int, int]
+    passed: bool  # whether the robot gets through
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """The part of a floor that a robot reaches."""
+
+    floor: Cells  # where a point gets (R, C)
+    reached: Cells  # where the robot's centre gets (R, C)
+    rooms: npt.NDArray[np.int64]  # number of each cell's room (R, C), -1 off the floor
+    doors: tuple[Door, ...]  # the narrowest first
+
+    @property
+    def share(self) -> float:
+        """The reached fraction of the floor."""
+        return share_of(self.reached, self.floor)
+
+    @property
+    def room_count(self) -> int:
+        """The number of rooms."""
+        return int(self.rooms.max(initial=-1)) + 1
+
+    @property
+    def rooms_reached(self) -> frozenset[int]:
+        """The numbers of the rooms that the robot reaches."""
+        return frozenset(np.unique(self.rooms[self.reached & self.floor]).tolist())
+
+
+def reached_cells(grid: Grid, ends: Iterable[Point]) -> Cells:
+    """Return the cells (R, C) that allowed moves connect to any of the given positions [m]."""
+    reached = np.zeros(grid.shape, dtype=np.bool_)
+    for x, y in ends:
+        at = grid.cell_at(x, y)
+        if grid.moves[at]:
+            _kernels_coverage.flood_moves(grid.moves, *at, reached)
+    return reached
+
+
+def share_of(reached: Cells, floor: Cells) -> float:
+    """Return the fraction of a floor's cells that are reached."""
+    return int(np.count_nonzero(reached & floor)) / max(1, int(np.count_nonzero(floor)))
+
+
+def coverage(world: World, grid: Grid, start: Point) -> Coverage:
+    """Return what a robot reaches on its grid from a start [m]."""
+    bare = rasterise(world, grid.cell)
+    floor = reached_cells(bare, [start])
+    clearance = np.zeros(grid.shape)
+    clearance[floor] = point_clearance(world, bare.xy(np.argwhere(floor)))
+    order = np.flatnonzero(floor)
+    order = order[np.argsort(-clearance.ravel()[order], kind="stable")]
+    rooms = np.full(grid.shape, -1)
+    _kernels_coverage.rooms(bare.moves, clearance, order, NARROW, LEAST_ROOM / grid.cell**2, rooms)
+    rooms[floor] = np.unique(rooms[floor], return_inverse=True)[1]
+    reached = reached_cells(grid, [start])
+    doors = []
+    for border in _borders(bare, rooms):
+        room = clearance[tuple(border.T)]
+        widest = border[room >= room.max() - grid.cell]
+        found = [door for at in widest if (door := _door(world, bare, clearance, reached, rooms, border, at))]
+        doors += [min(found, key=_order)] if found else []
+    return Coverage(floor, reached, rooms, tuple(sorted(doors, key=_order)))
+
+
+def _order(door: Door) -> tuple[float, Point]:
+    """Return the sort key of doors: by width."""
+    return door.width, door.at
+
+
+def _borders(grid: Grid, rooms: npt.NDArray[np.int64]) -> Iterable[npt.NDArray[np.int64]]:
+    """Yield the cells (N, 2) at each connected border of two rooms."""
+    pairs: dict[tuple[int, int], set[tuple[int, int]]] = {}
+    for k, (dr, dc) in enumerate(DIRECTIONS[:4]):
+        here = np.argwhere(grid.moves >> k & 1 > 0)
+        there = here + (dr, dc)
+        a, b = rooms[tuple(here.T)], rooms[tuple(there.T)]
+        for p, q, u, v in zip(*(x[(a != b) & (a >= 0)].tolist() for x in (here, there, a, b)), strict=True):
+            pairs.setdefault((min(u, v), max(u, v)), set()).update((tuple(p), tuple(q)))
+    for cells in pairs.values():
+        while cells:
+            todo = [cells.pop()]
+            group = list(todo)
+            while todo:
+                r, c = todo.pop()
+                near = cells & {(r + dr, c + dc) for dr, dc in DIRECTIONS}
+                cells -= near
+                todo += near
+                group += near
+            yield np.array(sorted(group))
+
+
+def _door(
+    world: World,
+    grid: Grid,
+    clearance: npt.NDArray[np.float64],
+    reached: Cells,
+    rooms: npt.NDArray[np.int64],
+    border: npt.NDArray[np.int64],
+    at: npt.NDArray[np.int64],
+) -> Door | None:
+    """Return the door at a border of two rooms: the narrowest gap around a cell of the border.
+
+    None if the gap is not there: the border ends at other rooms.
+    """
+    point = grid.xy(at)[0]
+    discs, (xmin, ymin, xmax, ymax) = world.discs, world.bounds
+    x, y = point.tolist()
+    feet = np.array([(xmin, y), (x, ymin), (xmax, y), (x, ymax)])  # the nearest points of the walls
+    centres, radii = np.vstack([discs[:, :2], feet]), np.append(discs[:, 2], np.zeros(4))
+    away = centres - point
+    room, most = np.hypot(*away.T) - radii, clearance[tuple(at)] + 2 * grid.cell
+    near = np.flatnonzero(room <= most)
+    first, second = near[np.stack(np.triu_indices(len(near), 1))]
+    lengths = np.hypot(*away.T)
+    across = (away[first] * away[second]).sum(axis=1) < OPPOSITE * lengths[first] * lengths[second]
+    first, second = first[across], second[across]
+    if not len(first):
+        return None
+    ends = np.stack([centres[first], centres[second]])
+    wall = second >= len(discs)  # the gap is perpendicular to it
+    axis = (second[wall] - len(discs)) % 2
+    ends[1, wall, 1 - axis] = ends[0, wall, 1 - axis]
+    gaps = np.hypot(*(ends[1] - ends[0]).T)
+    widths = gaps - radii[first] - radii[second]
+    k = int(widths.argmin())
+    width = float(widths[k])
+    mid_x, mid_y = (ends[0, k] + (ends[1, k] - ends[0, k]) * ((radii[first[k]] + width / 2) / gaps[k])).tolist()
+    low, high = np.unique(rooms[tuple(border.T)]).tolist()
+    return Door(width, (mid_x, mid_y), (low, high), bool(reached[tuple(border.T)].any()))

@@ -1,0 +1,87 @@
+"""Shares, rooms and doors of floors with known ones."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from antdrive.base.errors import FieldError
+from antdrive.worlds import Disc, World, forest, rasterise
+from antdrive.worlds.coverage import coverage
+from antdrive.worlds.generators.generate import OFFICE_DOORS, office
+
+
+def two_rooms(gaps):
+    """Two rooms of 4 x 6 m; the wall between them has openings (middle, width)."""
+    ys = np.arange(0.0, 6.001, 0.05)
+    clear = [y for y in ys.tolist() if all(abs(y - at) > width / 2 + 0.05 for at, width in gaps)]
+    ends = [at + side * (width / 2 + 0.05) for at, width in gaps for side in (-1, 1)]
+    return World("rooms", (0.0, 0.0, 8.0, 6.0), tuple(Disc(4.0, y, 0.05) for y in sorted({*clear, *ends})))
+
+
+def covered(world, inflate, start=(1.0, 3.0), cell=0.1):
+    return coverage(world, rasterise(world, cell, inflate), start)
+
+
+def test_an_empty_room_is_one_room_and_its_share_is_that_of_its_cells():
+    result = covered(World("room", (0.0, 0.0, 4.0, 3.0)), 0.5, (1.0, 1.0))
+    assert (result.room_count, result.rooms_reached, result.doors) == (1, {0}, ())
+    assert result.share == (30 * 20) / (40 * 30)
+
+
+@pytest.mark.parametrize(
+    ("inflate", "reached", "passed"), [(0.2, 2, (True, True)), (0.6, 2, (False, True)), (0.8, 1, (False, False))]
+)
+def test_two_doors_between_two_rooms(inflate, reached, passed):
+    result = covered(two_rooms([(1.5, 0.9), (4.5, 1.4)]), inflate)
+    assert result.room_count == 2
+    assert len(result.rooms_reached) == reached
+    assert [door.width for door in result.doors] == pytest.approx([0.9, 1.4])
+    assert [door.at for door in result.doors] == [pytest.approx((4.0, 1.5)), pytest.approx((4.0, 4.5))]
+    assert tuple(door.passed for door in result.doors) == passed
+
+
+def test_a_closed_room_is_no_part_of_the_floor():
+    result = covered(two_rooms([]), 0.2)
+    assert result.room_count == 1
+    assert not result.doors
+    assert result.floor[:, 40:].sum() == 0
+
+
+def test_crossing_corridors_are_one_room():
+    """The clearance between the crossing and its arms falls to 1 / sqrt(2)."""
+    along = np.arange(1.05, 4.0, 0.1).tolist()
+    rims = {(a, b) for s in along for a, b in ((1.05, s), (s, 1.05))}
+    corners = [Disc(4 + u * a, 4 + v * b, 0.05) for u in (-1, 1) for v in (-1, 1) for a, b in sorted(rims)]
+    world = World("crossing", (0.0, 0.0, 8.0, 8.0), tuple(corners))
+    assert covered(world, 0.3, (4.0, 4.0)).room_count == 1
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 100), st.floats(0.05, 0.6), st.floats(0.01, 0.5))
+def test_a_larger_robot_never_reaches_more(seed, inflate, more):
+    task = forest(np.random.default_rng(seed))
+    small, large = (covered(task.world, size, task.start[:2], 0.25) for size in (inflate, inflate + more))
+    assert not (large.reached & ~small.reached).any()
+    assert large.share <= small.share
+    assert large.rooms_reached <= small.rooms_reached
+    assert all(not far.passed or near.passed for near, far in zip(small.doors, large.doors, strict=True))
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(7, marks=pytest.mark.slow)])
+def test_every_door_of_an_office_is_found_with_its_width(seed):
+    task = office(np.random.default_rng(seed))
+    result = covered(task.world, 0.7, task.start[:2])  # a courier of 0.9 x 0.6 m, 0.15 m ahead of its axle
+    assert [round(door.width, 3) for door in result.doors] == sorted(OFFICE_DOORS)
+    assert [door.passed for door in result.doors] == [False] * 9 + [True]
+    assert (result.room_count, len(result.rooms_reached)) == (11, 2)
+    assert 0.12 < result.share < 0.14
+    jackal = covered(task.world, 0.363, task.start[:2])
+    assert len(jackal.rooms_reached) == 11
+    assert 0.8 < jackal.share < 0.9
+
+
+@pytest.mark.parametrize(("key", "value"), [("doors", (0.0, 1.0)), ("corridor", 0.5), ("radius", 1.0)])
+def test_an_office_names_a_wrong_size(key, value):
+    with pytest.raises(FieldError, match=key):
+        office(np.random.default_rng(0), **{key: value})
