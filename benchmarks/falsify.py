@@ -22,11 +22,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from antdrive.planners.anyangle.passage import feasible
 from antdrive.runs.failures.failure import Attempt, failure_of
 from antdrive.runs.failures.hunt import METHODS, Finding, Hunt, find_failures
 from antdrive.runs.pool import Pool
 from antdrive.sim import Scenario, run
+from antdrive.worlds.passage import feasible
 from benchmarks.markdown import chosen, command_line, print_tables, table
 from benchmarks.resuming import append_line, current_commit, read_lines
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,20 +71,6 @@ def test_a_margin_that_would_do_is_named_for_a_rectangle_too(jackal):
     reason = run(gate(jackal, 0.7, cell=0.05)).reason
     assert reason.endswith("its rectangle of 0.508 x 0.43 m needs 0.49 m of the 0.7 m straight ahead; "
                            "a margin below 0.0172 m leaves a way on fine cells")  # fmt: skip
-
-
-def test_in_a_world_of_very_many_obstacles_the_place_is_found_on_the_cells(jackal, monkeypatch):
-    import antdrive.sim.reasons as reasons
-
-    monkeypatch.setattr(reasons, "MOST_OBSTACLES", 3)
-    reason = run(gate(replace(jackal, footprint=Footprint.rectangle(0.9, 0.6)), 0.95, cell=0.05)).reason
-    found = re.search(r"a radius of about (0\.\d+) m, near \((.*), (.*)\); plans use", reason)
-    assert found, reason
-    about, x, y = map(float, found.groups())
-    assert 0.40 <= about <= 0.48
-    assert np.hypot(x - 3.0, y - 2.0) < 0.15
-    closed = gate(jackal, 0.02, cell=0.05)
-    assert run(closed).reason.endswith("no disc of 0.0028 m gets through, on these cells")
 
 
 def test_cells_that_would_do_are_named(turtlebot):

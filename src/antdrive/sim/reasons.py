@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from antdrive.base.plane import format_position
-from antdrive.planners import AStar, Query
-from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible, widest_passage
+from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.robots.clearance import obstacle_name
 from antdrive.robots.default_margin import LEAST
-from antdrive.worlds import Grid, Task, point_clearance, rasterise
+from antdrive.worlds import Grid, Task, rasterise
+from antdrive.worlds.passage import feasible, widest_passage
 
 if TYPE_CHECKING:
     from antdrive.sim.driving.routes import RoutePlanner
 
 FINER = (2, 4, 8)  # cells are tried this many times smaller
-HALVINGS = 7  # bisection steps for the passable radius in a world with too many gaps to try each
 MOST_CELLS = 2_000_000  # largest grid built only to test for a path
 
 
@@ -30,8 +27,6 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
         says = f": {said}" if said else ""
         return f"{s.planner_label} found no path for {disc}{says}; astar finds one on these cells of {grid.cell:g} m"
     start = f"no path for {disc} on cells of {grid.cell:g} m"
-    if len(s.task.world.obstacles) > MOST_OBSTACLES:
-        return f"{start}; {_narrowest_cell(s, grid)}"
     if feasible(s.task, s.inflate):
         finer = next((grid.cell / k for k in FINER if _has_path(s.task, grid.cell / k, s.inflate)), None)
         return f"{start}; there is one on {f'cells of {finer:g} m' if finer else 'finer cells'}"
@@ -41,7 +36,7 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
 def _narrowest_place(s: RoutePlanner) -> str:
     """Describe the widest passable disc, its bottleneck, and whether a smaller margin would help."""
     task = s.task
-    passage = widest_passage(task, s.inflate)
+    passage = widest_passage(task)
     if passage is None:
         return "not even a point gets through"
     at = format_position(task.frame, *passage.at)
@@ -69,24 +64,6 @@ def _what_it_takes(s: RoutePlanner, passes: float) -> str:
     return (
         f"plans use the disc of {robot.name}; {shape} needs {needs:.3g} m of the {2 * passes:.3g} m straight ahead"
         f"{'; ' * bool(helps)}{helps}"
-    )
-
-
-def _narrowest_cell(s: RoutePlanner, grid: Grid) -> str:
-    """Describe the widest passable disc on the plan's cells, for worlds with too many gaps to try each."""
-    low, high = 0.0, s.inflate
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _has_path(s.task, grid.cell, middle) else (low, middle)
-    if low == 0:
-        return f"no disc of {high:.2g} m gets through, on these cells"
-    free = rasterise(s.task.world, grid.cell, low)
-    cells = AStar().plan(Query.between(free, s.task), np.random.default_rng(0)).cells
-    room = point_clearance(s.task.world, free.xy(cells))
-    at = format_position(s.task.frame, *free.xy(cells)[int(room.argmin())].tolist())
-    return (
-        f"on these cells, the widest disc that passes has a radius of about {low:.2g} m, near {at}; "
-        f"{_what_it_takes(s, low)}"
     )
 
 

@@ -63,6 +63,38 @@ def wall_distance(x: float, y: float, bounds: Array) -> float:
 
 
 @kernel
+def polygon_distance(x: float, y: float, corners: Array) -> float:
+    """Return the signed distance from a convex polygon (K, 2), counter-clockwise, to a point, negative inside.
+
+    One corner is a point, two are a segment; corners may repeat.
+    """
+    over, apart2 = -math.inf, math.inf
+    for k in range(corners.shape[0]):
+        ax, ay = corners[k - 1, 0], corners[k - 1, 1]
+        ex, ey = corners[k, 0] - ax, corners[k, 1] - ay
+        dx, dy = x - ax, y - ay
+        length2 = ex * ex + ey * ey
+        share = 0.0
+        if length2 > 0.0:
+            share = min(max((dx * ex + dy * ey) / length2, 0.0), 1.0)
+            over = max(over, (dx * ey - dy * ex) / math.sqrt(length2))
+        dx, dy = dx - share * ex, dy - share * ey
+        apart2 = min(apart2, dx * dx + dy * dy)
+    return over if over <= 0.0 and corners.shape[0] > 2 else math.sqrt(apart2)
+
+
+@kernel
+def polygon_wall_distance(x: float, y: float, cos: float, sin: float, corners: Array, bounds: Array) -> float:
+    """Return the distance from a polygon (K, 2) at (x, y), rotated by cosine and sine, to the nearest wall."""
+    best = math.inf
+    for k in range(corners.shape[0]):
+        cx = x + cos * corners[k, 0] - sin * corners[k, 1]
+        cy = y + sin * corners[k, 0] + cos * corners[k, 1]
+        best = min(best, min(min(cx - bounds[0], bounds[2] - cx), min(cy - bounds[1], bounds[3] - cy)))
+    return best
+
+
+@kernel
 def boxes_around(discs: Array) -> Array:
     """Return the bounding boxes of each TOGETHER consecutive discs: x_min, y_min, x_max, y_max (B, 4).
 

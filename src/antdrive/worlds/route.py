@@ -18,6 +18,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.base.types import Floats
 
+ROUNDING = 1e-9  # tolerance of an arc length [m]
 DETOUR = 3.0  # largest excess of an any-angle planner's line over its path of cells [cells]
 
 
@@ -48,34 +49,51 @@ class Route:
         curvature: curvature of the exact curve from each point to the next (N,) [1/m]; None: unknown
         kind: how the plan was smoothed
         note: why the requested smoothing was not applied; empty if it was
+        turns: turn on the spot at each point (N,) [rad], counter-clockwise, 0 at the end; None: the robot may cut corners
+        backwards_until: arc length up to which the robot drives backwards, that of a point [m]; only with turns
 
     Raises:
-        FieldError: points are not finite, not of shape (N, 2) or all equal, or the curvature's length differs.
+        FieldError: points are not finite, not of shape (N, 2) or all equal, the length of curvature or turns differs, a turn is
+            a full one or more, or the robot drives backwards up to no point.
     """
 
     xy: Floats
     curvature: Floats | None = None
     kind: str = "none"
     note: str = ""
+    turns: Floats | None = None
+    backwards_until: float = 0.0
 
     def __post_init__(self) -> None:
         xy = np.array(self.xy, dtype=np.float64)
         if xy.ndim != 2 or xy.shape[1] != 2 or not np.isfinite(xy).all():
             raise FieldError("xy", f"must be finite numbers of shape (N, 2), got shape {xy.shape}")
         moves_on = np.any(np.diff(xy, axis=0) != 0.0, axis=1)
-        if self.curvature is not None:
-            curvature = np.array(self.curvature, dtype=np.float64)
-            if curvature.shape != xy.shape[:1] or not np.isfinite(curvature).all():
-                raise FieldError("curvature", f"must be {len(xy)} finite numbers, got shape {curvature.shape}")
-            # The last of equal points has the next segment's curvature.
-            curvature = curvature[np.append(moves_on, True)]
-            curvature.setflags(write=False)
-            object.__setattr__(self, "curvature", curvature)
+        for key in ("curvature", "turns"):
+            if getattr(self, key) is None:
+                continue
+            values = np.array(getattr(self, key), dtype=np.float64)
+            if values.shape != xy.shape[:1] or not np.isfinite(values).all():
+                raise FieldError(key, f"must be {len(xy)} finite numbers, got shape {values.shape}")
+            # The last of equal points has the next segment's curvature, and the whole turn.
+            values = values[np.append(moves_on, True)]
+            values.setflags(write=False)
+            object.__setattr__(self, key, values)
         xy = np.ascontiguousarray(xy[np.insert(moves_on, 0, True)])
         if len(xy) < 2:
             raise FieldError("xy", "must have at least two different points")
         xy.setflags(write=False)
         object.__setattr__(self, "xy", xy)
+        if self.turns is not None and np.abs(self.turns).max() >= 2 * math.pi:
+            raise FieldError("turns", f"must be less than a full turn, got {np.abs(self.turns).max():g}")
+        if self.backwards_until:
+            nearest = self.arc[np.abs(self.arc - self.backwards_until).argmin()].item()
+            if self.turns is None or not abs(nearest - self.backwards_until) <= ROUNDING:
+                raise FieldError(
+                    "backwards_until",
+                    f"must be the arc length of a point of a route with turns, got {self.backwards_until:g}",
+                )
+            object.__setattr__(self, "backwards_until", nearest)
 
     @functools.cached_property
     def arc(self) -> Floats:
@@ -86,3 +104,10 @@ class Route:
     def length(self) -> float:
         """Length [m]."""
         return float(self.arc[-1])
+
+    @property
+    def facing(self) -> Floats:
+        """Heading of a robot on the segment after each point but the last, (N - 1,) [rad]."""
+        ahead = np.where(self.arc[:-1] < self.backwards_until, -1.0, 1.0)
+        along = np.diff(self.xy, axis=0) * ahead[:, None]
+        return np.arctan2(along[:, 1], along[:, 0])

@@ -1,6 +1,5 @@
-"""The exact shortest path among discs against closed forms and a polygon oracle, and the widest passage."""
+"""The exact shortest path among discs against closed forms and a polygon oracle."""
 
-import heapq
 import itertools
 import math
 from collections.abc import Sequence
@@ -14,9 +13,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from antdrive.planners import AStar, PlanStatus, Query, Tangent, route_along
 from antdrive.planners.anyangle import _kernels_tangent
-from antdrive.planners.anyangle.passage import Passage, widest_passage
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
-from antdrive.worlds import Disc, Task, World, forest, point_clearance, polyline_clearance, rasterise
+from antdrive.worlds import Disc, Task, World, forest, polyline_clearance, rasterise
 from tests.planners.worlds_to_solve import catalogue
 
 Discs = Sequence[tuple[float, float, float]]
@@ -435,69 +433,3 @@ def test_every_tangent_to_a_free_arc_is_checked(discs, dx, dy, radius, turn, dat
     )
     passed_over = _kernels_tangent.misses(rims, i, turn, dx, dy, across)
     assert not (touched and passed_over)
-
-
-STEP = 0.03  # of the field [m]
-
-
-def flooded(task):
-    """Return the widest disc from start to goal over a field of points, by a flood in the order of clearance."""
-    xmin, ymin, xmax, ymax = task.world.bounds
-    x, y = np.arange(xmin, xmax + STEP / 2, STEP), np.arange(ymin, ymax + STEP / 2, STEP)
-    px, py = np.meshgrid(x, y)
-    room = np.minimum.reduce([px - xmin, xmax - px, py - ymin, ymax - py])
-    for disc in task.world.obstacles:
-        room = np.minimum(room, np.hypot(px - disc.x, py - disc.y) - disc.radius)
-    start, goal = (
-        (round((b - ymin) / STEP), round((a - xmin) / STEP)) for a, b in (task.start[:2], task.goal)
-    )  # fmt: skip
-    best = {start: float(room[start])}
-    queue = [(-best[start], start)]
-    while queue:
-        width, at = heapq.heappop(queue)
-        if at == goal:
-            return -width
-        for dr in (-1, 0, 1):
-            for dc in (-1, 0, 1):
-                near = at[0] + dr, at[1] + dc
-                if 0 <= near[0] < room.shape[0] and 0 <= near[1] < room.shape[1]:
-                    wide = min(-width, float(room[near]))
-                    if wide > best.get(near, -math.inf):
-                        best[near] = wide
-                        heapq.heappush(queue, (-wide, near))
-    return -math.inf
-
-
-def test_the_widest_disc_is_that_of_a_flood():
-    rng, through_gaps, solved = np.random.default_rng(4), 0, 0
-    for _ in range(25):
-        discs = tuple(Disc(*rng.uniform((0.4, 0.0), (3.6, 3.0)).tolist(), rng.uniform(0.1, 0.35)) for _ in range(18))
-        ends = (0.2, 1.5), (3.8, 1.5)
-        discs = tuple(d for d in discs if all(math.dist((d.x, d.y), end) > d.radius + 0.1 for end in ends))
-        task = Task(World("random", (0.0, 0.0, 4.0, 3.0), discs), (*ends[0], 0.0), ends[1])
-        passage, flood = widest_passage(task, 10.0), flooded(task)
-        if passage is None:
-            assert flood <= STEP
-            continue
-        solved += 1
-        assert passage.radius == pytest.approx(flood, abs=STEP)
-        assert point_clearance(task.world, [passage.at])[0] == pytest.approx(passage.radius, abs=1e-9)
-        through_gaps += bool(passage.between)
-    assert solved > 15
-    assert through_gaps > 8
-
-
-def test_the_bottleneck_is_the_middle_of_the_gap():
-    wall = tuple(Disc(2.0, y, 0.25) for y in (0.25, 0.75, 1.25, 2.25, 2.75))  # a gap of 0.5 m around (2, 1.75)
-    task = Task(World("gate", (0.0, 0.0, 4.0, 3.0), wall), (0.6, 0.6, 0.0), (3.4, 0.6))
-    passage = widest_passage(task, 0.4)
-    assert passage == Passage(pytest.approx(0.25), pytest.approx((2.0, 1.75)), (2, 3))
-    beside_a_wall = Task(World("side", (0.0, 0.0, 4.0, 3.0), (Disc(2.0, 1.2, 1.1),)), (0.6, 0.6, 0.0), (3.4, 0.6))
-    assert widest_passage(beside_a_wall, 0.9) == Passage(pytest.approx(0.35), pytest.approx((2.0, 2.65)), (0, 4))
-
-
-def test_worlds_without_a_bottleneck():
-    room = World("room", (0.0, 0.0, 4.0, 3.0))
-    assert widest_passage(Task(room, (0.5, 1.5, 0.0), (3.7, 1.5)), 0.4) == Passage(pytest.approx(0.3), (3.7, 1.5))
-    closed = World("closed", (0.0, 0.0, 4.0, 3.0), tuple(Disc(2.0, y, 0.3) for y in np.arange(0.0, 3.1, 0.5)))
-    assert widest_passage(Task(closed, (0.6, 0.6, 0.0), (3.4, 0.6)), 0.4) is None

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import AStar, Query, load_planner
-from antdrive.planners.anyangle.passage import feasible
 from antdrive.runs.failures import failure as failing
 from antdrive.runs.failures import hunt as hunting
 from antdrive.runs.failures import reproducers
@@ -37,6 +36,7 @@ from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.sim.log.margin import CAUSES
 from antdrive.worlds import Disc, World, rasterise
+from antdrive.worlds.passage import feasible
 
 PLACES = st.tuples(st.integers(-5, 5), st.integers(-5, 5))
 LINES = st.lists(PLACES, min_size=1, max_size=4).map(lambda places: np.array(places, dtype=np.float64))

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from antdrive.base import InputError
 from antdrive.planners import PLANNERS, Planner
-from antdrive.planners.anyangle.passage import feasible
 from antdrive.runs.failures import passes
 from antdrive.runs.failures.candidates import CandidateRunner, changeable, identity_of, room_in
 from antdrive.runs.failures.ddmin import one_minimal
@@ -18,6 +17,7 @@ from antdrive.runs.failures.failure import Failure, failure_of, parse_bound
 from antdrive.runs.failures.shrinker import shrink
 from antdrive.sim import run
 from antdrive.worlds import Cruising, Disc, Task, World
+from antdrive.worlds.passage import feasible
 
 Property = Callable[[Sequence[int]], bool]
 

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from antdrive.robots.control._kernels_lines import advance
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, clearance_at, nearby
 from antdrive.robots.control._kernels_path import PathSamples, point_at, project
-from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, pursue, reachable_twist
+from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, reachable_twist
 from antdrive.worlds._kernels import Array, kernel, segment_clearance
 
 # The columns of a table of candidates.
@@ -193,7 +194,7 @@ def follow(
             now += step
             continue
         if candidate[KIND] == FOLLOW_ROUTE:
-            v1, w1, s, rotating, _ = pursue(x, y, yaw, v, w, s, rotating, path, obstacles, capped, tuning)
+            v1, w1, s, rotating, _ = advance(x, y, yaw, v, w, s, rotating, path, obstacles, capped, tuning)
         else:
             second = now >= candidate[DURATION] - 1e-9
             speed = candidate[NEXT_SPEED] if second else candidate[SPEED]

@@ -7,8 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots._kernels_footprint import polygon_distance, polygon_wall_distance
-from antdrive.worlds._kernels import ROUNDING, Array, kernel, segment_clearance, wall_distance
+from antdrive.worlds._kernels import (
+    ROUNDING,
+    Array,
+    kernel,
+    polygon_distance,
+    polygon_wall_distance,
+    segment_clearance,
+    wall_distance,
+)
 
 
 class ObstacleIndex(NamedTuple):

@@ -18,6 +18,8 @@ from antdrive.worlds._kernels import (
     wall_distance,
 )
 
+NO_TURNS = np.empty(0)
+
 
 class PathSamples(NamedTuple):
     """A route and quantities at samples along it, at constant spacing.
@@ -29,6 +31,8 @@ class PathSamples(NamedTuple):
         speed: the speed limit (S,) [m/s]
         curvature: the route's curvature (S,) [1/m], NaN for a route with corners
         heading: the route's heading (S,) [rad]
+        turns: turns on the spot at the points of a route of lines (N,) [rad]; none for other routes
+        backwards: the robot drives backwards up to this arc length of a route of lines [m]
     """
 
     xy: Array
@@ -37,6 +41,8 @@ class PathSamples(NamedTuple):
     speed: Array
     curvature: Array
     heading: Array
+    turns: Array = NO_TURNS
+    backwards: float = 0.0
 
 
 @kernel

@@ -1,9 +1,11 @@
-"""Pure pursuit with clearance-checked lookahead (after R. C. Coulter, CMU-RI-TR-92-01, 1992).
+"""Pure pursuit with clearance-checked lookahead (after R. C. Coulter, CMU-RI-TR-92-01, 1992), or lines and turns on the spot.
 
 The carrot is the point of the route whose straight-line distance from the robot is the lookahead. Before a drive, the
 controller computes, at samples along the route, the longest lookahead whose straight line to the carrot keeps its
 clearance. During the drive it shortens the lookahead until the arc to the carrot is clear. The robot is slow where the
 lookahead is short, and rotates in place if the shortest arc is not clear.
+
+A route with turns (`Route.turns`) is followed line by line instead, with the same speed rules (`_kernels_lines`).
 """
 
 from __future__ import annotations
@@ -21,11 +23,11 @@ from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError
 from antdrive.base.records import meanings_of, require_ranges
-from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_pursuit
+from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels_path
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
-from antdrive.robots.control._kernels_path import PathSamples
+from antdrive.robots.control._kernels_path import NO_TURNS, PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
-from antdrive.robots.control.speed_limits import limits_along, speed_profile
+from antdrive.robots.control.speed_limits import limits_along, limits_along_lines, speed_profile
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
@@ -222,6 +224,49 @@ class PurePursuit:
         obstacles = (
             self._index(world, tuning.lookahead_clearance) if indexed else unsorted_obstacles(world.discs, world.bounds)
         )
+        samples = self._samples(route, world, spec, obstacles, tuning)
+        limits = MotionLimits(
+            speed=spec.max_speed,
+            yaw_rate=spec.max_yaw_rate,
+            acceleration=spec.max_acceleration,
+            yaw_acceleration=spec.max_yaw_acceleration,
+            lateral_acceleration=spec.max_lateral_acceleration,
+            half_track=spec.track / 2,
+            rim_speed=spec.max_wheel_speed * spec.wheel_radius,
+        )
+        return TrackedPath(route, tuning.goal_distance, samples, obstacles, limits, tuning)
+
+    def step(self, tracked: TrackedPath, pose: Pose, command: Twist, state: PursuitState) -> tuple[Twist, PursuitState]:
+        """Return the next command and the state for the next period.
+
+        Args:
+            tracked: the path to follow, from `prepare`
+            pose: the robot's estimated pose
+            command: the command of the previous period
+            state: the state returned by the last call; initially `PursuitState()`
+        """
+        if tracked.backwards:  # backwards is forwards with the heading turned by pi
+            reversed_ = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
+            ahead, after = self.step(replace(tracked, backwards=False), *reversed_, state)
+            return Twist(-ahead.speed, ahead.yaw_rate), after
+        speed, yaw_rate, arc, turning, limiter = _kernels_lines.advance(
+            *pose, *command, state.arc, state.turning,
+            tracked.samples, tracked.obstacles, tracked.limits, tracked.tuning,
+        )  # fmt: skip
+        return Twist(speed, yaw_rate), PursuitState(arc, turning, limiter)
+
+    def _samples(
+        self, route: Route, world: World, spec: RobotSpec, obstacles: ObstacleIndex, tuning: PursuitTuning
+    ) -> PathSamples:
+        """Return what the controller precomputes along a route."""
+        near_obstacles = self.min_speed_near_obstacles, self.clearance_time
+        braking = self.braking * spec.max_acceleration
+        if route.turns is not None:
+            speed = limits_along_lines(route, world, spec, tuning.spacing, near_obstacles, braking)
+            return PathSamples(
+                route.xy, route.arc, NO_TURNS, speed, NO_TURNS, NO_TURNS, route.turns, float(route.backwards_until)
+            )
+        spacing = tuning.spacing
         lookahead: Floats = np.empty(int(route.arc[-1] / spacing) + 2)
         _kernels_path.clear_lookaheads(
             route.xy, route.arc, obstacles, tuning.lookahead_clearance, spacing, self.lookahead_min,
@@ -239,39 +284,8 @@ class PurePursuit:
         heading = np.interp(at, profile.arc, profile.heading)
         if route.curvature is None:
             curvature[:] = np.nan
-        near_obstacles = self.min_speed_near_obstacles, self.clearance_time
-        braking = self.braking * spec.max_acceleration
         speed = limits_along(route, world, spec.radius, profile, lookahead, tuning, near_obstacles, braking)
-        limits = MotionLimits(
-            speed=spec.max_speed,
-            yaw_rate=spec.max_yaw_rate,
-            acceleration=spec.max_acceleration,
-            yaw_acceleration=spec.max_yaw_acceleration,
-            lateral_acceleration=spec.max_lateral_acceleration,
-            half_track=spec.track / 2,
-            rim_speed=spec.max_wheel_speed * spec.wheel_radius,
-        )
-        samples = PathSamples(route.xy, route.arc, lookahead, speed, curvature, heading)
-        return TrackedPath(route, tuning.goal_distance, samples, obstacles, limits, tuning)
-
-    def step(self, tracked: TrackedPath, pose: Pose, command: Twist, state: PursuitState) -> tuple[Twist, PursuitState]:
-        """Return the next command and the state for the next period.
-
-        Args:
-            tracked: the path to follow, from `prepare`
-            pose: the robot's estimated pose
-            command: the command of the previous period
-            state: the state returned by the last call; initially `PursuitState()`
-        """
-        if tracked.backwards:  # backwards is forwards with the heading turned by pi
-            reversed_ = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
-            ahead, after = self.step(replace(tracked, backwards=False), *reversed_, state)
-            return Twist(-ahead.speed, ahead.yaw_rate), after
-        speed, yaw_rate, arc, turning, limiter = _kernels_pursuit.pursue(
-            *pose, *command, state.arc, state.turning,
-            tracked.samples, tracked.obstacles, tracked.limits, tracked.tuning,
-        )  # fmt: skip
-        return Twist(speed, yaw_rate), PursuitState(arc, turning, limiter)
+        return PathSamples(route.xy, route.arc, lookahead, speed, curvature, heading)
 
     def _tuning(
         self, route: Route, spec: RobotSpec, margin: float, period: float, goal_distance: float

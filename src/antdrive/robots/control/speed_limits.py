@@ -16,10 +16,13 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
+from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.control import _kernels_path
 from antdrive.robots.control._kernels_pursuit import PursuitTuning
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Route, World, point_clearance
+
+BACKWARDS = 0.3  # highest speed on the part of a route that is driven backwards [m/s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,5 +213,22 @@ def limits_along(
     speed = np.minimum(speed, near_obstacles[0] + np.maximum(clearance, 0.0) / near_obstacles[1])
     for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
         speed[int(stop / spacing) : int(stop / spacing) + 2] = 0.0
+    _kernels_path.brake_backwards(speed, spacing, braking)
+    return speed
+
+
+def limits_along_lines(
+    route: Route, world: World, spec: RobotSpec, spacing: float, near_obstacles: tuple[float, float], braking: float
+) -> Floats:
+    """Return the speed limit at the samples of a route of lines (S,) [m/s], by the footprint's clearance.
+
+    Stops at corners are not included. `near_obstacles` is that of `limits_along`.
+    """
+    at = spacing * np.arange(int(route.length / spacing) + 2)
+    xy = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
+    facing = route.facing[np.clip(np.searchsorted(route.arc, at, side="right") - 1, 0, len(route.xy) - 2)]
+    clearance = footprint_clearance(world, spec.footprint, np.column_stack([xy, facing]))
+    speed: Floats = np.minimum(spec.max_speed, near_obstacles[0] + np.maximum(clearance, 0.0) / near_obstacles[1])
+    speed[at < route.backwards_until] = min(BACKWARDS, spec.max_speed)
     _kernels_path.brake_backwards(speed, spacing, braking)
     return speed

@@ -16,7 +16,6 @@ from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes
 from antdrive.planners import Planner, PlannerError
-from antdrive.planners.anyangle.passage import MOST_OBSTACLES, feasible
 from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_planner
 from antdrive.runs.pool import Pool
@@ -27,6 +26,7 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.files.world_file import task_to_dict
+from antdrive.worlds.passage import feasible
 
 JOURNAL_EVERY = 2.0  # shortest interval between writes of the journal, except the last [s]
 
@@ -52,11 +52,9 @@ def room_in(scenario: Scenario, failure: Failure) -> float | None:
     """Return the clearance with which a path exists in the world of a failing scenario [m]; None if none exists.
 
     This is the clearance that the scenario claims. If the planner found no path, one cell is added where a path with that
-    exists, so that the grid cannot explain the failure. Worlds of more than `MOST_OBSTACLES` are not checked.
+    exists, so that the grid cannot explain the failure.
     """
     task, claimed = scenario.task, scenario.inflate
-    if len(task.world.obstacles) > MOST_OBSTACLES:
-        return None
     more = [claimed + (scenario.cell or task.cell)] if failure.outcome == Outcome.NO_PATH.key else []
     return next((clearance for clearance in (*more, claimed) if feasible(task, clearance)), None)
 

@@ -19,7 +19,6 @@ from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import PlannerError
-from antdrive.planners.anyangle.passage import feasible
 from antdrive.robots import PurePursuit, TrackedPath, Twist, footprint_clearance
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
@@ -34,6 +33,7 @@ from antdrive.sim.physics.engine import State
 from antdrive.sim.pipeline import plan
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Disc, Task, World
+from antdrive.worlds.passage import feasible
 
 # The arena, in radii of the robot. Cylinders lie between start and goal, at any distance from the side walls.
 LENGTH, WIDTH = 24.0, 12.0

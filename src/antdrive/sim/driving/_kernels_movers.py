@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from antdrive.robots._kernels_footprint import polygon_distance
-from antdrive.worlds._kernels import Array, kernel
+from antdrive.worlds._kernels import Array, kernel, polygon_distance
 
 
 @kernel

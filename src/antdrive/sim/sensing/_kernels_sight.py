@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from antdrive.robots._kernels_footprint import polygon_distance
 from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays, grain_disc
-from antdrive.worlds._kernels import Array, kernel
+from antdrive.worlds._kernels import Array, kernel, polygon_distance
 
 TOUCHING = 1e-3  # distance at which the footprint meets a disc [m]
 SAMPLES = 8  # samples of the path, for its part of the map
