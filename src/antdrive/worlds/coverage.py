@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.types import Point
-from antdrive.worlds import _kernels_coverage
+from antdrive.worlds import _kernels_coverage, _kernels_turns
 from antdrive.worlds.geometry import point_clearance
 from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
 from antdrive.worlds.world import World
@@ -61,11 +61,17 @@ class Coverage:
 
 
 def reached_cells(grid: Grid, ends: Iterable[Point]) -> Cells:
-    """Return the cells (R, C) that allowed moves connect to any of the given positions [m]."""
+    """Return the cells (R, C) that allowed moves connect to any of the given positions [m].
+
+    On a grid with turns, the robot sets out at any free heading.
+    """
     reached = np.zeros(grid.shape, dtype=np.bool_)
     for x, y in ends:
         at = grid.cell_at(x, y)
-        if grid.moves[at]:
+        if grid.turns:
+            for node in set(grid.turns.label[at[0] * grid.shape[1] + at[1]].tolist()) - {-1}:
+                reached.ravel()[grid.turns.cell[_kernels_turns.led_to(grid.graph, node)]] = True
+        elif grid.moves[at]:
             _kernels_coverage.flood_moves(grid.moves, *at, reached)
     return reached
 

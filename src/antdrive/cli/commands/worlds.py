@@ -74,8 +74,9 @@ def show_world(
     """Describe a world and check whether a robot can cross it."""
     from antdrive.base.plane import world_to_map
     from antdrive.planners import Query, load_planner, reachable
-    from antdrive.robots import list_robots, load_robot, overlap_at
+    from antdrive.robots import list_robots, load_robot, outline_of, overlap_at
     from antdrive.robots.default_margin import LEAST
+    from antdrive.sim.driving.routes import FINE
     from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
     from antdrive.worlds.coverage import coverage
 
@@ -90,6 +91,9 @@ def show_world(
     starts = {each.name: overlap_at(shown.world, each, shown.start) for each in (*known.values(), spec)}
     passable = not starts[spec.name] and query.blocked_end is None and reachable(query)
     covered = coverage(shown.world, grid, shown.start[:2])
+    outline = outline_of(spec.footprint, margin)
+    outlined = rasterise(shown.world, min(shown.cell, FINE), spec.radius + margin, outline)
+    by_footprint = coverage(shown.world, outlined, shown.start[:2]) if outlined.turns else covered
     if out is not None:
         import numpy as np
 
@@ -100,6 +104,8 @@ def show_world(
         )
     facts = {"passable": passable, "robot": spec.name, "margin": margin, "starts": starts, "tasks": named}
     facts["coverage"] = _coverage_facts(covered)
+    if outlined.turns:
+        facts["coverage_by_footprint"] = _coverage_facts(by_footprint)
     said = {key + UNITS.get(key, ""): "-" if value is None else value for key, value in _facts(shown).items()}
     if any(shown.frame):
         for key, pose in {"start": shown.start, "goal": shown.goal}.items():
@@ -108,7 +114,9 @@ def show_world(
     said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m{reason}"
     said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
     lines = [f"{key:18} {value}" for key, value in said.items()]
-    lines += _coverage_lines(covered)
+    lines += _coverage_lines(covered, "by its disc" * bool(outlined.turns))
+    if outlined.turns:
+        lines += _coverage_lines(by_footprint, "by its footprint")
     lines += [f"start for {name} {overlap}" for name, overlap in starts.items() if overlap]
     lines += [f"{'tasks':18} {', '.join(named)}"] if named else []
     lines += [] if out is None else file_lines({"figure": out})
@@ -122,12 +130,12 @@ def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
     return {"share": covered.share, **rooms, "doors": doors}
 
 
-def _coverage_lines(covered: "Coverage") -> list[str]:
+def _coverage_lines(covered: "Coverage", shape: str) -> list[str]:
     """Say what a robot reaches, and name the narrowest doors that it does not pass."""
     shut = [door for door in covered.doors if not door.passed]
     rooms = f"{len(covered.rooms_reached)} of {covered.room_count} rooms"
     doors = f", {len(covered.doors) - len(shut)} of {len(covered.doors)} doors" if covered.doors else ""
-    lines = [f"{'floor reached':18} {covered.share:.0%} of where a point gets: {rooms}{doors}"]
+    lines = [f"{shape or 'floor reached':18} {covered.share:.0%} of the floor that a point reaches: {rooms}{doors}"]
     for door in shut[:MOST_DOORS]:
         lines.append(f"{'door not passed':18} {door.width:.2f} m wide at ({door.at[0]:.2f}, {door.at[1]:.2f})")
     return lines + ([f"{'':18} and {len(shut) - MOST_DOORS} more"] if len(shut) > MOST_DOORS else [])
