@@ -75,7 +75,7 @@ def test_in_open_ground_auto_takes_the_disc_bit_for_bit(jackal):
 
 def test_exact_needs_a_planner_for_footprints(jackal):
     with pytest.raises(FieldError, match=r"^footprint: exact: .* plans for the disc around the robot; [^\n]*$"):
-        Scenario.of(door(3.0), load_planner("aco-han"), jackal, footprint="exact")
+        Scenario.of(door(3.0), load_planner("tangent"), jackal, footprint="exact")
 
 
 def test_a_disc_has_no_choice_of_shape(turtlebot):

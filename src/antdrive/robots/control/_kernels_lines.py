@@ -7,6 +7,7 @@ chained systems*, IEEE Trans. Automatic Control 40, 1995, in the form without in
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,17 @@ SETTLED = 0.1  # yaw rate at which a turn ends [rad/s]
 NEAREST, RESPONSE = 0.2, 0.15  # errors decay over this distance, or this time at speed [m], [s]
 STEEPEST = 0.5  # largest angle at which the robot returns to a straight [rad]
 CHECKED = 0.05  # distance between the checked poses of a stopping path [m]
+
+
+class Straight(NamedTuple):
+    """Straight of a route: a point (x, y), its direction (ux, uy), the robot's heading, and 1 forwards or -1 backwards."""
+
+    x: float
+    y: float
+    ux: float
+    uy: float
+    facing: float
+    side: float
 
 
 @kernel
@@ -77,16 +89,33 @@ def outline_clearance(poses: Array, discs: Array, bounds: Array, tuning: Pursuit
 
 
 @kernel
-def stopping_poses(x: float, y: float, yaw: float, v: float, w: float, deceleration: float, period: float) -> Array:
-    """Return poses (N, 3) along the stopping arc of a robot, forwards or backwards: one more period, then braking."""
-    length = abs(v) * period + 0.5 * v * v / deceleration
+def line_curvature(x: float, y: float, yaw: float, v: float, line: Straight) -> float:
+    """Return the curvature that leads a robot back to a straight: errors decay over a distance."""
+    reach = max(NEAREST, RESPONSE * v)
+    aside = (x - line.x) * line.uy - (y - line.y) * line.ux
+    back = clip(0.5 * aside / reach, -STEEPEST, STEEPEST)
+    return float(2.0 * (back + wrapped(line.facing - yaw)) / reach)
+
+
+@kernel
+def stopping_poses(
+    x: float, y: float, yaw: float, v: float, w: float, line: Straight, limits: MotionLimits, period: float
+) -> Array:
+    """Return poses (N, 3) of a robot that stops along a straight, steering back to it: one more period, then braking."""
+    braked = 0.5 * v * v / limits.acceleration
+    length = v * period + braked
     count = int(length / CHECKED) + 1
+    step = length / count
     poses = np.empty((count, 3))
     for i in range(count):
-        driven = math.copysign(length * (i + 1) / count, v)
-        middle = yaw + 0.5 * w / v * driven
-        poses[i, 0], poses[i, 1] = x + driven * math.cos(middle), y + driven * math.sin(middle)
-        poses[i, 2] = yaw + w / v * driven
+        speed = math.sqrt(2.0 * limits.acceleration * min(braked, length - (i + 0.5) * step))
+        lasts = step / speed
+        wanted = line_curvature(x, y, yaw, speed, line) * speed
+        w = reachable_yaw_rate(wanted, w, lasts, limits)
+        middle = yaw + 0.5 * w * lasts
+        x, y = x + line.side * step * math.cos(middle), y + line.side * step * math.sin(middle)
+        yaw += w * lasts
+        poses[i, 0], poses[i, 1], poses[i, 2] = x, y, yaw
     return poses
 
 
@@ -111,6 +140,7 @@ def follow_lines(
     ux, uy = (path.xy[k + 1, 0] - path.xy[k, 0]) / length, (path.xy[k + 1, 1] - path.xy[k, 1]) / length
     s = clip(arc[k] + dx * ux + dy * uy, progress, arc[k + 1])
     facing = math.atan2(side * uy, side * ux)
+    line = Straight(path.xy[k, 0], path.xy[k, 1], ux, uy, facing, side)
     planned = path.turns[k] if progress <= arc[k] else 0.0
     turn = 0.5 * planned + wrapped(facing - yaw - 0.5 * planned)
 
@@ -134,9 +164,7 @@ def follow_lines(
     elif at_end:
         target, limiter = 0.0, DONE if last else ROUTE
     else:
-        reach = max(NEAREST, RESPONSE * v)
-        back = clip(0.5 * (dx * uy - dy * ux) / reach, -STEEPEST, STEEPEST)
-        curvature = 2.0 * (back + wrapped(facing - yaw)) / reach
+        curvature = line_curvature(x, y, yaw, v, line)
         i = min(int(s / tuning.spacing), path.speed.shape[0] - 2)
         route_speed = min(path.speed[i], path.speed[i + 1])
         # The speed limit's goal is half of the goal distance before the end; a corner's stop is at the corner.
@@ -158,10 +186,11 @@ def follow_lines(
     # Overrides the rules above: the stopping path must be clear.
     if new_v > tuning.creep_speed:
         required = min(max(tuning.stopping_clearance - tuning.robot_radius, 0.0), clearance - START_TOLERANCE)
-        poses = stopping_poses(x, y, yaw, side * new_v, new_w, limits.acceleration, period)
+        poses = stopping_poses(x, y, yaw, new_v, new_w, line, limits, period)
         if outline_clearance(poses, discs, bounds, tuning) < required:
             limiter, slowed = BRAKING, max(v - limits.acceleration * period, 0.0)
-            new_v, new_w = slowed, w * slowed / v if v > 0.0 else 0.0
+            # It steers on while it brakes: on the arc of one moment's yaw rate it would leave the straight.
+            new_v, new_w = slowed, reachable_yaw_rate(curvature * slowed, w, period, limits)
     if at_end and not last and new_v == 0.0:
         s = arc[stop]
     return side * new_v, new_w, s, turning, limiter
