@@ -1,3 +1,4 @@
+from .coverage import Coverage as Coverage
 from .files.world_file import list_worlds as list_worlds
 from .files.world_file import load_task as load_task
 from .files.world_file import load_tasks as load_tasks
@@ -33,6 +34,7 @@ from .geometry import polyline_clearance as polyline_clearance
 from .geometry import segment_clearance as segment_clearance
 from .grid import DIRECTIONS as DIRECTIONS
 from .grid import Grid as Grid
+from .grid import Turns as Turns
 from .grid import rasterise as rasterise
 from .motions import MoverMotion as MoverMotion
 from .movers import Cruising as Cruising
