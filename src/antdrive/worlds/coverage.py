@@ -37,12 +37,19 @@ class Door:
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """The part of a floor that a robot reaches."""
+    """The part of a floor that a robot reaches.
 
-    floor: Cells  # where a point gets (R, C)
-    reached: Cells  # where the robot's centre gets (R, C)
-    rooms: npt.NDArray[np.int64]  # number of each cell's room (R, C), -1 off the floor
-    doors: tuple[Door, ...]  # the narrowest first
+    Attributes:
+        floor: where a point gets (R, C)
+        reached: where the robot's centre gets (R, C)
+        rooms: number of each cell's room (R, C), -1 off the floor
+        doors: the doors, the narrowest first
+    """
+
+    floor: Cells
+    reached: Cells
+    rooms: npt.NDArray[np.int64]
+    doors: tuple[Door, ...]
 
     @property
     def share(self) -> float:

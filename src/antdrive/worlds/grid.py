@@ -75,7 +75,11 @@ class Turns:
         return cls(outline, cell, label, moves)
 
     def without(self, blocked: npt.NDArray[np.bool_]) -> Turns:
-        """Return the turns without the moves out of or into some cells (R, C)."""
+        """Return the turns without the moves out of or into some cells.
+
+        Args:
+            blocked: the cells (R, C)
+        """
         cols, shut = blocked.shape[1], blocked.ravel()
         moves = np.where(shut[self.cell], 0, self.moves).astype(np.uint8)
         for k, (row, col) in enumerate(DIRECTIONS):
