@@ -1,4 +1,5 @@
 from .coverage import Coverage as Coverage
+from .coverage import Door as Door
 from .files.world_file import list_worlds as list_worlds
 from .files.world_file import load_task as load_task
 from .files.world_file import load_tasks as load_tasks

@@ -27,12 +27,19 @@ OPPOSITE = -0.5  # cosine of the angle between the directions to a door's two si
 
 @dataclass(frozen=True)
 class Door:
-    """A narrow passage between two rooms."""
+    """A narrow passage between two rooms.
 
-    width: float  # distance between its two obstacles [m]
-    at: Point  # its middle [m]
+    Attributes:
+        width: distance between its two obstacles [m]
+        at: its middle [m]
+        rooms: the numbers of the rooms on both sides
+        passed: whether the robot gets through
+    """
+
+    width: float
+    at: Point
     rooms: tuple[int, int]
-    passed: bool  # whether the robot gets through
+    passed: bool
 
 
 @dataclass(frozen=True, eq=False)
