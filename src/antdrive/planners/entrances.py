@@ -41,13 +41,11 @@ def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
     away = np.hypot(*(grid.xy(free) - task.goal).T)
     order = np.argsort(away, kind="stable")
     goals = np.ravel_multi_index(tuple(free[order[: np.count_nonzero(away <= within)]].T), grid.shape)
-    if not len(goals):
-        return entrance(grid, task, goals), -1
     start = entrance(grid, task, goals)
-    if start < 0:
-        return -1, int(goals[0])
+    if start < 0 or not len(goals):
+        return start, next(iter(goals.tolist()), -1)
     reached = np.zeros(grid.free.size, dtype=np.bool_)
-    reached[grid.turns.cell[_kernels_turns.led_to(grid.graph, start)]] = True
+    reached[grid.cells_of(_kernels_turns.led_to(grid.graph, start))] = True
     return start, int(goals[reached[goals].argmax()])
 
 
@@ -120,8 +118,7 @@ def lead_heading(pose: Pose, x: float, y: float, outline: Outline, world: World,
     heading = math.atan2(-dy, -dx) if backwards else math.atan2(dy, dx)
     if sweep_clearance(pose[0], pose[1], x, y, heading, outline, world.discs, world.bounds) <= 0:
         return math.nan
-    turn = clear_turn(pose, heading, outline, world)
-    return math.nan if math.isnan(turn) else heading
+    return heading if math.isfinite(clear_turn(pose, heading, outline, world)) else math.nan
 
 
 def clear_turn(pose: Pose, heading: float, outline: Outline, world: World) -> float:

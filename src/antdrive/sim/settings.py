@@ -123,7 +123,7 @@ class Settings:
         str,
         Setting(
             "the shape that plans keep clear: disc (the circle around the robot), exact (its footprint, which turns on the "
-            "spot and drives straight), or auto (the disc unless that way is over 10 % longer, or there is none)",
+            "spot and drives straight), or auto (the disc unless it has no way or, for searches, one over 10 % longer)",
             "Planner",
             "auto|disc|exact",
             choices=FOOTPRINTS,

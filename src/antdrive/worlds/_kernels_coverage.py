@@ -1,27 +1,10 @@
-"""Compiled flood along moves and segmentation of a floor into rooms."""
+"""Compiled segmentation of a floor into rooms."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, Array, kernel
-
-
-@kernel
-def flood_moves(moves: Array, row: int, col: int, reached: Array) -> None:
-    """Mark in `reached` a cell and all cells that allowed moves lead to from it."""
-    todo = np.empty((moves.size, 2), dtype=np.int64)
-    count = 0 if reached[row, col] else 1
-    todo[0, 0], todo[0, 1], reached[row, col] = row, col, True
-    while count:
-        count -= 1
-        r, c = todo[count, 0], todo[count, 1]
-        for k in range(8):
-            rn, cn = r + DROW[k], c + DCOL[k]
-            if moves[r, c] >> k & 1 and not reached[rn, cn]:
-                reached[rn, cn] = True
-                todo[count, 0], todo[count, 1] = rn, cn
-                count += 1
 
 
 @kernel

@@ -81,12 +81,9 @@ def reached_cells(grid: Grid, ends: Iterable[Point]) -> Cells:
     """
     reached = np.zeros(grid.shape, dtype=np.bool_)
     for x, y in ends:
-        at = grid.cell_at(x, y)
-        if grid.turns:
-            for node in set(grid.turns.label[at[0] * grid.shape[1] + at[1]].tolist()) - {-1}:
-                reached.ravel()[grid.turns.cell[_kernels_turns.led_to(grid.graph, node)]] = True
-        elif grid.moves[at]:
-            _kernels_coverage.flood_moves(grid.moves, *at, reached)
+        for node in grid.nodes_at(grid.cell_at(x, y)):
+            if grid.graph.mask[node]:
+                reached.ravel()[grid.cells_of(_kernels_turns.led_to(grid.graph, node))] = True
     return reached
 
 

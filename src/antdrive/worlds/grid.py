@@ -119,6 +119,16 @@ class Grid:
         turns = self.turns
         return MoveGraph(turns.moves if turns else self.moves.ravel(), turns.cell, turns.label, self.shape[1])
 
+    def nodes_at(self, cell: tuple[int, int]) -> list[int]:
+        """Return the nodes of a cell (row, col) with a free heading; without turns its flat index."""
+        flat = cell[0] * self.shape[1] + cell[1]
+        return sorted(set(self.turns.label[flat].tolist()) - {_kernels_turns.NOWHERE}) if self.turns else [flat]
+
+    def cells_of(self, nodes: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+        """Return the flat cells of marked nodes (N,), with repetitions."""
+        marked = np.flatnonzero(nodes)
+        return self.turns.cell[marked].astype(np.int64) if self.turns else marked
+
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""

@@ -164,25 +164,3 @@ def shortest_path(graph: MoveGraph, start: int, goal: int, informed: bool) -> tu
         return np.empty((0, 2), dtype=np.int32), 0, 0, expanded
     cells, diagonal = traced(graph, mark, start, last)
     return cells, len(cells) - 1 - diagonal, diagonal, expanded
-
-
-@kernel
-def connected(graph: MoveGraph, start: int, goal: int) -> bool:
-    """Return whether allowed moves lead from a node to a cell, by a flood fill."""
-    seen = np.zeros(len(graph.mask), dtype=np.uint8)
-    stack = np.empty(len(graph.mask), dtype=np.int32)
-    stack[0], size = start, 1
-    seen[start] = 1
-    while size > 0:
-        size -= 1
-        i: Any = np.int64(stack[size])
-        if cell_of(graph, i) == goal:
-            return True
-        for k in range(8):
-            if graph.mask[i] & (1 << k):
-                j = after_move(graph, i, k)
-                if not seen[j]:
-                    seen[j] = 1
-                    stack[size] = j
-                    size += 1
-    return False

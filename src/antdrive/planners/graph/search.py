@@ -67,6 +67,9 @@ def shortest(query: Query, *, informed: bool = True) -> PlanResult:
 
 def reachable(query: Query) -> bool:
     """Return whether allowed moves lead from the start to the goal."""
-    from antdrive.planners.graph import _kernels_search
+    from antdrive.worlds import _kernels_turns
 
-    return bool(_kernels_search.connected(query.grid.graph, query.start_node, query.goal_cell))
+    if query.start_node < 0:
+        return False
+    reached = _kernels_turns.led_to(query.grid.graph, query.start_node)
+    return bool(reached[query.grid.nodes_at(query.goal)].any())

@@ -105,12 +105,15 @@ class RoutePlanner:
         """Return the grid of the first plan.
 
         With footprint `auto` it is the disc's, unless its shortest path is longer than the footprint's by more than `LONGER`.
+        Iterative planners may not arrive on the footprint's finer grid, so they take it only where the disc has no path.
         """
         world = by_geometry(self.task.world)
         disc = grid_of(world, self.cell, self.inflate)
         if not self.turns:
             return disc
         length = self._shortest(disc) if self.footprint == "auto" else math.inf
+        if capabilities_of(self.planner).iterative and length < math.inf:
+            return disc
         inner = self.robot.footprint.inner_radius + self.outline_margins[-1]
         # No path of the footprint is shorter than that of the disc within it.
         if length <= LONGER * self._shortest(grid_of(world, self.cell, inner)) < math.inf:
