@@ -53,7 +53,7 @@ def free_near(grid, point, within):
 def leading_to(grid, cell):
     """Nodes from which moves lead to a cell, by a search against them."""
     into = collections.defaultdict(list)
-    rows, cols = grid.shape
+    cols = grid.shape[1]
     for node, flat in enumerate(grid.turns.cell.tolist()):
         for k, (dr, dc) in enumerate(DIRECTIONS):
             if grid.turns.moves[node] >> k & 1:
@@ -151,7 +151,7 @@ def test_ends_of_many_tasks_are_those_of_the_search_in_plain_python():
 def test_leads_and_turns_are_clear_where_samples_are():
     seen = collections.Counter()
     for seed in range(60):
-        task, grid, around = random_case(seed)
+        task, _, around = random_case(seed)
         outline, rng = OUTLINES[SHAPES[seed % len(SHAPES)]], np.random.default_rng(seed)
         for backwards in (False, True):
             to = (np.array(task.start[:2]) + rng.uniform(-0.5, 0.5, 2)).tolist()

@@ -57,5 +57,5 @@ def first_entrance(
             node = np.int64(labels[i, side % 8])
             turn = side * STEP - heading
             if node >= 0 and goals[node] >= 0 and turn_clear(to_x, to_y, heading, turn, corners, reach, discs, bounds):
-                return node
+                return int(node)
     return -1
