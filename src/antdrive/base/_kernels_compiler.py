@@ -1,8 +1,8 @@
 """Compilation and on-disk caching of kernels.
 
 Unreadable cache entries (truncated, damaged, or for removed records) are dropped, and the kernel is compiled again. An entry
-is valid for one text of *all* kernel files; numba alone detects changes of a kernel's own file, but not of kernels that it
-calls in other files.
+is valid for one text of the kernel's file and of all kernel files that it imports; numba alone detects changes of a kernel's
+own file, but not of kernels that it calls in other files.
 
 Each entry is one file, written atomically, with its key beside the machine code. numba uses an index and numbered files: it
 reserves a number before writing the file, so two processes that compile at once take the same number, and a process may run
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import inspect
 import pickle
 import re
 from collections.abc import Callable
@@ -87,7 +88,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         super().__init__(function)
         entries = self._cache_file  # type: ignore[has-type]
         name = entries._index_name.removesuffix(".nbi")
-        self._cache_file = _Entries(entries._cache_path, name, sources_stamp())
+        self._cache_file = _Entries(entries._cache_path, name, sources_stamp(Path(inspect.getfile(function))))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
