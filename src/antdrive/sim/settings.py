@@ -123,7 +123,8 @@ class Settings:
         str,
         Setting(
             "the shape that plans keep clear: disc (the circle around the robot), exact (its footprint, which turns on the "
-            "spot and drives straight), or auto (the disc unless it has no way or one over 10 % longer; ants compare ways on the world's cells)",
+            "spot and drives straight), or auto (the disc unless it has no way or one over 10 % longer; ants compare ways on the "
+            "world's cells)",
             "Planner",
             "auto|disc|exact",
             choices=FOOTPRINTS,
