@@ -406,3 +406,18 @@ def test_a_plan_for_a_footprint_keeps_away_from_movers_in_its_way(turtlebot):
         at = grid.xy(plan.cells)
         y = at[np.abs(at[:, 0] - 4.0).argmin(), 1]
         assert abs(y - crosses) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("robot", "world", "planner", "cell"),
+    [
+        ("jackal", "forest", "ants", None),  # the disc's way is at most 10 % longer
+        ("warehouse", "slalom", "astar", 0.05),
+        ("warehouse", "slalom", "ants", 0.25),  # the disc has a way, over 10 % longer
+        ("warehouse", "gate", "as", 0.2),  # the disc has none
+        pytest.param("warehouse", "forest", "ants", 0.05, marks=pytest.mark.slow),  # on finer cells only
+    ],
+)
+def test_auto_takes_the_footprint_on_cells_that_the_planner_can_search(robot, world, planner, cell):
+    grid = route_planner(Scenario.of(world, planner, robot)).chosen_grid()
+    assert (grid.cell if grid.turns else None) == cell
