@@ -11,16 +11,19 @@ from antdrive.robots import load_robot
 from antdrive.sim import Rollout, Scenario, certify, run
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.rerun import replayed
-from antdrive.worlds import Disc, Task, World
+from antdrive.worlds import Disc, Keyframed, Task, World
 
 #: Width of a door that the footprint passes and the disc around the robot does not [m].
 DOORS = {"jackal": 0.62, "warehouse": 0.84}
 
+#: A mover that crosses the room behind the door, back and forth.
+CROSSING = Keyframed(radius=0.2, keyframes=((0.0, 3.9, 0.6), (8.0, 3.9, 5.4)), loop="pingpong")
 
-def door(width):
+
+def door(width, *movers):
     """A hall of two rooms, with a door of a given width between them."""
     ends = [*np.arange(3.0 + width / 2 + 0.1, 6.0, 0.2), *np.arange(3.0 - width / 2 - 0.1, 0.0, -0.2)]
-    world = World("door", (0.0, 0.0, 6.0, 6.0), tuple(Disc(3.0, float(y), 0.1) for y in ends))
+    world = World("door", (0.0, 0.0, 6.0, 6.0), tuple(Disc(3.0, float(y), 0.1) for y in ends), movers=movers)
     return Task(world, (1.2, 2.8, 0.3), (4.8, 3.2), cell=0.1)
 
 
@@ -46,6 +49,15 @@ def test_a_footprint_passes_a_door_that_its_disc_does_not(driven, robot, noise):
     assert certify(made.rollout).certified
     assert 0 < record.footprint_margin < DOORS[robot] / 2 - load_robot(robot).footprint.inner_radius
     assert not run(replace(made.scenario, footprint="disc")).succeeded
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("robot", [pytest.param("husky", marks=pytest.mark.slow), "warehouse"])
+def test_avoidance_in_a_door_keeps_the_footprint_clear(robot, noise):
+    made = run(Scenario.of(door({**DOORS, "husky": 0.9}[robot], CROSSING), "astar", robot, noise=noise, seed=2))
+    assert made.succeeded, (made.outcome, made.reason)
+    assert certify(made.rollout).certified
+    assert made.rollout.record.footprint_margin > 0
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
