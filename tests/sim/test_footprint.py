@@ -61,6 +61,30 @@ def test_avoidance_in_a_door_keeps_the_footprint_clear(robot, noise):
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("robot", DOORS)
+def test_a_plan_in_time_for_a_footprint_passes_a_door_behind_a_mover_on_schedule(robot, noise):
+    made = run(Scenario.of(door(DOORS[robot], CROSSING), "sipp", robot, noise=noise, seed=2, footprint="exact"))
+    record, plan = made.rollout.record, made.plan
+    assert made.succeeded, (made.outcome, made.reason)
+    assert certify(made.rollout).certified
+    assert record.footprint_margin > 0
+    assert plan.waited > 5.0  # the mover has crossed
+    assert record.replans == ()
+    assert made.rollout.t[-1] < plan.arrive[-1] + 1.0
+    turns = np.abs(np.diff(plan.cells, 2, axis=0)).any(axis=1)
+    assert (plan.leave - plan.arrive)[1:-1][turns].min() >= np.pi / 4 / plan.options["yaw_rate"] - 1e-9
+
+
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
+def test_a_robot_that_turns_slower_than_planned_is_late_and_plans_again(noise):
+    hasty = load_planner("sipp", speed=1.0, yaw_rate=5.0)
+    made = run(Scenario.of(door(DOORS["jackal"], CROSSING), hasty, "jackal", noise=noise, seed=2, footprint="exact"))
+    assert made.succeeded, (made.outcome, made.reason)
+    assert certify(made.rollout).certified
+    assert {(one.trigger, one.solved) for one in made.rollout.record.replans} == {("late", True)}
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_a_saved_drive_of_a_footprint_is_driven_again_bit_for_bit(driven, noise, tmp_path):
     driven("jackal", noise).rollout.save(tmp_path / "run.npz")
     loaded = Rollout.load(tmp_path / "run.npz")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,13 @@ LEAD = 0.75  # farthest entrance from a start [m]
 ROOM = 1e-4  # a start closer to obstacles than the margin leaves with this much less room than it has [m]
 FAR = 25.0  # obstacles farther from a start than this meet no lead; robots are at most 20 m long [m]
 STEP = math.pi / 4  # between the headings of a grid [rad]
+
+
+class Lead(NamedTuple):
+    """Straight from an exact start to the centre of its cell: the robot's heading [rad], and whether it drives backwards."""
+
+    heading: float
+    backwards: bool
 
 
 def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
@@ -130,6 +137,26 @@ def clear_turn(pose: Pose, heading: float, outline: Outline, world: World) -> fl
         if turn_clear(*pose, turn, outline, world.discs, world.bounds):
             return turn
     return math.nan
+
+
+def clear_lead(task: Task, to: Point, heading: float | None, outline: Outline) -> Lead:
+    """Return the clear lead from a task's start to a point, forwards if possible; from there the robot turns to a heading.
+
+    Without a clear one it is the straight forwards: an estimated pose may overlap obstacles.
+    """
+    for backwards in (False, True):
+        facing = lead_heading(task.start, *to, outline, task.world, backwards=backwards)
+        if math.isfinite(facing) and (
+            heading is None or math.isfinite(clear_turn((*to, facing), heading, outline, task.world))
+        ):
+            return Lead(facing, backwards)
+    return Lead(math.atan2(to[1] - task.start[1], to[0] - task.start[0]), False)
+
+
+def turn_at(pose: Pose, heading: float, task: Task, outlines: Sequence[Outline]) -> float:
+    """Return the turn on the spot that is clear for the first outline possible, or the shorter one without any [rad]."""
+    turns = (clear_turn(pose, heading, outline, task.world) for outline in outlines)
+    return next(filter(math.isfinite, turns), float(wrap_angle(heading - pose[2])))
 
 
 def _entrances(
