@@ -16,8 +16,9 @@ from antdrive.worlds import Disc, Keyframed, Task, World
 #: Width of a door that the footprint passes and the disc around the robot does not [m].
 DOORS = {"jackal": 0.62, "warehouse": 0.84}
 
-#: A mover that crosses the room behind the door, back and forth.
+#: Movers that cross the room behind the door, back and forth.
 CROSSING = Keyframed(radius=0.2, keyframes=((0.0, 3.9, 0.6), (8.0, 3.9, 5.4)), loop="pingpong")
+SLOW = Keyframed(radius=0.2, keyframes=((0.0, 3.9, 5.4), (18.0, 3.9, 0.6)), loop="pingpong")
 
 
 def door(width, *movers):
@@ -63,16 +64,16 @@ def test_avoidance_in_a_door_keeps_the_footprint_clear(robot, noise):
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 @pytest.mark.parametrize("robot", DOORS)
 def test_a_plan_in_time_for_a_footprint_passes_a_door_behind_a_mover_on_schedule(robot, noise):
-    made = run(Scenario.of(door(DOORS[robot], CROSSING), "sipp", robot, noise=noise, seed=2, footprint="exact"))
-    record, plan = made.rollout.record, made.plan
+    made = run(Scenario.of(door(DOORS[robot], SLOW), "sipp", robot, noise=noise, seed=2, footprint="exact"))
+    plan, rate = made.plan, made.plan.options["yaw_rate"]
     assert made.succeeded, (made.outcome, made.reason)
     assert certify(made.rollout).certified
-    assert record.footprint_margin > 0
-    assert plan.waited > 5.0  # the mover has crossed
-    assert record.replans == ()
-    assert made.rollout.t[-1] < plan.arrive[-1] + 1.0
+    assert made.rollout.record.footprint_margin > 0
+    assert made.rollout.t[-1] < plan.arrive[-1] + 2.0
     turns = np.abs(np.diff(plan.cells, 2, axis=0)).any(axis=1)
-    assert (plan.leave - plan.arrive)[1:-1][turns].min() >= np.pi / 4 / plan.options["yaw_rate"] - 1e-9
+    stops = (plan.leave - plan.arrive)[1:-1]
+    assert stops[turns].min() >= np.pi / 4 / rate - 1e-9
+    assert stops.sum() > turns.sum() * np.pi / 4 / rate + 0.5  # it waits for the mover as well
 
 
 @pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])

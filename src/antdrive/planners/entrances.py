@@ -22,6 +22,7 @@ MAX_BACKWARDS = 0.5  # longest way that a robot backs out of a place where it ca
 LEAD = 0.75  # farthest entrance from a start [m]
 ROOM = 1e-4  # a start closer to obstacles than the margin leaves with this much less room than it has [m]
 FAR = 25.0  # obstacles farther from a start than this meet no lead; robots are at most 20 m long [m]
+TURNING = 0.1  # a turn to an entrance counts as this much of a way [m/rad]
 STEP = math.pi / 4  # between the headings of a grid [rad]
 
 
@@ -60,8 +61,9 @@ def entrance(grid: Grid, task: Task, goals: npt.NDArray[np.int64]) -> int:
     """Return the node by which the robot enters a grid with turns from its exact start; -1 if it cannot.
 
     A lead turns on the spot, drives straight to the centre of the node's cell, and turns to a heading of the node. The node
-    is the nearest with a clear lead from which moves lead to a goal. Only where no lead forwards reaches such a node the
-    robot leaves backwards, by at most `MAX_BACKWARDS`. Where no such node is near, it is any node of the nearest free cell.
+    is the first with a clear lead from which moves lead to a goal, in the order of the way and the turn to it. Only where no
+    lead forwards reaches such a node the robot leaves backwards, by at most `MAX_BACKWARDS`. Where no such node is near, it
+    is any node of the nearest free cell.
 
     Args:
         grid: a grid with turns
@@ -81,7 +83,8 @@ def entrance(grid: Grid, task: Task, goals: npt.NDArray[np.int64]) -> int:
     around = _around(task)
     outline = outline_at(around, grid.turns.outline)
     for most, backwards in ((LEAD, False), (MAX_BACKWARDS, True)):
-        for node in _entrances(grid, around, outline, near[useful & (away <= most)], backwards):
+        some = near[useful & (away <= most)]
+        for node in _entrances(grid, around, outline, some[_by_effort(grid, task.start, some, backwards)], backwards):
             if leading[node]:
                 return node
     return -1
@@ -97,6 +100,14 @@ def _free_around(grid: Grid, point: Point) -> tuple[npt.NDArray[np.int64], Float
     order = np.argsort(away, kind="stable")
     order = order[away[order] <= LEAD]
     return near[order, 0] * grid.shape[1] + near[order, 1], away[order]
+
+
+def _by_effort(grid: Grid, start: Pose, cells: npt.NDArray[np.int64], backwards: bool) -> npt.NDArray[np.int64]:
+    """Return the order of some flat cells by the way to them and the turn towards them."""
+    dx, dy = (grid.xy(np.stack(np.divmod(cells, grid.shape[1]), axis=1)) - start[:2]).T
+    turn = np.abs(wrap_angle(np.arctan2(dy, dx) + math.pi * backwards - start[2]))
+    away = np.hypot(dx, dy)
+    return np.argsort(away + np.where(away > ROOM, TURNING * turn, 0.0), kind="stable")
 
 
 def _around(task: Task) -> Task:

@@ -91,8 +91,7 @@ def plan_in_time(
     `2 * TOLERANCE` off, replace each motion. On these legs, the robot's centre keeps `inflate + 2 * TOLERANCE`
     from a mover's surface, and so at least the grid's `inflate` from the mover itself. With the legs as motions the
     plan is exact: no path on this grid, at this speed, arrives sooner. Motions are sampled every `STEP`, more densely
-    near
-    turns and jumps; two turns within half a `STEP` may be missed.
+    near turns and jumps; two turns within half a `STEP` may be missed.
 
     On a grid with turns the robot faces ahead on each move, and turns on the spot at `yaw_rate` between moves in
     different directions. Obstacles are kept from its outline, movers from the circle around it: the plan is exact, in

@@ -199,7 +199,7 @@ def meets_obstacle(
     k, steps = 0, trail.shape[0] - 1
     while k < steps and not passes_within(trail, k, required, path, obstacles, tuning, step):
         k += 1
-    return k < steps
+    return bool(k < steps)
 
 
 @kernel
