@@ -16,7 +16,6 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import segment_lengths
-from antdrive.planners.entrances import STEP as EIGHTH
 from antdrive.planners.entrances import clear_lead, outline_at, turn_at
 from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, TimedPlan, path_cost
@@ -27,6 +26,7 @@ INSTANT = 1e-6  # a motion that is not straight over this time is a jump [s]
 # Maximum distance between a motion and the chords that join its samples, and between the samples and the legs that
 # replace them [m]. Twice this is added to the clearance.
 TOLERANCE = 1e-3
+EIGHTH = math.pi / 4  # between the headings of a grid [rad]
 UNIT = "safe intervals expanded"
 
 
