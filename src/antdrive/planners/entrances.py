@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from antdrive.base.plane import wrap_angle
 
 if TYPE_CHECKING:
     from antdrive.base import Floats, Point, Pose
@@ -16,6 +19,14 @@ if TYPE_CHECKING:
 MAX_BACKWARDS = 0.5  # longest way that a robot backs out of a place where it cannot turn [m]
 LEAD = 0.75  # farthest entrance from a start [m]
 ROOM = 1e-4  # a start closer to obstacles than the margin leaves with this much less room than it has [m]
+TURNING = 0.1  # a turn to an entrance counts as this much of a way [m/rad]
+
+
+class Lead(NamedTuple):
+    """Straight from an exact start to the centre of its cell: the robot's heading [rad], and whether it drives backwards."""
+
+    heading: float
+    backwards: bool
 
 
 def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
@@ -41,7 +52,8 @@ def entrance(grid: Grid, task: Task, nearest: npt.NDArray[np.int32]) -> int:
     """Return the node by which the robot enters a grid with turns from its exact start; -1 if it cannot.
 
     A lead turns on the spot, drives straight to the centre of the node's cell, and turns to a heading of the node. The node
-    is the nearest with a clear lead from which moves lead to a goal. Only where no lead forwards reaches such a node the
+    is the first with a clear lead from which moves lead to a goal, by way and turn.
+    Only where no lead forwards reaches such a node the
     robot leaves backwards, by at most `MAX_BACKWARDS`. Where no such node is near, it is any node of the nearest free cell.
 
     Args:
@@ -62,7 +74,8 @@ def entrance(grid: Grid, task: Task, nearest: npt.NDArray[np.int32]) -> int:
     around = _around(task, LEAD + float(np.hypot(*outline.corners.T).max()) + outline.reach + ROOM)
     centres = grid.xy(np.column_stack(np.divmod(near, grid.shape[1])))
     for most, backwards in ((LEAD, False), (MAX_BACKWARDS, True)):
-        kept = useful & (away <= most)
+        kept = np.flatnonzero(useful & (away <= most))
+        kept = kept[_by_effort(centres[kept], task.start, backwards)]
         found = _kernels_entrances.first_entrance(
             *task.start, centres[kept], labels[kept], nearest, backwards, *outline, *around
         )
@@ -81,6 +94,14 @@ def _free_around(grid: Grid, point: Point, within: float) -> tuple[npt.NDArray[n
     order = np.argsort(away, kind="stable")
     order = order[away[order] <= within]
     return near[order, 0] * grid.shape[1] + near[order, 1], away[order]
+
+
+def _by_effort(centres: Floats, start: Pose, backwards: bool) -> npt.NDArray[np.int64]:
+    """Return the order of some points (N, 2) [m] by the way to them and the turn towards them."""
+    dx, dy = (centres - start[:2]).T
+    turn = np.abs(wrap_angle(np.arctan2(dy, dx) + math.pi * backwards - start[2]))
+    away = np.hypot(dx, dy)
+    return np.argsort(away + np.where(away > ROOM, TURNING * turn, 0.0), kind="stable")
 
 
 def _around(task: Task, within: float) -> tuple[Floats, Floats]:
@@ -113,3 +134,23 @@ def clear_turn(pose: Pose, heading: float, outline: Outline, world: World) -> fl
 
     walls = np.asarray(world.bounds, dtype=np.float64)
     return float(_kernels_entrances.clear_turn(*pose, heading, *outline, world.discs, walls))
+
+
+def clear_lead(task: Task, to: Point, heading: float | None, outline: Outline) -> Lead:
+    """Return the clear lead from a task's start to a point, forwards if possible; from there the robot turns to a heading.
+
+    Without a clear one it is the straight forwards: an estimated pose may overlap obstacles.
+    """
+    for backwards in (False, True):
+        facing = lead_heading(task.start, *to, outline, task.world, backwards=backwards)
+        if math.isfinite(facing) and (
+            heading is None or math.isfinite(clear_turn((*to, facing), heading, outline, task.world))
+        ):
+            return Lead(facing, backwards)
+    return Lead(math.atan2(to[1] - task.start[1], to[0] - task.start[0]), False)
+
+
+def turn_at(pose: Pose, heading: float, task: Task, outlines: Sequence[Outline]) -> float:
+    """Return the turn on the spot that is clear for the first outline possible, or the shorter one without any [rad]."""
+    turns = (clear_turn(pose, heading, outline, task.world) for outline in outlines)
+    return next(filter(math.isfinite, turns), float(wrap_angle(heading - pose[2])))
