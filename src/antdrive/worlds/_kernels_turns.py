@@ -50,6 +50,23 @@ def before_move(graph: MoveGraph, node: int, k: int) -> Any:
 
 
 @kernel
+def beside(graph: MoveGraph, node: int, k: int) -> Any:
+    """Return the node in direction k from which the opposite move, if it is allowed, leads to a node with turns; else -1."""
+    here = graph.cell[node]
+    row, col, back = here // graph.cols + DROW[k], here % graph.cols + DCOL[k], (k + 4) & 7
+    there: Any = np.int64(row * graph.cols + col)
+    inside = row >= 0 and 0 <= col < graph.cols and there < len(graph.label)
+    return np.int64(graph.label[there, back]) if inside and graph.label[here, back] == node else np.int64(NOWHERE)
+
+
+@kernel
+def behind(graph: MoveGraph, node: int, k: int) -> Any:
+    """Return the node in direction k from which the opposite move leads to a node with turns; -1 without one."""
+    before = beside(graph, node, k)
+    return before if before >= 0 and graph.mask[before] >> ((k + 4) & 7) & 1 else np.int64(NOWHERE)
+
+
+@kernel
 def count_labels(bits: Array) -> int:
     """Return the number of nodes: one for each cell, and one for each further label of a cell."""
     count = 0
@@ -130,20 +147,12 @@ def leads_to(graph: MoveGraph, goals: Array) -> Array:
                 seen[node] = True
                 stack[size] = node
                 size += 1
-    rows = len(graph.label) // graph.cols
     while size > 0:
         size -= 1
         node = stack[size]
-        here = graph.cell[node]
-        row, col = here // graph.cols, here % graph.cols
         for k in range(8):
-            if graph.label[here, k] != node:
-                continue
-            r, c = row - DROW[k], col - DCOL[k]
-            if r < 0 or c < 0 or r >= rows or c >= graph.cols:
-                continue
-            before = graph.label[r * graph.cols + c, k]
-            if before >= 0 and not seen[before] and graph.mask[before] >> k & 1:
+            before = behind(graph, node, k)
+            if before >= 0 and not seen[before]:
                 seen[before] = True
                 stack[size] = before
                 size += 1

@@ -114,7 +114,7 @@ def test_a_blocked_corridor_raises_the_costs_of_paths_through_it():
     assert repair.result().cost == 9
     repair.block([(1, 6)])
     assert repair.result().cost == 4 + 9 + 4
-    heights = repair._h.reshape(7, 12)
+    heights = repair._arrays[0].reshape(7, 12)
     assert heights[1, 1] == 17 * STRAIGHT
     assert heights[1, 5] >= NEVER  # RAISE; costs that the robot does not need are not computed
     assert heights[1, 7] == 3 * STRAIGHT  # between the block and the goal nothing changed
@@ -128,7 +128,7 @@ def test_a_new_gap_lowers_the_costs_of_cells_behind_it():
     repair.result()
     repair.clear([(1, 6)])
     assert repair.result().cost == 9
-    assert repair._h.reshape(7, 12)[1, 5] == 5 * STRAIGHT
+    assert repair._arrays[0].reshape(7, 12)[1, 5] == 5 * STRAIGHT
 
 
 def test_a_change_away_from_the_path_is_not_processed():
