@@ -148,14 +148,15 @@ def test_backpointers_of_processed_states_lead_to_the_goal():
             tell(cells)
             world.free[tuple(cells.T)] = value
         agree(repair, world)
-        floor = int(repair._heap[0, 0]) if repair._state[0] else NEVER
-        settled = np.flatnonzero((repair._h < min(floor, NEVER)) & (repair._place < 0) & (repair._h > 0))
+        floor = int(repair._arrays[2][0, 0]) if repair._state[0] else NEVER
+        h, back, _, place = repair._arrays
+        settled = np.flatnonzero((h < min(floor, NEVER)) & (place < 0) & (h > 0))
         for cell in settled:
-            k = int(repair._back[cell])
+            k = int(back[cell])
             row, col = divmod(int(cell), 30)
             parent = (row + DIRECTIONS[k][0]) * 30 + col + DIRECTIONS[k][1]
             assert repair.query.grid.moves[row, col] >> k & 1
-            assert repair._h[cell] == repair._h[parent] + COST[k]
+            assert h[cell] == h[parent] + COST[k]
 
 
 @pytest.mark.parametrize("size", [1, 2])

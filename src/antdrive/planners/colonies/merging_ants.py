@@ -150,7 +150,6 @@ class MergingAnts(MaxMinAnts):
         """Return the shortest path on `graph` over the arcs of these `tours` and of the `best` one."""
         from antdrive.planners.colonies import _kernels_colony
         from antdrive.planners.graph import _kernels_search
-        from antdrive.worlds._kernels_turns import MoveGraph
 
         moves = np.zeros_like(graph.mask)
         for walks in (tours, best):
@@ -159,7 +158,7 @@ class MergingAnts(MaxMinAnts):
         moves &= graph.mask  # the best tour may predate the last change of the grid
         moves.setflags(write=False)  # the search is compiled for read-only moves, like a grid's
         cells, straight, diagonal, _ = _kernels_search.shortest_path(
-            MoveGraph(moves, graph.turns.cell, graph.turns.label, graph.shape[1]), graph.start, graph.goal, True
+            graph.moves._replace(mask=moves), graph.start, graph.goal, True
         )
         if not len(cells):
             return None
