@@ -37,10 +37,7 @@ def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
     """
     from antdrive.worlds import _kernels_turns
 
-    free = np.argwhere(grid.free)
-    away = np.hypot(*(grid.xy(free) - task.goal).T)
-    order = np.argsort(away, kind="stable")
-    goals = np.ravel_multi_index(tuple(free[order[: np.count_nonzero(away <= within)]].T), grid.shape)
+    goals, _ = _free_around(grid, task.goal, within)
     start = entrance(grid, task, goals)
     if start < 0 or not len(goals):
         return start, next(iter(goals.tolist()), -1)
@@ -63,7 +60,7 @@ def entrance(grid: Grid, task: Task, goals: npt.NDArray[np.int64]) -> int:
     """
     from antdrive.worlds import _kernels_turns
 
-    near, away = _free_around(grid, task.start[:2])
+    near, away = _free_around(grid, task.start[:2], LEAD)
     if not len(near):
         return -1
     leading = _kernels_turns.leads_to(grid.graph, goals)
@@ -80,15 +77,15 @@ def entrance(grid: Grid, task: Task, goals: npt.NDArray[np.int64]) -> int:
     return -1
 
 
-def _free_around(grid: Grid, point: Point) -> tuple[npt.NDArray[np.int64], Floats]:
-    """Return the free cells within `LEAD` of a point, nearest first, and their distances [m]."""
+def _free_around(grid: Grid, point: Point, within: float) -> tuple[npt.NDArray[np.int64], Floats]:
+    """Return the free flat cells within some distance [m] of a point, nearest first, and their distances [m]."""
     row, col = grid.cell_at(*point)
-    reach = math.ceil(LEAD / grid.cell)
+    reach = math.ceil(within / grid.cell)
     low, left = max(0, row - reach), max(0, col - reach)
     near = np.argwhere(grid.free[low : row + reach + 1, left : col + reach + 1]) + (low, left)
     away = np.hypot(*(grid.xy(near) - point).T)
     order = np.argsort(away, kind="stable")
-    order = order[away[order] <= LEAD]
+    order = order[away[order] <= within]
     return near[order, 0] * grid.shape[1] + near[order, 1], away[order]
 
 

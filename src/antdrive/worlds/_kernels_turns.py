@@ -51,12 +51,14 @@ def before_move(graph: MoveGraph, node: int, k: int) -> Any:
 
 @kernel
 def beside(graph: MoveGraph, node: int, k: int) -> Any:
-    """Return the node in direction k from which the opposite move, if it is allowed, leads to a node with turns; else -1."""
-    here = graph.cell[node]
-    row, col, back = here // graph.cols + DROW[k], here % graph.cols + DCOL[k], (k + 4) & 7
-    there: Any = np.int64(row * graph.cols + col)
-    inside = row >= 0 and 0 <= col < graph.cols and there < len(graph.label)
-    return np.int64(graph.label[there, back]) if inside and graph.label[here, back] == node else np.int64(NOWHERE)
+    """Return the node in direction k from which the opposite move, if it is allowed, leads to a node with turns; else -1.
+
+    Beyond the first or last column it is a node of the next row, whose move is not allowed.
+    """
+    here, back = graph.cell[node], (k + 4) & 7
+    there: Any = np.int64(here + DROW[k] * graph.cols + DCOL[k])
+    joined = graph.label[here, back] == node and 0 <= there < len(graph.label)
+    return np.int64(graph.label[there, back]) if joined else np.int64(NOWHERE)
 
 
 @kernel

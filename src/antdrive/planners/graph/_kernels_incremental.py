@@ -238,24 +238,32 @@ def relabel(label: Array, new: Array, own: Array, cell: Array, relabelled: Array
     size = len(cell)
     for i in range(len(label)):
         relabelled[i] = False
+        last, most, same = NOWHERE, NOWHERE, True
         for k in range(8):
-            node: Any = np.int64(NOWHERE)
-            if new[i, k] >= 0:
-                rank = 0
-                for j in range(8 if new[i, k] != i else 0):
-                    first = 0 <= new[i, j] < new[i, k]
-                    for before in range(j):
-                        first &= new[i, before] != new[i, j]
-                    rank += first
-                if own[i, rank] < 0:
-                    own[i, rank] = size
-                    if size == len(cell):
-                        cell = doubled(cell)
-                    cell[size] = i
-                    size += 1
-                node = np.int64(own[i, rank])
-            if label[i, k] != node:
-                label[i, k] = node
+            most = max(most, new[i, k])
+            same &= new[i, k] == label[i, k]
+        if same:
+            continue
+        rank = 0
+        while last < most:  # the labels in order of their nodes
+            node = most
+            for k in range(8):
+                if last < new[i, k] < node:
+                    node = new[i, k]
+            if own[i, rank] < 0:
+                own[i, rank] = size
+                if size == len(cell):
+                    cell = doubled(cell)
+                cell[size] = i
+                size += 1
+            for k in range(8):
+                if new[i, k] == node and label[i, k] != own[i, rank]:
+                    label[i, k] = own[i, rank]
+                    relabelled[i] = True
+            last, rank = node, rank + 1
+        for k in range(8):
+            if new[i, k] < 0 and label[i, k] >= 0:
+                label[i, k] = NOWHERE
                 relabelled[i] = True
     return cell[:size].copy()
 
