@@ -49,23 +49,25 @@ def before_move(graph: MoveGraph, node: int, k: int) -> Any:
     return np.int64(graph.label[graph.cell[node] - step, k]) if len(graph.cell) else node - step
 
 
-@kernel
-def beside(graph: MoveGraph, node: int, k: int) -> Any:
+# Inner loops pass arrays: to take them from a graph there costs more than the search.
+
+
+@inline
+def beside(cell: Array, label: Array, cols: int, node: int, k: int) -> Any:
     """Return the node in direction k from which the opposite move, if it is allowed, leads to a node with turns; else -1.
 
     Beyond the first or last column it is a node of the next row, whose move is not allowed.
     """
-    here, back = graph.cell[node], (k + 4) & 7
-    there: Any = np.int64(here + DROW[k] * graph.cols + DCOL[k])
-    joined = graph.label[here, back] == node and 0 <= there < len(graph.label)
-    return np.int64(graph.label[there, back]) if joined else np.int64(NOWHERE)
+    there = cell[node] + DROW[k] * cols + DCOL[k]
+    joined = label[cell[node], (k + 4) & 7] == node and 0 <= there < len(label)
+    return np.int64(label[there, (k + 4) & 7]) if joined else np.int64(NOWHERE)
 
 
-@kernel
-def behind(graph: MoveGraph, node: int, k: int) -> Any:
+@inline
+def behind(mask: Array, cell: Array, label: Array, cols: int, node: int, k: int) -> Any:
     """Return the node in direction k from which the opposite move leads to a node with turns; -1 without one."""
-    before = beside(graph, node, k)
-    return before if before >= 0 and graph.mask[before] >> ((k + 4) & 7) & 1 else np.int64(NOWHERE)
+    before = beside(cell, label, cols, node, k)
+    return before if before >= 0 and mask[before] >> ((k + 4) & 7) & 1 else np.int64(NOWHERE)
 
 
 @kernel
@@ -149,12 +151,20 @@ def leads_to(graph: MoveGraph, goals: Array) -> Array:
                 seen[node] = True
                 stack[size] = node
                 size += 1
+    rows = len(graph.label) // graph.cols
     while size > 0:
         size -= 1
         node = stack[size]
+        here = graph.cell[node]
+        row, col = here // graph.cols, here % graph.cols
         for k in range(8):
-            before = behind(graph, node, k)
-            if before >= 0 and not seen[before]:
+            if graph.label[here, k] != node:
+                continue
+            r, c = row - DROW[k], col - DCOL[k]
+            if r < 0 or c < 0 or r >= rows or c >= graph.cols:
+                continue
+            before = graph.label[r * graph.cols + c, k]
+            if before >= 0 and not seen[before] and graph.mask[before] >> k & 1:
                 seen[before] = True
                 stack[size] = before
                 size += 1

@@ -45,7 +45,8 @@ def propagate(graph: MoveGraph, start: int, goal: int, retained: float, pheromon
     in the order of cost, as in D*. Costs are multiples of 1/5, so the list is a ring of eight buckets, each a
     linked list.
     """
-    mask, offset, turning = graph.mask, offsets(graph.cols), len(graph.cell) > 0
+    mask, cell, label, cols = graph.mask, graph.cell, graph.label, graph.cols
+    offset, turning = offsets(cols), len(cell) > 0
     cost = np.full(len(mask), -1, dtype=np.int64)
     closed = np.zeros(len(mask), dtype=np.bool_)
     head = np.full(8, -1, dtype=np.int64)
@@ -55,7 +56,7 @@ def propagate(graph: MoveGraph, start: int, goal: int, retained: float, pheromon
     head[0] = -1
     entries, level = 0, 0
     for k in range(8):
-        node = np.int64(graph.label[goal, k]) if turning else goal
+        node = np.int64(label[goal, k]) if turning else goal
         if node >= 0 and cost[node] < 0:
             cost[node], pheromone[node] = 0, 0.0
             entry_cell[entries], entry_next[entries] = node, head[0]
@@ -75,7 +76,7 @@ def propagate(graph: MoveGraph, start: int, goal: int, retained: float, pheromon
         closed[i] = True
         for k in range(8):
             if turning:
-                j = behind(graph, i, k)
+                j = behind(mask, cell, label, cols, i, k)
                 if j < 0:
                     continue
             elif mask[i] & (1 << k):

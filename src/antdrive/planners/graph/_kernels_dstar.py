@@ -34,7 +34,7 @@ def settle(
     Returns the list's length and the number of processed states.
     """
     cols, mask, offset, turning = graph.cols, graph.mask, offsets(graph.cols), len(graph.cell) > 0
-    rows = len(mask) // cols  # without turns
+    rows, cell, label = len(mask) // cols, graph.cell, graph.label  # rows without turns
     processed = 0
     while size > 0 and heap[0, 0] < h[start]:  # L1 to L3
         x, k_old = heap[0, 2], heap[0, 0]
@@ -52,7 +52,7 @@ def settle(
         lower = k_old == h[x]  # L8
         for k in range(8):
             if turning:
-                y = beside(graph, x, k)
+                y = beside(cell, label, cols, x, k)
                 if y < 0:
                     continue
             else:

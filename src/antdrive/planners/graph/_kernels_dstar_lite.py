@@ -54,7 +54,7 @@ def settle(
     Returns the queue's size and the number of expanded nodes.
     """
     cols, mask, cell, offset = graph.cols, graph.mask, graph.cell, offsets(graph.cols)
-    turning = len(cell) > 0
+    label, turning = graph.label, len(cell) > 0
     r0, c0 = cell_of(graph, start) // cols, cell_of(graph, start) % cols
     expanded = 0
     while size > 0:
@@ -77,7 +77,7 @@ def settle(
             size = take(heap, place, size, u)
             for k in range(8):
                 if turning:
-                    s = behind(graph, u, k)
+                    s = behind(mask, cell, label, cols, u, k)
                     if s < 0:
                         continue
                 elif mask[u] & (1 << k):
@@ -94,7 +94,7 @@ def settle(
             g[u] = NEVER
             for k in range(8):
                 if turning:
-                    s = behind(graph, u, k)
+                    s = behind(mask, cell, label, cols, u, k)
                     if s < 0:
                         continue
                 elif mask[u] & (1 << k):
