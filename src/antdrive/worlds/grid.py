@@ -119,7 +119,12 @@ class Grid:
         return self.turns.cell[marked].astype(np.int64) if self.turns else marked
 
     def nodes_along(self, start: int, cells: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-        """Return the nodes (N,) of a path from a node along cells (N, 2); after a move that is not allowed they are undefined."""
+        """Return the nodes (N,) of a path along cells; after a move that is not allowed they are undefined.
+
+        Args:
+            start: the path's first node
+            cells: (row, col) of each cell (N, 2)
+        """
         flat: npt.NDArray[np.int64] = cells[:, 0].astype(np.int64) * self.shape[1] + cells[:, 1]
         if self.turns:
             steps = np.diff(cells.astype(np.int64), axis=0)
