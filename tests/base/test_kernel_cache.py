@@ -224,3 +224,22 @@ def test_the_stamp_of_a_file_covers_the_files_that_it_imports(tmp_path, monkeypa
         assert kernel_cache.sources_stamp(tmp_path / "elsewhere.py") == kernel_cache.sources_stamp()
     finally:
         kernel_cache._first_state.cache_clear()
+
+
+@pytest.mark.slow
+def test_of_two_processes_that_need_a_kernel_one_compiles_it(tmp_path):
+    code = MEASURE.replace("\n", "\nk.on_compile = lambda name: (print('compiles', name), time.sleep(0.3))\n", 1)
+    code = "import time\nfrom antdrive.base import kernel_cache as k\n" + code
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    two = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        for _ in range(2)
+    ]
+    said = [process.communicate(timeout=300) for process in two]
+    assert [err for _, err in said] == ["", ""]
+    compiled = [line for out, _ in said for line in out.splitlines() if line.startswith("compiles ")]
+    assert compiled
+    assert len(set(compiled)) == len(compiled)
+    assert {out.splitlines()[-1] for out, _ in said} == {said[0][0].splitlines()[-1]}

@@ -9,13 +9,20 @@ import os
 import re
 import stat
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 _ROOT = Path(__file__).parent.parent  # the package antdrive
 _IMPORT = re.compile(rb"^[ \t]*(?:from|import)\b[^\n(]*(?:\([^)]*\))?", re.MULTILINE)
 _NAME = re.compile(rb"\b_kernels\w*")
 PACKAGES = ("base", "worlds", "planners", "robots", "sim", "views")
+
+
+def ignore(name: str) -> None:
+    """Ignore that a kernel compiles."""
+
+
+on_compile: Callable[[str], None] = ignore  # called with each kernel's name before it compiles
 
 
 def sources_stamp(file: Path | None = None) -> str:
