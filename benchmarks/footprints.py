@@ -3,7 +3,7 @@
 Prints Markdown.
 
 - lattice: BARN worlds that the independent lattice (`benchmarks/lattice.py`) crosses, by its disc and by its outline
-- repair: time to repair a plan for the `warehouse` robot after a small change, against planning from scratch; lengths must ag
+- repair: time to repair a plan for the `warehouse` robot after a small change, against planning from scratch; lengths must agree
 - plans: times of `astar` in random worlds, median / worst, after a first world
 """
 
