@@ -1,30 +1,41 @@
-"""BARN's worlds that a robot's footprint crosses: `python -m benchmarks.footprints [lattice]`.
+"""Drives of rectangles between obstacles: `python -m benchmarks.footprints [TABLE ...]`.
 
-Prints Markdown.
+Tables:
 
-- lattice: worlds that the independent lattice (`benchmarks/lattice.py`) crosses, by the circumscribed disc and by the outline
+- lattice: BARN's worlds that the independent lattice (`benchmarks/lattice.py`) crosses, by the circumscribed disc and by the outline
+- drives: the same worlds driven with `astar` and default margins, with the map and without it, beside drives of the disc
+- durations: worlds that both the disc and the footprint cross, driven with either
+- office: a campaign of random tasks in an office of ten doors
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import itertools
 import math
+import statistics
+import tempfile
 from collections.abc import Iterator
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from antdrive.robots import RobotSpec, load_robot
+from antdrive.runs.campaigns import make_campaign, sweep
 from antdrive.runs.pool import call_all
-from benchmarks.drives import barn_tasks
+from benchmarks.drives import Result, barn_tasks, drive
 from benchmarks.lattice import Flood, Point, Shape, flood
 from benchmarks.markdown import command_line, print_tables, table
 from tools.shared_data import BARN
 
-SMALLEST = ("lattice --worlds 1 --jobs 1",)
+SMALLEST = ("lattice drives durations --worlds 1 --jobs 1", "office --office-tasks 1 --jobs 1")
 MARGIN = 0.03  # [m]
 CELL = 0.05  # [m]
 SIZES = {"husky": (0.99, 0.67, 0.0), "warehouse": (0.90, 0.60, 0.15)}  # length, width, middle ahead of the axle [m]
 SEARCHES = {"disc": 8, "8 headings": 8, "16 headings": 16}
+LIDAR = "jackal"  # the robot whose lidar mapless drives borrow: neither rectangle has one
+SEED = 1
 
 
 def rectangle(length: float, width: float, ahead: float) -> list[Point]:
@@ -66,15 +77,89 @@ def lattice(given: argparse.Namespace) -> Iterator[str]:
     yield from table(("robot", *SEARCHES), rows)
 
 
+def robot_of(name: str, *, mapped: bool = True) -> RobotSpec:
+    """Return a robot, with a lidar where it has no map; its size is that of the lattice."""
+    robot = load_robot(name)
+    length, width, ahead = SIZES[name]
+    assert robot.footprint.box == (length, width, (ahead, 0.0)), robot.footprint.box
+    return robot if mapped else dataclasses.replace(robot, lidar=load_robot(LIDAR).lidar)
+
+
+def driven(given: argparse.Namespace, name: str, **settings: Any) -> list[Result]:
+    """Drive a robot through the worlds, in their order."""
+    tasks = dict(list(barn_tasks(given.barn).items())[: given.worlds or None])
+    robot = robot_of(name, mapped=settings["map"] == "given")
+    calls = (partial(drive, world, task, "astar", robot, seed=SEED, **settings) for world, task in tasks.items())
+    return call_all(calls, given.jobs)
+
+
+def drives(given: argparse.Namespace) -> Iterator[str]:
+    """Yield drives by robot, map, noise and the shape that plans keep clear."""
+    heads = ["robot", "map", "noise", "footprint", "solved", "by the footprint", "succeeded", "certified", "contacts"]
+    yield from table([*heads, "crossed by the lattice, not certified"], drive_rows(given))
+
+
+def drive_rows(given: argparse.Namespace) -> Iterator[list[str]]:
+    for name, known, noise, shape in itertools.product(SIZES, ("given", "none"), (0.0, 1.0), ("auto", "disc")):
+        if not set(given.only.split()) <= {name, known, f"{noise:g}", shape}:
+            continue
+        got = driven(given, name, map=known, noise=noise, footprint=shape)
+        there = [one for one in got if one.metrics]
+        found = crossed(given.barn, given.worlds, given.jobs, name, "disc" if shape == "disc" else "8 headings")
+        left = [f"{one.name} ({one.outcome.lower()})" for one in got if found[one.name] and not one.succeeded]
+        counts = (
+            len(there),
+            sum(one.shape == "footprint" for one in there),
+            sum(one.outcome == "SUCCEEDED" for one in there),
+            sum(one.succeeded for one in there),
+            sum(one.contacts for one in there),
+        )
+        yield [f"`{name}`", known, f"{noise:g}", shape, *map(str, counts), ", ".join(left) or "none"]
+
+
+def durations(given: argparse.Namespace) -> Iterator[str]:
+    """Yield the durations of drives of the footprint over those of the disc, in worlds that the disc crosses, too."""
+    rows = []
+    for name, noise in itertools.product(SIZES, (0.0, 1.0)):
+        disc, exact = (driven(given, name, map="given", noise=noise, footprint=shape) for shape in ("disc", "exact"))
+        pairs = [(one.metrics, two.metrics) for one, two in zip(disc, exact, strict=True) if one.metrics]
+        ratios = [two["duration_s"] / one["duration_s"] for one, two in pairs if two]
+        lengths = [two["driven_length_m"] / one["driven_length_m"] for one, two in pairs if two]
+        shown = [f"{statistics.median(some):.3f} / {max(some):.3f}" if some else "–" for some in (ratios, lengths)]
+        rows.append([f"`{name}`", f"{noise:g}", str(len(ratios)), *shown])
+    yield from table(
+        "robot | noise | worlds | duration over the disc's: median / max | driven length: median / max", rows
+    )
+
+
+def office(given: argparse.Namespace) -> Iterator[str]:
+    """Yield the results of a campaign of random tasks in an office."""
+    rows = []
+    for noise in (0.0, 1.0):
+        tasks = {"random": given.office_tasks, "seed": SEED, "min_distance": 5.0}
+        with tempfile.TemporaryDirectory() as folder:
+            campaign = make_campaign(
+                {"schema": 1, "worlds": [{"generate": "office"}], "planners": ["astar"], "robots": ["warehouse"],
+                 "noise": noise, "tasks": tasks, "seeds": [SEED]}
+            )  # fmt: skip
+            done = sweep(campaign, folder, jobs=given.jobs)
+            got = done.table.to_pylist()
+        print(got[0])
+        rows.append([f"{noise:g}", str(len(got))])
+    yield from table("noise | tasks | with a path | certified | contacts", rows)
+
+
 def main() -> None:
     given = command_line(
         __doc__,
-        tables=([], "lattice"),
+        tables=([], "tables to print; default: all"),
         barn=(BARN, "folder or archive of BARN's world_*.world files"),
         worlds=(0, "how many of BARN's worlds; 0: all"),
         jobs=(2, "processes; 0: this one"),
+        only=("", "rows of `drives` with these values, such as 'husky none 1 auto'; default: all"),
+        office_tasks=(100, "how many random tasks in the office"),
     )
-    print_tables(given.tables, {"lattice": lattice}, given)
+    print_tables(given.tables, {f.__name__: f for f in (lattice, drives, durations, office)}, given)
 
 
 if __name__ == "__main__":

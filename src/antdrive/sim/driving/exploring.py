@@ -54,6 +54,7 @@ ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hits than to mapped obstacles [m]
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
+TURNABLE = 0.025  # plans for the footprint keep at least this margin: the controller refuses turns closer to hits [m]
 LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
 
@@ -137,7 +138,8 @@ class Exploration(RouteGuide):
         ):
             for share in MARGINS:
                 task = self._known(pose, self._bounds(growth, pose))
-                grid = self._grid(task, share * self._routes.margin, outlined=outlined)
+                margin = max(share * self._routes.margin, TURNABLE if outlined else 0.0)
+                grid = self._grid(task, margin, outlined=outlined)
                 answer = self._routes.around(task, grid, avoided)
                 if answer.status is PlanStatus.INVALID:
                     return grid, answer
