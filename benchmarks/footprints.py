@@ -2,7 +2,7 @@
 
 Tables:
 
-- lattice: BARN's worlds that the independent lattice (`benchmarks/lattice.py`) crosses, by the circumscribed disc and by the outline
+- lattice: BARN's worlds that the independent lattice (`benchmarks/lattice.py`) crosses, by the disc and by the outline
 - drives: the same worlds driven with `astar` and default margins, with the map and without it, beside drives of the disc
 - durations: worlds that both the disc and the footprint cross, driven with either
 - office: a campaign of random tasks in an office of ten doors
@@ -20,6 +20,8 @@ from collections.abc import Iterator
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from antdrive.robots import RobotSpec, load_robot
 from antdrive.runs.campaigns import make_campaign, sweep
@@ -80,8 +82,8 @@ def lattice(given: argparse.Namespace) -> Iterator[str]:
 def robot_of(name: str, *, mapped: bool = True) -> RobotSpec:
     """Return a robot, with a lidar where it has no map; its size is that of the lattice."""
     robot = load_robot(name)
-    length, width, ahead = SIZES[name]
-    assert robot.footprint.box == (length, width, (ahead, 0.0)), robot.footprint.box
+    length, width, (ahead, aside) = robot.footprint.box or (math.nan, math.nan, (math.nan, math.nan))
+    assert np.allclose((length, width, ahead, aside), (*SIZES[name], 0.0)), robot.footprint
     return robot if mapped else dataclasses.replace(robot, lidar=load_robot(LIDAR).lidar)
 
 
@@ -134,19 +136,27 @@ def durations(given: argparse.Namespace) -> Iterator[str]:
 
 def office(given: argparse.Namespace) -> Iterator[str]:
     """Yield the results of a campaign of random tasks in an office."""
+    campaign = {
+        "worlds": [{"generate": "office"}],
+        "planners": ["astar"],
+        "robots": ["warehouse"],
+        "noise": [0.0, 1.0],
+        "tasks": {"random": given.office_tasks, "seed": SEED, "min_distance": 5.0},
+        "seeds": [SEED],
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        runs = sweep(make_campaign(campaign), folder, jobs=given.jobs).table.to_pylist()
     rows = []
-    for noise in (0.0, 1.0):
-        tasks = {"random": given.office_tasks, "seed": SEED, "min_distance": 5.0}
-        with tempfile.TemporaryDirectory() as folder:
-            campaign = make_campaign(
-                {"schema": 1, "worlds": [{"generate": "office"}], "planners": ["astar"], "robots": ["warehouse"],
-                 "noise": noise, "tasks": tasks, "seeds": [SEED]}
-            )  # fmt: skip
-            done = sweep(campaign, folder, jobs=given.jobs)
-            got = done.table.to_pylist()
-        print(got[0])
-        rows.append([f"{noise:g}", str(len(got))])
-    yield from table("noise | tasks | with a path | certified | contacts", rows)
+    for noise, some in itertools.groupby(sorted(runs, key=lambda run: run["noise"]), key=lambda run: run["noise"]):
+        got = list(some)
+        outcomes = [run["outcome"] for run in got]
+        certified = [run for run in got if run["succeeded"]]
+        failed = [f"{run['task']} ({run['outcome']})" for run in got if not run["succeeded"]]
+        least = min((run["min_clearance_m"] for run in got if run["certified"]), default=math.nan)
+        counts = len(got), len(got) - outcomes.count("no_path"), outcomes.count("succeeded"), len(certified)
+        shown = *map(str, counts), str(outcomes.count("collided")), f"{100 * least:.1f} cm", ", ".join(failed) or "none"
+        rows.append([f"{noise:g}", *shown])
+    yield from table("noise | tasks | solved | succeeded | certified | collided | min. clearance | not certified", rows)
 
 
 def main() -> None:
