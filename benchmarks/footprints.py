@@ -16,7 +16,7 @@ import itertools
 import math
 import statistics
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -87,11 +87,12 @@ def robot_of(name: str, *, mapped: bool = True) -> RobotSpec:
     return robot if mapped else dataclasses.replace(robot, lidar=load_robot(LIDAR).lidar)
 
 
-def driven(given: argparse.Namespace, name: str, **settings: Any) -> list[Result]:
-    """Drive a robot through the worlds, in their order."""
+def driven(given: argparse.Namespace, name: str, among: Collection[str] = (), **settings: Any) -> list[Result]:
+    """Drive a robot through the worlds, or those among the given ones, in their order."""
     tasks = dict(list(barn_tasks(given.barn).items())[: given.worlds or None])
     robot = robot_of(name, mapped=settings["map"] == "given")
-    calls = (partial(drive, world, task, "astar", robot, seed=SEED, **settings) for world, task in tasks.items())
+    picked = {world: task for world, task in tasks.items() if not among or world in among}
+    calls = (partial(drive, world, task, "astar", robot, seed=SEED, **settings) for world, task in picked.items())
     return call_all(calls, given.jobs)
 
 
@@ -120,15 +121,17 @@ def drive_rows(given: argparse.Namespace) -> Iterator[list[str]]:
 
 
 def durations(given: argparse.Namespace) -> Iterator[str]:
-    """Yield the durations of drives of the footprint over those of the disc, in worlds that the disc crosses, too."""
+    """Yield the durations of drives of the footprint over those of the disc, in worlds that both cross."""
     rows = []
     for name, noise in itertools.product(SIZES, (0.0, 1.0)):
-        disc, exact = (driven(given, name, map="given", noise=noise, footprint=shape) for shape in ("disc", "exact"))
-        pairs = [(one.metrics, two.metrics) for one, two in zip(disc, exact, strict=True) if one.metrics]
-        ratios = [two["duration_s"] / one["duration_s"] for one, two in pairs if two]
-        lengths = [two["driven_length_m"] / one["driven_length_m"] for one, two in pairs if two]
-        shown = [f"{statistics.median(some):.3f} / {max(some):.3f}" if some else "–" for some in (ratios, lengths)]
-        rows.append([f"`{name}`", f"{noise:g}", str(len(ratios)), *shown])
+        disc = {
+            one.name: one for one in driven(given, name, map="given", noise=noise, footprint="disc") if one.succeeded
+        }
+        exact = driven(given, name, disc, map="given", noise=noise, footprint="exact") if disc else []
+        pairs = [(one.metrics, disc[one.name].metrics) for one in exact if one.succeeded]
+        ratios = ([one[key] / two[key] for one, two in pairs] for key in ("duration_s", "driven_length_m"))
+        shown = (f"{statistics.median(some):.3f} / {max(some):.3f}" if some else "–" for some in ratios)
+        rows.append([f"`{name}`", f"{noise:g}", str(len(pairs)), *shown])
     yield from table(
         "robot | noise | worlds | duration over the disc's: median / max | driven length: median / max", rows
     )
