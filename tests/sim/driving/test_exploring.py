@@ -123,7 +123,8 @@ def test_the_controller_makes_the_turns_of_plans_for_the_footprint(jackal):
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
-def test_plans_for_the_footprint_keep_room_for_the_controllers_turns(jackal, noise, monkeypatch):
+def test_plans_for_the_footprint_keep_less_margin_only_without_a_path(jackal, noise, monkeypatch):
+    """Room for the controller's turns comes before none at all."""
     guide, margins = compose(scenario(jackal, footprint="exact", noise=noise)).guide, []
 
     def around(task, grid, avoided):
@@ -132,8 +133,37 @@ def test_plans_for_the_footprint_keep_room_for_the_controllers_turns(jackal, noi
 
     monkeypatch.setattr(guide._routes, "around", around)
     guide.plan(TASK.start)
-    assert min(margins) == pytest.approx(TURNABLE)
-    assert max(margins) == pytest.approx(guide._routes.margin)
+    wide, planned = guide._routes.outline_margins
+    assert margins == pytest.approx([*dict.fromkeys((wide, planned)), TURNABLE, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("pose", "led", "outlined"),
+    [
+        ((0.8, 0.8, 0.0), True, [False, True]),  # room for the disc
+        ((2.62, 0.8, 0.0), False, [False, True]),  # closer to a post than the disc's radius
+        ((2.62, 0.8, 0.0), True, [True, False]),
+    ],
+)
+def test_where_the_disc_does_not_fit_the_footprint_leads_on(jackal, pose, led, outlined, monkeypatch):
+    guide, found = compose(scenario(jackal)).guide, []
+
+    def around(task, grid, avoided):
+        found.append(bool(grid.turns))
+        return PlanResult(status=PlanStatus.NO_PATH)
+
+    monkeypatch.setattr(guide._routes, "around", around)
+    guide._routes.footprint_margin = 0.03 if led else None
+    guide.plan(pose)
+    assert list(dict.fromkeys(found)) == outlined
+
+
+@pytest.mark.parametrize(("turns", "stalled"), [(True, False), (False, True)])
+def test_a_turn_on_the_spot_is_no_stall_on_a_route_with_turns(jackal, turns, stalled):
+    recovery = Recovery(None, jackal, (0.0, 0.0, 0.0), 60)
+    for second in range(5):
+        recovery.note_progress(second, (0.0, 0.0, 1.0 * second), waiting=False, backwards=False, turns=turns)
+    assert recovery.stalled(4.0) is stalled
 
 
 def test_an_estimate_that_a_scan_moved_before_the_robot_drove_is_certified(jackal):
