@@ -97,8 +97,19 @@ def driven(given: argparse.Namespace, name: str, among: Collection[str] = (), **
 
 
 def drives(given: argparse.Namespace) -> Iterator[str]:
-    """Yield drives by robot, map, noise and the shape that plans keep clear."""
-    heads = ["robot", "map", "noise", "footprint", "solved", "by the footprint", "succeeded", "certified", "contacts"]
+    """Yield drives by robot, map, noise and the shape that plans keep clear; mapless only in worlds that it crosses."""
+    heads = [
+        "robot",
+        "map",
+        "noise",
+        "footprint",
+        "worlds",
+        "solved",
+        "by the footprint",
+        "succeeded",
+        "certified",
+        "contacts",
+    ]
     yield from table([*heads, "crossed by the lattice, not certified"], drive_rows(given))
 
 
@@ -106,11 +117,13 @@ def drive_rows(given: argparse.Namespace) -> Iterator[list[str]]:
     for name, known, noise, shape in itertools.product(SIZES, ("given", "none"), (0.0, 1.0), ("auto", "disc")):
         if not set(given.only.split()) <= {name, known, f"{noise:g}", shape}:
             continue
-        got = driven(given, name, map=known, noise=noise, footprint=shape)
-        there = [one for one in got if one.metrics]
         found = crossed(given.barn, given.worlds, given.jobs, name, "disc" if shape == "disc" else "8 headings")
+        among = [world for world in found if known == "given" or found[world]]
+        got = driven(given, name, among, map=known, noise=noise, footprint=shape) if among else []
+        there = [one for one in got if one.metrics]
         left = [f"{one.name} ({one.outcome.lower()})" for one in got if found[one.name] and not one.succeeded]
         counts = (
+            len(got),
             len(there),
             sum(one.shape == "footprint" for one in there),
             sum(one.outcome == "SUCCEEDED" for one in there),
