@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-
-from antdrive.base.plane import wrap_angle
-from antdrive.worlds.world import PointWorld
 
 if TYPE_CHECKING:
     from antdrive.base import Floats, Point, Pose
@@ -21,8 +16,6 @@ if TYPE_CHECKING:
 MAX_BACKWARDS = 0.5  # longest way that a robot backs out of a place where it cannot turn [m]
 LEAD = 0.75  # farthest entrance from a start [m]
 ROOM = 1e-4  # a start closer to obstacles than the margin leaves with this much less room than it has [m]
-FAR = 25.0  # obstacles farther from a start than this meet no lead; robots are at most 20 m long [m]
-STEP = math.pi / 4  # between the headings of a grid [rad]
 
 
 def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
@@ -37,19 +30,14 @@ def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
     """
     from antdrive.worlds import _kernels_turns
 
-    free = np.argwhere(grid.free)
-    away = np.hypot(*(grid.xy(free) - task.goal).T)
-    order = np.argsort(away, kind="stable")
-    goals = np.ravel_multi_index(tuple(free[order[: np.count_nonzero(away <= within)]].T), grid.shape)
-    start = entrance(grid, task, goals)
-    if start < 0 or not len(goals):
-        return start, next(iter(goals.tolist()), -1)
-    reached = np.zeros(grid.free.size, dtype=np.bool_)
-    reached[grid.cells_of(_kernels_turns.led_to(grid.graph, start))] = True
-    return start, int(goals[reached[goals].argmax()])
+    goals, _ = _free_around(grid, task.goal, within)
+    nearest = _kernels_turns.leads_to(grid.graph, goals)
+    start = entrance(grid, task, nearest)
+    place = int(nearest[start]) if start >= 0 else 0
+    return start, int(goals[max(0, place)]) if len(goals) else -1
 
 
-def entrance(grid: Grid, task: Task, goals: npt.NDArray[np.int64]) -> int:
+def entrance(grid: Grid, task: Task, nearest: npt.NDArray[np.int32]) -> int:
     """Return the node by which the robot enters a grid with turns from its exact start; -1 if it cannot.
 
     A lead turns on the spot, drives straight to the centre of the node's cell, and turns to a heading of the node. The node
@@ -59,44 +47,47 @@ def entrance(grid: Grid, task: Task, goals: npt.NDArray[np.int64]) -> int:
     Args:
         grid: a grid with turns
         task: the task whose world was rasterised
-        goals: flat cells (G,)
+        nearest: which goal moves lead to from each node, -1 for none (N,)
     """
-    from antdrive.worlds import _kernels_turns
+    from antdrive.planners import _kernels_entrances
 
-    near, away = _free_around(grid, task.start[:2])
+    near, away = _free_around(grid, task.start[:2], LEAD)
     if not len(near):
         return -1
-    leading = _kernels_turns.leads_to(grid.graph, goals)
     labels = grid.turns.label[near]
-    useful = np.where(labels >= 0, leading[labels], False).any(axis=1)
+    useful = ((labels >= 0) & (nearest[labels] >= 0)).any(axis=1)
     if not useful.any():
         return int(labels[0].max())
-    around = _around(task)
-    outline = outline_at(around, grid.turns.outline)
+    outline = outline_at(task, grid.turns.outline)
+    around = _around(task, LEAD + float(np.hypot(*outline.corners.T).max()) + outline.reach + ROOM)
+    centres = grid.xy(np.column_stack(np.divmod(near, grid.shape[1])))
     for most, backwards in ((LEAD, False), (MAX_BACKWARDS, True)):
-        for node in _entrances(grid, around, outline, near[useful & (away <= most)], backwards):
-            if leading[node]:
-                return node
+        kept = useful & (away <= most)
+        found = _kernels_entrances.first_entrance(
+            *task.start, centres[kept], labels[kept], nearest, backwards, *outline, *around
+        )
+        if found >= 0:
+            return int(found)
     return -1
 
 
-def _free_around(grid: Grid, point: Point) -> tuple[npt.NDArray[np.int64], Floats]:
-    """Return the free cells within `LEAD` of a point, nearest first, and their distances [m]."""
+def _free_around(grid: Grid, point: Point, within: float) -> tuple[npt.NDArray[np.int64], Floats]:
+    """Return the free flat cells within a distance of a point, nearest first, and their distances [m]."""
     row, col = grid.cell_at(*point)
-    reach = math.ceil(LEAD / grid.cell)
+    reach = math.ceil(within / grid.cell)
     low, left = max(0, row - reach), max(0, col - reach)
     near = np.argwhere(grid.free[low : row + reach + 1, left : col + reach + 1]) + (low, left)
     away = np.hypot(*(grid.xy(near) - point).T)
     order = np.argsort(away, kind="stable")
-    order = order[away[order] <= LEAD]
+    order = order[away[order] <= within]
     return near[order, 0] * grid.shape[1] + near[order, 1], away[order]
 
 
-def _around(task: Task) -> Task:
-    """Return the task with the obstacles that leads may meet."""
+def _around(task: Task, within: float) -> tuple[Floats, Floats]:
+    """Return the discs (N, 3) within a distance of the start, and the walls (4,) [m]."""
     discs, (x, y, _) = task.world.discs, task.start
-    close = np.hypot(discs[:, 0] - x, discs[:, 1] - y) - discs[:, 2] < FAR
-    return dataclasses.replace(task, world=PointWorld.of(task.world.name, task.world.bounds, discs[close]))
+    close = np.hypot(discs[:, 0] - x, discs[:, 1] - y) - discs[:, 2] < within
+    return discs[close], np.asarray(task.world.bounds, dtype=np.float64)
 
 
 def outline_at(task: Task, outline: Outline) -> Outline:
@@ -110,41 +101,15 @@ def outline_at(task: Task, outline: Outline) -> Outline:
 
 def lead_heading(pose: Pose, x: float, y: float, outline: Outline, world: World, *, backwards: bool) -> float:
     """Return the heading of a straight lead from a pose to (x, y) [rad]; NaN if it or the turn to it is not clear."""
-    from antdrive.worlds.headings import sweep_clearance
+    from antdrive.planners import _kernels_entrances
 
-    dx, dy = x - pose[0], y - pose[1]
-    if math.hypot(dx, dy) < 1e-6:
-        return pose[2]
-    heading = math.atan2(-dy, -dx) if backwards else math.atan2(dy, dx)
-    if sweep_clearance(pose[0], pose[1], x, y, heading, outline, world.discs, world.bounds) <= 0:
-        return math.nan
-    return heading if math.isfinite(clear_turn(pose, heading, outline, world)) else math.nan
+    walls = np.asarray(world.bounds, dtype=np.float64)
+    return float(_kernels_entrances.lead_heading(*pose, x, y, backwards, *outline, world.discs, walls))
 
 
 def clear_turn(pose: Pose, heading: float, outline: Outline, world: World) -> float:
     """Return the shortest clear turn on the spot from a pose to a heading [rad]; NaN if neither way round is clear."""
-    from antdrive.worlds.headings import turn_clear
+    from antdrive.planners import _kernels_entrances
 
-    short = float(wrap_angle(heading - pose[2]))
-    for turn in (short, short - math.copysign(2 * math.pi, short)):
-        if turn_clear(*pose, turn, outline, world.discs, world.bounds):
-            return turn
-    return math.nan
-
-
-def _entrances(
-    grid: Grid, task: Task, outline: Outline, cells: npt.NDArray[np.int64], backwards: bool
-) -> Iterator[int]:
-    """Yield the nodes of some flat cells with a clear lead."""
-    from antdrive.worlds.headings import turn_clear
-
-    world = task.world
-    for cell in cells.tolist():
-        x, y = grid.xy([divmod(cell, grid.shape[1])])[0].tolist()
-        heading = lead_heading(task.start, x, y, outline, world, backwards=backwards)
-        if math.isnan(heading):
-            continue
-        for side in (math.floor(heading / STEP), math.ceil(heading / STEP)):
-            node = int(grid.turns.label[cell, side % 8])
-            if node >= 0 and turn_clear(x, y, heading, side * STEP - heading, outline, world.discs, world.bounds):
-                yield node
+    walls = np.asarray(world.bounds, dtype=np.float64)
+    return float(_kernels_entrances.clear_turn(*pose, heading, *outline, world.discs, walls))
