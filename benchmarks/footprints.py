@@ -1,19 +1,25 @@
-"""Plans for a robot's footprint: `python -m benchmarks.footprints [TABLE ...]`.
+"""Plans and drives of rectangles between obstacles: `python -m benchmarks.footprints [TABLE ...]`.
 
-Prints Markdown.
+Tables:
 
-- lattice: BARN worlds that the independent lattice (`benchmarks/lattice.py`) crosses, by its disc and by its outline
+- lattice: BARN's worlds that the independent lattice (`benchmarks/lattice.py`) crosses, by the disc and by the outline
+- drives: the same worlds driven with `astar` and default margins, with the map and without it, beside drives of the disc
+- durations: worlds that both the disc and the footprint cross, driven with either
 - repair: time to repair a plan for the `warehouse` robot after a small change, against planning from scratch; lengths must agree
 - plans: times of `astar` in random worlds, median / worst, after a first world
+- office: a campaign of random tasks in an office of ten doors
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import itertools
 import math
 import statistics
+import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -22,18 +28,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from antdrive.planners import Query, load_planner, replanner_for
-from antdrive.robots import load_robot
+from antdrive.robots import RobotSpec, load_robot
 from antdrive.robots.clearance import outline_of
+from antdrive.runs.campaigns import make_campaign, sweep
 from antdrive.runs.pool import call_all
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 from antdrive.worlds.headings import Outline, turn_clear
 from antdrive.worlds.world import PointWorld
-from benchmarks.drives import barn_tasks
+from benchmarks.drives import Result, barn_tasks, drive
 from benchmarks.lattice import Flood, Point, Shape, flood
 from benchmarks.markdown import command_line, print_tables, table
 from tools.shared_data import BARN
 
-SMALLEST = ("lattice --worlds 1 --jobs 1", "plans --random 1", "repair --rounds 1")
+SMALLEST = (
+    "lattice drives durations --worlds 1 --jobs 1",
+    "plans --random 1",
+    "repair --rounds 1",
+    "office --office-tasks 1 --jobs 1",
+)
 MARGIN = 0.03  # [m]
 CELL = 0.05  # [m]
 SIZES = {"husky": (0.99, 0.67, 0.0), "warehouse": (0.90, 0.60, 0.15)}  # length, width, middle ahead of the axle [m]
@@ -42,6 +54,8 @@ CHANGES = {
     "post": "a post of 2 to 5 cm appears beside the path: a new grid",
 }
 SEARCHES = {"disc": 8, "8 headings": 8, "16 headings": 16}
+LIDAR = "jackal"  # the robot whose lidar mapless drives borrow: neither rectangle has one
+SEED = 1
 
 
 def rectangle(length: float, width: float, ahead: float) -> list[Point]:
@@ -233,17 +247,115 @@ def plans(given: argparse.Namespace) -> Iterator[str]:
     yield from table(("robot", "with a path", *(f"{name} [ms]" for name in Times._fields)), rows)
 
 
+def robot_of(name: str, *, mapped: bool = True) -> RobotSpec:
+    """Return a robot, with a lidar where it has no map; its size is that of the lattice."""
+    robot = load_robot(name)
+    length, width, (ahead, aside) = robot.footprint.box or (math.nan, math.nan, (math.nan, math.nan))
+    assert np.allclose((length, width, ahead, aside), (*SIZES[name], 0.0)), robot.footprint
+    return robot if mapped else dataclasses.replace(robot, lidar=load_robot(LIDAR).lidar)
+
+
+def driven(given: argparse.Namespace, name: str, among: Collection[str] = (), **settings: Any) -> list[Result]:
+    """Drive a robot through the worlds, or those among the given ones, in their order."""
+    tasks = dict(list(barn_tasks(given.barn).items())[: given.worlds or None])
+    robot = robot_of(name, mapped=settings["map"] == "given")
+    picked = {world: task for world, task in tasks.items() if not among or world in among}
+    calls = (partial(drive, world, task, "astar", robot, seed=SEED, **settings) for world, task in picked.items())
+    return call_all(calls, given.jobs)
+
+
+def drives(given: argparse.Namespace) -> Iterator[str]:
+    """Yield drives by robot, map, noise and the shape that plans keep clear; mapless only in worlds that it crosses."""
+    heads = [
+        "robot",
+        "map",
+        "noise",
+        "footprint",
+        "worlds",
+        "solved",
+        "by the footprint",
+        "succeeded",
+        "certified",
+        "contacts",
+    ]
+    yield from table([*heads, "crossed by the lattice, not certified"], drive_rows(given))
+
+
+def drive_rows(given: argparse.Namespace) -> Iterator[list[str]]:
+    for name, known, noise, shape in itertools.product(SIZES, ("given", "none"), (0.0, 1.0), ("auto", "disc")):
+        if not set(given.only.split()) <= {name, known, f"{noise:g}", shape}:
+            continue
+        found = crossed(given.barn, given.worlds, given.jobs, name, "disc" if shape == "disc" else "8 headings")
+        among = [world for world in found if known == "given" or found[world]]
+        got = driven(given, name, among, map=known, noise=noise, footprint=shape) if among else []
+        there = [one for one in got if one.metrics]
+        left = [f"{one.name} ({one.outcome.lower()})" for one in got if found[one.name] and not one.succeeded]
+        counts = (
+            len(got),
+            len(there),
+            sum(one.shape == "footprint" for one in there),
+            sum(one.outcome == "SUCCEEDED" for one in there),
+            sum(one.succeeded for one in there),
+            sum(one.contacts for one in there),
+        )
+        yield [f"`{name}`", known, f"{noise:g}", shape, *map(str, counts), ", ".join(left) or "none"]
+
+
+def durations(given: argparse.Namespace) -> Iterator[str]:
+    """Yield the durations of drives of the footprint over those of the disc, in worlds that both cross."""
+    rows = []
+    for name, noise in itertools.product(SIZES, (0.0, 1.0)):
+        disc = {
+            one.name: one for one in driven(given, name, map="given", noise=noise, footprint="disc") if one.succeeded
+        }
+        exact = driven(given, name, disc, map="given", noise=noise, footprint="exact") if disc else []
+        pairs = [(one.metrics, disc[one.name].metrics) for one in exact if one.succeeded]
+        ratios = ([one[key] / two[key] for one, two in pairs] for key in ("duration_s", "driven_length_m"))
+        shown = (f"{statistics.median(some):.3f} / {max(some):.3f}" if some else "–" for some in ratios)
+        rows.append([f"`{name}`", f"{noise:g}", str(len(pairs)), *shown])
+    yield from table(
+        "robot | noise | worlds | duration over the disc's: median / max | driven length: median / max", rows
+    )
+
+
+def office(given: argparse.Namespace) -> Iterator[str]:
+    """Yield the results of a campaign of random tasks in an office."""
+    campaign = {
+        "worlds": [{"generate": "office"}],
+        "planners": ["astar"],
+        "robots": ["warehouse"],
+        "noise": [0.0, 1.0],
+        "tasks": {"random": given.office_tasks, "seed": SEED, "min_distance": 5.0},
+        "seeds": [SEED],
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        runs = sweep(make_campaign(campaign), folder, jobs=given.jobs).table.to_pylist()
+    rows = []
+    for noise, some in itertools.groupby(sorted(runs, key=lambda run: run["noise"]), key=lambda run: run["noise"]):
+        got = list(some)
+        outcomes = [run["outcome"] for run in got]
+        certified = [run for run in got if run["succeeded"]]
+        failed = [f"{run['task']} ({run['outcome']})" for run in got if not run["succeeded"]]
+        least = min((run["min_clearance_m"] for run in got if run["certified"]), default=math.nan)
+        counts = len(got), len(got) - outcomes.count("no_path"), outcomes.count("succeeded"), len(certified)
+        shown = *map(str, counts), str(outcomes.count("collided")), f"{100 * least:.1f} cm", ", ".join(failed) or "none"
+        rows.append([f"{noise:g}", *shown])
+    yield from table("noise | tasks | solved | succeeded | certified | collided | min. clearance | not certified", rows)
+
+
 def main() -> None:
     given = command_line(
         __doc__,
-        tables=([], "lattice, plans, repair"),
+        tables=([], "tables to print; default: all"),
         barn=(BARN, "folder or archive of BARN's world_*.world files"),
         worlds=(0, "how many of BARN's worlds; 0: all"),
         jobs=(2, "processes; 0: this one"),
+        only=("", "rows of `drives` with these values, such as 'husky none 1 auto'; default: all"),
         rounds=(20, "repair: drives of each kind"),
         random=(60, "random worlds"),
+        office_tasks=(100, "how many random tasks in the office"),
     )
-    print_tables(given.tables, {"lattice": lattice, "plans": plans, "repair": repair}, given)
+    print_tables(given.tables, {f.__name__: f for f in (lattice, drives, durations, plans, repair, office)}, given)
 
 
 if __name__ == "__main__":
