@@ -8,6 +8,8 @@ Tables:
 - repair: time to repair a plan for the `warehouse` robot after a small change, against planning from scratch; lengths must agree
 - plans: times of `astar` in random worlds, median / worst, after a first world
 - office: a campaign of random tasks in an office of ten doors
+- ants: shortest paths of the colonies where `auto` takes the footprint, by the disc and by the footprint
+- lines: margin that noise costs on courses of lines and turns [mm], beside its closed form
 """
 
 from __future__ import annotations
@@ -27,14 +29,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from antdrive.planners import Query, load_planner, replanner_for
-from antdrive.robots import RobotSpec, load_robot
+from antdrive.planners import PLANNERS, Query, capabilities_of, load_planner, replanner_for
+from antdrive.robots import PurePursuit, RobotSpec, load_robot
 from antdrive.robots.clearance import outline_of
+from antdrive.robots.default_margin import line_margin
 from antdrive.runs.campaigns import make_campaign, sweep
+from antdrive.runs.margins.loss import loss_on_course
 from antdrive.runs.pool import call_all
+from antdrive.sim.compose import route_planner
+from antdrive.sim.driving.routes import grid_of
+from antdrive.sim.scenario import LossFactors, Scenario
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 from antdrive.worlds.headings import Outline, turn_clear
-from antdrive.worlds.world import PointWorld
+from antdrive.worlds.world import PointWorld, by_geometry
 from benchmarks.drives import Result, barn_tasks, drive
 from benchmarks.lattice import Flood, Point, Shape, flood
 from benchmarks.markdown import command_line, print_tables, table
@@ -45,6 +52,15 @@ SMALLEST = (
     "plans --random 1",
     "repair --rounds 1",
     "office --office-tasks 1 --jobs 1",
+    "ants --seeds 1",
+    "lines --courses 1 --jobs 1",
+)
+ANTS = (
+    ("jackal", "hasan-4d"),
+    ("warehouse", "slalom"),
+    ("warehouse", "u-trap"),
+    ("warehouse", "gate"),
+    ("warehouse", "han2007-aco"),
 )
 MARGIN = 0.03  # [m]
 CELL = 0.05  # [m]
@@ -343,6 +359,39 @@ def office(given: argparse.Namespace) -> Iterator[str]:
     yield from table("noise | tasks | solved | succeeded | certified | collided | min. clearance | not certified", rows)
 
 
+def ants(given: argparse.Namespace) -> Iterator[str]:
+    """Yield the shortest paths of the colonies by the disc and on the grid that footprint `auto` takes instead."""
+    colonies = [
+        name for name in PLANNERS if capabilities_of(PLANNERS[name]).iterative and capabilities_of(PLANNERS[name]).turns
+    ]
+    rows = []
+    for robot, world in ANTS:
+        routes = route_planner(Scenario.of(world, planner=colonies[0], robot=robot))
+        disc = grid_of(by_geometry(routes.task.world), routes.cell, routes.inflate)
+        for shape, grid in (("disc", disc), ("footprint", routes.chosen_grid())):
+            query, lengths = Query.between(grid, routes.task), []
+            for name in colonies:
+                made = [load_planner(name).plan(query, np.random.default_rng(seed)) for seed in range(given.seeds)]
+                lengths.append(min((plan.cost for plan in made if plan.solved), default=math.nan))
+            shown = ("–" if math.isnan(length) else f"{length:.2f}" for length in lengths)
+            rows.append([f"`{robot}`", f"`{world}`", f"{grid.cell:g}", shape, *shown])
+    yield from table(("robot", "world", "cell [m]", "shape", *(f"`{name}`" for name in colonies)), rows)
+
+
+def lines(given: argparse.Namespace) -> Iterator[str]:
+    """Yield the margin that noise costs on courses of lines and turns, beside its closed form."""
+    rows = []
+    for name in ("jackal", *SIZES):
+        robot, controller = load_robot(name), PurePursuit()
+        margin = line_margin(robot, controller, 1.0)
+        factors = LossFactors(robot=robot, controller=controller, noise=1.0, smoothing="clearance", outlined=True)
+        calls = (partial(loss_on_course, factors, margin, seed) for seed in range(given.courses))
+        losses = [loss.footprint for loss in call_all(calls, given.jobs)]
+        figures = margin, statistics.median(losses), max(losses)
+        rows.append([f"`{name}`", str(sum(map(math.isfinite, losses))), *(f"{1000 * one:.0f}" for one in figures)])
+    yield from table(("robot", "arrived", "`line_margin`", "median loss", "largest loss"), rows)
+
+
 def main() -> None:
     given = command_line(
         __doc__,
@@ -354,8 +403,11 @@ def main() -> None:
         rounds=(20, "repair: drives of each kind"),
         random=(60, "random worlds"),
         office_tasks=(100, "how many random tasks in the office"),
+        seeds=(3, "ants: runs of each colony"),
+        courses=(80, "lines: courses of each robot"),
     )
-    print_tables(given.tables, {f.__name__: f for f in (lattice, drives, durations, plans, repair, office)}, given)
+    shown = (lattice, drives, durations, plans, repair, office, ants, lines)
+    print_tables(given.tables, {f.__name__: f for f in shown}, given)
 
 
 if __name__ == "__main__":
