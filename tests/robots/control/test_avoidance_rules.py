@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist
+from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot
 from antdrive.robots.control._kernels_avoidance import first_contact, intrusion
 from antdrive.worlds import Route, World
 
@@ -79,3 +79,62 @@ def test_the_prediction_covers_the_horizon_in_equal_steps():
     times = Avoidance(horizon=1.0, step=0.1).prediction_times
     np.testing.assert_allclose(times, np.arange(11) / 10)
     assert Avoidance(horizon=0.95, step=0.1).prediction_times[-1] == pytest.approx(1.0)
+
+
+JACKAL = load_robot("jackal")
+
+
+@given(gap=st.floats(0.0, 8.0), mover=st.floats(-1.4, 1.4), speed=st.floats(0.0, 2.0))
+def test_a_robot_that_brakes_in_time_is_slow_within_a_metre_of_a_mover(gap, mover, speed):
+    """Both move on one line; from the allowed speed the robot brakes as late as it may."""
+    avoidance = Avoidance()
+    x = JACKAL.radius + 0.3 + gap
+    places = np.array([[[x, 0.0]], [[x - mover * avoidance.step, 0.0]]])
+    v = avoidance.speed_near(JACKAL, (0.0, 0.0, 0.0), Twist(speed, 0.0), places, np.array([0.3]))
+    assert v >= avoidance.near_speed
+    braking = (v - avoidance.near_speed) / JACKAL.max_acceleration
+    covered = max(mover, 0.0) * braking + (v**2 - avoidance.near_speed**2) / (2 * JACKAL.max_acceleration)
+    assert gap - covered >= avoidance.near_distance - 1e-9 or v == pytest.approx(avoidance.near_speed)
+
+
+@pytest.mark.parametrize(("mover", "capped"), [(0.0, True), (1.4, True), (1.9, False)])
+def test_movers_faster_than_people_leave_the_speed_alone(mover, capped):
+    places = np.array([[[1.0, 0.0]], [[1.0, 0.1 * mover]]])
+    v = Avoidance().speed_near(JACKAL, (0.0, 0.0, 0.0), Twist(2.0, 0.0), places, np.array([0.3]))
+    assert v == (0.8 if capped else math.inf)
+
+
+def test_the_way_backwards_counts_until_it_is_driven_forwards_again(tracked, turtlebot):
+    avoidance, far = Avoidance(), np.tile((9.0, 9.0), (26, 1, 1))
+    state = AvoidanceState()
+    for speed, way in ((-0.3, 0.3), (-0.3, 0.6), (0.3, 0.3), (0.7, 0.0)):
+        for _ in range(60):
+            last = Twist(speed, 0.0)
+            _, _, state = avoidance.avoid(
+                tracked, turtlebot, (1.0, 0.0, 0.0), last, PursuitState(1.0), last, state, far, np.array([0.2])
+            )
+        assert state.reversed == pytest.approx(way, abs=1e-6)
+
+
+@pytest.mark.parametrize(("comes", "most"), [(0.0, 0.0), (0.15, 0.3), (1.2, 0.7)])
+def test_a_robot_reverses_slowly_unless_it_would_be_hit(tracked, turtlebot, comes, most):
+    """A mover comes straight at the robot."""
+    avoidance, x = Avoidance(), 1.0 + turtlebot.radius + 0.2 + max(0.5, 1.25 * comes)
+    state, last, fastest = AvoidanceState(reversed=0.0), Twist(0.0, 0.0), 0.0
+    for _ in range(40):
+        places = np.zeros((26, 1, 2))
+        places[:, 0, 0] = x - comes * avoidance.prediction_times
+        last, _, state = avoidance.avoid(
+            tracked,
+            turtlebot,
+            (1.0, 0.0, 0.0),
+            last,
+            PursuitState(1.0),
+            Twist(0.1, 0.0),
+            state,
+            places,
+            np.array([0.2]),
+        )
+        x, fastest = x - (comes + last.speed) / 60, max(fastest, -last.speed)
+    assert fastest <= most + 1e-9
+    assert fastest > 0.3 or comes < 1.0

@@ -7,6 +7,9 @@ sequences of two constant twists, forwards or backwards, within the robot's dyna
 IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing still is only
 one of the candidates, so the robot moves out of the path of an approaching mover.
 
+Near movers the robot drives slowly, and it reverses slowly and not far. These limits are lifted step by step where every
+candidate within them ends in a contact.
+
 If a nearby mover turns, there may be no candidate that keeps the minimum clearance. While the robot can still stop in time,
 it takes the candidate with the latest contact. After that it takes the one that stays farthest from movers, and
 stops only if every candidate ends in a contact. T. Fraichard and
@@ -30,6 +33,7 @@ from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
 from antdrive.robots.spec import Footprint, RobotSpec
 
 SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progress [m per m/s]
+WALKING = 1.5  # a slow robot is no safer beside faster movers, which are not people [m/s]
 PERSISTENCE = 0.05  # value of keeping the last decision, in metres of progress [m]
 
 
@@ -39,10 +43,12 @@ class AvoidanceState(NamedTuple):
     Attributes:
         candidate: the pair of twists being executed, a row of the candidate table; empty if there is none
         remaining: remaining time of its first twist [s]
+        reversed: distance driven backwards and not yet forwards again [m]
     """
 
     candidate: tuple[float, ...] = ()
     remaining: float = 0.0
+    reversed: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +66,10 @@ class Avoidance:
         reversal_time: prediction horizon for a mover's sudden reversal [s]
         reversal_margin: clearance to a reversing mover beyond `min_clearance` [m]
         reversal_weight: cost of each metre below this clearance [m/m]; 0 ignores reversals
+        near_speed: highest speed near movers up to 1.5 m/s, unless a contact follows [m/s]
+        near_distance: gap between the robot's circumscribed circle and a mover below which that holds [m]
+        reverse_speed: highest speed backwards, unless a contact follows [m/s]
+        reverse_distance: longest way backwards, unless a contact follows [m]
 
     Raises:
         ValueError: a setting is out of range.
@@ -75,6 +85,10 @@ class Avoidance:
     reversal_time: float = 0.6
     reversal_margin: float = 0.05
     reversal_weight: float = 6.0
+    near_speed: float = 0.8
+    near_distance: float = 1.0
+    reverse_speed: float = 0.3
+    reverse_distance: float = 0.5
 
     def __post_init__(self) -> None:
         for key in ("horizon", "step"):
@@ -118,22 +132,51 @@ class Avoidance:
             speed_limit: speed limit from the schedule of a timed plan [m/s]
             backwards: maximum reverse speed, for a robot that cannot see behind; ignored if obeying it causes a contact [m/s]
         """
-        candidates = self._candidates(spec, state, speed_limit, backwards)
-        situation = (
-            *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
-            tracked.limits, tracked.tuning._replace(period=self.step),
-            _weights(self, tracked.tuning.robot_radius, spec.footprint), places, radii,
-        )  # fmt: skip
-        chosen, contact = kernels.choose(*situation)
-        if chosen == 0 and contact == math.inf:
-            return wanted, False, AvoidanceState()
-        if contact < math.inf and backwards < spec.max_speed:
-            return self.avoid(tracked, spec, pose, last, before, wanted, state, places, radii, speed_limit)
-        stopping = abs(last.speed) / tracked.limits.acceleration
-        if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
+        period, limits = tracked.tuning.period, tracked.limits
+        state = state._replace(reversed=max(0.0, state.reversed - last.speed * period))
+        near = self.speed_near(spec, pose, last, places, radii)
+        left = max(self.reverse_distance - state.reversed, 0.0)
+        slow = min(self.reverse_speed, math.sqrt(2 * limits.acceleration * left), backwards)
+        tuning = tracked.tuning._replace(period=self.step)
+        weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
+        for fastest, reverse in ((near, slow), (near, backwards), (math.inf, math.inf)):
+            candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
+            situation = (
+                *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
+                limits, tuning, weights, places, radii,
+            )  # fmt: skip
+            chosen, contact = kernels.choose(*situation)
+            if contact == math.inf:
+                break
+        if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
+            return wanted, False, AvoidanceState(reversed=state.reversed)
+        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(tracked, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
-        twist, state = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
-        return twist, True, state
+        twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
+        return twist, True, after._replace(reversed=state.reversed)
+
+    def speed_near(self, spec: RobotSpec, pose: Pose, last: Twist, places: Floats, radii: Floats) -> float:
+        """Return the highest speed at which the robot can slow to `near_speed` before it is near a mover [m/s].
+
+        Args:
+            spec: the robot
+            pose: its estimated pose
+            last: the command of the previous period
+            places: the movers' predicted positions (K + 1, M, 2), K >= 1 [m]
+            radii: their radii (M,) [m]
+        """
+        if not len(radii) or self.near_speed >= spec.max_speed:
+            return math.inf
+        velocities = (places[1] - places[0]) / self.step
+        to = places[0] - pose[:2]
+        away = np.hypot(*to.T)
+        closing = np.maximum(-(velocities * to).sum(axis=1) / np.maximum(away, 1e-9), 0.0)
+        gap = away - radii - spec.radius - self.near_distance - (closing + abs(last.speed)) * self.step
+        both = closing + self.near_speed
+        # With x beyond `near_speed`: closing x / a + (x^2 + 2 near_speed x) / (2 a) <= gap.
+        more = np.sqrt(both**2 + 2 * spec.max_acceleration * np.maximum(gap, 0.0)) - both
+        walks = np.hypot(*velocities.T) <= WALKING
+        return self.near_speed + float(more.min(initial=math.inf, where=walks))
 
     def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
@@ -142,20 +185,21 @@ class Avoidance:
         return 2 * self.step if close else 0.0
 
     def _candidates(
-        self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, backwards: float = math.inf
+        self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float
     ) -> Floats:
-        """Return the candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
+        """Return the candidates (N, 6) up to a speed and a reverse speed [m/s]; row 0 keeps the speed limit, row 1 is the
+        last decision."""
         table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
-        if backwards < spec.max_speed:
-            slowest = table[:, [kernels.SPEED, kernels.NEXT_SPEED]].min(axis=1)
-            table = table[slowest >= -backwards - 1e-9]
-        if not state.candidate and speed_limit >= spec.max_speed:
+        fastest, reverse = min(fastest, spec.max_speed), min(reverse, spec.max_speed)
+        if not state.candidate and min(speed_limit, fastest, reverse) >= spec.max_speed:
             return table
         table = table.copy()
         table[0, kernels.SPEED] = min(spec.max_speed, speed_limit)
         if state.candidate:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining
+        speeds = [kernels.SPEED, kernels.NEXT_SPEED]
+        table[:, speeds] = np.clip(table[:, speeds], -min(reverse, fastest), fastest)
         return table
 
 
@@ -190,6 +234,10 @@ _NOT_NEGATIVE = (
     "reversal_time",
     "reversal_margin",
     "reversal_weight",
+    "near_speed",
+    "near_distance",
+    "reverse_speed",
+    "reverse_distance",
 )
 
 
