@@ -34,6 +34,8 @@ from antdrive.robots.spec import Footprint, RobotSpec
 
 SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progress [m per m/s]
 WALKING = 1.5  # a slow robot is no safer beside faster movers, which are not people [m/s]
+SURPRISE = 0.1  # a mover has another velocity than predicted if they differ by more than this [m/s]
+CROSSING = 0.5  # a robot crosses a mover's lane if the sine of the angle between both headings exceeds this
 PERSISTENCE = 0.05  # value of keeping the last decision, in metres of progress [m]
 
 
@@ -66,8 +68,7 @@ class Avoidance:
         reversal_time: prediction horizon for a mover's sudden reversal [s]
         reversal_margin: clearance to a reversing mover beyond `min_clearance` [m]
         reversal_weight: cost of each metre below this clearance [m/m]; 0 ignores reversals
-        near_speed: highest speed near movers up to 1.5 m/s, unless a contact follows [m/s]
-        near_distance: gap between the robot's circumscribed circle and a mover below which that holds [m]
+        near_distance: gap to a mover below which the robot keeps its `near_speed`, unless a contact follows [m]
         reverse_speed: highest speed backwards, unless a contact follows [m/s]
         reverse_distance: longest way backwards, unless a contact follows [m]
 
@@ -85,7 +86,6 @@ class Avoidance:
     reversal_time: float = 0.6
     reversal_margin: float = 0.05
     reversal_weight: float = 6.0
-    near_speed: float = 0.8
     near_distance: float = 1.0
     reverse_speed: float = 0.3
     reverse_distance: float = 0.5
@@ -114,6 +114,7 @@ class Avoidance:
         state: AvoidanceState,
         places: Floats,
         radii: Floats,
+        velocities: Floats | None = None,
         speed_limit: float = math.inf,
         backwards: float = math.inf,
     ) -> tuple[Twist, bool, AvoidanceState]:
@@ -129,17 +130,22 @@ class Avoidance:
             state: the state returned in the previous period
             places: the movers' predicted positions at the `prediction_times` (K + 1, M, 2) [m]
             radii: their radii (M,) [m]
+            velocities: their observed velocities (M, 2) [m/s]; None: those of the prediction
             speed_limit: speed limit from the schedule of a timed plan [m/s]
             backwards: maximum reverse speed, for a robot that cannot see behind; ignored if obeying it causes a contact [m/s]
         """
         period, limits = tracked.tuning.period, tracked.limits
         state = state._replace(reversed=max(0.0, state.reversed - last.speed * period))
-        near = self.speed_near(spec, pose, last, places, radii)
+        predicted = (places[1] - places[0]) / self.step
+        near = self.speed_near(spec, pose, last, places[0], predicted, radii)
         left = max(self.reverse_distance - state.reversed, 0.0)
         slow = min(self.reverse_speed, math.sqrt(2 * limits.acceleration * left), backwards)
         tuning = tracked.tuning._replace(period=self.step)
         weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
-        for fastest, reverse in ((near, slow), (near, backwards), (math.inf, math.inf)):
+        limits_of = [(near, slow), (near, backwards), (math.inf, backwards), (math.inf, math.inf)]
+        if velocities is not None and self._surprised(spec, pose, places[0], velocities - predicted, radii):
+            del limits_of[:2]
+        for fastest, reverse in dict.fromkeys(limits_of):
             candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
@@ -155,28 +161,42 @@ class Avoidance:
         twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
         return twist, True, after._replace(reversed=state.reversed)
 
-    def speed_near(self, spec: RobotSpec, pose: Pose, last: Twist, places: Floats, radii: Floats) -> float:
-        """Return the highest speed at which the robot can slow to `near_speed` before it is near a mover [m/s].
+    def speed_near(
+        self, spec: RobotSpec, pose: Pose, last: Twist, places: Floats, velocities: Floats, radii: Floats
+    ) -> float:
+        """Return the highest speed at which the robot can slow to its `near_speed` before it is near a mover [m/s].
+
+        Movers behind the robot do not count, nor movers whose lane it crosses before them: those that come faster than
+        `near_speed`, while the robot's heading leads out of the strip that they sweep. There, slowing down is the danger.
 
         Args:
             spec: the robot
             pose: its estimated pose
             last: the command of the previous period
-            places: the movers' predicted positions (K + 1, M, 2), K >= 1 [m]
+            places: the movers' positions (M, 2) [m]
+            velocities: their velocities (M, 2) [m/s]
             radii: their radii (M,) [m]
         """
-        if not len(radii) or self.near_speed >= spec.max_speed:
+        if not len(radii) or spec.near_speed >= spec.max_speed:
             return math.inf
-        velocities = (places[1] - places[0]) / self.step
-        to = places[0] - pose[:2]
-        away = np.hypot(*to.T)
-        closing = np.maximum(-(velocities * to).sum(axis=1) / np.maximum(away, 1e-9), 0.0)
+        heading = np.array((math.cos(pose[2]), math.sin(pose[2])))
+        to, speeds = places - pose[:2], np.hypot(*velocities.T)
+        away, moving = np.maximum(np.hypot(*to.T), 1e-9), np.maximum(speeds, 1e-9)
+        closing = np.maximum(-(velocities * to).sum(axis=1) / away, 0.0)
+        aside = np.abs(_cross(to, velocities)) / moving - radii - spec.radius - self.min_clearance
+        crosses = (closing > spec.near_speed) & (aside < 0) & (np.abs(_cross(heading, velocities)) > CROSSING * moving)
+        counts = (to @ heading > 0) & (speeds <= WALKING) & ~crosses
         gap = away - radii - spec.radius - self.near_distance - (closing + abs(last.speed)) * self.step
-        both = closing + self.near_speed
+        both = closing + spec.near_speed
         # With x beyond `near_speed`: closing x / a + (x^2 + 2 near_speed x) / (2 a) <= gap.
         more = np.sqrt(both**2 + 2 * spec.max_acceleration * np.maximum(gap, 0.0)) - both
-        walks = np.hypot(*velocities.T) <= WALKING
-        return self.near_speed + float(more.min(initial=math.inf, where=walks))
+        return spec.near_speed + float(more.min(initial=math.inf, where=counts))
+
+    def _surprised(self, spec: RobotSpec, pose: Pose, places: Floats, off: Floats, radii: Floats) -> bool:
+        """Return whether a mover that may come near soon has another velocity than predicted, by `off` (M, 2) [m/s]."""
+        off_by = np.hypot(*off.T)
+        gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
+        return bool(((off_by > SURPRISE) & (gap < self.horizon * (off_by + spec.max_speed))).any())
 
     def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
@@ -201,6 +221,11 @@ class Avoidance:
         speeds = [kernels.SPEED, kernels.NEXT_SPEED]
         table[:, speeds] = np.clip(table[:, speeds], -min(reverse, fastest), fastest)
         return table
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Return the cross products of vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _execute(
@@ -234,7 +259,6 @@ _NOT_NEGATIVE = (
     "reversal_time",
     "reversal_margin",
     "reversal_weight",
-    "near_speed",
     "near_distance",
     "reverse_speed",
     "reverse_distance",

@@ -137,7 +137,8 @@ class OccupancyMap:
         Args:
             pose: the estimated pose of the robot, not of its lidar
             ranges: the scan (beams,) [m]
-            omitted: beams whose hits are omitted, such as those of movers (beams,)
+            omitted: beams that hit movers, whose hits are omitted (beams,). Other movers may not be tracked yet, so hits
+                beyond `trust` are cleared as well; None: nothing moves
         """
         x, y, yaw = self._lidar.pose_on(pose)
         if self._grows:
@@ -153,6 +154,11 @@ class OccupancyMap:
             x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, turn, turns, mask,
             self.horizon, self.trust, self.scans, self._plain, self._changed,
         )  # fmt: skip
+        if omitted is not None and not rest:
+            count = kernels.see_far(
+                x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self.trust, self.scans,
+                self._plain, self._changed, count,
+            )  # fmt: skip
         self._spare -= count
         return self._changed[:count].copy()
 
