@@ -1,5 +1,6 @@
 """The parts of local avoidance, each by itself."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot, robot_to_dict
 from antdrive.robots.control._kernels_avoidance import first_contact, intrusion
 from antdrive.worlds import Route, World
 
@@ -84,24 +85,46 @@ def test_the_prediction_covers_the_horizon_in_equal_steps():
 JACKAL = load_robot("jackal")
 
 
+def speed_near(place, velocity, speed=2.0):
+    places, velocities = np.array([place], float), np.array([velocity], float)
+    return Avoidance().speed_near(JACKAL, (0.0, 0.0, 0.0), Twist(speed, 0.0), places, velocities, np.array([0.3]))
+
+
 @given(gap=st.floats(0.0, 8.0), mover=st.floats(-1.4, 1.4), speed=st.floats(0.0, 2.0))
 def test_a_robot_that_brakes_in_time_is_slow_within_a_metre_of_a_mover(gap, mover, speed):
     """Both move on one line; from the allowed speed the robot brakes as late as it may."""
-    avoidance = Avoidance()
-    x = JACKAL.radius + 0.3 + gap
-    places = np.array([[[x, 0.0]], [[x - mover * avoidance.step, 0.0]]])
-    v = avoidance.speed_near(JACKAL, (0.0, 0.0, 0.0), Twist(speed, 0.0), places, np.array([0.3]))
-    assert v >= avoidance.near_speed
-    braking = (v - avoidance.near_speed) / JACKAL.max_acceleration
-    covered = max(mover, 0.0) * braking + (v**2 - avoidance.near_speed**2) / (2 * JACKAL.max_acceleration)
-    assert gap - covered >= avoidance.near_distance - 1e-9 or v == pytest.approx(avoidance.near_speed)
+    distance, slow = Avoidance().near_distance, JACKAL.near_speed
+    v = speed_near((JACKAL.radius + 0.3 + gap, 0.0), (-mover, 0.0), speed)
+    assert v >= slow
+    braking = (v - slow) / JACKAL.max_acceleration
+    covered = max(mover, 0.0) * braking + (v**2 - slow**2) / (2 * JACKAL.max_acceleration)
+    assert gap - covered >= distance - 1e-9 or v == pytest.approx(slow)
 
 
-@pytest.mark.parametrize(("mover", "capped"), [(0.0, True), (1.4, True), (1.9, False)])
-def test_movers_faster_than_people_leave_the_speed_alone(mover, capped):
-    places = np.array([[[1.0, 0.0]], [[1.0, 0.1 * mover]]])
-    v = Avoidance().speed_near(JACKAL, (0.0, 0.0, 0.0), Twist(2.0, 0.0), places, np.array([0.3]))
-    assert v == (0.8 if capped else math.inf)
+@pytest.mark.parametrize(
+    ("place", "velocity", "capped"),
+    [
+        ((1.0, 0.0), (0.0, 0.0), True),
+        ((1.0, 0.0), (0.0, 1.4), True),
+        ((1.0, 0.0), (0.0, 1.9), False),  # faster than people
+        ((-1.0, 0.0), (0.0, 0.0), False),  # behind
+        ((1.0, 0.0), (-1.0, 0.0), True),  # head on: driving on does not lead out of its lane
+        ((0.3, 1.0), (0.0, -1.2), False),  # the robot crosses its lane
+        ((0.3, 1.0), (0.0, -0.5), True),  # slower than the robot may be
+        ((1.2, 1.0), (0.0, -1.2), True),  # the robot is not in its lane yet
+    ],
+)
+def test_only_movers_that_the_robot_approaches_limit_its_speed(place, velocity, capped):
+    assert speed_near(place, velocity) == (0.8 if capped else math.inf)
+
+
+def test_a_robot_has_a_speed_near_movers_of_its_own():
+    slow = dataclasses.replace(JACKAL, near_speed=0.4)
+    places, still = np.array([(1.0, 0.0)]), np.zeros((1, 2))
+    v = Avoidance().speed_near(slow, (0.0, 0.0, 0.0), Twist(2.0, 0.0), places, still, np.array([0.3]))
+    assert v == 0.4
+    assert robot_to_dict(slow)["near_speed"] == 0.4
+    assert "near_speed" not in robot_to_dict(JACKAL)
 
 
 def test_the_way_backwards_counts_until_it_is_driven_forwards_again(tracked, turtlebot):
