@@ -1,5 +1,7 @@
 """Drives past people in the catalogue's worlds: certified, without long detours, slowly near people, hardly backwards."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,7 +53,7 @@ def test_a_person_far_away_leaves_no_wall_in_the_map(jackal):
     """The person walks across the aisle's end, 10 m away; nothing else is there. The robot is slow and plans often."""
     task = load_task("people-aisle")
     task = changed(task, "world", movers=task.world.later(3.0).movers)
-    log = run(Scenario.of(task, "dstar-lite", changed(jackal, max_speed=0.5), **SEES["mapless"])).rollout
+    log = run(Scenario.of(task, "dstar-lite", replace(jackal, max_speed=0.5), **SEES["mapless"])).rollout
     for row in np.unique(log.seen[log.seen[:, 0] < 8 * log.record.physics_hz, 0]).astype(int):
         x, y = log.seen[log.seen[:, 0] == row, 1:3].T
         lane = (abs(x - 11.6) < 0.4) & (abs(y - 3.0) < 1.9)
