@@ -61,8 +61,14 @@ def test_the_limits_cause_no_contact(meets, after, heading, speed, radius, known
     assert gap > 0 or least_gap(*UNLIMITED, mover, velocity, radius, known=known, turn=turn) <= 0
 
 
-def test_a_mover_that_moves_unlike_its_prediction_lifts_the_limits():
-    """It comes from the side, and its position alone is known."""
-    mover, velocity = (3.0, 2.4), (0.0, -1.2)
-    gaps = [least_gap(*which, mover, velocity, 0.3, known=False) for which in (LIMITED, UNLIMITED)]
+@pytest.mark.parametrize(("speed", "known"), [(1.2, False), (1.6, True)])
+def test_a_mover_faster_than_people_or_unlike_its_prediction_lifts_the_limits(speed, known):
+    """It comes from the side."""
+    mover, velocity = (3.0, 2.0 * speed), (0.0, -speed)
+    gaps = [least_gap(*which, mover, velocity, 0.3, known=known) for which in (LIMITED, UNLIMITED)]
     assert gaps[0] == gaps[1]
+
+
+def test_a_person_on_the_way_does_not_lift_them():
+    gaps = [least_gap(*which, (3.0, 2.4), (0.0, -1.2), 0.3, known=True) for which in (LIMITED, UNLIMITED)]
+    assert gaps[0] != gaps[1]

@@ -402,8 +402,8 @@ def test_a_robot_without_a_map_drives_round_busy_ground(jackal):
 class AlwaysObstructed(MoversAhead):
     """Movers that obstruct every route."""
 
-    def _obstacle(self, *_):
-        return OBSTRUCTED
+    def _obstructed(self, *_):
+        return True
 
 
 @given(way=st.lists(st.floats(1.0, 15.0), min_size=1, max_size=60))

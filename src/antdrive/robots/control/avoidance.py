@@ -7,8 +7,13 @@ sequences of two constant twists, forwards or backwards, within the robot's dyna
 IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing still is only
 one of the candidates, so the robot moves out of the path of an approaching mover.
 
-Near movers the robot drives slowly, and it reverses slowly and not far. These limits are lifted step by step where every
-candidate within them ends in a contact.
+Near movers ahead the robot keeps its `near_speed`, and it reverses slowly and not far. These limits cause no contact that a
+robot without them avoids:
+
+- Where every candidate within them ends in a contact, they are lifted step by step, so a predicted contact has the same escapes.
+- A prediction that is wrong could hide a contact. They hold only where movers move as predicted: a mover with another observed
+  velocity, as among ground-truth positions, lifts them all. So does a mover faster than people: speed is the way out.
+- A robot that crosses the lane of a mover that comes faster than `near_speed` is not slowed, nor one that leaves a mover behind.
 
 If a nearby mover turns, there may be no candidate that keeps the minimum clearance. While the robot can still stop in time,
 it takes the candidate with the latest contact. After that it takes the one that stays farthest from movers, and
@@ -33,7 +38,7 @@ from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
 from antdrive.robots.spec import Footprint, RobotSpec
 
 SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progress [m per m/s]
-WALKING = 1.5  # a slow robot is no safer beside faster movers, which are not people [m/s]
+WALKING = 1.5  # movers faster than this are not people [m/s]
 SURPRISE = 0.1  # a mover has another velocity than predicted if they differ by more than this [m/s]
 CROSSING = 0.5  # a robot crosses a mover's lane if the sine of the angle between both headings exceeds this
 PERSISTENCE = 0.05  # value of keeping the last decision, in metres of progress [m]
@@ -130,7 +135,7 @@ class Avoidance:
             state: the state returned in the previous period
             places: the movers' predicted positions at the `prediction_times` (K + 1, M, 2) [m]
             radii: their radii (M,) [m]
-            velocities: their observed velocities (M, 2) [m/s]; None: those of the prediction
+            velocities: their observed velocities (M, 2) [m/s]; None: as predicted
             speed_limit: speed limit from the schedule of a timed plan [m/s]
             backwards: maximum reverse speed, for a robot that cannot see behind; ignored if obeying it causes a contact [m/s]
         """
@@ -142,8 +147,9 @@ class Avoidance:
         slow = min(self.reverse_speed, math.sqrt(2 * limits.acceleration * left), backwards)
         tuning = tracked.tuning._replace(period=self.step)
         weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
+        observed = predicted if velocities is None else velocities
         limits_of = [(near, slow), (near, backwards), (math.inf, backwards), (math.inf, math.inf)]
-        if velocities is not None and self._surprised(spec, pose, places[0], velocities - predicted, radii):
+        if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
             del limits_of[:2]
         for fastest, reverse in dict.fromkeys(limits_of):
             candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
@@ -185,18 +191,21 @@ class Avoidance:
         closing = np.maximum(-(velocities * to).sum(axis=1) / away, 0.0)
         aside = np.abs(_cross(to, velocities)) / moving - radii - spec.radius - self.min_clearance
         crosses = (closing > spec.near_speed) & (aside < 0) & (np.abs(_cross(heading, velocities)) > CROSSING * moving)
-        counts = (to @ heading > 0) & (speeds <= WALKING) & ~crosses
+        counts = (to @ heading > 0) & ~crosses
         gap = away - radii - spec.radius - self.near_distance - (closing + abs(last.speed)) * self.step
         both = closing + spec.near_speed
         # With x beyond `near_speed`: closing x / a + (x^2 + 2 near_speed x) / (2 a) <= gap.
         more = np.sqrt(both**2 + 2 * spec.max_acceleration * np.maximum(gap, 0.0)) - both
         return spec.near_speed + float(more.min(initial=math.inf, where=counts))
 
-    def _surprised(self, spec: RobotSpec, pose: Pose, places: Floats, off: Floats, radii: Floats) -> bool:
-        """Return whether a mover that may come near soon has another velocity than predicted, by `off` (M, 2) [m/s]."""
-        off_by = np.hypot(*off.T)
+    def _must_dodge(
+        self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, predicted: Floats, radii: Floats
+    ) -> bool:
+        """Return whether a mover that may come near soon is faster than people, or has another velocity than predicted."""
+        speeds, off_by = np.hypot(*observed.T), np.hypot(*(observed - predicted).T)
         gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
-        return bool(((off_by > SURPRISE) & (gap < self.horizon * (off_by + spec.max_speed))).any())
+        soon = gap < self.horizon * (speeds + spec.max_speed)
+        return bool((soon & ((speeds > WALKING) | (off_by > SURPRISE))).any())
 
     def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""

@@ -244,27 +244,24 @@ class MoversAhead:
     def trigger(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> str:
         """Return why movers make a new route due; empty if they do not.
 
-        After `REPLANS` for a metre of progress towards the goal, the robot keeps its route until it has waited.
+        After `REPLANS` around movers for a metre of progress towards the goal, the robot keeps its route until it has waited
+        or traffic grows.
         """
         policy = self._policy
         if tick / self._hz - self._waiting_since >= policy.max_wait:
             self.reset_wait()
             return WAITED
-        if self._replanned[-REPLANS] - self._nearest < PROGRESS:
-            return ""
-        due = self._obstacle(tick, pose, tracked, arc)
-        if due:
+        if self._replanned[-REPLANS] - self._nearest >= PROGRESS and self._obstructed(tick, pose, tracked, arc):
             self._replanned.append(self._nearest)
-        return due
-
-    def _obstacle(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> str:
-        """Return what movers do to the route ahead; empty if nothing."""
-        if close_route(self.discs(tick, pose), tracked, arc, self._policy.obstruction_range, self._grid.inflate):
             return OBSTRUCTED
         traffic = self._traffic
         if traffic is None or not traffic.grown(self._grid.cell) or not self.heavy(tick, pose):
             return ""
         return TRAFFIC if self.zones(tick, pose, self._around(pose))[-1].crossed(tracked, arc) else ""
+
+    def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
+        """Return whether movers will cover the route ahead."""
+        return close_route(self.discs(tick, pose), tracked, arc, self._policy.obstruction_range, self._grid.inflate)
 
     def heavy(self, tick: int, pose: Pose) -> bool:
         """Return whether traffic is heavy enough to plan around zones."""
