@@ -310,7 +310,9 @@ def people(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
             f"{among.length / alone.length:.2f}", f"{among.duration:.1f} s", f"{alone.duration:.1f} s",
             str(among.replans), f"{among.reverse:.2f} m", f"{among.backwards:.2f} m/s", f"{among.near:.2f} m/s",
         ]  # fmt: skip
-        rows.append([f"`{name}`", f"`{robot}`", map, f"{noise:g}", "certified" if among.certified else among.end, *figures])
+        rows.append(
+            [f"`{name}`", f"`{robot}`", map, f"{noise:g}", "certified" if among.certified else among.end, *figures]
+        )
     yield from table(
         "world | robot | map | noise | end | length / free | time | free time | replans | reverse | backwards | near ahead",
         rows,

@@ -355,7 +355,11 @@ def see_far(
         if beam >= number and not closed:
             continue
         m.cells[i, 3] = scan
-        crossed[crossings, 0], crossed[crossings, 1], crossed[crossings, 2] = m.cells[i, 0], m.cells[i, 1], beam % number
+        crossed[crossings, 0], crossed[crossings, 1], crossed[crossings, 2] = (
+            m.cells[i, 0],
+            m.cells[i, 1],
+            beam % number,
+        )
         crossings += 1
     after = see_through(crossed[:crossings], scan, fan, m, changed, count)
     for j in range(count, after):
