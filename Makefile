@@ -14,7 +14,7 @@ DEMO := out/demo
 help:
 	@sed -n '1,5s/^# //p' Makefile
 
-# The core, then the compiled kernels' cache, so that the first plan is quick.
+# The core; then, where much runs, the cache of all compiled kernels.
 $(VENV)/.core: pyproject.toml tools/find-python
 	@python=$$(tools/find-python) && echo "Setting up $(VENV) with $$python" && "$$python" -m venv $(VENV)
 	@echo "Installing antdrive and what it needs"
@@ -39,7 +39,7 @@ $(VENV)/.docs: $(VENV)/.core
 
 warm: $(VENV)/.warm
 
-demo: $(VENV)/.warm
+demo: $(VENV)/.core
 	@$(BIN)/antdrive compare forest -p mmas -p astar --out $(DEMO) --film $(DEMO)/film.mp4 --prelude 5 --speed 2
 
 test: $(VENV)/.dev $(VENV)/.warm

@@ -268,7 +268,7 @@ def way_of(task: Task, robot: str, **settings: Any) -> Way:
     done = run(Scenario.of(task, "dstar-lite", spec, **settings))
     log = done.rollout
     if log is None:
-        return Way(False, done.outcome.key, *[math.nan] * 2, 0, *[math.nan] * 3)
+        return Way(False, done.outcome.key, math.nan, math.nan, 0, math.nan, math.nan, math.nan)
     speeds, reverse, furthest = log.twist[:, 0], 0.0, 0.0
     for speed in speeds.tolist():
         reverse = max(0.0, reverse - speed / log.record.physics_hz)
@@ -304,10 +304,10 @@ def people(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
         calls += [partial(way_of, each, robot, **settings) for each in (task, alone)]
     got = call_all(calls, jobs)
     rows = []
-    for case, among, alone in zip(cases, got[::2], got[1::2], strict=True):
+    for case, among, free in zip(cases, got[::2], got[1::2], strict=True):
         name, robot, map, noise = case
         figures = [
-            f"{among.length / alone.length:.2f}", f"{among.duration:.1f} s", f"{alone.duration:.1f} s",
+            f"{among.length / free.length:.2f}", f"{among.duration:.1f} s", f"{free.duration:.1f} s",
             str(among.replans), f"{among.reverse:.2f} m", f"{among.backwards:.2f} m/s", f"{among.near:.2f} m/s",
         ]  # fmt: skip
         rows.append(

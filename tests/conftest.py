@@ -18,10 +18,10 @@ hypothesis.settings.load_profile("repeatable")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def kernels_are_compiled_when_called():
-    """`make test` compiles all kernels before. Without it a test compiles those that it calls, not all in its first command."""
+def compiling_is_silent():
+    """`make test` compiles all kernels before. Without it, commands would print a line more than tests expect."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("antdrive.cli.compiling.is_warm", lambda: True)
+        patch.setattr("antdrive.cli.groups.report_compiling", lambda: None)
         yield
 
 

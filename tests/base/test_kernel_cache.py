@@ -198,3 +198,48 @@ def test_code_of_files_that_were_edited_meanwhile_is_of_neither_version(tmp_path
         assert kernel_cache.sources_stamp() == stamps["three"]
     finally:
         kernel_cache._first_state.cache_clear()
+
+
+def test_the_stamp_of_a_file_covers_the_files_that_it_imports(tmp_path, monkeypatch):
+    """Tops import the middle, in each way to write an import; the middle imports the base; another file stands alone."""
+    imports = {
+        "top": "from antdrive.worlds._kernels_middle import f",
+        "lazy": "def f():\n    from antdrive.worlds import (\n        _kernels_middle as k,\n    )",
+        "plain": "import antdrive.worlds._kernels_middle",
+        "middle": "from antdrive.worlds._kernels_base import g",
+        "base": "X = 1",
+        "alone": "X = 2  # like _kernels_base",
+    }
+    files = {name: tmp_path / "worlds" / f"_kernels_{name}.py" for name in imports}
+    (tmp_path / "worlds").mkdir()
+    monkeypatch.setattr(kernel_cache, "_ROOT", tmp_path)
+    try:
+        stamps = []
+        for base in ("X = 1", "X = 3"):
+            for name, text in imports.items():
+                files[name].write_text(base if name == "base" else text)
+            kernel_cache._first_state.cache_clear()
+            stamps.append({name: kernel_cache.sources_stamp(file) for name, file in files.items()})
+        assert {name for name in files if stamps[0][name] == stamps[1][name]} == {"alone"}
+        assert kernel_cache.sources_stamp(tmp_path / "elsewhere.py") == kernel_cache.sources_stamp()
+    finally:
+        kernel_cache._first_state.cache_clear()
+
+
+@pytest.mark.slow
+def test_of_two_processes_that_need_a_kernel_one_compiles_it(tmp_path):
+    code = MEASURE.replace("\n", "\nk.on_compile = lambda name: (print('compiles', name), time.sleep(0.3))\n", 1)
+    code = "import time\nfrom antdrive.base import kernel_cache as k\n" + code
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    two = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        for _ in range(2)
+    ]
+    said = [process.communicate(timeout=300) for process in two]
+    assert [err for _, err in said] == ["", ""]
+    compiled = [line for out, _ in said for line in out.splitlines() if line.startswith("compiles ")]
+    assert compiled
+    assert len(set(compiled)) == len(compiled)
+    assert {out.splitlines()[-1] for out, _ in said} == {said[0][0].splitlines()[-1]}

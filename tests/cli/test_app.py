@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from antdrive.cli.commands import COMMANDS, ROBOTS, WORLDS
+from antdrive.cli.console import COMPILING
 from antdrive.cli.exits import BROKEN_PIPE
 from antdrive.cli.groups import application
 from antdrive.planners import PLANNERS, on_progress
@@ -67,7 +68,7 @@ def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small, tmp_pat
     command = [sys.executable, "-m", "antdrive", "run", str(small), "--json", "--out", str(tmp_path / "r")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0
-    assert [line for line in done.stderr.splitlines() if "compiling the planners, once" not in line] == []
+    assert [line for line in done.stderr.splitlines() if COMPILING not in line] == []
     assert json.loads(done.stdout)["succeeded"]
 
 

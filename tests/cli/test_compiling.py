@@ -1,61 +1,55 @@
-"""A fresh installation compiles its kernels once, where people can see it."""
+"""A command compiles what it needs, where people can see it; `antdrive warm` compiles everything."""
 
+import os
+import subprocess
 import sys
 
 import pytest
 
-from antdrive.cli.compiling import TOGETHER, compile_once
+from antdrive.base import kernel_cache
+from antdrive.cli.compiling import TOGETHER
+from antdrive.cli.console import COMPILING, bar, report_compiling
 from antdrive.planners import PLANNERS
 
 
-@pytest.fixture
-def terminal(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "100")
+@pytest.fixture(autouse=True)
+def hook(monkeypatch):
+    monkeypatch.setattr(kernel_cache, "on_compile", kernel_cache.ignore)
+
+
+def test_without_a_bar_one_line_says_why_it_takes_a_while(capsys):
+    report_compiling()
+    for name in ("astar", "smooth"):
+        kernel_cache.on_compile(name)
+    assert capsys.readouterr() == ("", f"antdrive: {COMPILING}\n")
+
+
+def test_a_bar_counts_the_kernels(monkeypatch, capsys):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "100")
+    report_compiling()
+    outside = kernel_cache.on_compile
+    with bar("driving") as progress:
+        for name in ("astar", "smooth"):
+            kernel_cache.on_compile(name)
+        progress(0.5)
+    assert "driving, after compiling 2 kernels once" in capsys.readouterr().err
+    assert kernel_cache.on_compile is outside
 
 
-@pytest.mark.usefixtures("terminal")
-def test_the_first_call_compiles_and_the_second_does_not(compiled):
-    compile_once()
-    compile_once()
-    assert compiled == ["all"]
-
-
-def test_without_a_terminal_a_line_says_why_it_takes_a_while(compiled, capsys):
-    compile_once()
-    compile_once()
-    assert compiled == ["all"]
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("compiling the planners, once per installation") == 1
-
-
-@pytest.mark.usefixtures("terminal")
-def test_nothing_is_compiled_where_no_cache_can_be_kept(compiled, monkeypatch):
-    monkeypatch.setattr("antdrive.base.kernel_cache.cache_folder", lambda: None)
-    compile_once()
-    assert compiled == []
-
-
-@pytest.mark.parametrize("command", ["run", "plan", "compare", "find-margin", "reproduce"])
-def test_commands_that_plan_compile_first(antdrive, monkeypatch, command):
-    class Compiled(BaseException):  # which no command turns into a message
-        pass
-
-    def stop():
-        raise Compiled
-
-    words = {"compare": ["empty", "-p", "astar", "-p", "dijkstra"], "reproduce": ["lee2008"]}.get(command, ["empty"])
-    monkeypatch.setattr("antdrive.cli.compiling.is_warm", stop)
-    with pytest.raises(Compiled):
-        antdrive(command, *words)
-
-
-@pytest.mark.parametrize("words", [["planners"], ["robots"], ["worlds", "show", "empty"], ["schema"]], ids=" ".join)
-@pytest.mark.usefixtures("terminal")
-def test_commands_that_only_look_do_not_compile(antdrive, compiled, words):
-    assert antdrive(*words)[0] == 0
-    assert compiled == []
+@pytest.mark.slow
+def test_a_command_compiles_what_it_needs_and_says_so_once(tmp_path):
+    """The first plan compiles the search alone, and the second nothing."""
+    command = [sys.executable, "-m", "antdrive", "plan", "empty", "-p", "astar", "-o", str(tmp_path / "plan.png")]
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    said = [
+        subprocess.run(command, env=env, capture_output=True, text=True, check=True, cwd=tmp_path).stderr
+        for _ in range(2)
+    ]
+    assert said == [f"antdrive: {COMPILING}\n", ""]
+    compiled = {path.name.partition(".")[0] for path in (tmp_path / "cache").rglob("*.nbc")}
+    assert "_kernels_search" in compiled
+    assert not compiled & {"_kernels_colony", "_kernels_tangent", "_kernels_avoidance", "_kernels_sipp"}
 
 
 def test_warm_compiles_on_request_and_once(antdrive, compiled):

@@ -11,16 +11,20 @@ from antdrive.robots import load_robot
 from antdrive.sim import Rollout, Scenario, certify, run
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.rerun import replayed
-from antdrive.worlds import Disc, Task, World
+from antdrive.worlds import Disc, Keyframed, Task, World
 
 #: Width of a door that the footprint passes and the disc around the robot does not [m].
 DOORS = {"jackal": 0.62, "warehouse": 0.84}
 
+#: Movers that cross the room behind the door, back and forth.
+CROSSING = Keyframed(radius=0.2, keyframes=((0.0, 3.9, 0.6), (8.0, 3.9, 5.4)), loop="pingpong")
+SLOW = Keyframed(radius=0.2, keyframes=((0.0, 3.9, 5.4), (18.0, 3.9, 0.6)), loop="pingpong")
 
-def door(width):
+
+def door(width, *movers):
     """A hall of two rooms, with a door of a given width between them."""
     ends = [*np.arange(3.0 + width / 2 + 0.1, 6.0, 0.2), *np.arange(3.0 - width / 2 - 0.1, 0.0, -0.2)]
-    world = World("door", (0.0, 0.0, 6.0, 6.0), tuple(Disc(3.0, float(y), 0.1) for y in ends))
+    world = World("door", (0.0, 0.0, 6.0, 6.0), tuple(Disc(3.0, float(y), 0.1) for y in ends), movers=movers)
     return Task(world, (1.2, 2.8, 0.3), (4.8, 3.2), cell=0.1)
 
 
@@ -46,6 +50,39 @@ def test_a_footprint_passes_a_door_that_its_disc_does_not(driven, robot, noise):
     assert certify(made.rollout).certified
     assert 0 < record.footprint_margin < DOORS[robot] / 2 - load_robot(robot).footprint.inner_radius
     assert not run(replace(made.scenario, footprint="disc")).succeeded
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("robot", [pytest.param("husky", marks=pytest.mark.slow), "warehouse"])
+def test_avoidance_in_a_door_keeps_the_footprint_clear(robot, noise):
+    made = run(Scenario.of(door({**DOORS, "husky": 0.9}[robot], CROSSING), "astar", robot, noise=noise, seed=2))
+    assert made.succeeded, (made.outcome, made.reason)
+    assert certify(made.rollout).certified
+    assert made.rollout.record.footprint_margin > 0
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("robot", DOORS)
+def test_a_plan_in_time_for_a_footprint_passes_a_door_behind_a_mover_on_schedule(robot, noise):
+    made = run(Scenario.of(door(DOORS[robot], SLOW), "sipp", robot, noise=noise, seed=2, footprint="exact"))
+    plan, rate = made.plan, made.plan.options["yaw_rate"]
+    assert made.succeeded, (made.outcome, made.reason)
+    assert certify(made.rollout).certified
+    assert made.rollout.record.footprint_margin > 0
+    assert made.rollout.t[-1] < plan.arrive[-1] + 2.0
+    turns = np.abs(np.diff(plan.cells, 2, axis=0)).any(axis=1)
+    stops = (plan.leave - plan.arrive)[1:-1]
+    assert stops[turns].min() >= np.pi / 4 / rate - 1e-9
+    assert stops.sum() > turns.sum() * np.pi / 4 / rate + 0.5  # it waits for the mover as well
+
+
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
+def test_a_robot_that_turns_slower_than_planned_is_late_and_plans_again(noise):
+    hasty = load_planner("sipp", speed=1.0, yaw_rate=5.0)
+    made = run(Scenario.of(door(DOORS["jackal"], CROSSING), hasty, "jackal", noise=noise, seed=2, footprint="exact"))
+    assert made.succeeded, (made.outcome, made.reason)
+    assert certify(made.rollout).certified
+    assert {(one.trigger, one.solved) for one in made.rollout.record.replans} == {("late", True)}
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])

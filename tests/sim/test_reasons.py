@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from antdrive.planners import GridPlanner, PlanResult, PlanStatus
+from antdrive.planners import AStar, GridPlanner, PlanResult, PlanStatus
 from antdrive.robots import Footprint
 from antdrive.sim import Outcome, Scenario, run
-from antdrive.worlds import Disc, Task, World
+from antdrive.worlds import Disc, Task, World, load_task
 from tests.records import changed
 
 
@@ -67,9 +67,26 @@ def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_n
     assert run(gate(robot, 0.95, cell=0.05)).succeeded, "the footprint passes"
     narrow = run(gate(robot, 0.62, cell=0.05)).reason
     assert "on cells of 0.05 m, nor for its rectangle of 0.9 x 0.6 m; " in narrow
-    assert narrow.endswith("; its rectangle of 0.9 x 0.6 m needs 0.66 m of the 0.62 m straight ahead")
+    assert narrow.endswith("; its rectangle of 0.9 x 0.6 m needs 0.66 m straight ahead, more than the 0.62 m there")
     exact = run(gate(robot, 0.62, cell=0.05, footprint="exact")).reason
-    assert exact == "no path for its rectangle of 0.9 x 0.6 m with a margin of 0.03 m on cells of 0.05 m"
+    assert exact.startswith("no path for its rectangle of 0.9 x 0.6 m with a margin of 0.03 m on cells of 0.05 m; ")
+    assert exact.endswith(narrow[narrow.index("the widest disc") :])
+    beside = run(gate(robot, 0.67, cell=0.05)).reason
+    assert beside.endswith(
+        "needs 0.66 m of the 0.67 m straight ahead; between cells, by straight moves and turns on the spot, it does not get "
+        "through"
+    )
+
+
+@pytest.mark.parametrize("footprint", ["auto", "exact"])
+def test_an_office_with_a_robot_too_wide_for_its_doors_names_the_door_of_the_goal(jackal, footprint):
+    robot = replace(jackal, name="wide", footprint=Footprint.rectangle(1.2, 1.1))
+    task = replace(load_task("office"), goal=(20.0, 5.0))
+    reason = run(Scenario(task=task, planner=AStar(), robot=robot, footprint=footprint)).reason
+    assert "a radius of 0.425 m, at (21.63, 10.90), between obstacles[385]" in reason, (
+        "the room's only door, 0.85 m wide"
+    )
+    assert reason.endswith("needs 1.16 m straight ahead, more than the 0.85 m there")
 
 
 def test_a_planner_for_discs_names_one_for_footprints(jackal):

@@ -47,12 +47,13 @@ def test_metrics_have_sensible_values(small_run):
 
 
 STATIC = [name for name in list_worlds() if not name.endswith("-moving")]
+LARGE = [name for name in STATIC if name.startswith("hasan") or name == "office"]
 
 
 @pytest.mark.parametrize("planner", ["astar", "aco-han"])
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name.startswith("hasan") else name for name in STATIC]
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in LARGE else name for name in STATIC]
 )
 def test_every_catalogue_world_is_driven(name, robot, planner):
     if robot == "jackal" and name in TOO_NARROW_FOR_JACKAL:

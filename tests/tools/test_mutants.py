@@ -170,7 +170,6 @@ def fates_of(tmp_path, monkeypatch, codes):
         path.write_text("a = 1\n")
     ends = iter(codes)
     failed = "FAILED tests/test_a.py::test_it - no"
-    monkeypatch.setattr("tools.mutants.running.stamp_of", lambda root: "stamp")
     monkeypatch.setattr(Server, "_start", lambda self: None)
     monkeypatch.setattr(Server, "end", lambda self: None)
     monkeypatch.setattr(Server, "run", lambda *_: Ended(next(ends), 1.0, failed))

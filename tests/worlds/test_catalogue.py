@@ -8,6 +8,7 @@ import pytest
 
 from antdrive.runs.papers.maps import environments
 from antdrive.worlds import Disc, Trajectories, forest, list_worlds, load_task, point_clearance, rasterise
+from antdrive.worlds.generators.generate import generate
 from tests.worlds.oracles import passable
 
 TURTLEBOT, JACKAL = 0.18, 0.333  # radii [m]
@@ -21,8 +22,9 @@ PASSABLE = {
     "hasan-3c": (True, False), "hasan-3c-moving": (True, False), "hasan-4d": (True, True),
     "hasan-4d-moving": (True, True), "hasan-5e": (True, True), "hasan-5e-moving": (True, True),
     "hasan-5f": (True, False), "hasan-5f-moving": (True, False), "no-path": (False, False),
-    "people-aisle": (True, True), "people-corridor": (True, True), "people-crossing": (True, True),
-    "people-doorway": (True, True), "plaza-moving": (True, True), "slalom": (True, True), "u-trap": (True, True),
+    "office": (True, True), "people-aisle": (True, True), "people-corridor": (True, True),
+    "people-crossing": (True, True), "people-doorway": (True, True), "plaza-moving": (True, True),
+    "slalom": (True, True), "u-trap": (True, True),
 }  # fmt: skip
 #: Grid points of the thesis' listings, 0.5 m each.
 ACO = [(4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)]
@@ -62,11 +64,20 @@ def test_a_catalogue_world_has_the_name_of_its_file_and_a_source(task):
     assert task.goal_tolerance == 0.25
 
 
-def test_a_world_has_the_size_of_a_room_and_a_grid_that_ants_can_walk(task):
-    assert all(6 <= side <= (25 if task.world.name.startswith("hasan") else 15) for side in task.world.size)
+def test_a_world_has_the_size_of_a_room_or_a_floor_and_a_grid_that_ants_can_walk(task):
+    """Colonies with default options find paths over 160 cells and plan them in seconds."""
+    most = {"hasan": 25, "offic": 40}.get(task.world.name[:5], 15)
+    assert all(6 <= side <= most for side in task.world.size)
     rows, cols = rasterise(task.world, task.cell).shape
-    assert 20 <= rows <= 60
-    assert 20 <= cols <= 60
+    assert 20 <= rows <= (60 if most < 40 else 100)
+    assert 20 <= cols <= (60 if most < 40 else 160)
+
+
+def test_the_office_is_the_generators():
+    task = load_task("office")
+    made = generate("office", np.random.default_rng(0), {})
+    assert task.world.obstacles == made.world.obstacles
+    assert (task.world.bounds, task.start, task.goal) == (made.world.bounds, made.start, made.goal)
 
 
 def test_no_obstacle_is_listed_twice(task):

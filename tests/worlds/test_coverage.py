@@ -20,7 +20,7 @@ def two_rooms(gaps):
 
 
 def covered(world, inflate, start=(1.0, 3.0), cell=0.1):
-    return coverage(world, rasterise(world, cell, inflate), start)
+    return coverage(world, [rasterise(world, cell, inflate)], start)[0]
 
 
 def test_an_empty_room_is_one_room_and_its_share_is_that_of_its_cells():

@@ -68,7 +68,7 @@ PLANS: dict[str, Plan] = {
     "planners/graph/_kernels_dstar.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar.py"), 5, plain=True),
     "planners/graph/_kernels_dstar_lite.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar.py"), 5, plain=True),
     "planners/graph/_kernels_incremental.py": Plan((f"{_GRAPH}test_incremental.py",), 4),
-    "planners/graph/_kernels_sipp.py": Plan((f"{_GRAPH}test_sipp.py",), 4),
+    "planners/graph/_kernels_sipp.py": Plan((f"{_GRAPH}test_sipp.py", f"{_GRAPH}test_sipp_turns.py"), 4),
     "planners/colonies/_kernels_colony.py": Plan(
         (_PLANNERS, f"{_COLONIES}test_colony.py", f"{_COLONIES}test_aco_han.py"), 5
     ),

@@ -1,8 +1,7 @@
 """Test runs on mutants, each in a copy of the project with one changed file.
 
-A copy keeps the machine code of the kernels, and its `sources_stamp` returns the original's stamp. Otherwise each mutant
-would invalidate the cache and recompile every kernel. Instead, only cache entries that depend on the changed file are
-deleted. Copies share nothing.
+A copy keeps the machine code of the kernels; only cache entries that depend on the changed file are deleted. Copies share
+nothing.
 """
 
 from __future__ import annotations
@@ -127,8 +126,6 @@ class Copy:
         self.root = root
         self._original, self._processes = original, processes
         shutil.copytree(original, root, symlinks=True, ignore=shutil.ignore_patterns(*LEFT_OUT))
-        cache = root / SOURCE / "base" / "kernel_cache.py"
-        _write(cache, f"{cache.read_text()}\n\ndef sources_stamp() -> str:\n    return {stamp_of(original)!r}\n")
 
     def fates(self, mutants: list[Mutant], plan: Plan) -> Iterator[tuple[Mutant, str]]:
         """Return the fate of each mutant of a file: "killed", "timeout" or "alive".
@@ -224,15 +221,6 @@ class Server:
         with contextlib.suppress(OSError):  # a process that has ended is noticed when it gives no answer
             pipe.write(json.dumps(message) + "\n")
             pipe.flush()
-
-
-def stamp_of(root: Path) -> str:
-    """Return the stamp of a project's cache of machine code."""
-    code = "from antdrive.base.kernel_cache import sources_stamp; print(sources_stamp())"
-    environment = {**os.environ, "PYTHONPATH": str(root / "src")}
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=True)  # noqa: S603
-    return done.stdout.strip()
 
 
 def dependents(root: Path, file: str) -> set[str]:

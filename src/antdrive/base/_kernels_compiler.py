@@ -1,21 +1,25 @@
 """Compilation and on-disk caching of kernels.
 
 Unreadable cache entries (truncated, damaged, or for removed records) are dropped, and the kernel is compiled again. An entry
-is valid for one text of *all* kernel files; numba alone detects changes of a kernel's own file, but not of kernels that it
-calls in other files.
+is valid for one text of the kernel's file and of all kernel files that it imports; numba alone detects changes of a kernel's
+own file, but not of kernels that it calls in other files.
 
 Each entry is one file, written atomically, with its key beside the machine code. numba uses an index and numbered files: it
 reserves a number before writing the file, so two processes that compile at once take the same number, and a process may run
-code of older sources or for other types.
+code of older sources or for other types. A process that needs an entry which another one compiles waits for it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
+import inspect
+import os
 import pickle
 import re
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,9 +27,12 @@ import numba
 from numba.core import config
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from antdrive.base import kernel_cache
 from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
 
 _settings: Any = config  # its attributes are set on import
+LOCK = "antdrive-compiling.lock"  # in each folder of machine code
+PATIENCE = 120.0  # longest wait for another process that compiles the same entry [s]
 F = TypeVar("F", bound=Callable[..., Any])
 
 # IEEE arithmetic (no fastmath), so that results repeat bit for bit.
@@ -87,25 +94,94 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         super().__init__(function)
         entries = self._cache_file  # type: ignore[has-type]
         name = entries._index_name.removesuffix(".nbi")
-        self._cache_file = _Entries(entries._cache_path, name, sources_stamp())
+        self._saved: set[Any] = set()  # the dispatcher asks to save what the compiler has saved or loaded
+        self._cache_file = _Entries(entries._cache_path, name, sources_stamp(Path(inspect.getfile(function))))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
+            if found is not None:
+                self._saved.add(sig)
+            return found
         except Exception:  # unpickling damaged bytes can raise almost anything; compile again
             with contextlib.suppress(OSError):
                 self.flush()
             return None
 
+    def path_of(self, sig: Any, target_context: Any) -> Path:
+        """Return the file of an entry."""
+        entries: _Entries = self._cache_file
+        return entries._path(self._index_key(sig, target_context.codegen()))
+
     def save_overload(self, sig: Any, data: Any) -> None:
+        if sig in self._saved:
+            return
+        self._saved.add(sig)
         with contextlib.suppress(OSError):  # a full disk costs time at the next start only
             super().save_overload(sig, data)
+
+
+class _Compiler:
+    """The compiler of one kernel: reports each entry, and compiles none that another process is compiling."""
+
+    def __init__(self, dispatcher: Any, cache: _Cache) -> None:
+        self._compiler, self._context, self._cache = dispatcher._compiler, dispatcher.targetctx, cache
+        self._name = dispatcher.py_func.__name__
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._compiler, name)
+
+    def compile(self, args: Any, return_type: Any) -> Any:
+        with _only_here(self._cache.path_of(args, self._context)):
+            found = self._cache.load_overload(args, self._context)
+            if found is not None:
+                self._context.insert_user_function(found.entry_point, found.fndesc, [found.library])
+                return found
+            kernel_cache.on_compile(self._name)
+            made = self._compiler.compile(args, return_type)
+            self._cache.save_overload(args, made)
+            return made
+
+
+@contextlib.contextmanager
+def _only_here(path: Path) -> Iterator[None]:
+    """Wait until no other process compiles an entry, `PATIENCE` at most, and keep others from it. No lock: no waiting."""
+    place = int(hashlib.sha256(path.name.encode()).hexdigest()[:12], 16)
+    try:
+        import fcntl
+
+        file = _lock_file(path.parent)
+        end = time.monotonic() + PATIENCE
+        while True:
+            try:
+                fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
+                break
+            except BlockingIOError:
+                if time.monotonic() > end:
+                    break
+                time.sleep(0.02)
+    except (ImportError, OSError):
+        yield
+        return
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            fcntl.lockf(file, fcntl.LOCK_UN, 1, place)
+
+
+@functools.cache
+def _lock_file(folder: Path) -> int:
+    """Return the open file for a folder's locks. It stays open: closing it would release all locks of this process."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
 
 
 def _cached(dispatcher: Any, function: F) -> F:
     if hasattr(dispatcher, "enable_caching"):  # with NUMBA_DISABLE_JIT it is the plain function
         with contextlib.suppress(RuntimeError):  # no writable folder: every process compiles
             dispatcher._cache = _Cache(function)
+            dispatcher._compiler = _Compiler(dispatcher, dispatcher._cache)
     return dispatcher  # type: ignore[no-any-return]  # has the function's signature
 
 

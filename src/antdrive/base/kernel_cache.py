@@ -6,35 +6,67 @@ import contextlib
 import functools
 import hashlib
 import os
+import re
 import stat
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 _ROOT = Path(__file__).parent.parent  # the package antdrive
+_IMPORT = re.compile(rb"^[ \t]*(?:from|import)\b[^\n(]*(?:\([^)]*\))?", re.MULTILINE)
+_NAME = re.compile(rb"\b_kernels\w*")
 PACKAGES = ("base", "worlds", "planners", "robots", "sim", "views")
 
 
-def sources_stamp() -> str:
-    """Return the SHA-256 of all kernel files' texts as imported by this process.
+def ignore(name: str) -> None:
+    """Ignore that a kernel compiles."""
+
+
+on_compile: Callable[[str], None] = ignore  # called with each kernel's name before it compiles
+
+
+def sources_stamp(file: Path | None = None) -> str:
+    """Return the SHA-256 of the texts of a kernel file and those it imports, as imported by this process.
+
+    For None and files elsewhere, it is that of all kernel files.
 
     Modules are imported lazily, so a file edited while the process runs mixes two versions in it. Code compiled then belongs to
     neither version: its stamp covers both texts.
     """
-    first, then, stamp = _first_state()
+    first, then, imported = _first_state()
+    paths = sorted(_closure(file, imported)) if file in imported else list(first)
+    stamp = _sha(first[path] for path in paths)
     if _state(first) == then:
         return stamp
-    texts = {path: path.read_bytes() if path.exists() else b"" for path in first}
-    return stamp if texts == first else _sha([*first.values(), *texts.values()])
+    texts = [path.read_bytes() if path.exists() else b"" for path in paths]
+    return stamp if texts == [first[path] for path in paths] else _sha([*(first[path] for path in paths), *texts])
 
 
 @functools.cache
-def _first_state() -> tuple[dict[Path, bytes], list[tuple[int, int]], str]:
-    """Return the texts, `_state` and stamp of all kernel files at the first call."""
+def _first_state() -> tuple[dict[Path, bytes], list[tuple[int, int]], dict[Path, set[Path]]]:
+    """Return the texts, `_state` and imported kernel files of all kernel files at the first call."""
     paths = [path for package in PACKAGES for path in sorted((_ROOT / package).rglob("_kernels*.py"))]
     state = _state(paths)  # before reading, to detect edits in between
     texts = {path: path.read_bytes() for path in paths}
-    return texts, state, _sha(texts.values())
+    named: dict[bytes, set[Path]] = {}
+    for path in paths:
+        named.setdefault(path.stem.encode(), set()).add(path)
+    # By name alone: of two files of one name, both count.
+    imported = {
+        path: set().union(*(named.get(name, ()) for line in _IMPORT.findall(text) for name in _NAME.findall(line)))
+        for path, text in texts.items()
+    }
+    return texts, state, imported
+
+
+def _closure(file: Path, imported: dict[Path, set[Path]]) -> set[Path]:
+    """Return a file and all files that it imports, directly or not."""
+    found, new = {file}, [file]
+    while new:
+        more = imported[new.pop()] - found
+        found |= more
+        new += more
+    return found
 
 
 def _state(paths: Iterable[Path]) -> list[tuple[int, int]]:

@@ -1,7 +1,6 @@
 """Ahead-of-time compilation of every kernel into the cache of `antdrive.base.kernel_cache`.
 
-Compiling takes about half a minute on two idle cores. It runs before the first command that plans, drives or films
-(`compile_once`), or on request (`antdrive warm`).
+Other commands compile each kernel at its first call.
 """
 
 from __future__ import annotations
@@ -11,9 +10,8 @@ import hashlib
 import importlib.metadata
 import os
 import platform
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,44 +30,6 @@ TOGETHER = (
     ("dstar-lite", "dstar"),
     ("apf", "mmas-dstar"),
 )
-LOCK = "antdrive-compiling.lock"
-COMPILING = "compiling the planners, once per installation; this takes a minute or two"
-
-
-def compile_once(say: Callable[[str], None] | None = None) -> None:
-    """Compile every kernel unless the cache is complete. Concurrent processes wait for the first one.
-
-    Progress is shown as a bar on a terminal, otherwise as one line; `say` always prints the line. Without a writable cache
-    nothing is compiled here: each kernel compiles on its first call, which is faster for a single command.
-    """
-    folder = kernel_cache.cache_folder()
-    if is_warm() or folder is None:
-        return
-    with _lock(folder):
-        if is_warm():
-            return
-        if say is not None:
-            say(COMPILING)
-            warm()
-            return
-        from antdrive.cli.console import bar, print_error
-
-        if not sys.stderr.isatty():
-            print_error(COMPILING)
-        with bar("compiling the planners, once") as progress:
-            warm(progress=progress)
-
-
-@contextlib.contextmanager
-def _lock(folder: Path) -> Iterator[None]:
-    """Hold a lock on a folder, where the system and the file system support locks."""
-    with contextlib.ExitStack() as stack:
-        with contextlib.suppress(ImportError, OSError):
-            import fcntl
-
-            file = stack.enter_context((folder / LOCK).open("a"))
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
 
 
 def is_warm() -> bool:
@@ -83,16 +43,12 @@ def warm(jobs: int | None = None, progress: Callable[[float], None] | None = Non
     from antdrive.planners import PLANNERS
     from antdrive.runs.pool import Pool, cores
 
-    # The second round reads the cache and compiles kernels lost to concurrent writes.
-    first = [TOGETHER[0], None, *TOGETHER[1:]]
-    second = [tuple(PLANNERS), None]
-    done = 0
+    named = {name for group in TOGETHER for name in group}
+    groups = [TOGETHER[0], None, *TOGETHER[1:], tuple(name for name in PLANNERS if name not in named)]
     with Pool(jobs or cores()) as pool:
-        for groups in (first, second):
-            for _ in pool.results(_compile, groups, in_order=False):
-                done += 1
-                if progress is not None:
-                    progress(done / (len(first) + len(second)))
+        for done, _ in enumerate(pool.results(_compile, groups, in_order=False), 1):
+            if progress is not None:
+                progress(done / len(groups))
     marker = _marker()
     if marker is not None:
         with contextlib.suppress(OSError):

@@ -15,6 +15,7 @@ from typing import Any
 
 import typer
 
+from antdrive.base import kernel_cache
 from antdrive.base.errors import visible
 from antdrive.base.files import as_json
 
@@ -22,6 +23,7 @@ LAYOUT = "\n\t"  # control characters that lines may hold
 GOOD, BAD = "✓", "✗"  # signs of success and failure
 COLOURS = {GOOD: "green", BAD: "red"}
 PLAIN = {GOOD: "+", BAD: "x"}  # for streams that cannot encode the signs
+COMPILING = "compiling what this command needs, once per installation"
 LEAST_WRAPPED = 24  # least width of a wrapped column [characters]
 
 
@@ -45,7 +47,28 @@ def _progress(
     shown = (progress.TextColumn("{task.description}"), progress.BarColumn(), *made)
     with progress.Progress(*shown, console=Console(stderr=True), transient=True, **settings) as rows:
         task = rows.add_task(label, total=total, note="")
-        yield lambda **changes: rows.update(task, **changes)
+        kernels = 0
+
+        def compiles(_: str) -> None:
+            nonlocal kernels
+            kernels += 1
+            rows.update(task, description=f"{label}, after compiling {kernels} kernels once")
+
+        before, kernel_cache.on_compile = kernel_cache.on_compile, compiles
+        try:
+            yield lambda **changes: rows.update(task, **changes)
+        finally:
+            kernel_cache.on_compile = before
+
+
+def report_compiling() -> None:
+    """Print a line when a kernel compiles; progress bars count them instead."""
+
+    def compiles(_: str) -> None:
+        kernel_cache.on_compile = kernel_cache.ignore
+        print_error(COMPILING)
+
+    kernel_cache.on_compile = compiles
 
 
 @contextmanager

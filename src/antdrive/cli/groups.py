@@ -16,7 +16,7 @@ import typer.main
 
 from antdrive.base.errors import FieldError, InputError, Terminated, input_error
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
-from antdrive.cli.console import print_error, print_line
+from antdrive.cli.console import print_error, print_line, report_compiling
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INTERRUPTED, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.options import with_plan_limit
 from antdrive.sim.settings import PANELS
@@ -32,6 +32,7 @@ _USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 
 def exit_code_of(words: list[str]) -> int:
     """Run a command line and return its exit code."""
+    report_compiling()
     try:
         code = _code_of(application()(args=words, prog_name="antdrive", standalone_mode=False))
     except (InputError, FieldError) as error:

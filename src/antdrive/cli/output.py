@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, file_lines, marked, print_error, this_command
 from antdrive.runs.results_folder import free_folder, opened
 from antdrive.views.run_folder import check_folder
@@ -24,12 +23,11 @@ def results_folder(
 ) -> Iterator[tuple[Path, dict[str, Any]]]:
     """Claim a results folder for this command. Yields the folder and the first entries of its manifest.
 
-    The folder is checked and the kernels are compiled before any work. Without `out`, it is `usual`, or a folder beside that if
+    The folder is checked before any work. Without `out`, it is `usual`, or a folder beside that if
     `usual` holds other results. `write_manifest`: write the manifest now; otherwise the caller does.
     """
     folder, facts = out or free_folder(usual, manifest, mark), {"fingerprint": mark, "command": this_command()}
     check_folder(folder)
-    compile_once()
     with opened(folder, manifest, facts if write_manifest else None):
         yield folder, facts
 

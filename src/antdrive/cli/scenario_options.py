@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, print_error
 from antdrive.cli.options import Planner, Robot, option
 from antdrive.cli.parse import numbers, pair
@@ -143,7 +142,6 @@ def with_chosen_margin(scenario: "Scenario") -> "Scenario":
     conditions = scenario.loss_factors
     if known_margin(conditions) is not None:
         return choose(scenario)
-    compile_once()
     label = f"calibrating {conditions.robot.name}, noise {conditions.noise:g}, smoothing {conditions.smoothing}"
     if not sys.stderr.isatty():
         print_error(f"{label}: about {TYPICAL_MARGINS * DRIVES} short drives, result cached")

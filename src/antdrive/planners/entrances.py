@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.plane import wrap_angle
-from antdrive.worlds.world import PointWorld
 
 if TYPE_CHECKING:
     from antdrive.base import Floats, Point, Pose
@@ -21,8 +19,14 @@ if TYPE_CHECKING:
 MAX_BACKWARDS = 0.5  # longest way that a robot backs out of a place where it cannot turn [m]
 LEAD = 0.75  # farthest entrance from a start [m]
 ROOM = 1e-4  # a start closer to obstacles than the margin leaves with this much less room than it has [m]
-FAR = 25.0  # obstacles farther from a start than this meet no lead; robots are at most 20 m long [m]
-STEP = math.pi / 4  # between the headings of a grid [rad]
+TURNING = 0.1  # a turn to an entrance counts as this much of a way [m/rad]
+
+
+class Lead(NamedTuple):
+    """Straight from an exact start to the centre of its cell: the robot's heading [rad], and whether it drives backwards."""
+
+    heading: float
+    backwards: bool
 
 
 def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
@@ -37,66 +41,74 @@ def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
     """
     from antdrive.worlds import _kernels_turns
 
-    free = np.argwhere(grid.free)
-    away = np.hypot(*(grid.xy(free) - task.goal).T)
-    order = np.argsort(away, kind="stable")
-    goals = np.ravel_multi_index(tuple(free[order[: np.count_nonzero(away <= within)]].T), grid.shape)
-    start = entrance(grid, task, goals)
-    if start < 0 or not len(goals):
-        return start, next(iter(goals.tolist()), -1)
-    reached = np.zeros(grid.free.size, dtype=np.bool_)
-    reached[grid.cells_of(_kernels_turns.led_to(grid.graph, start))] = True
-    return start, int(goals[reached[goals].argmax()])
+    goals, _ = _free_around(grid, task.goal, within)
+    nearest = _kernels_turns.leads_to(grid.graph, goals)
+    start = entrance(grid, task, nearest)
+    place = int(nearest[start]) if start >= 0 else 0
+    return start, int(goals[max(0, place)]) if len(goals) else -1
 
 
-def entrance(grid: Grid, task: Task, goals: npt.NDArray[np.int64]) -> int:
+def entrance(grid: Grid, task: Task, nearest: npt.NDArray[np.int32]) -> int:
     """Return the node by which the robot enters a grid with turns from its exact start; -1 if it cannot.
 
     A lead turns on the spot, drives straight to the centre of the node's cell, and turns to a heading of the node. The node
-    is the nearest with a clear lead from which moves lead to a goal. Only where no lead forwards reaches such a node the
+    is the first with a clear lead from which moves lead to a goal, by way and turn.
+    Only where no lead forwards reaches such a node the
     robot leaves backwards, by at most `MAX_BACKWARDS`. Where no such node is near, it is any node of the nearest free cell.
 
     Args:
         grid: a grid with turns
         task: the task whose world was rasterised
-        goals: flat cells (G,)
+        nearest: which goal moves lead to from each node, -1 for none (N,)
     """
-    from antdrive.worlds import _kernels_turns
+    from antdrive.planners import _kernels_entrances
 
-    near, away = _free_around(grid, task.start[:2])
+    near, away = _free_around(grid, task.start[:2], LEAD)
     if not len(near):
         return -1
-    leading = _kernels_turns.leads_to(grid.graph, goals)
     labels = grid.turns.label[near]
-    useful = np.where(labels >= 0, leading[labels], False).any(axis=1)
+    useful = ((labels >= 0) & (nearest[labels] >= 0)).any(axis=1)
     if not useful.any():
         return int(labels[0].max())
-    around = _around(task)
-    outline = outline_at(around, grid.turns.outline)
+    outline = outline_at(task, grid.turns.outline)
+    around = _around(task, LEAD + float(np.hypot(*outline.corners.T).max()) + outline.reach + ROOM)
+    centres = grid.xy(np.column_stack(np.divmod(near, grid.shape[1])))
     for most, backwards in ((LEAD, False), (MAX_BACKWARDS, True)):
-        for node in _entrances(grid, around, outline, near[useful & (away <= most)], backwards):
-            if leading[node]:
-                return node
+        kept = np.flatnonzero(useful & (away <= most))
+        kept = kept[_by_effort(centres[kept], task.start, backwards)]
+        found = _kernels_entrances.first_entrance(
+            *task.start, centres[kept], labels[kept], nearest, backwards, *outline, *around
+        )
+        if found >= 0:
+            return int(found)
     return -1
 
 
-def _free_around(grid: Grid, point: Point) -> tuple[npt.NDArray[np.int64], Floats]:
-    """Return the free cells within `LEAD` of a point, nearest first, and their distances [m]."""
+def _free_around(grid: Grid, point: Point, within: float) -> tuple[npt.NDArray[np.int64], Floats]:
+    """Return the free flat cells within a distance of a point, nearest first, and their distances [m]."""
     row, col = grid.cell_at(*point)
-    reach = math.ceil(LEAD / grid.cell)
+    reach = math.ceil(within / grid.cell)
     low, left = max(0, row - reach), max(0, col - reach)
     near = np.argwhere(grid.free[low : row + reach + 1, left : col + reach + 1]) + (low, left)
     away = np.hypot(*(grid.xy(near) - point).T)
     order = np.argsort(away, kind="stable")
-    order = order[away[order] <= LEAD]
+    order = order[away[order] <= within]
     return near[order, 0] * grid.shape[1] + near[order, 1], away[order]
 
 
-def _around(task: Task) -> Task:
-    """Return the task with the obstacles that leads may meet."""
+def _by_effort(centres: Floats, start: Pose, backwards: bool) -> npt.NDArray[np.int64]:
+    """Return the order of some points (N, 2) [m] by the way to them and the turn towards them."""
+    dx, dy = (centres - start[:2]).T
+    turn = np.abs(wrap_angle(np.arctan2(dy, dx) + math.pi * backwards - start[2]))
+    away = np.hypot(dx, dy)
+    return np.argsort(away + np.where(away > ROOM, TURNING * turn, 0.0), kind="stable")
+
+
+def _around(task: Task, within: float) -> tuple[Floats, Floats]:
+    """Return the discs (N, 3) within a distance of the start, and the walls (4,) [m]."""
     discs, (x, y, _) = task.world.discs, task.start
-    close = np.hypot(discs[:, 0] - x, discs[:, 1] - y) - discs[:, 2] < FAR
-    return dataclasses.replace(task, world=PointWorld.of(task.world.name, task.world.bounds, discs[close]))
+    close = np.hypot(discs[:, 0] - x, discs[:, 1] - y) - discs[:, 2] < within
+    return discs[close], np.asarray(task.world.bounds, dtype=np.float64)
 
 
 def outline_at(task: Task, outline: Outline) -> Outline:
@@ -110,41 +122,35 @@ def outline_at(task: Task, outline: Outline) -> Outline:
 
 def lead_heading(pose: Pose, x: float, y: float, outline: Outline, world: World, *, backwards: bool) -> float:
     """Return the heading of a straight lead from a pose to (x, y) [rad]; NaN if it or the turn to it is not clear."""
-    from antdrive.worlds.headings import sweep_clearance
+    from antdrive.planners import _kernels_entrances
 
-    dx, dy = x - pose[0], y - pose[1]
-    if math.hypot(dx, dy) < 1e-6:
-        return pose[2]
-    heading = math.atan2(-dy, -dx) if backwards else math.atan2(dy, dx)
-    if sweep_clearance(pose[0], pose[1], x, y, heading, outline, world.discs, world.bounds) <= 0:
-        return math.nan
-    return heading if math.isfinite(clear_turn(pose, heading, outline, world)) else math.nan
+    walls = np.asarray(world.bounds, dtype=np.float64)
+    return float(_kernels_entrances.lead_heading(*pose, x, y, backwards, *outline, world.discs, walls))
 
 
 def clear_turn(pose: Pose, heading: float, outline: Outline, world: World) -> float:
     """Return the shortest clear turn on the spot from a pose to a heading [rad]; NaN if neither way round is clear."""
-    from antdrive.worlds.headings import turn_clear
+    from antdrive.planners import _kernels_entrances
 
-    short = float(wrap_angle(heading - pose[2]))
-    for turn in (short, short - math.copysign(2 * math.pi, short)):
-        if turn_clear(*pose, turn, outline, world.discs, world.bounds):
-            return turn
-    return math.nan
+    walls = np.asarray(world.bounds, dtype=np.float64)
+    return float(_kernels_entrances.clear_turn(*pose, heading, *outline, world.discs, walls))
 
 
-def _entrances(
-    grid: Grid, task: Task, outline: Outline, cells: npt.NDArray[np.int64], backwards: bool
-) -> Iterator[int]:
-    """Yield the nodes of some flat cells with a clear lead."""
-    from antdrive.worlds.headings import turn_clear
+def clear_lead(task: Task, to: Point, heading: float | None, outline: Outline) -> Lead:
+    """Return the clear lead from a task's start to a point, forwards if possible; from there the robot turns to a heading.
 
-    world = task.world
-    for cell in cells.tolist():
-        x, y = grid.xy([divmod(cell, grid.shape[1])])[0].tolist()
-        heading = lead_heading(task.start, x, y, outline, world, backwards=backwards)
-        if math.isnan(heading):
-            continue
-        for side in (math.floor(heading / STEP), math.ceil(heading / STEP)):
-            node = int(grid.turns.label[cell, side % 8])
-            if node >= 0 and turn_clear(x, y, heading, side * STEP - heading, outline, world.discs, world.bounds):
-                yield node
+    Without a clear one it is the straight forwards: an estimated pose may overlap obstacles.
+    """
+    for backwards in (False, True):
+        facing = lead_heading(task.start, *to, outline, task.world, backwards=backwards)
+        if math.isfinite(facing) and (
+            heading is None or math.isfinite(clear_turn((*to, facing), heading, outline, task.world))
+        ):
+            return Lead(facing, backwards)
+    return Lead(math.atan2(to[1] - task.start[1], to[0] - task.start[0]), False)
+
+
+def turn_at(pose: Pose, heading: float, task: Task, outlines: Sequence[Outline]) -> float:
+    """Return the turn on the spot that is clear for the first outline possible, or the shorter one without any [rad]."""
+    turns = (clear_turn(pose, heading, outline, task.world) for outline in outlines)
+    return next(filter(math.isfinite, turns), float(wrap_angle(heading - pose[2])))

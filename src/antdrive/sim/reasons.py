@@ -30,11 +30,11 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
         says = f": {said}" if said else ""
         return f"{s.planner_label} found no path for {disc}{says}; astar finds one on these cells of {grid.cell:g} m"
     start = f"no path for {disc} on cells of {grid.cell:g} m"
-    if grid.turns:
-        return start
-    if s.turns:
+    if s.turns and not grid.turns:
         start += f", nor for {_shape(robot)}"
     if feasible(s.task, s.inflate):
+        if grid.turns:
+            return start
         finer = next((grid.cell / k for k in FINER if _has_path(s.task, grid.cell / k, s.inflate)), None)
         return f"{start}; there is one on {f'cells of {finer:g} m' if finer else 'finer cells'}"
     return f"{start}; {_narrowest_place(s)}"
@@ -59,16 +59,20 @@ def _narrowest_place(s: RoutePlanner) -> str:
 def _what_it_takes(s: RoutePlanner, passes: float) -> str:
     """Describe the room that the robot needs where only discs of radius `passes` [m] fit, and a remedy."""
     robot, foot = s.robot, s.robot.footprint
-    fits = passes - robot.radius
-    helps = f"a margin below {fits:.3g} m leaves a way on fine cells" if fits > 0 else ""
+    spare = passes - robot.radius
+    helps = f"a margin below {spare:.3g} m leaves a way on fine cells" if spare > 0 else ""
     if helps and LEAST < s.usual_margin <= s.margin:
         helps += ", but noise may then cause contacts; --margin auto measures its effect"
     if foot.is_disc:
         return helps or "this robot does not fit through"
     _, ymin, _, ymax = foot.bounds
-    needs = f"{_shape(robot)} needs {ymax - ymin + 2 * s.margin:.3g} m of the {2 * passes:.3g} m straight ahead"
+    width, gap = ymax - ymin + 2 * s.margin, 2 * passes
+    fits = f"of the {gap:.3g} m straight ahead" if width <= gap else f"straight ahead, more than the {gap:.3g} m there"
+    needs = f"{_shape(robot)} needs {width:.3g} m {fits}"
+    if s.turns and width <= gap:
+        needs += "; between cells, by straight moves and turns on the spot, it does not get through"
     if not s.turns:
-        others = "" if s.footprint == "disc" else "; astar plans for the footprint"
+        others = "" if s.footprint == "disc" or width > gap else "; astar plans for the footprint"
         needs = f"plans use the disc of {robot.name}; {needs}{others}"
     return f"{needs}{'; ' * bool(helps)}{helps}"
 

@@ -50,6 +50,7 @@ class LossFactors:
     controller: PurePursuit  # the controller
     noise: float  # factor on the robot's documented noise
     smoothing: str  # how plans become routes
+    outlined: bool = False  # whether all plans keep the footprint clear, on routes of lines and turns
     physics_hz: int = 240  # physics steps per simulated second
     control_hz: int = 60  # control periods per simulated second
 
@@ -208,6 +209,7 @@ class Scenario(Settings):
             controller=self.controller,
             noise=float(self.noise),
             smoothing=self.driven_smoothing,
+            outlined=self.footprint == "exact" and not self.robot.footprint.is_disc,
             physics_hz=self.physics_hz,
             control_hz=self.control_hz,
         )

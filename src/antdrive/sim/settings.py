@@ -116,14 +116,15 @@ class Settings:
             "side of a grid cell [m]",
             "Planner",
             "METRES",
-            usual="the world's own; at most 0.05 without a map, and for footprints",
+            usual="the world's own; at most 0.05 without a map, and for footprints unless ants find a way on larger ones",
         ),
     ] = None
     footprint: Annotated[
         str,
         Setting(
             "the shape that plans keep clear: disc (the circle around the robot), exact (its footprint, which turns on the "
-            "spot and drives straight), or auto (the disc unless it has no way or, for searches, one over 10 % longer)",
+            "spot and drives straight), or auto (the disc unless it has no way or one over 10 % longer; ants compare ways on the "
+            "world's cells)",
             "Planner",
             "auto|disc|exact",
             choices=FOOTPRINTS,

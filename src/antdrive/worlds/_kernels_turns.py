@@ -119,32 +119,32 @@ def led_to(graph: MoveGraph, start: int) -> Array:
 
 @kernel
 def leads_to(graph: MoveGraph, goals: Array) -> Array:
-    """Return the nodes from which moves lead to any node of some cells (N,): a flood fill against the moves."""
-    seen = np.zeros(len(graph.mask), dtype=np.bool_)
+    """Return the first of some cells that moves from each node lead to, as its place among them, or NOWHERE (N,).
+
+    Each cell in turn floods what no cell before it has, against the moves.
+    """
+    first = np.full(len(graph.mask), NOWHERE, dtype=np.int32)
     stack = np.empty(len(graph.mask), dtype=np.int64)
-    size = 0
-    for goal in goals:
+    for i in range(len(goals)):
+        size = 0
         for k in range(8):
-            node = np.int64(graph.label[goal, k])
-            if node >= 0 and not seen[node]:
-                seen[node] = True
+            node = np.int64(graph.label[goals[i], k])
+            if node >= 0 and first[node] < 0:
+                first[node] = i
                 stack[size] = node
                 size += 1
-    rows = len(graph.label) // graph.cols
-    while size > 0:
-        size -= 1
-        node = stack[size]
-        here = graph.cell[node]
-        row, col = here // graph.cols, here % graph.cols
-        for k in range(8):
-            if graph.label[here, k] != node:
-                continue
-            r, c = row - DROW[k], col - DCOL[k]
-            if r < 0 or c < 0 or r >= rows or c >= graph.cols:
-                continue
-            before = graph.label[r * graph.cols + c, k]
-            if before >= 0 and not seen[before] and graph.mask[before] >> k & 1:
-                seen[before] = True
-                stack[size] = before
-                size += 1
-    return seen
+        while size > 0:
+            size -= 1
+            node = stack[size]
+            here = graph.cell[node]
+            for k in range(8):
+                there = here - DROW[k] * graph.cols - DCOL[k]
+                if graph.label[here, k] != node or there < 0 or there >= len(graph.label):
+                    continue
+                before = graph.label[there, k]
+                # No move leaves the grid, so none leads here from the far end of a row.
+                if before >= 0 and first[before] < 0 and graph.mask[before] >> k & 1:
+                    first[before] = i
+                    stack[size] = before
+                    size += 1
+    return first

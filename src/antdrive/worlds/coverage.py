@@ -6,8 +6,8 @@ indoor mobile robot navigation*, Artificial Intelligence 99, 1998.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -39,7 +39,7 @@ class Door:
     width: float
     at: Point
     rooms: tuple[int, int]
-    passed: bool
+    passed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +47,14 @@ class Coverage:
     """The part of a floor that a robot reaches.
 
     Attributes:
+        by: the robot's grid; its cells may be larger than those of the arrays below
         floor: where a point gets (R, C)
         reached: where the robot's centre gets (R, C)
         rooms: number of each cell's room (R, C), -1 off the floor
         doors: the doors, the narrowest first
     """
 
+    by: Grid
     floor: Cells
     reached: Cells
     rooms: npt.NDArray[np.int64]
@@ -92,25 +94,40 @@ def share_of(reached: Cells, floor: Cells) -> float:
     return int(np.count_nonzero(reached & floor)) / max(1, int(np.count_nonzero(floor)))
 
 
-def coverage(world: World, grid: Grid, start: Point) -> Coverage:
-    """Return what a robot reaches on its grid from a start [m]."""
-    bare = rasterise(world, grid.cell)
+def coverage(world: World, grids: Sequence[Grid], start: Point) -> tuple[Coverage, ...]:
+    """Return what a robot reaches on each of its grids from a start [m], on the cells of the finest."""
+    bare = rasterise(world, min(grid.cell for grid in grids))
     floor = reached_cells(bare, [start])
-    clearance = np.zeros(grid.shape)
+    clearance = np.zeros(bare.shape)
     clearance[floor] = point_clearance(world, bare.xy(np.argwhere(floor)))
     order = np.flatnonzero(floor)
     order = order[np.argsort(-clearance.ravel()[order], kind="stable")]
-    rooms = np.full(grid.shape, -1)
-    _kernels_coverage.rooms(bare.moves, clearance, order, NARROW, LEAST_ROOM / grid.cell**2, rooms)
+    rooms = np.full(bare.shape, -1)
+    _kernels_coverage.rooms(bare.moves, clearance, order, NARROW, LEAST_ROOM / bare.cell**2, rooms)
     rooms[floor] = np.unique(rooms[floor], return_inverse=True)[1]
-    reached = reached_cells(grid, [start])
-    doors = []
+    masks = [_on_cells_of(bare, grid, reached_cells(grid, [start])) for grid in grids]
+    doors: list[list[Door]] = [[] for _ in grids]
     for border in _borders(bare, rooms):
         room = clearance[tuple(border.T)]
-        widest = border[room >= room.max() - grid.cell]
-        found = [door for at in widest if (door := _door(world, bare, clearance, reached, rooms, border, at))]
-        doors += [min(found, key=_order)] if found else []
-    return Coverage(floor, reached, rooms, tuple(sorted(doors, key=_order)))
+        widest = border[room >= room.max() - bare.cell]
+        found = [door for at in widest if (door := _door(world, bare, clearance, rooms, border, at))]
+        for mask, passed in zip(masks, doors, strict=True) if found else ():
+            passed.append(replace(min(found, key=_order), passed=bool(mask[tuple(border.T)].any())))
+    return tuple(
+        Coverage(grid, floor, mask, rooms, tuple(sorted(passed, key=_order)))
+        for grid, mask, passed in zip(grids, masks, doors, strict=True)
+    )
+
+
+def _on_cells_of(bare: Grid, grid: Grid, cells: Cells) -> Cells:
+    """Return cells of a grid (R, C) as those of another of the same world."""
+    if grid.shape == bare.shape:
+        return cells
+    rows, cols = (
+        np.minimum((np.arange(count) + 0.5) * bare.cell / grid.cell, most - 1).astype(np.int64)
+        for count, most in zip(bare.shape, grid.shape, strict=True)
+    )
+    return cells[np.ix_(rows, cols)]
 
 
 def _order(door: Door) -> tuple[float, Point]:
@@ -144,7 +161,6 @@ def _door(
     world: World,
     grid: Grid,
     clearance: npt.NDArray[np.float64],
-    reached: Cells,
     rooms: npt.NDArray[np.int64],
     border: npt.NDArray[np.int64],
     at: npt.NDArray[np.int64],
@@ -177,4 +193,4 @@ def _door(
     width = float(widths[k])
     mid_x, mid_y = (ends[0, k] + (ends[1, k] - ends[0, k]) * ((radii[first[k]] + width / 2) / gaps[k])).tolist()
     low, high = np.unique(rooms[tuple(border.T)]).tolist()
-    return Door(width, (mid_x, mid_y), (low, high), bool(reached[tuple(border.T)].any()))
+    return Door(width, (mid_x, mid_y), (low, high))

@@ -47,12 +47,14 @@ class Turns:
         cell: flat cell of each node (N,), read-only
         label: node of each flat cell and heading, -1 where it is not free (R * C, 8), read-only
         moves: bit k is set where the node may make the move `DIRECTIONS[k]` (N,), read-only
+        joints: bit k is set where the turn from heading k to the next is free, of each flat cell (R * C,), read-only
     """
 
     outline: Outline = DISC
     cell: npt.NDArray[np.int32] = field(default_factory=functools.partial(_none, 0))
     label: npt.NDArray[np.int32] = field(default_factory=functools.partial(_none, 0, 8))
     moves: npt.NDArray[np.uint8] = field(default_factory=functools.partial(_none, 0, dtype=np.uint8))
+    joints: npt.NDArray[np.uint8] = field(default_factory=functools.partial(_none, 0, dtype=np.uint8))
 
     def __bool__(self) -> bool:
         return len(self.cell) > 0
@@ -70,9 +72,10 @@ class Turns:
         cell, label = np.empty(count, dtype=np.int32), np.empty((bits.size, 8), dtype=np.int32)
         moves = np.zeros(count, dtype=np.uint8)
         _kernels_turns.number_labels(bits.ravel(), able.ravel(), cell, label, moves)
-        for array in (cell, label, moves):
+        joints = (bits.ravel() >> 8).astype(np.uint8)
+        for array in (cell, label, moves, joints):
             array.setflags(write=False)
-        return cls(outline, cell, label, moves)
+        return cls(outline, cell, label, moves, joints)
 
     def without(self, blocked: npt.NDArray[np.bool_]) -> Turns:
         """Return the turns without the moves out of or into some cells.

@@ -276,6 +276,5 @@ def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeyp
     monkeypatch.setattr("joblib.cpu_count", lambda: cores)
     monkeypatch.setattr("antdrive.runs.suites.select", lambda words, only: [case] * 10)
     monkeypatch.setattr("antdrive.cli.testing.check_cases", check_cases)
-    monkeypatch.setattr(check, "compile_once", lambda: None)
     assert check.drive_suites(["a"], None, asked, "", Results(tmp_path), json=True) == []
     assert found == [started]

@@ -11,7 +11,7 @@ import pytest
 from antdrive.base.files import as_json
 from antdrive.planners import PLANNERS
 from antdrive.robots import PurePursuit, RobotSpec
-from antdrive.worlds import list_worlds, load_task
+from antdrive.worlds import Disc, Task, World, list_worlds, load_task, save_task
 
 
 def test_every_planner_is_listed_with_its_options(antdrive):
@@ -64,10 +64,29 @@ def test_every_world_is_listed(antdrive):
 def test_show_reports_whether_a_robot_can_cross(antdrive, tmp_path):
     code, out, _ = antdrive("worlds", "show", "gate", "--out", tmp_path / "gate.png")
     assert code == 0
-    assert "passable           yes" in out
+    assert re.search("^passable +yes, for turtlebot with", out, re.MULTILINE)
     assert (tmp_path / "gate.png").exists()
     assert not json.loads(antdrive("worlds", "show", "no-path", "--json")[1])["passable"]
     assert "; antdrive plan says why\n" in antdrive("worlds", "show", "no-path")[1]
+
+
+def test_show_reports_what_a_robot_reaches_by_its_disc_and_by_its_footprint(antdrive, tmp_path):
+    posts = tuple(Disc(5.0, y / 10, 0.05) for y in range(51) if not 20 < y < 29)  # a door of 0.8 m
+    world = World("rooms", (0.0, 0.0, 10.0, 5.0), posts)
+    save_task(Task(world, (1.5, 2.5, 0.0), (8.0, 2.5), cell=0.1), tmp_path / "rooms.yaml")
+    words = "worlds", "show", tmp_path / "rooms.yaml", "--robot", "warehouse"
+    code, out, _ = antdrive(*words)
+    assert code == 0
+    assert "yes, for warehouse by its footprint with a margin of 0.03 m\n" in out
+    assert re.search(r"^by its disc +\d\d% of the connected floor, 1 of 2 rooms, 0 of 1 doors$", out, re.MULTILINE)
+    assert re.search(r"^by its footprint +\d\d% of the connected floor, 2 of 2 rooms, 1 of 1 doors$", out, re.MULTILINE)
+    assert re.search(r"^door by footprint +0\.80 m wide at \(5\.00, 2\.45\)$", out, re.MULTILINE)
+    facts = json.loads(antdrive(*words, "--json")[1])
+    assert facts["passable"]
+    assert facts["coverage"]["share"] < 0.4 < 0.5 < facts["coverage_by_footprint"]["share"]
+    shut = antdrive(*words, "--margin", "0.15")[1]
+    assert "no, for warehouse with a margin of 0.15 m; antdrive plan says why\n" in shut
+    assert re.search(r"^door not passed +0\.80 m wide", shut, re.MULTILINE)
 
 
 @pytest.mark.parametrize("words", [["forest", "--set", "count=8"], ["barn", "--set", "fill=0.2"]])

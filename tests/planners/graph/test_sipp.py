@@ -1,6 +1,7 @@
 """Safe-interval planning against an independent oracle in discrete time."""
 
 import dataclasses
+import functools
 import itertools
 import math
 
@@ -70,57 +71,65 @@ def some_mover(rng, side):
     return Keyframed(radius, np.column_stack([t, rng.uniform(0, side, (count, 2))]), bool(rng.random() < 0.8))
 
 
-# The oracle tabulates the reachable cells at each tick.
+# The oracle tabulates the reachable states at each tick: cells, on grids with turns also the heading.
 
 TICK = 0.05
+FINE = 2  # samples per tick
 MOVES = [(dr, dc) for dr, dc in itertools.product((-1, 0, 1), repeat=2) if (dr, dc) != (0, 0)]
 
 
-def first_tick(query, movers, horizon, *, slack, hurry, stay=False):
+def first_tick(ways, starts, goals, movers, horizon, *, inflate=INFLATE, slack, hurry, stay=False):
     """Return the earliest arrival of a robot that acts only on ticks [s]; inf: not within the horizon.
 
-    `slack` is added to the clearance. The duration of a diagonal move is rounded up to ticks; with `hurry`, also
-    down.
+    `ways` has for each state its place and its ways on: next state, next place, duration [s]. The robot may also wait. `slack`
+    is added to the clearance. Durations are rounded up to ticks; with `hurry`, also down.
     """
-    free, (rows, cols), ticks = query.grid.free, query.grid.shape, round(horizon / TICK)
-    fine = 2  # samples per tick
-    t = np.arange(ticks * fine + 1) * TICK / fine
-    where = [(m.at(t), m.radius + INFLATE + 2 * TOLERANCE + slack) for m in movers]
+    ticks = round(horizon / TICK)
+    t = np.arange(ticks * FINE + 1) * TICK / FINE
+    where = [(m.at(t), m.radius + inflate + 2 * TOLERANCE + slack) for m in movers]
 
-    def clear(path, n):
-        """Return for each tick whether a robot that follows (S, 2) from there, one row per sample, keeps the clearance."""
-        samples = fine * np.arange(ticks - n + 1)[:, np.newaxis] + np.arange(len(path))
+    @functools.cache
+    def clear(a, b, n, exact):
+        """Return for each tick whether a robot that drives from there straight from a to b keeps the clearance."""
+        part = np.minimum(1.0, np.arange(n * FINE + 1) * TICK / FINE / exact)[:, np.newaxis]
+        path = np.array(a) + part * (np.array(b) - np.array(a))
+        samples = FINE * np.arange(ticks - n + 1)[:, np.newaxis] + np.arange(len(path))
         gaps = [np.hypot(*np.moveaxis(xy[samples] - path, -1, 0)) - reach for xy, reach in where]
         return np.asarray((np.array(gaps) >= 0).all(axis=(0, 2)))
 
-    def centre(r, c):
-        return CELL * np.array([c, r], dtype=float)
-
     options = {}
-    for r, c in np.argwhere(free):
-        waiting = clear(np.repeat(centre(r, c)[np.newaxis], fine + 1, axis=0), 1)
-        options[r, c] = [((r, c), 1, waiting)]
-        for dr, dc in MOVES:
-            q, d = r + dr, c + dc
-            if not (0 <= q < rows and 0 <= d < cols and free[q, d] and free[r, d] and free[q, c]):
-                continue
-            exact = CELL * math.hypot(dr, dc) / SPEED
+    for state, (at, onward) in ways.items():
+        options[state] = [(state, 1, clear(at, at, 1, TICK))]
+        for to, there, exact in onward:
             for n in {math.ceil(exact / TICK - 1e-9), *([math.floor(exact / TICK + 1e-9)] if hurry else [])}:
-                part = np.minimum(1.0, np.arange(n * fine + 1) * TICK / fine / exact)
-                path = centre(r, c) + part[:, np.newaxis] * (centre(q, d) - centre(r, c))
-                options[r, c].append(((q, d), n, clear(path, n)))
-    can = np.zeros((ticks + 1, rows, cols), dtype=np.bool_)
-    can[0][query.start] = bool(clear(centre(*query.start)[np.newaxis], 0)[0])
+                options[state].append((to, n, clear(at, there, n, exact)))
+    can = {state: np.zeros(ticks + 1, dtype=np.bool_) for state in ways}
+    for state in starts:
+        can[state][0] = bool(clear(ways[state][0], ways[state][0], 0, TICK)[0])
     for tick in range(ticks):
-        for r, c in np.argwhere(can[tick]):
-            for to, n, ok in options[r, c]:
+        for state in [state for state, when in can.items() if when[tick]]:
+            for to, n, ok in options[state]:
                 if tick + n <= ticks and ok[tick]:
-                    can[tick + n][to] = True
-    reached = can[(slice(None), *query.goal)].copy()
+                    can[to][tick + n] = True
+    reached = np.any([can[state] for state in goals], axis=0)
     if stay:
-        waiting = options[query.goal][0][2]
+        waiting = options[goals[0]][0][2]
         reached &= np.append(np.logical_and.accumulate(waiting[::-1])[::-1], True)
     return float(np.argmax(reached)) * TICK if reached.any() else math.inf
+
+
+def on_discs(query):
+    """Return the ways of a disc between the cells of a query, its start and its goal."""
+    free = query.grid.free
+    ways = {}
+    for r, c in np.argwhere(free).tolist():
+        onward = []
+        for dr, dc in MOVES:
+            q, d = r + dr, c + dc
+            if 0 <= q < free.shape[0] and 0 <= d < free.shape[1] and free[q, d] and free[r, d] and free[q, c]:
+                onward.append(((q, d), (CELL * d, CELL * q), CELL * math.hypot(dr, dc) / SPEED))
+        ways[r, c] = (CELL * c, CELL * r), onward
+    return ways, [query.start], [query.goal]
 
 
 def small_world(seed):
@@ -149,9 +158,9 @@ def test_no_path_arrives_sooner_and_none_is_missed(seeds, stay):
     for query, movers in map(small_world, seeds):
         plan = plan_in_time(query, movers, speed=SPEED, horizon=HORIZON, stay=stay)
         # A robot on ticks with more clearance bounds the free robot from above ...
-        above = first_tick(query, movers, HORIZON, slack=ABOVE, hurry=False, stay=stay)
+        above = first_tick(*on_discs(query), movers, HORIZON, slack=ABOVE, hurry=False, stay=stay)
         # ... and one with less clearance bounds it from below.
-        below = first_tick(query, movers, HORIZON, slack=BELOW, hurry=True, stay=stay)
+        below = first_tick(*on_discs(query), movers, HORIZON, slack=BELOW, hurry=True, stay=stay)
         assert below - TICK - 1e-9 <= plan.duration <= above + 1e-9
         without += math.isinf(below)
         if math.isfinite(above):

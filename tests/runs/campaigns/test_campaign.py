@@ -181,7 +181,7 @@ def test_random_tasks_on_a_map_need_no_problem_and_lie_on_its_largest_ground(tmp
         for x, y in (task.start[:2], task.goal):
             assert not (3 < x < block + 3 and 5 < y < block + 5), "not in the hollow"
     assert expansion.remarks == (
-        "random tasks are drawn from 100% of the connected floor: where the largest robot gets with its margin",
+        "random tasks are drawn from 100% of the connected floor: where the largest robot gets with its margin, by its disc",
     )
     with pytest.raises(InputError, match="start and goal: missing"):
         expand(make_campaign(campaign | {"tasks": "own"}, tmp_path))
@@ -202,6 +202,33 @@ def test_the_floor_counts_only_where_the_largest_robot_gets(tmp_path):
     (remark,) = expand(make_campaign(campaign, tmp_path)).remarks
     share = int(re.search(r"(\d+)%", remark)[1])
     assert 30 <= share < 50, "one room of two"
+
+
+@pytest.mark.parametrize(
+    ("planners", "robots", "more", "how"),
+    [
+        (["astar"], ["warehouse"], {}, "by footprint (warehouse)"),
+        (["astar"], ["warehouse", "turtlebot"], {}, "by footprint (warehouse)"),
+        (["astar"], ["warehouse"], {"footprint": "disc"}, "by its disc"),
+        (["astar", "tangent"], ["warehouse"], {}, "by its disc"),
+        (["astar"], ["turtlebot"], {}, "by its disc"),
+    ],
+)
+def test_random_tasks_are_drawn_from_what_robots_reach_by_the_shape_of_their_plans(
+    planners, robots, more, how, tmp_path
+):
+    rooms = [Disc(5.0, y / 10, 0.05) for y in range(50) if not 20 < y < 30]  # a passage of 0.9 m between two rooms
+    task = Task(World("rooms", (0.0, 0.0, 10.0, 5.0), tuple(rooms)), (1.5, 2.5, 0.0), (8.0, 2.5), cell=0.1)
+    save_task(task, tmp_path / "rooms.yaml")
+    campaign = {"worlds": ["rooms.yaml"], "planners": planners, "robots": robots, "tasks": {"random": 12}}
+    expansion = expand(make_campaign(campaign | {"settings": more}, tmp_path))
+    tasks = [job.case.place.task for job in expansion.jobs]
+    through = any((task.start[0] < 5) != (task.goal[0] < 5) for task in tasks)
+    by_disc = how == "by its disc" and "warehouse" in robots
+    assert through != by_disc, "a disc of 0.7 m closes the passage"
+    assert expansion.remarks[0].endswith(how)
+    share = int(re.search(r"(\d+)%", expansion.remarks[0])[1])
+    assert (share < 60) == by_disc
 
 
 def test_worlds_of_one_name_are_called_by_their_files(tmp_path):

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import PLANNERS, Query, load_planner, smooth
-from antdrive.robots import Footprint, PurePursuit, load_robot
+from antdrive.robots import Footprint, PurePursuit, load_robot, outline_of
+from antdrive.robots.clearance import footprint_clearance
+from antdrive.robots.default_margin import line_margin
 from antdrive.runs.margins import choice
 from antdrive.runs.margins.choice import (
     CLOSE,
@@ -51,6 +53,51 @@ def test_a_course_has_a_path_that_touches_its_pillars_surroundings(robot, margin
         spare.append(float(gap.min()) - inflate)
     assert min(spare) >= -1e-9
     assert np.median(spare) < 1e-3
+
+
+@pytest.mark.parametrize("robot", ["warehouse", "jackal"])
+def test_a_course_for_a_footprint_has_a_path_that_touches_its_pillars_surroundings(robot):
+    spec, margin, spare = load_robot(robot), 0.05, []
+    _, right, _, left = spec.footprint.bounds
+    for seed in range(12):
+        task = course(spec, spec.radius + margin, np.random.default_rng(seed), max(left, -right) + margin)
+        grid = rasterise(task.world, task.cell, spec.radius + margin, outline_of(spec.footprint, margin))
+        plan = PLANNERS["astar"].plan(Query.between(grid, task), np.random.default_rng(0))
+        assert plan.solved, seed
+        clearance = footprint_clearance(task.world, spec.footprint, swept(grid.xy(plan.line)))
+        spare.append(float(clearance.min()) - margin)
+    assert min(spare) >= -1e-6
+    assert np.median(spare) < 0.02
+
+
+def swept(line):
+    """Return dense poses along a polyline, facing ahead."""
+    parts = []
+    for a, b in itertools.pairwise(line):
+        points = np.linspace(a, b, 30)
+        parts.append(np.column_stack([points, np.full(30, math.atan2(b[1] - a[1], b[0] - a[0]))]))
+    return np.concatenate(parts)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["jackal", "husky", "warehouse"])
+def test_the_margin_of_lines_holds_the_calibrated_loss(name):
+    robot = load_robot(name)
+    margin = line_margin(robot, PurePursuit(), 1.0)
+    factors = LossFactors(robot=robot, controller=PurePursuit(), noise=1.0, smoothing="clearance", outlined=True)
+    losses = [loss_on_course(factors, margin, seed) for seed in range(20)]
+    assert max(loss.footprint for loss in losses) < margin
+    assert all(loss.footprint == loss.disc for loss in losses)
+
+
+def test_only_scenarios_that_drive_by_footprint_alone_calibrate_lines(jackal, turtlebot):
+    shapes = {
+        (robot.name, shape): Scenario.of("gate", "astar", robot, footprint=shape).loss_factors
+        for robot in (jackal, turtlebot)
+        for shape in ("auto", "disc", "exact")
+    }
+    assert [key for key, factors in shapes.items() if factors.outlined] == [(jackal.name, "exact")]
+    assert len({calibration_key(factors) for factors in shapes.values()}) == 3
 
 
 def test_courses_differ_by_seed_and_only_by_seed():

@@ -16,6 +16,9 @@ import pytest
 
 # pytester forgets what a run of pytest has imported, so that the next run would import all of it again.
 from antdrive import list_robots
+from antdrive.base import kernel_cache
+from antdrive.cli.console import COMPILING
+from antdrive.cli.testing import evaluation
 
 # What the compiler loads when it first compiles must not be forgotten either: it cannot be loaded twice.
 numba.njit(lambda: 0.0)()
@@ -317,15 +320,20 @@ def test_commands_work_where_pytest_was_started_and_in_its_rootdir(project):
         again.assert_outcomes(passed=1)
 
 
-def test_kernels_are_compiled_before_the_first_drive_with_one_line(project, monkeypatch, capfd):
-    compiled = []
-    monkeypatch.setattr("antdrive.cli.compiling.is_warm", lambda: bool(compiled))
-    monkeypatch.setattr("antdrive.cli.compiling.warm", lambda: compiled.append(1))
-    monkeypatch.setattr("antdrive.base.kernel_cache.cache_folder", lambda: project.path)
+def test_a_line_reports_that_kernels_compile(project, monkeypatch, capfd):
+    """The first drive compiles two kernels, the second none."""
+    waiting = ["astar", "smooth"]
+    drive = evaluation.drive
+
+    def compiles(*args, **kwargs):
+        while waiting:
+            kernel_cache.on_compile(waiting.pop())
+        return drive(*args, **kwargs)
+
+    monkeypatch.setattr(evaluation, "drive", compiles)
     for _ in range(2):
         project.runpytest(*PLUGIN, "-k", "closed", "--drive-update-new").assert_outcomes(passed=1, deselected=1)
-    assert compiled == [1]
-    assert capfd.readouterr().err.count("antdrive: compiling the planners, once per installation") == 1
+    assert capfd.readouterr().err.count(f"antdrive: {COMPILING}") == 1
 
 
 def test_junit_properties_and_the_summary_of_a_ci_run(accepted, monkeypatch):

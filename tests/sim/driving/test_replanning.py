@@ -281,6 +281,23 @@ def test_a_schedule_is_late_only_when_behind(t, arc):
         assert schedule.speed_limit(t, arc) == 0.0
 
 
+def test_a_schedule_with_turns_begins_at_the_first_cell_and_leaves_stops_at_corners_to_the_controller():
+    """A lead of 0.6 m, 2 m along x, a turn and 2 m along y; the plan turns from 5 to 8 s and waits until 12 s."""
+    route = Route(
+        np.array([[-0.6, 0.0], [0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]), turns=np.array([0.0, 0.0, math.pi / 2, 0.0])
+    )
+    xy = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0]])
+    times = np.array([[0.0, 1.2], [3.2, 3.2], [5.2, 12.0], [16.0, 16.0]])
+    plan = TimedPlan(status=PlanStatus.SOLVED, arrive=times[:, 0], leave=times[:, 1], xy=xy)
+    schedule = Schedule.of(plan, route)
+    assert [schedule.due(t) for t in (0.0, 3.2, 7.0, 14.0)] == pytest.approx([0.6, 1.6, 2.6, 3.6])
+    assert not schedule.late(0.5, 0.0)  # it is on its lead
+    assert schedule.late(3.0, 0.0)
+    assert schedule.speed_limit(4.9, 2.5) == math.inf
+    assert schedule.speed_limit(8.0, 2.6) == 0.0
+    assert 0 < schedule.speed_limit(11.9, 2.6) < 0.5
+
+
 def test_a_command_is_slowed_down_no_faster_than_the_robot_brakes():
     fast = Twist(0.6, 0.3)
     assert slow_down(fast, fast, math.inf, 0.02) == fast
@@ -406,3 +423,18 @@ def test_a_plan_for_a_footprint_keeps_away_from_movers_in_its_way(turtlebot):
         at = grid.xy(plan.cells)
         y = at[np.abs(at[:, 0] - 4.0).argmin(), 1]
         assert abs(y - crosses) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("robot", "world", "planner", "cell"),
+    [
+        ("jackal", "forest", "ants", None),  # the disc's way is at most 10 % longer
+        ("warehouse", "slalom", "astar", 0.05),
+        ("warehouse", "slalom", "ants", 0.25),  # the disc has a way, over 10 % longer
+        ("warehouse", "gate", "as", 0.2),  # the disc has none
+        pytest.param("warehouse", "forest", "ants", 0.05, marks=pytest.mark.slow),  # on finer cells only
+    ],
+)
+def test_auto_takes_the_footprint_on_cells_that_the_planner_can_search(robot, world, planner, cell):
+    grid = route_planner(Scenario.of(world, planner, robot)).chosen_grid()
+    assert (grid.cell if grid.turns else None) == cell

@@ -73,6 +73,35 @@ def test_a_route_too_close_is_rounding_and_near_a_corner_it_is_cutting():
     assert loss["tracking"] < 0.001
 
 
+def rotated(yaw, *, forward=1.0, estimated=None, backwards=False):
+    """The same drive by a rectangle of 0.4 x 0.2 m whose plan keeps 0.13 m free, at a constant heading."""
+    log = passing(0.27)
+    pose = log.pose + (0, 0, yaw)
+    route = log.route[::-1] if backwards else log.route
+    record = replace(log.record, robot=replace(log.record.robot, footprint=Footprint.rectangle(0.4, 0.2), track=0.15))
+    estimate = np.empty((0, 3)) if estimated is None else log.pose + (0, 0, estimated)
+    command = np.tile([forward, 0.0], (401, 1))
+    record = replace(record, footprint_margin=0.13)
+    return replace(log, record=record, pose=pose, route=route, estimate=estimate, command=command)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_footprint_that_leaves_the_heading_of_its_straight_loses_margin(backwards):
+    """Its corner, 0.2 m ahead and 0.1 m aside, comes closer to the disc."""
+    closer = 0.2 * math.sin(0.1) + 0.1 * math.cos(0.1) - 0.1
+    loss = losses(rotated(0.1, backwards=backwards))
+    assert loss == pytest.approx({**dict.fromkeys(CAUSES, 0.0), "heading": closer}, abs=2e-4)
+    assert max(losses(rotated(0.0, backwards=backwards)).values()) == pytest.approx(0, abs=1e-12)
+    unknown = losses(rotated(0.1, estimated=0.0))
+    assert unknown == pytest.approx({**dict.fromkeys(CAUSES, 0.0), "localisation": closer}, abs=2e-4)
+
+
+def test_a_turn_on_the_spot_has_no_heading_to_leave():
+    loss = losses(rotated(0.1, forward=0.0))
+    assert loss["heading"] == 0
+    assert loss["rounding"] > 0.01
+
+
 def test_unseen_obstacles_do_not_count():
     log = passing(0.27)
     post, task = Disc(1.0, 0.5, 0.1), log.record.task

@@ -15,7 +15,7 @@ from PIL import Image
 
 from antdrive.base import InputError
 from antdrive.planners import History, PlanResult, PlanStatus, Query, load_planner
-from antdrive.robots import load_robot
+from antdrive.robots import load_robot, outline_of
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.outcome import Outcome
 from antdrive.views.colours import BAD, CONTACT, GOOD, SHELL, START, label_styles
@@ -35,6 +35,7 @@ from antdrive.views.figures.sight_figure import LISTED, sight_figure
 from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.views.scene import Scene
 from antdrive.worlds import Disc, Keyframed, Task, Wandering, World, rasterise
+from antdrive.worlds.coverage import coverage
 from tests.made_up_drive import scanned, undriven
 from tests.records import changed
 
@@ -119,6 +120,38 @@ def test_a_failed_plan_gives_the_reason(planned, tmp_path):
     failed = PlanResult(status=PlanStatus.NO_PATH, reason="walled in")
     figure = plan_figure(task, grid, failed, ROBOT, tmp_path / "failed.png", dpi=80)
     assert near(pixels(figure), (204, 32, 42), 24) > 40
+
+
+@pytest.mark.parametrize("tall", [False, True])
+def test_a_map_shows_what_a_robot_reaches_by_each_shape_and_the_doors_that_it_passes(searched, tall):
+    """Three rooms in a row; the disc of 0.7 m passes no door, the rectangle of 0.6 m passes the first."""
+    gaps = {4.0: (2.0, 2.9), 8.0: (2.0, 2.4)}
+    posts = [(x, y / 10) for x, (low, high) in gaps.items() for y in range(51) if not low < y / 10 < high]
+    size = (12.0, 5.0)
+    posts, size = ([(y, x) for x, y in posts], size[::-1]) if tall else (posts, size)
+    world = World("rooms", (0.0, 0.0, *size), tuple(Disc(x, y, 0.04) for x, y in posts))
+    start = (2.45, 2.0, math.pi / 2) if tall else (2.0, 2.45, 0.0)
+    robot = load_robot("warehouse")
+    outline = outline_of(robot.footprint, 0.03)
+    grids = [rasterise(world, 0.1, robot.radius + 0.03), rasterise(world, 0.05, robot.radius + 0.03, outline)]
+    covered = coverage(world, grids, start[:2])
+    assert [[door.passed for door in each.doors] for each in covered] == [[False, False], [False, True]]
+    figure = plan_figure(Task(world, start, (1.0, 1.0)), grids[0], searched, robot, covered=covered)
+    figure.draw_without_rendering()
+    chart = panels(figure)["map"]
+    words = [text.get_text() for text in chart.get_legend().get_texts()]
+    shares = [re.search(rf"^{kind}: (\d+)% of the floor", "\n".join(words), re.MULTILINE) for kind in SHARES]
+    assert sum(int(share[1]) for share in shares) == pytest.approx(100, abs=1), "all of the floor"
+    assert {"door passed only by its footprint", "door not passed"} <= set(words)
+    assert "door passed by its disc" not in words
+    assert not any("no-go" in word for word in words)
+    assert {text.get_text() for text in chart.texts} == {"0.82 m", "0.32 m"}
+    assert chart.get_legend().get_window_extent().x1 < figure.bbox.x1
+    alone = plan_figure(Task(world, start, (1.0, 1.0)), grids[0], searched, robot, covered=covered[:1])
+    assert "not reached" in [text.get_text() for text in panels(alone)["map"].get_legend().get_texts()][1]
+
+
+SHARES = "reached by its disc", "reached only by its footprint", "not reached"
 
 
 def test_a_long_reason_covers_nothing_of_the_map(planned):

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.campaign_options import OPTIONS
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, campaign_bar, print_error, show, table
 from antdrive.cli.options import argument, flag, option
 from antdrive.sim.settings import SETTINGS
@@ -78,7 +77,6 @@ def barn(
     data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
     fastest = challenge.reference_times(folder)
-    compile_once()
     with campaign_bar("driving") as progress:
         results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress, notify=print_error)
     runs = challenge.by_map(results.table)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, marked, print_error, print_line, show
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.options import argument, flag, option
@@ -109,7 +108,6 @@ def drive_suites(
     from antdrive.runs.suites import scenario_of, select
 
     cases = select(suites, only)
-    compile_once()
     for case in cases:
         if case.given.get("margin") == "auto":  # calibrate once, with a bar, before processes start
             with suppress(InputError, FieldError):  # reported as the test's failure

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import planning, show, table
 from antdrive.cli.options import argument, option
 from antdrive.cli.scenario_options import Ends, Setup, random_world
@@ -58,7 +57,6 @@ def find_margin(
     def drive_with(margin: float, seed: int) -> "Run":
         return drive(dataclasses.replace(base, task=tasks[seed], margin=margin, seed=seed))
 
-    compile_once()
     with planning("searching for the smallest safe margin"):
         trials = list(search(drive_with, list(tasks), reserve=reserve))
     smallest = min((trial.margin for trial in trials if trial.safe), default=None)

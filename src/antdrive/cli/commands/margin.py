@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 def margin(rollout: options.Log, json: options.Json = False) -> None:
     """Break down a drive's safety margin by cause.
 
-    Plans keep the margin free around the robot. The table shows how much of it the drive used, where, and why: rounding,
-    corner cutting, tracking, slip or localisation. For a margin of --margin auto, it also compares the predicted loss with
-    the actual loss; a margin that is the default is called so.
+    Plans keep the margin free around the robot's disc, or its footprint. The table shows how much of it the drive used, where,
+    and why: rounding, corner cutting, tracking, heading, slip or localisation. For a margin of --margin auto, it also compares
+    the predicted loss with the actual loss; a margin that is the default is called so.
 
     "Used at most" is the maximum that a cause used anywhere in the drive. "At the tightest place" splits the loss at the
     smallest remaining clearance by cause: positive towards the obstacle, negative away from it.
@@ -36,8 +36,9 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
         )
         for share in spent.contributions
     )
+    shape = log.record.shape
     lines = [
-        f"{rollout}: margin {spent.margin:.3f} m, smallest clearance of the robot's disc {spent.left:.4f} m at {place}",
+        f"{rollout}: margin {spent.margin:.3f} m, smallest clearance of the robot's {shape} {spent.left:.4f} m at {place}",
         *table(("cause", "used at most m", "at", "at the tightest place m"), rows),
         f"largest loss: {spent.largest.cause}"
         if spent.largest.metres
@@ -63,5 +64,9 @@ def _prediction(log: "Rollout") -> dict[str, float | None] | None:
     record = log.record
     if record.margin_choice is None:
         return None
-    loss = None if record.world.movers or record.unseen else record.margin - certify(log).bound
+    loss = (
+        None
+        if record.world.movers or record.unseen
+        else (record.footprint_margin or record.margin) - certify(log).bound
+    )
     return {**dataclasses.asdict(record.margin_choice), "footprint_loss_m": loss}

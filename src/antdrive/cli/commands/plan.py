@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.atomic import folder_lock
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, planning, show
 from antdrive.cli.options import option
 from antdrive.cli.output import in_brackets, margin_lines, plain
@@ -38,7 +37,6 @@ def plan(
     from antdrive.sim.pipeline import plan as make_plan
 
     scenario = setup.scenario(ends.of(world), given)
-    compile_once()
     with planning(f"planning with {scenario.planner_name}"), keep_best():
         grid, answer = make_plan(scenario)
     files: dict[str, str] = {}

@@ -5,7 +5,6 @@ from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives
@@ -42,7 +41,6 @@ def render(
     one_frame = at is not None or out.suffix.lower() == ".png"
     if len(logs) > 1 and one_frame:
         raise InputError(f"--out {out}: several rollouts need a film format")
-    compile_once()
     if one_frame:
         from antdrive.views.film.video import still
 

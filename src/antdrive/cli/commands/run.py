@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.atomic import folder_lock
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, planning, show, stage, this_command
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, print_idle_settings, run_lines
@@ -47,7 +46,6 @@ def run(
     _check_views(scenario, film, prelude, gui)
     check_folder(folder)
     print_idle_settings([scenario])
-    compile_once()
     with folder_lock(folder):
         with planning(f"planning with {scenario.planner_name}"), keep_best():  # Ctrl-C keeps the best path so far
             planned = plan(scenario)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import file_lines, show, this_command, working
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
@@ -103,7 +102,6 @@ def _broken_bound(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | No
 
     if case is None or not (case.demands.bounds or case.entry.baseline):
         return None
-    compile_once()
     done = Attempt.of(scenario).run
     return None if done is None else bound_broken_in(case, done)
 

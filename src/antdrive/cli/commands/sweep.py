@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.campaign_options import campaign_from
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import campaign_bar, print_error, show, table
 from antdrive.cli.options import argument, flag, option
 from antdrive.sim.settings import SETTINGS
@@ -102,7 +101,6 @@ def sweep(
         counts = {"duplicates": expansion.duplicates, "counts": expansion.counts}
         show(json, {"runs": size, "missing": missing, **counts}, _size_lines(expansion, missing))
         return
-    compile_once()
     with campaign_bar("driving") as progress:
         rest |= {"jobs": jobs, "dask": dask, "keep": cast("Keep | None", keep)}
         results = make_runs(requested, out, expansion=expansion, progress=progress, notify=print_error, **rest)

@@ -1,6 +1,6 @@
 """`antdrive worlds`: list, show, generate, import and export."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from antdrive.worlds.coverage import Coverage
 
 MOST_DOORS = 12  # listed at most
+NAMES = {"disc": "coverage", "footprint": "coverage_by_footprint"}  # keys in JSON, by the shape of plans
 MANY = 5000  # cylinders; planning takes seconds beyond this
 UNITS = {
     "frame": " m, m, rad",
@@ -85,41 +86,39 @@ def show_world(
         raise InputError("--margin auto: applies to drives only; give a number of metres")
     given, spec = ends.of(world), load_robot(robot)
     shown = load_task(given) if isinstance(given, str) else given
-    grid = rasterise(shown.world, shown.cell, spec.radius + margin)
-    query, named = Query.between(grid, shown), list(load_tasks(world))
     known = {name: load_robot(name) for name in list_robots()}
     starts = {each.name: overlap_at(shown.world, each, shown.start) for each in (*known.values(), spec)}
-    passable = not starts[spec.name] and query.blocked_end is None and reachable(query)
-    covered = coverage(shown.world, grid, shown.start[:2])
-    outline = outline_of(spec.footprint, margin)
-    outlined = rasterise(shown.world, min(shown.cell, FINE), spec.radius + margin, outline)
-    by_footprint = coverage(shown.world, outlined, shown.start[:2]) if outlined.turns else covered
+    grids = {"disc": rasterise(shown.world, shown.cell, spec.radius + margin)}
+    if not spec.footprint.is_disc:
+        outline = outline_of(spec.footprint, margin)
+        grids["footprint"] = rasterise(shown.world, min(shown.cell, FINE), spec.radius + margin, outline)
+    queries = {shape: Query.between(grid, shown) for shape, grid in grids.items()}
+    passing = [shape for shape, query in queries.items() if query.blocked_end is None and reachable(query)]
+    passable = not starts[spec.name] and bool(passing)
+    covered = dict(zip(grids, coverage(shown.world, list(grids.values()), shown.start[:2]), strict=True))
     if out is not None:
         import numpy as np
 
         from antdrive.views.figures.plan_figures import plan_figure
 
-        plan_figure(
-            shown, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out, covered=covered
-        )
+        query = queries[passing[0] if passing else "disc"]
+        plan = load_planner("astar").plan(query, np.random.default_rng(0))
+        plan_figure(shown, query.grid, plan, spec, out, covered=list(covered.values()))
+    named = list(load_tasks(world))
     facts = {"passable": passable, "robot": spec.name, "margin": margin, "starts": starts, "tasks": named}
-    facts["coverage"] = _coverage_facts(covered)
-    if outlined.turns:
-        facts["coverage_by_footprint"] = _coverage_facts(by_footprint)
-    said = {key + UNITS.get(key, ""): "-" if value is None else value for key, value in _facts(shown).items()}
+    facts |= {NAMES[shape]: _coverage_facts(each) for shape, each in covered.items()}
+    said = {key + UNITS.get(key, ""): "-" if value is None else str(value) for key, value in _facts(shown).items()}
     if any(shown.frame):
         for key, pose in {"start": shown.start, "goal": shown.goal}.items():
-            said[f"{key} in its map"] = world_to_map(shown.frame, [pose])[0].round(4).tolist()
+            said[f"{key} in its map"] = str(world_to_map(shown.frame, [pose])[0].round(4).tolist())
     reason = "" if passable else "; antdrive plan says why"
-    said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m{reason}"
+    by = "" if passing[:1] != ["footprint"] else " by its footprint"
+    said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name}{by} with a margin of {margin:g} m{reason}"
     said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
-    lines = [f"{key:18} {value}" for key, value in said.items()]
-    lines += _coverage_lines(covered, "by its disc" * bool(outlined.turns))
-    if outlined.turns:
-        lines += _coverage_lines(by_footprint, "by its footprint")
-    lines += [f"start for {name} {overlap}" for name, overlap in starts.items() if overlap]
-    lines += [f"{'tasks':18} {', '.join(named)}"] if named else []
-    lines += [] if out is None else file_lines({"figure": out})
+    rows = [*said.items(), *_coverage_rows(covered)]
+    rows += [(f"start for {name}", overlap) for name, overlap in starts.items() if overlap]
+    rows += [("tasks", ", ".join(named))] if named else []
+    lines = [*table(rows[0], rows[1:]), *([] if out is None else file_lines({"figure": out}))]
     show(json, {**task_to_dict(shown), **facts}, lines)
 
 
@@ -130,15 +129,21 @@ def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
     return {"share": covered.share, **rooms, "doors": doors}
 
 
-def _coverage_lines(covered: "Coverage", shape: str) -> list[str]:
-    """Say what a robot reaches, and name the narrowest doors that it does not pass."""
-    shut = [door for door in covered.doors if not door.passed]
-    rooms = f"{len(covered.rooms_reached)} of {covered.room_count} rooms"
-    doors = f", {len(covered.doors) - len(shut)} of {len(covered.doors)} doors" if covered.doors else ""
-    lines = [f"{shape or 'floor reached':18} {covered.share:.0%} of the floor that a point reaches: {rooms}{doors}"]
+def _coverage_rows(covered: "Mapping[str, Coverage]") -> "Iterator[tuple[str, str]]":
+    """Yield what a robot reaches by each shape, and the narrowest doors that its disc does not pass."""
+    for shape, each in covered.items():
+        rooms = f"{len(each.rooms_reached)} of {each.room_count} rooms"
+        passed = sum(door.passed for door in each.doors)
+        doors = f", {passed} of {len(each.doors)} doors" if each.doors else ""
+        reached = f"by its {shape}" if len(covered) > 1 else "reached"
+        yield reached, f"{each.share:.0%} of the connected floor, {rooms}{doors}"
+    last = list(covered.values())[-1].doors
+    shut = [door for first, door in zip(covered["disc"].doors, last, strict=True) if not first.passed]
     for door in shut[:MOST_DOORS]:
-        lines.append(f"{'door not passed':18} {door.width:.2f} m wide at ({door.at[0]:.2f}, {door.at[1]:.2f})")
-    return lines + ([f"{'':18} and {len(shut) - MOST_DOORS} more"] if len(shut) > MOST_DOORS else [])
+        place = f"{door.width:.2f} m wide at ({door.at[0]:.2f}, {door.at[1]:.2f})"
+        yield "door by footprint" if door.passed else "door not passed", place
+    if len(shut) > MOST_DOORS:
+        yield "", f"and {len(shut) - MOST_DOORS} more"
 
 
 @options.with_settings(("seed",))

@@ -109,7 +109,7 @@ class DriveItem(pytest.Item):
         from antdrive.cli.testing.evaluation import check_case
         from antdrive.cli.testing.fixture import DriveFailure
 
-        compile_first(self.config)
+        report_compiling(self.config)
         result = check_case(self.case, update=update_of(self.config), results=results_of(self.config))
         note(self, result)
         if not result.passed:
@@ -138,7 +138,7 @@ def drive(request: pytest.FixtureRequest) -> DriveFixture:
     """
     from antdrive.cli.testing.fixture import DriveFixture
 
-    compile_first(request.config)
+    report_compiling(request.config)
     item, config = request.node, request.config
     at_root = config.invocation_params.dir.resolve() == config.rootpath.resolve()
     return DriveFixture(
@@ -152,19 +152,21 @@ def drive(request: pytest.FixtureRequest) -> DriveFixture:
     )
 
 
-def compile_first(config: pytest.Config) -> None:
-    """Compile the kernels before the first drive of an installation and report it."""
+def report_compiling(config: pytest.Config) -> None:
+    """Print a line when a kernel compiles."""
     if _COMPILED in config.stash:
         return
     config.stash[_COMPILED] = True
-    from antdrive.cli.compiling import compile_once
+    from antdrive.base import kernel_cache
+    from antdrive.cli.console import COMPILING
 
-    def say(text: str) -> None:
+    def say(_: str) -> None:
+        kernel_cache.on_compile = kernel_cache.ignore
         capture = config.pluginmanager.getplugin("capturemanager")
         with capture.global_and_fixture_disabled() if capture else contextlib.nullcontext():
-            print(f"\nantdrive: {text}", file=sys.stderr, flush=True)  # noqa: T201 - also in xdist workers
+            print(f"\nantdrive: {COMPILING}", file=sys.stderr, flush=True)  # noqa: T201 - also in xdist workers
 
-    compile_once(say)
+    kernel_cache.on_compile = say
 
 
 def note(item: pytest.Item, result: CheckResult) -> None:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError, input_error
-from antdrive.cli.compiling import compile_once
 from antdrive.cli.testing.evaluation import INVALID_INPUT, CheckResult, Update
 from antdrive.runs.suites.suite import SUFFIX
 
@@ -60,7 +59,6 @@ def drive_python_tests(
     options += ["--drive-film", results.films, f"--drive-results={results.folder.resolve()}"]
     if importlib.util.find_spec("xdist") is not None:
         options += ["-n", "0"]  # results stay in this process
-    compile_once()
     drives = _Drives(only)
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

@@ -47,7 +47,7 @@ class ColonyGraph:
         grid, goal = query.grid, query.goal_cell
         mask, to = grid.moves.ravel(), _kernels_colony.offsets(grid.shape[1])
         if grid.turns:  # some moves cannot be taken back, so ants keep to nodes that lead to the goal
-            kept = _kernels_turns.leads_to(grid.graph, np.array([goal]))
+            kept = _kernels_turns.leads_to(grid.graph, np.array([goal])) >= 0
             mask, to = np.empty(len(kept), dtype=np.uint8), np.empty((len(kept), 8), dtype=np.int32)
             _kernels_colony.table_of(grid.graph, kept, goal, mask, to)
             mask.setflags(write=False)  # as a grid's

@@ -1,8 +1,11 @@
 """Compiled safe-interval path planning: arrays in, arrays out, no validation.
 
-A mover's motion consists of straight legs at constant speed. So does the robot's: waits and moves. The conflicts of
-a leg and a move form an interval with ends in closed form; nothing is sampled. Times are in seconds, positions in
-metres.
+A mover's motion consists of straight legs at constant speed. So does the robot's: waits, turns on the spot and moves.
+The conflicts of a leg and a move form an interval with ends in closed form; nothing is sampled. Times are in seconds,
+positions in metres.
+
+A state is a safe interval of a cell and, on a grid with turns, one of the eight headings: number 8 * interval + heading.
+There, moves lead ahead alone, and turns lead to the next heading of the same interval.
 """
 
 from __future__ import annotations
@@ -14,14 +17,15 @@ import numpy as np
 
 from antdrive.planners.graph._kernels_search import octile
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled_rows, inline, kernel, segment_distance2
+from antdrive.worlds._kernels_turns import MoveGraph
 
 INSTANT = 1e-9  # s: shorter gaps count as closed
 
 # Columns of a leg: start and end time, start position, velocity, clearance of the robot's centre.
 BEGIN, END, X, Y, VX, VY, KEEP = range(7)
 
-# Columns of an open-list entry: lower bound of the arrival at the goal, arrival here, safe interval.
-F, G, INTERVAL = range(3)
+# Columns of an open-list entry: lower bound of the arrival at the goal, arrival here, state.
+F, G, STATE = range(3)
 
 
 class Frame(NamedTuple):
@@ -49,31 +53,37 @@ class Intervals(NamedTuple):
 
 
 class Trip(NamedTuple):
-    """Flat start and goal cells, speed, departure, deadline, and whether the goal must stay safe."""
+    """Flat start and goal cells, speed, time of a turn by 45°, departure, deadline, and whether the goal must stay safe."""
 
     start: int
     goal: int
     speed: float
+    turn: float
     departure: float
     end: float
     stay: bool
 
 
 class Tree(NamedTuple):
-    """The best known path into each safe interval."""
+    """The best known path into each state."""
 
-    reached: Array  # (K,) arrival time, inf while unreached [s]
-    parent: Array  # (K,) the previous interval, -1 at the root
-    left: Array  # (K,) departure time from the parent's cell [s]
+    reached: Array  # (S,) arrival time, inf while unreached [s]
+    parent: Array  # (S,) the previous state, -1 at the root
+    left: Array  # (S,) departure time from the parent's cell [s]
 
 
 class Move(NamedTuple):
-    """A move: earliest and latest departure, duration, and the minimum time from its end to the goal."""
+    """A move: earliest and latest departure, duration, the minimum time from its end to the goal, and how states count.
+
+    State `offset` + `headings` * k is that of interval k.
+    """
 
     now: float
     latest: float
     lasts: float
     rest: float
+    headings: int
+    offset: int
 
 
 @kernel
@@ -276,14 +286,14 @@ def swap(heap: Array, a: int, b: int) -> None:
 
 
 @kernel
-def push(heap: Array, size: int, f: float, g: float, interval: int) -> Array:
+def push(heap: Array, size: int, f: float, g: float, state: int) -> Array:
     """Add an entry to the `size` entries of the open list.
 
     Returns the list, enlarged if it was full.
     """
     if size == len(heap):
         heap = doubled_rows(heap)
-    heap[size, F], heap[size, G], heap[size, INTERVAL] = f, g, interval
+    heap[size, F], heap[size, G], heap[size, STATE] = f, g, state
     n = size
     while n > 0 and sooner(heap, n, (n - 1) >> 1):
         swap(heap, n, (n - 1) >> 1)
@@ -343,7 +353,7 @@ def relax(
     heap: Array,
     size: int,
 ) -> tuple[Array, int]:
-    """Reach the safe intervals of cell `to` from interval `state` between conflicts; returns the open list and its size.
+    """Reach the safe intervals of cell `to` from a state between conflicts; returns the open list and its size.
 
     Between two conflicts the robot can leave at any instant; all these departures reach one interval of the next
     cell.
@@ -359,9 +369,10 @@ def relax(
         arrive = leave + move.lasts
         while interval < last and intervals.until[interval] < arrive - INSTANT:
             interval += 1
-        if interval < last and intervals.since[interval] <= arrive + INSTANT and arrive < tree.reached[interval]:
-            tree.reached[interval], tree.parent[interval], tree.left[interval] = arrive, state, leave
-            heap = push(heap, size, arrive + move.rest, arrive, interval)
+        reaches = interval * move.headings + move.offset
+        if interval < last and intervals.since[interval] <= arrive + INSTANT and arrive < tree.reached[reaches]:
+            tree.reached[reaches], tree.parent[reaches], tree.left[reaches] = arrive, state, leave
+            heap = push(heap, size, arrive + move.rest, arrive, reaches)
             size += 1
         if n == count:
             break
@@ -370,23 +381,49 @@ def relax(
     return heap, size
 
 
-@kernel
-def traced(tree: Tree, cell_of: Array, cols: int, found: int) -> tuple[Array, Array, Array]:
-    """Return the cells (N, 2) from the root to interval `found`, with their arrival and departure times.
+@inline
+def fewest_turns(heading: int, rows: int, cols: int) -> int:
+    """Return the least number of turns by 45° from a heading to a goal some rows and columns away, on open ground."""
+    if rows == 0 and cols == 0:
+        return 0
+    straight = (0 if cols > 0 else 4) if abs(cols) > abs(rows) else (2 if rows > 0 else 6)
+    diagonal = (1 if cols > 0 else 3) if rows > 0 else (7 if cols > 0 else 5)
+    one, two = abs((straight - heading + 4) % 8 - 4), abs((diagonal - heading + 4) % 8 - 4)
+    if abs(rows) == abs(cols):
+        return two
+    return one if rows == 0 or cols == 0 else min(one, two) + 1
 
-    All are empty if `found` is -1.
+
+@inline
+def least_time(heading: int, rows: int, cols: int, trip: Trip, pace: float, headings: int) -> float:
+    """Return the time to a goal some rows and columns away, on open ground; `pace` is the time of a straight move [s]."""
+    time = pace * octile(rows, cols)
+    return time + trip.turn * fewest_turns(heading, rows, cols) if headings > 1 else time
+
+
+@kernel
+def traced(tree: Tree, cell_of: Array, cols: int, headings: int, found: int) -> tuple[Array, Array, Array]:
+    """Return the cells (N, 2) from the root to state `found`, with their arrival and departure times.
+
+    Turns happen between arrival and departure. All are empty if `found` is -1.
     """
     length = 0
-    state = found
+    state, here = found, -1
     while state >= 0:
-        length += 1
+        if cell_of[state // headings] != here:
+            here = cell_of[state // headings]
+            length += 1
         state = tree.parent[state]
     cells, arrive, leave = np.empty((length, 2), dtype=np.int32), np.empty(length), np.empty(length)
-    state = found
+    state, here, n = found, -1, length
     left = tree.reached[found] if found >= 0 else 0.0
-    for n in range(length - 1, -1, -1):
-        cells[n, 0], cells[n, 1] = cell_of[state] // cols, cell_of[state] % cols
-        arrive[n], leave[n] = tree.reached[state], left
+    while state >= 0:
+        if cell_of[state // headings] != here:
+            here = cell_of[state // headings]
+            n -= 1
+            cells[n, 0], cells[n, 1] = here // cols, here % cols
+            leave[n] = left
+        arrive[n] = tree.reached[state]
         left = tree.left[state]
         state = tree.parent[state]
     return cells, arrive, leave
@@ -394,22 +431,24 @@ def traced(tree: Tree, cell_of: Array, cols: int, found: int) -> tuple[Array, Ar
 
 @kernel
 def earliest(
-    moves: Array, frame: Frame, near: NearLegs, intervals: Intervals, trip: Trip
+    graph: MoveGraph, joints: Array, ready: Array, frame: Frame, near: NearLegs, intervals: Intervals, trip: Trip
 ) -> tuple[Array, Array, Array, int]:
-    """Return the earliest-arrival path: cells, arrival and departure times, and the number of expanded intervals.
+    """Return the earliest-arrival path: cells, arrival and departure times, and the number of expanded states.
 
-    Phillips and Likhachev's A* over the safe intervals of cells; of all paths into an interval only the earliest
-    counts, as the robot can wait there. The path is empty if none arrives by `trip.end`.
+    Phillips and Likhachev's A* over the safe intervals of cells, with the heading where the grid has turns. Of all paths
+    into a state only the earliest counts, as the robot can wait there. The path is empty if none arrives by `trip.end`.
+
+    `joints` are those of `Turns`. `ready` has the time from departure until the robot is ready to move ahead from the start
+    cell, at each of eight headings (8,), inf at others; (1,) without turns.
     """
-    rows, cols = moves.shape
-    mask = moves.ravel()
+    cols, headings = graph.cols, len(ready)
     goal_row, goal_col = trip.goal // cols, trip.goal % cols
     pace = frame.cell / trip.speed
-    states = len(intervals.since)
+    states = headings * len(intervals.since)
     tree = Tree(np.full(states, np.inf), np.full(states, -1, dtype=np.int64), np.empty(states))
     closed = np.zeros(states, dtype=np.bool_)
-    cell_of = np.empty(states, dtype=np.int64)
-    for i in range(rows * cols):
+    cell_of = np.empty(len(intervals.since), dtype=np.int64)
+    for i in range(len(intervals.first) - 1):
         for k in range(intervals.first[i], intervals.first[i + 1]):
             cell_of[k] = i
     most = most_legs(near)
@@ -418,34 +457,53 @@ def earliest(
     size, expanded, found = 0, 0, -1
     for k in range(intervals.first[trip.start], intervals.first[trip.start + 1]):
         if intervals.since[k] <= trip.departure <= intervals.until[k]:
-            tree.reached[k] = trip.departure
-            heap = push(heap, size, trip.departure, trip.departure, k)
-            size = 1
+            for h in range(headings):
+                now = trip.departure + ready[h]
+                if now <= intervals.until[k]:
+                    rows, away = goal_row - trip.start // cols, goal_col - trip.start % cols
+                    tree.reached[k * headings + h] = now
+                    heap = push(
+                        heap, size, now + least_time(h, rows, away, trip, pace, headings), now, k * headings + h
+                    )
+                    size += 1
             break
     while size > 0:
-        state, now = int(heap[0, INTERVAL]), heap[0, G]
+        state, now = int(heap[0, STATE]), heap[0, G]
         size = drop_first(heap, size)
         if closed[state]:
             continue
         closed[state] = True
-        i = cell_of[state]
-        if i == trip.goal and (not trip.stay or intervals.until[state] >= trip.end):
+        here, heading = state // headings, state % headings
+        i = cell_of[here]
+        if i == trip.goal and (not trip.stay or intervals.until[here] >= trip.end):
             found = state
             break
         expanded += 1
         r, c = i // cols, i % cols
         x, y = frame.x0 + c * frame.cell, frame.y0 + r * frame.cell
+        able = graph.mask[graph.label[i, heading]] & (1 << heading) if headings > 1 else graph.mask[i]
         for k in range(8):
-            if not mask[i] & (1 << k):
+            if not able & (1 << k):
                 continue
             rn, cn = r + DROW[k], c + DCOL[k]
             lasts = pace * (SQRT2 if k & 1 else 1.0)
-            latest = min(intervals.until[state], trip.end - lasts)
+            latest = min(intervals.until[here], trip.end - lasts)
             if now > latest:
                 continue
-            move = Move(now, latest, lasts, pace * octile(goal_row - rn, goal_col - cn))
+            rest = least_time(k, goal_row - rn, goal_col - cn, trip, pace, headings)
+            move = Move(now, latest, lasts, rest, headings, heading)
             along = trip.speed / SQRT2 if k & 1 else trip.speed
             count = conflicts(near, i, x, y, DCOL[k] * along, DROW[k] * along, move, lows, highs)
             heap, size = relax(tree, intervals, state, rn * cols + cn, move, lows, highs, count, heap, size)
-    cells, arrive, leave = traced(tree, cell_of, cols, found)
-    return cells, arrive, leave, expanded
+        for side in range(-1, 2, 2):
+            if headings == 1 or not joints[i] & (1 << (heading + (side - 1) // 2) % 8):
+                continue
+            after = (heading + side) % 8
+            arrive, reaches = now + trip.turn, here * headings + after
+            if arrive <= intervals.until[here] and arrive < tree.reached[reaches]:
+                tree.reached[reaches], tree.parent[reaches], tree.left[reaches] = arrive, state, now
+                rest = least_time(after, goal_row - r, goal_col - c, trip, pace, headings)
+                heap = push(heap, size, arrive + rest, arrive, reaches)
+                size += 1
+    cells, arrive_at, leave_at = traced(tree, cell_of, cols, headings, found)
+    return cells, arrive_at, leave_at, expanded

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import segment_lengths
+from antdrive.planners.entrances import clear_lead, outline_at, turn_at
 from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, TimedPlan, path_cost
 from antdrive.worlds import MoverMotion
@@ -25,6 +26,7 @@ INSTANT = 1e-6  # a motion that is not straight over this time is a jump [s]
 # Maximum distance between a motion and the chords that join its samples, and between the samples and the legs that
 # replace them [m]. Twice this is added to the clearance.
 TOLERANCE = 1e-3
+EIGHTH = math.pi / 4  # between the headings of a grid [rad]
 UNIT = "safe intervals expanded"
 
 
@@ -41,26 +43,35 @@ class SafeIntervals(GridPlanner):
 
     Attributes:
         speed: the robot's speed on every move [m/s]
+        yaw_rate: mean yaw rate of turns on the spot, with the stop before and after, on grids with turns [rad/s]
         horizon: time after departure for which motions are known and within which the robot must arrive [s]
         stay: whether the goal must also be safe from the arrival to the horizon
     """
 
     speed: float = 0.5
+    yaw_rate: float = 0.5
     horizon: float = 120.0
     stay: bool = False
 
     def __post_init__(self) -> None:
         require("speed", self.speed, above=0)
+        require("yaw_rate", self.yaw_rate, above=0)
         require("horizon", self.horizon, above=0)
 
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner: it needs the movers' motions."""
-        return Capabilities(needs_motions=True, deterministic=True)
+        return Capabilities(needs_motions=True, deterministic=True, turns=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return plan_in_time(
-            query, query.motions, speed=self.speed, start_time=query.start_time, horizon=self.horizon, stay=self.stay
+            query,
+            query.motions,
+            speed=self.speed,
+            yaw_rate=self.yaw_rate,
+            start_time=query.start_time,
+            horizon=self.horizon,
+            stay=self.stay,
         )
 
 
@@ -69,6 +80,7 @@ def plan_in_time(
     movers: Iterable[MoverMotion],
     *,
     speed: float,
+    yaw_rate: float = 0.5,
     start_time: float = 0.0,
     horizon: float = 120.0,
     stay: bool = False,
@@ -79,44 +91,57 @@ def plan_in_time(
     `2 * TOLERANCE` off, replace each motion. On these legs, the robot's centre keeps `inflate + 2 * TOLERANCE`
     from a mover's surface, and so at least the grid's `inflate` from the mover itself. With the legs as motions the
     plan is exact: no path on this grid, at this speed, arrives sooner. Motions are sampled every `STEP`, more densely
-    near
-    turns and jumps; two turns within half a `STEP` may be missed.
+    near turns and jumps; two turns within half a `STEP` may be missed.
+
+    On a grid with turns the robot faces ahead on each move, and turns on the spot at `yaw_rate` between moves in
+    different directions. Obstacles are kept from its outline, movers from the circle around it: the plan is exact, in
+    position, heading and time, for that clearance. If the query has a task, the robot first turns and drives from the
+    exact start to the first cell; on this lead, movers are kept from the cell alone.
 
     Args:
         query: the grid and its ends; its own motions are ignored
         movers: the motions of the movers
         speed: the robot's speed on every move [m/s]
+        yaw_rate: the robot's yaw rate in turns on the spot, on a grid with turns [rad/s]
         start_time: departure time on the clock of the motions [s]
         horizon: latest arrival after `start_time` [s]
         stay: whether the goal must also be safe from the arrival to the horizon
 
     Raises:
-        ValueError: the speed or the horizon is not positive, or a mover's position is not finite.
+        ValueError: the speed, the yaw rate or the horizon is not positive, or a mover's position is not finite.
     """
     require("speed", speed, above=0, below=math.inf)
+    require("yaw_rate", yaw_rate, above=0, below=math.inf)
     require("horizon", horizon, above=0)
     started = time.perf_counter()
     reason = query.blocked_end or ("" if reachable(query) else UNREACHABLE)
     plan = (
         TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
         if reason
-        else _earliest(query, movers, speed=speed, start_time=start_time, horizon=horizon, stay=stay)
+        else _earliest(query, movers, speed, yaw_rate, start_time=start_time, horizon=horizon, stay=stay)
     )
     return replace(plan, work_unit=UNIT, wall_s=time.perf_counter() - started)
 
 
 def _earliest(
-    query: Query, movers: Iterable[MoverMotion], *, speed: float, start_time: float, horizon: float, stay: bool
+    query: Query,
+    movers: Iterable[MoverMotion],
+    speed: float,
+    yaw_rate: float,
+    *,
+    start_time: float,
+    horizon: float,
+    stay: bool,
 ) -> TimedPlan:
     """Return the earliest-arrival plan on a grid whose goal is reachable without movers."""
     from antdrive.planners.graph import _kernels_sipp as kernels
 
-    grid, cols = query.grid, query.grid.shape[1]
+    grid = query.grid
     known = [_legs(mover, start_time, start_time + horizon, grid.inflate) for mover in movers]
     legs = np.concatenate([np.empty((0, 7)), *known])
     legs = legs[np.argsort(legs[:, kernels.BEGIN], kind="stable")]
     end = start_time + horizon if known else math.inf
-    start, goal = (cell[0] * cols + cell[1] for cell in (query.start, query.goal))
+    start = query.start[0] * grid.shape[1] + query.start[1]
     frame = kernels.Frame(*grid.origin, grid.cell)
     near = kernels.NearLegs(legs, *kernels.near_legs(legs, grid.free, frame))
     intervals = kernels.Intervals(*kernels.safe_intervals(near, grid.free, frame, start_time, end))
@@ -124,12 +149,14 @@ def _earliest(
     if first == intervals.first[start + 1] or intervals.since[first] > start_time:
         reason = "a mover is too close to the start at departure"
         return TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
-    trip = kernels.Trip(start, goal, float(speed), float(start_time), end, stay)
-    cells, arrive, leave, work = kernels.earliest(grid.moves, frame, near, intervals, trip)
+    trip = kernels.Trip(start, query.goal_cell, float(speed), EIGHTH / yaw_rate, float(start_time), end, stay)
+    ready = _ready(query, speed, yaw_rate)
+    cells, arrive, leave, work = kernels.earliest(grid.graph, grid.turns.joints, ready, frame, near, intervals, trip)
     if not len(cells):
         stays = " and can stay there" if stay else ""
         reason = f"no path past the movers reaches the goal within {horizon:g} s{stays}"
         return TimedPlan(status=PlanStatus.NO_PATH, reason=reason, work=work)
+    arrive[0] = start_time
     return TimedPlan(
         status=PlanStatus.SOLVED,
         cells=cells,
@@ -139,6 +166,30 @@ def _earliest(
         leave=leave,
         xy=grid.xy(cells),
     )
+
+
+def _ready(query: Query, speed: float, yaw_rate: float) -> Floats:
+    """Return the time that the robot takes from the exact start to each heading of the start's node (8,) [s].
+
+    It is infinite at other headings, and 0 without a task. Without turns there is one entry, 0 (1,).
+    """
+    grid, task = query.grid, query.task
+    if not grid.turns:
+        return np.zeros(1)
+    own = grid.turns.label[query.start[0] * grid.shape[1] + query.start[1]] == query.start_node
+    ready = np.where(own, 0.0, math.inf)
+    if task is None:
+        return ready
+    x, y = grid.xy([query.start])[0].tolist()
+    outlines = grid.turns.outline, outline_at(task, grid.turns.outline)
+    for k in np.flatnonzero(own).tolist():
+        facing = clear_lead(task, (x, y), k * EIGHTH, outlines[1]).heading
+        before, after = (
+            turn_at(task.start, facing, task, outlines),
+            turn_at((x, y, facing), k * EIGHTH, task, outlines),
+        )
+        ready[k] = (abs(before) + abs(after)) / yaw_rate + math.dist((x, y), task.start[:2]) / speed
+    return ready
 
 
 def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Floats:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from antdrive.base import Point
-from antdrive.base.plane import wrap_angle
-from antdrive.planners.entrances import clear_turn, lead_heading, outline_at
+from antdrive.planners.entrances import clear_lead, clear_turn, lead_heading, outline_at, turn_at
 from antdrive.planners.plan import Cells, PlanResult
 from antdrive.worlds import Grid, Route, Task
 from antdrive.worlds.headings import Outline, sweep_clearance
@@ -52,7 +50,7 @@ def smooth_lines(plan: PlanResult, grid: Grid, task: Task, kind: str) -> Route:
     before = [task.start[2], *line.headings]
     leaving = outline_at(task, outline)
     turns = [
-        _turn(point, was, heading, task, [outline] if k > 1 else [outline, leaving])
+        turn_at((*point, was), heading, task, [outline] if k > 1 else [outline, leaving])
         for k, (point, was, heading) in enumerate(zip(line.points, before, line.headings, strict=False))
     ]
     first = math.dist(*line.points[:2]) if backwards else 0.0
@@ -66,17 +64,9 @@ def _planned(plan: PlanResult, grid: Grid, task: Task, outline: Outline) -> tupl
     headings = [_heading(a, b) for a, b in itertools.pairwise(points)]
     backwards = False
     if math.dist(start[:2], points[0]) > NEAR:
-        leaving = outline_at(task, outline)
-        for backwards in (False, True):
-            heading = lead_heading(start, *points[0], leaving, task.world, backwards=backwards)
-            at = (*points[0], heading)
-            if math.isfinite(heading) and (
-                not headings or math.isfinite(clear_turn(at, headings[0], leaving, task.world))
-            ):
-                break
-        else:  # an estimated pose may overlap obstacles
-            backwards, heading = False, _heading(start[:2], points[0])
-        points, headings = [start[:2], *points], [heading, *headings]
+        lead = clear_lead(task, points[0], next(iter(headings), None), outline_at(task, outline))
+        backwards = lead.backwards
+        points, headings = [start[:2], *points], [lead.heading, *headings]
     if math.dist(points[-1], goal) > NEAR:
         last = (*points[-1], headings[-1] if headings else start[2])
         heading = lead_heading(last, *goal, outline, task.world, backwards=False)
@@ -152,12 +142,6 @@ def _merged(points: list[Point], headings: list[float]) -> _Line:
     """Return a line without points between straights of one heading."""
     keep = [k for k in range(1, len(headings)) if abs(headings[k] - headings[k - 1]) > 1e-9]
     return _Line([points[0], *(points[k] for k in keep), points[-1]], [headings[0], *(headings[k] for k in keep)])
-
-
-def _turn(at: Point, was: float, heading: float, task: Task, outlines: Sequence[Outline]) -> float:
-    """Return the turn at a point that is clear for the first outline possible, or the shorter one without any."""
-    turns = (clear_turn((*at, was), heading, outline, task.world) for outline in outlines)
-    return next(filter(math.isfinite, turns), float(wrap_angle(heading - was)))
 
 
 def _heading(a: Point, b: Point) -> float:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots.control._kernels_lines import advance
+from antdrive.robots.control._kernels_lines import CHECKED, advance, outline_clearance
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, clearance_at, nearby
 from antdrive.robots.control._kernels_path import PathSamples, point_at, project
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, reachable_twist
@@ -147,28 +147,59 @@ def intrusion(x: float, y: float, places: Array, k: int, radii: Array, near: Arr
 
 
 @kernel
-def least_clearance(trail: Array, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
-    """Return the required clearance of the robot's centre along a trail, reduced if its start is closer [m]."""
-    return min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
+def least_clearance(trail: Array, path: PathSamples, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
+    """Return the required clearance along a trail, reduced if its start is closer [m].
+
+    It is that of the robot's centre; on a route with turns, that of its outline.
+    """
+    if path.turns.shape[0] == 0:
+        return min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
+    discs = nearby(trail[0, 0], trail[0, 1], obstacles)
+    here = outline_clearance(trail[:1, :3], discs, obstacles.bounds, tuning)
+    return min(max(tuning.stopping_clearance - tuning.robot_radius, 0.0), here - 1e-3)
 
 
 @kernel
-def passes_within(x: float, y: float, x1: float, y1: float, required: float, obstacles: ObstacleIndex) -> bool:
-    """Return whether a straight step comes closer to an obstacle than required."""
-    return bool(segment_clearance(x, y, x1, y1, nearby(x, y, obstacles), obstacles.bounds) < required)
+def passes_within(
+    trail: Array,
+    k: int,
+    required: float,
+    path: PathSamples,
+    obstacles: ObstacleIndex,
+    tuning: PursuitTuning,
+    step: float,
+) -> bool:
+    """Return whether the step after row k of a trail comes closer to an obstacle than required.
+
+    A step is straight, or on a route with turns a few poses of the outline.
+    """
+    length, lines = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step, path.turns.shape[0] > 0
+    if abs(length) <= 1e-6 and not lines:
+        return False
+    discs = nearby(trail[k, 0], trail[k, 1], obstacles)
+    distance = segment_clearance(trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1], discs, obstacles.bounds)
+    if not lines or distance >= required + tuning.robot_radius:
+        return bool(distance < required)
+    sweep = abs(trail[k + 1, 2] - trail[k, 2]) * tuning.robot_radius
+    count = int((abs(length) + sweep) / CHECKED) + 1
+    poses = np.empty((count, 3))
+    for n in range(count):
+        share = (n + 1.0) / count
+        for j in range(3):
+            poses[n, j] = trail[k, j] + share * (trail[k + 1, j] - trail[k, j])
+    return bool(outline_clearance(poses, discs, obstacles.bounds, tuning) < required)
 
 
 @kernel
-def meets_obstacle(trail: Array, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float) -> bool:
+def meets_obstacle(
+    trail: Array, path: PathSamples, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float
+) -> bool:
     """Return whether a trail that was followed without obstacle checks comes too close to an obstacle."""
-    required = least_clearance(trail, obstacles, tuning)
-    for k in range(trail.shape[0] - 1):
-        length = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step
-        if abs(length) > 1e-6 and passes_within(
-            trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1], required, obstacles
-        ):
-            return True
-    return False
+    required = least_clearance(trail, path, obstacles, tuning)
+    k, steps = 0, trail.shape[0] - 1
+    while k < steps and not passes_within(trail, k, required, path, obstacles, tuning, step):
+        k += 1
+    return bool(k < steps)
 
 
 @kernel
@@ -187,7 +218,7 @@ def follow(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
         limits.lateral_acceleration, limits.half_track, limits.rim_speed,
     )  # fmt: skip
-    required = least_clearance(trail, obstacles, tuning) if looks else 0.0
+    required = least_clearance(trail, path, obstacles, tuning) if looks else 0.0
     cos, sin, facing, now = 1.0, 0.0, 0.0, 0.0
     for k in range(trail.shape[0] - 1):
         if k < first:
@@ -207,7 +238,7 @@ def follow(
         x1, y1 = x + length * cos, y + length * sin
         yaw1 = yaw + 0.5 * (w + w1) * step
         trail[k + 1, 0], trail[k + 1, 1], trail[k + 1, 2], trail[k + 1, 3], trail[k + 1, 4] = x1, y1, yaw1, v1, w1
-        if looks and abs(length) > 1e-6 and passes_within(x, y, x1, y1, required, obstacles):
+        if looks and passes_within(trail, k, required, path, obstacles, tuning, step):
             return Trail(k + 1, True)
         x, y, yaw, v, w, now = x1, y1, yaw1, v1, w1, now + step
     return Trail(trail.shape[0] - 1, False)
@@ -495,7 +526,7 @@ def choose(
             if n <= 1:
                 limit[n] += weights.persistence
             continue
-        if meets_obstacle(trails[n], obstacles, tuning, weights.step):
+        if meets_obstacle(trails[n], path, obstacles, tuning, weights.step):
             limit[n] = -math.inf
             continue
         met = encounter(

@@ -91,7 +91,7 @@ class TaskEntry(BaseModel):
 
 
 class RandomTasks(BaseModel):
-    """Random starts and goals in each world: free cells for the largest robot, connected by a path."""
+    """Random starts and goals in each world: free cells for the largest robot, connected by a path of its planning shape."""
 
     model_config = STRICT
 

@@ -62,7 +62,7 @@ def expand(campaign: Campaign) -> Expansion:
     planners, robots = planner_variants(campaign), _robots(campaign)
     skipped: list[str] = []
     worlds = campaign_worlds(campaign, skipped)
-    tasks = list(campaign_tasks(campaign, worlds, [one.robot for one in robots]))
+    tasks = list(campaign_tasks(campaign, worlds, [one.robot for one in robots], planners))
     settings = _settings(campaign)
     tasks = _fitting(campaign, tasks, robots, settings, planners[0], skipped)
     if not tasks:
@@ -94,11 +94,14 @@ def _remarks(tasks: Sequence[NamedTask], skipped: Sequence[str]) -> Iterator[str
     """Yield sentences about skipped problems and about the share of the floor that random tasks were drawn from."""
     if skipped:
         yield f"{len(skipped)} {'problem' if len(skipped) == 1 else 'problems'} skipped; {skipped[0]}"
-    floors = {one.world: one.floor for one in tasks if one.name.startswith("random-")}
+    origins = {one.world: one.origin for one in tasks if one.origin}
+    floors = {world: origin.share for world, origin in origins.items()}
     if floors:
         least, most = min(floors, key=floors.__getitem__), max(floors.values())
         share = f"{floors[least]:.0%}" if len(floors) == 1 else f"{floors[least]:.0%} (world {least}) to {most:.0%}"
-        yield f"random tasks are drawn from {share} of the connected floor: where the largest robot gets with its margin"
+        outlined = ", ".join(next(iter(origins.values())).outlined)
+        how = f"by footprint ({outlined})" if outlined else "by its disc"
+        yield f"random tasks are drawn from {share} of the connected floor: where the largest robot gets with its margin, {how}"
 
 
 def _count_tasks(tasks: Sequence[NamedTask]) -> dict[str, int]:

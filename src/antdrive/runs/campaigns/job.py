@@ -22,6 +22,13 @@ from antdrive.worlds import Task
 KEY_DIGITS = 32  # hexadecimal digits of a key; two of 10^9 runs collide with probability 1e-21
 
 
+class TaskOrigin(NamedTuple):
+    """The part of a floor from which random tasks were drawn."""
+
+    share: float  # fraction of the connected floor
+    outlined: tuple[str, ...]  # names of the robots that reach it by their footprint; the others by their disc
+
+
 @dataclass(frozen=True, eq=False)
 class NamedTask:
     """A world with start and goal, under the campaign's names."""
@@ -33,7 +40,7 @@ class NamedTask:
     place: Location  # location of the world in the campaign
     others: Mapping[str, Task] = field(default_factory=dict)  # the world file's other tasks, by name
     skip: bool = False  # whether to skip the task if the robot does not fit at its start
-    floor: float = 1.0  # share of the world's floor from which the task was drawn
+    origin: TaskOrigin | None = None  # origin of a random task
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,16 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base.checks import show, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
-from antdrive.planners import PLANNERS, Query, load_planner, planner_version
+from antdrive.planners import PLANNERS, Query, capabilities_of, load_planner, planner_version
 from antdrive.planners.user_code import label_names
-from antdrive.robots import PurePursuit, RobotSpec, overlap_at
+from antdrive.robots import PurePursuit, RobotSpec, outline_of, overlap_at
 from antdrive.robots.default_margin import LEAST, default_margin
 from antdrive.runs.campaigns.campaign import Campaign, RandomTasks, seeds_of
-from antdrive.runs.campaigns.job import NamedTask, PlannerVariant
+from antdrive.runs.campaigns.job import NamedTask, PlannerVariant, TaskOrigin
+from antdrive.sim.driving.routes import FINE
 from antdrive.sim.forms import option_text, seed_list
 from antdrive.sim.log.record import canonical_hash, settings_of
 from antdrive.worlds import Disc, Grid, Task, World, list_worlds, load_task, load_tasks, rasterise
@@ -239,12 +241,17 @@ NAMED = "named"  # value of the key tasks: those of the world files
 TRIES = 1000  # most random pairs of start and goal drawn for one task
 
 
-def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequence[RobotSpec]) -> Iterator[NamedTask]:
+def campaign_tasks(
+    campaign: Campaign,
+    worlds: Sequence[NamedTask],
+    robots: Sequence[RobotSpec],
+    planners: Sequence[PlannerVariant],
+) -> Iterator[NamedTask]:
     """Yield the tasks of a campaign: each world with each of its starts and goals."""
     if isinstance(campaign.tasks, RandomTasks):
-        inflate = max(robot.radius for robot in robots) + max(_margins(campaign, robots))
+        outlined = _outlined(campaign, robots, planners)
         for world in _each_once(worlds):
-            yield from _drawn(campaign, campaign.tasks, world, robots, inflate)
+            yield from _drawn(campaign, campaign.tasks, world, robots, outlined)
     elif campaign.entry.tasks == NAMED:
         for world in worlds:
             if not world.others:
@@ -258,6 +265,28 @@ def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequ
             yield from _listed(campaign, world)
     else:
         yield from worlds
+
+
+def _outlined(
+    campaign: Campaign, robots: Sequence[RobotSpec], planners: Sequence[PlannerVariant]
+) -> tuple[RobotSpec, ...]:
+    """Return the robots that plan for their footprint with every planner and setting of a campaign."""
+    outlined = all(entry.get("footprint") != "disc" for entry in campaign.settings)
+    outlined = outlined and all(capabilities_of(load_planner(one.source, **one.given)).turns for one in planners)
+    return tuple(robot for robot in robots if outlined and not robot.footprint.is_disc)
+
+
+def _reach(
+    campaign: Campaign, world: World, cell: float, robots: Sequence[RobotSpec], outlined: Sequence[RobotSpec]
+) -> list[Grid]:
+    """Return the grids on which a task must have a path: each outlined robot's, and the largest other robot's disc."""
+    discs = [robot for robot in robots if robot not in outlined]
+    margin = max(_margins(campaign, robots))
+    grids = [rasterise(world, cell, max(robot.radius for robot in discs) + margin)] if discs else []
+    for robot in outlined:
+        outline = outline_of(robot.footprint, margin)
+        grids.append(rasterise(world, min(cell, FINE), robot.radius + margin, outline))
+    return grids
 
 
 def _margins(campaign: Campaign, robots: Sequence[RobotSpec]) -> Iterator[float]:
@@ -290,7 +319,11 @@ def _listed(campaign: Campaign, world: NamedTask) -> Iterator[NamedTask]:
 
 
 def _drawn(
-    campaign: Campaign, request: RandomTasks, world: NamedTask, robots: Sequence[RobotSpec], inflate: float
+    campaign: Campaign,
+    request: RandomTasks,
+    world: NamedTask,
+    robots: Sequence[RobotSpec],
+    outlined: Sequence[RobotSpec],
 ) -> Iterator[NamedTask]:
     """Yield random tasks in one world. They depend on the world, the seed and the sizes of robots and unseen obstacles."""
     unseen = tuple(
@@ -299,39 +332,51 @@ def _drawn(
     content = int(canonical_hash(world.task)[:16], 16)
     rng = np.random.default_rng([request.seed, content])
     cell = max(entry.get("cell") or world.task.cell for entry in campaign.settings)
-    grid = rasterise(world.task.world, cell, inflate)
-    bare = rasterise(world.task.world, cell)
-    inside = reached_cells(bare, (world.task.start[:2], world.task.goal))
-    floor = inside if inside.any() else bare.moves > 0  # a converted map is hollow where it is blocked
-    free = np.argwhere((grid.moves > 0) & floor)
+    grids = _reach(campaign, world.task.world, cell, robots, outlined)
+    floors = [_floor(world.task, grid.cell) for grid in grids]
+    free = np.argwhere((grids[0].moves > 0) & floors[0])
     tasks: list[Task] = []
     for _ in range(request.random):
-        task = _draw(rng, grid, free, request.min_distance, world.task, robots, unseen) if len(free) else None
+        task = _draw(rng, grids, free, request.min_distance, world.task, robots, unseen) if len(free) else None
         if task is None:
+            largest = max(grids, key=lambda grid: grid.inflate)
+            shape = "the footprint" if largest.turns else "a robot"
             problem = (
                 f"no start and goal {request.min_distance:g} m apart with a path between them in {TRIES} draws in world "
-                f"{world.world} for a robot of radius {inflate:.3g} m with its margin; use a smaller min_distance"
+                f"{world.world} for {shape} of radius {largest.inflate:.3g} m with its margin; use a smaller min_distance"
             )
             raise campaign.error(("tasks",), problem)
         tasks.append(task)
-    share = share_of(reached_cells(grid, [task.start[:2] for task in tasks]), floor)
+    starts = [task.start[:2] for task in tasks]
+    share = min(share_of(reached_cells(grid, starts), floor) for grid, floor in zip(grids, floors, strict=True))
+    origin = TaskOrigin(share, tuple(robot.name for robot in outlined))
     for number, task in enumerate(tasks):
         name = f"random-{request.seed}-{number}"
-        yield dataclasses.replace(world, name=name, task=task, catalogue=None, floor=share)
+        yield dataclasses.replace(world, name=name, task=task, catalogue=None, origin=origin)
+
+
+def _floor(task: Task, cell: float) -> npt.NDArray[np.bool_]:
+    """Return the cells (R, C) of a world's floor: where a point gets."""
+    bare = rasterise(task.world, cell)
+    inside = reached_cells(bare, (task.start[:2], task.goal))
+    return inside if inside.any() else bare.moves > 0  # a converted map is hollow where it is blocked
 
 
 def _draw(
     rng: np.random.Generator,
-    grid: Grid,
+    grids: Sequence[Grid],
     free: np.ndarray,
     distance: float,
     own: Task,
     robots: Sequence[RobotSpec],
     unseen: tuple[Disc, ...],
 ) -> Task | None:
-    """Draw a task with start and goal in free cells, the robot facing the goal; None after too many draws."""
+    """Draw a task with start and goal in free cells of the first grid and a path on all, the robot facing the goal.
+
+    None after too many draws.
+    """
     for _ in range(TRIES):
-        (x, y), (goal_x, goal_y) = grid.xy(free[rng.integers(len(free), size=2)]).tolist()
+        (x, y), (goal_x, goal_y) = grids[0].xy(free[rng.integers(len(free), size=2)]).tolist()
         if math.hypot(goal_x - x, goal_y - y) < max(distance, own.goal_tolerance):
             continue
         start = x, y, math.atan2(goal_y - y, goal_x - x)
@@ -339,7 +384,8 @@ def _draw(
             task = dataclasses.replace(own, start=start, goal=(goal_x, goal_y))
         except FieldError:
             continue
-        fits = not any(overlap_at(task.world, robot, start, unseen) for robot in robots)
-        if fits and PLANNERS["astar"].plan(Query.between(grid, task), rng).solved:
+        if any(overlap_at(task.world, robot, start, unseen) for robot in robots):
+            continue
+        if all(PLANNERS["astar"].plan(Query.between(grid, task), rng).solved for grid in grids):
             return task
     return None

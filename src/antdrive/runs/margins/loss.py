@@ -17,7 +17,7 @@ from antdrive.base import Floats
 from antdrive.base.kernel_cache import sources_stamp
 from antdrive.base.plane import segment_lengths, wrap_angle
 from antdrive.planners import PLANNERS, Query, smooth
-from antdrive.robots import RobotSpec
+from antdrive.robots import RobotSpec, outline_of
 from antdrive.sim.driving.drive import follow
 from antdrive.sim.driving.localising import localiser_of
 from antdrive.sim.driving.plants import Drive
@@ -26,7 +26,7 @@ from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.scenario import LossFactors
 from antdrive.worlds import Disc, Task, World, point_clearance, rasterise
-from antdrive.worlds.grid import DIRECTIONS
+from antdrive.worlds.grid import DIRECTIONS, DISC
 
 CELLS = (0.5, 1.5)  # smallest and largest cell, in radii of the robot
 PILLARS = (0.2, 2.0)  # smallest and largest radius of a pillar, in radii of the robot
@@ -38,10 +38,11 @@ TOLERANCE = 0.5  # of the goal, plus the robot's radius; a course does not test 
 HEADINGS = (6, 7, 0, 1, 2)  # indices of DIRECTIONS from south via east to north: a course never turns back
 
 
-def course(robot: RobotSpec, inflate: float, rng: np.random.Generator) -> Task:
+def course(robot: RobotSpec, inflate: float, rng: np.random.Generator, beside: float | None = None) -> Task:
     """Return a task with a path that bends between pillars at the distance `inflate` from it.
 
-    The path leads through cells; planning with that distance finds it or a shorter one.
+    The path leads through cells; planning with that distance finds it or a shorter one. For a footprint, pillars stand at
+    that distance from corners, where it turns, and at the distance `beside` from legs.
     """
     cell = robot.radius * float(rng.uniform(*CELLS))
     cells = _bends(cell, SECONDS * robot.max_speed + RADII * robot.radius, rng)
@@ -49,7 +50,11 @@ def course(robot: RobotSpec, inflate: float, rng: np.random.Generator) -> Task:
     cells = cells - cells.min(axis=0) + pad
     rows, cols = (cells.max(axis=0) + pad + 1).tolist()
     line, corners = (np.asarray((at[:, ::-1] + 0.5) * cell, dtype=np.float64) for at in (cells, _beside(cells)))
-    pillars = _pillars(line, corners, robot.radius, inflate + ROUNDING, rng)
+    if beside is not None:
+        turns = line[1:-1][np.abs(np.diff(np.diff(line, axis=0), axis=0)).sum(axis=1) > cell / 2]
+        corners = np.concatenate([line[:1], turns])
+    distance = (inflate if beside is None else beside) + ROUNDING
+    pillars = _pillars(line, corners, robot.radius, distance, inflate + ROUNDING, rng)
     world = World("course", (0.0, 0.0, cols * cell, rows * cell), pillars)
     (x, y), (goal_x, goal_y) = line[0].tolist(), line[-1].tolist()
     yaw = math.atan2(*(line[1] - line[0])[::-1].tolist())
@@ -78,14 +83,18 @@ def _beside(cells: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     return np.concatenate([np.stack([row, next_col], axis=1), np.stack([next_row, col], axis=1)])
 
 
-def _pillars(line: Floats, free: Floats, radius: float, distance: float, rng: np.random.Generator) -> tuple[Disc, ...]:
-    """Draw cylinders at a distance from a line (N, 2), and no nearer to the points `free` (M, 2)."""
+def _pillars(
+    line: Floats, free: Floats, radius: float, distance: float, around: float, rng: np.random.Generator
+) -> tuple[Disc, ...]:
+    """Draw cylinders at a distance from a line (N, 2), and at the distance `around` from the points `free` (M, 2)."""
     left_out, pillars = rng.uniform(*LEFT_OUT), []
     smallest, largest = (math.log(radius * share) for share in PILLARS)
     for at, away, factor in _places(line, radius, rng):
         size = math.exp(rng.uniform(smallest, largest))
         centre = at + (distance + size) * factor * np.array([math.cos(away), math.sin(away)])
-        room = min(_distance(centre, line), float(np.hypot(*(free - centre).T).min(initial=math.inf)))
+        room = min(
+            _distance(centre, line), float(np.hypot(*(free - centre).T).min(initial=math.inf)) - around + distance
+        )
         if rng.random() >= left_out and room >= distance + size - ROUNDING / 2:
             pillars.append(Disc(float(centre[0]), float(centre[1]), size))
     return tuple(pillars)
@@ -121,12 +130,14 @@ class Loss(NamedTuple):
     """Margin used up by a drive."""
 
     footprint: float  # by the robot's footprint [m]
-    disc: float  # by its smallest enclosing disc, which plans use; at least the footprint's loss [m]
+    disc: float  # by the shape that plans keep clear: its smallest enclosing disc, or again its footprint [m]
 
 
 def calibration_key(conditions: LossFactors) -> str:
     """Return the SHA-256 of the loss factors and of the versions of the code that the loss depends on."""
     facts = dataclasses.asdict(conditions)
+    if not conditions.outlined:
+        del facts["outlined"]
     for label in ("name", "source"):
         del facts["robot"][label]
     versions = {name: metadata.version(name) for name in ("antdrive", "pybullet", "numpy")}
@@ -141,8 +152,11 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     not be certified. The footprint's loss is negative if the footprint stayed farther from obstacles than the planned disc.
     """
     c, robot = conditions, conditions.robot
-    task = course(robot, robot.radius + margin, random_stream(seed, "course"))
-    grid = rasterise(task.world, task.cell, robot.radius + margin)
+    right, left = -robot.footprint.bounds[1], robot.footprint.bounds[3]
+    beside = max(left, right) + margin if c.outlined else None
+    task = course(robot, robot.radius + margin, random_stream(seed, "course"), beside)
+    outline = outline_of(robot.footprint, margin) if c.outlined else DISC
+    grid = rasterise(task.world, task.cell, robot.radius + margin, outline)
     answer = PLANNERS["astar"].plan(Query.between(grid, task), random_stream(seed, "planner"))
     route = smooth(answer, grid, task, kind=c.smoothing)
     period, limit = 1 / c.control_hz, 30.0 + 10.0 * route.length / robot.max_speed
@@ -152,7 +166,7 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
         log = follow(engine, c.controller, path, task, limit=limit, control_hz=c.control_hz, localiser=localiser)
     if log.outcome is not Outcome.SUCCEEDED:
         return Loss(math.inf, math.inf)
-    disc = point_clearance(task.world, log.pose[:, :2]) - robot.radius
+    disc = log.clearance if c.outlined else point_clearance(task.world, log.pose[:, :2]) - robot.radius
     return Loss(*(margin - least_bound(log, robot.radius, clearance) for clearance in (log.clearance, disc)))
 
 

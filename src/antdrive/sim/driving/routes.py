@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -105,21 +106,23 @@ class RoutePlanner:
         """Return the grid of the first plan.
 
         With footprint `auto` it is the disc's, unless its shortest path is longer than the footprint's by more than `LONGER`.
-        Iterative planners may not arrive on the footprint's finer grid, so they take it only where the disc has no path.
+        Iterative planners may not arrive on the footprint's finer grid, so they try cells of the task's size first, and the
+        finer only where the disc has no path.
         """
         world = by_geometry(self.task.world)
         disc = grid_of(world, self.cell, self.inflate)
         if not self.turns:
             return disc
         length = self._shortest(disc) if self.footprint == "auto" else math.inf
-        if capabilities_of(self.planner).iterative and length < math.inf:
-            return disc
+        cells = [min(self.cell, FINE)]
+        if capabilities_of(self.planner).iterative:
+            cells = [self.cell, *(cells if length == math.inf else ())]
         inner = self.robot.footprint.inner_radius + self.outline_margins[-1]
         # No path of the footprint is shorter than that of the disc within it.
         if length <= LONGER * self._shortest(grid_of(world, self.cell, inner)) < math.inf:
             return disc
-        for margin in self.outline_margins:
-            outlined = outlined_grid_of(world, min(self.cell, FINE), self.robot.footprint, margin)
+        for cell, margin in itertools.product(dict.fromkeys(cells), self.outline_margins):
+            outlined = outlined_grid_of(world, cell, self.robot.footprint, margin)
             if self._shortest(outlined) * LONGER < length:
                 return outlined
         return disc if self.footprint == "auto" else outlined

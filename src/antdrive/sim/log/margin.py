@@ -1,11 +1,13 @@
 """Margin budget: how a drive used up its safety margin.
 
-Planners keep the disc around the robot `margin` metres from every surface. Drives come closer, for the reasons in `CAUSES`.
+Plans keep the disc around the robot, or its footprint, `margin` metres from every surface. Drives come closer, for the reasons
+in `CAUSES`.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +17,9 @@ import numpy.typing as npt
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import PurePursuit
-from antdrive.robots.default_margin import default_margin
-from antdrive.sim.log.metrics import nearest_on_route
+from antdrive.robots.clearance import footprint_clearance
+from antdrive.robots.default_margin import default_margin, line_margin
+from antdrive.sim.log.metrics import nearest_segments
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds import point_clearance
@@ -26,6 +29,7 @@ CAUSES: dict[str, str] = {
     "rounding": "the route comes closer to obstacles than planned, where start and goal are no cell centres",
     "cutting": "the robot leaves the route to the inside of a corner",
     "tracking": "the robot leaves the route elsewhere",
+    "heading": "the footprint leaves the heading of its straight",
     "slip": "the wheels did not do as commanded during the last quarter of a second",
     "localisation": "the estimated pose is wrong",
 }
@@ -48,9 +52,9 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Budget:
-    """Safety margin of a drive, broken down by cause. Clearances are those of the disc around the robot."""
+    """Safety margin of a drive, broken down by cause. Clearances are those of the shape that plans kept clear."""
 
-    margin: float  # planned margin [m]
+    margin: float  # planned margin of that shape [m]
     left: float  # least remaining clearance [m]
     t: float  # its time [s]
     x: float  # its position [m]
@@ -75,7 +79,9 @@ def has_default(record: DriveRecord) -> bool:
     route = record.smoothing.asked if record.smoothing.note else record.smoothing.made
     try:
         controller = PurePursuit(**record.controller.settings)
-        return record.margin == default_margin(record.robot, controller, record.noise, route)
+        usual = default_margin(record.robot, controller, record.noise, route)
+        lines = max(usual, line_margin(record.robot, controller, record.noise))
+        return record.margin == usual and record.footprint_margin in (None, lines)
     except (KeyError, TypeError, ValueError):  # settings or noise that no drive has
         return False
 
@@ -83,30 +89,35 @@ def has_default(record: DriveRecord) -> bool:
 def budget(rollout: Rollout) -> Budget:
     """Break a drive's safety margin down by cause.
 
-    At each row, margin - clearance is the sum of three losses. The first is at the route's point nearest to the estimate, where
+    At each row, margin - clearance is the sum of four losses. The first is at the route's point nearest to the estimate, where
     the route itself may be closer to obstacles than the margin (rounding). The second lies between that point and the
     estimate: cutting near corners, else tracking. Slip is the part by which the robot is closer to an obstacle than its
-    last commands would have brought it. The third lies between the estimate and the true pose (localisation). Unseen
-    cylinders are omitted.
+    last commands would have brought it. The third is the footprint's rotation from the route's heading to the estimate's
+    (heading); turns on the spot have all headings. The fourth lies between the estimate and the true pose (localisation).
+    Unseen cylinders are omitted.
     """
-    margin = rollout.record.margin
-    true = np.ascontiguousarray(rollout.pose[:, :2])
-    estimated = np.ascontiguousarray(rollout.estimate[:, :2]) if len(rollout.estimate) else true
-    foot, cutting = np.empty_like(true), np.empty(len(true), dtype=np.bool_)
+    record, true = rollout.record, rollout.pose
+    margin = record.margin if record.footprint_margin is None else record.footprint_margin
+    estimated = rollout.estimate if len(rollout.estimate) else true
+    planned, cutting, turning = estimated.copy(), np.empty(len(true), dtype=np.bool_), rollout.command[:, 0] == 0
     for rows, route in rollout.legs():
-        foot[rows] = nearest_on_route(estimated[rows], route)
-        cutting[rows] = _near_corner(foot[rows], route)
+        planned[rows] = _on_route(estimated[rows], route, turning[rows])
+        cutting[rows] = _near_corner(planned[rows, :2], route)
 
-    def clearance(points: Floats) -> Floats:
-        return point_clearance(rollout.record.task.world, points) - rollout.record.robot.radius
+    def clearance(poses: Floats) -> Floats:
+        if record.footprint_margin is not None:
+            return footprint_clearance(record.task.world, record.robot.footprint, poses)
+        return point_clearance(record.task.world, np.ascontiguousarray(poses[:, :2])) - record.robot.radius
 
-    left, at_estimate, on_route = clearance(true), clearance(estimated), clearance(foot)
-    off_route = on_route - at_estimate
+    left, at_estimate, on_route = clearance(true), clearance(estimated), clearance(planned)
+    kept = clearance(np.column_stack([estimated[:, :2], planned[:, 2]]))
+    off_route = on_route - kept
     slip = np.clip(clearance(_as_commanded(rollout)) - left, 0.0, np.maximum(off_route, 0.0))
     losses = {
         "rounding": margin - on_route,
         "cutting": np.where(cutting, off_route - slip, 0.0),
         "tracking": np.where(cutting, 0.0, off_route - slip),
+        "heading": kept - at_estimate,
         "slip": slip,
         "localisation": at_estimate - left,
     }
@@ -116,15 +127,29 @@ def budget(rollout: Rollout) -> Budget:
         # A loss only counts where the robot is closer to an obstacle than planned.
         harm = np.where(left < margin, np.minimum(losses[cause], margin - left), 0.0)
         at = int(harm.argmax())
-        x, y = true[at].tolist()
+        x, y = true[at, :2].tolist()
         most = max(0.0, float(harm[at]))
         contributions.append(Contribution(cause, most, float(rollout.t[at]), x, y, float(losses[cause][tightest])))
-    x, y = true[tightest].tolist()
+    x, y = true[tightest, :2].tolist()
     return Budget(margin, float(left[tightest]), float(rollout.t[tightest]), x, y, tuple(contributions))
 
 
+def _on_route(poses: Floats, route: Floats, turning: npt.NDArray[np.bool_]) -> Floats:
+    """Return the pose (T, 3) of a route (N, 2) nearest to each pose, forwards or backwards along its segment.
+
+    At a corner, and where the robot turns on the spot (T,), the heading is that of the pose.
+    """
+    feet, segment = nearest_segments(np.ascontiguousarray(poses[:, :2]), route)
+    steps = np.diff(route, axis=0)[segment]
+    yaw, heading = poses[:, 2], np.arctan2(steps[:, 1], steps[:, 0])
+    off = wrap_angle(yaw - heading)
+    off = np.where(np.abs(off) > math.pi / 2, wrap_angle(off - math.pi), off)
+    turning = turning | (feet == route[segment]).all(axis=1) | (np.abs(feet - route[segment + 1]) < 1e-9).all(axis=1)
+    return np.column_stack([feet, np.where(turning, yaw, yaw - off)])
+
+
 def _as_commanded(rollout: Rollout) -> Floats:
-    """Return the positions (T, 2) [m] of a robot that had followed the commands of the last `REACTION` seconds exactly."""
+    """Return the poses (T, 3) of a robot that had followed the commands of the last `REACTION` seconds exactly."""
     dt = 1.0 / rollout.record.physics_hz
     back = min(round(REACTION / dt), len(rollout.t) - 1)
     turned = np.concatenate(([0.0], np.cumsum(rollout.command[1:, 1] * dt)))
@@ -138,7 +163,7 @@ def _as_commanded(rollout: Rollout) -> Floats:
         distance = np.where(live, rollout.command[row, 0] * dt, 0.0)
         xy[:, 0] += distance * np.cos(yaw)
         xy[:, 1] += distance * np.sin(yaw)
-    return xy
+    return np.column_stack([xy, rollout.pose[begin, 2] + turned - turned[begin]])
 
 
 def _near_corner(points: Floats, route: Floats) -> npt.NDArray[np.bool_]:

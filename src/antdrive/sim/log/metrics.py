@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import Literal, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import polyline_length, wrap_angle
@@ -329,16 +330,21 @@ def tracking_error(rollout: Rollout) -> Floats:
 
 def nearest_on_route(points: Floats, route: Floats) -> Floats:
     """Return the point of a route (N, 2) nearest to each of the points (T, 2), shape (T, 2) [m]."""
+    return nearest_segments(points, route)[0]
+
+
+def nearest_segments(points: Floats, route: Floats) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Return the point of a route (N, 2) nearest to each of the points (T, 2), shape (T, 2) [m], and its segment (T,)."""
     a, along = route[:-1], np.diff(route, axis=0)
     length2 = (along**2).sum(axis=1)
-    nearest = np.empty((len(points), 2))
+    nearest, segment = np.empty((len(points), 2)), np.empty(len(points), dtype=np.int64)
     for rows in np.array_split(np.arange(len(points)), 1 + len(points) * len(a) // 1_000_000):
         offset = points[rows, None, :] - a
         f = np.clip((offset * along).sum(axis=2) / np.where(length2 > 0, length2, 1.0), 0, 1)
         feet = a + f[:, :, None] * along
         best = np.linalg.norm(points[rows, None, :] - feet, axis=2).argmin(axis=1)
-        nearest[rows] = feet[np.arange(len(rows)), best]
-    return nearest
+        nearest[rows], segment[rows] = feet[np.arange(len(rows)), best], best
+    return nearest, segment
 
 
 def _touches(rollout: Rollout, outcome: Outcome) -> float:

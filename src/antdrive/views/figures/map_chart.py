@@ -11,12 +11,13 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 from matplotlib.path import Path
 
-from antdrive.base.types import Floats
+from antdrive.base.types import Floats, Point
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views import colours
 from antdrive.views.colours import hexed
 from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, legend_above, thinned
 from antdrive.views.scene import Scene, contact_point
+from antdrive.worlds.coverage import share_of
 
 if TYPE_CHECKING:
     from antdrive.worlds.coverage import Coverage
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in colours.FIELD_STOPS])
 SWEPT = 0.02  # motion of the farthest corner between two drawn footprints [m]
-MOST_LABELS = 24  # doors; more are drawn without their widths
+LABEL = (0.5, 0.17)  # width and height of a door's label [inches]; doors within it of a labelled one have none
 MANY = 1000  # cylinders; larger numbers are drawn without edges
 SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in colours.SPEED_STOPS])
 
@@ -73,36 +74,50 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
     _draw_robot(axes, scene, scene.start, colours.START, 4.0)
 
 
-def draw_coverage(axes: Any, grid: Grid, covered: Coverage) -> list[Any]:
-    """Draw the reached floor, the rooms not reached and the doors with their widths; return the legend's handles."""
-    missed = covered.floor & ~np.isin(covered.rooms, list(covered.rooms_reached))
-    x, y = (np.asarray(grid.origin) - grid.cell / 2).tolist()
-    rows, cols = grid.shape
-    place = (x, x + cols * grid.cell, y, y + rows * grid.cell)
+#: Colours of floor and doors, and markers of doors, by the shape that gets there: the first, the second, none.
+REACHED = ((colours.GOOD, colours.GOOD, "o"), (colours.START, colours.START, "D"))
+MISSED = (colours.DOUBT, colours.BAD, "X")
+
+
+def draw_coverage(axes: Any, covered: Sequence[Coverage], scale: float) -> list[Any]:
+    """Draw the reached floor, the rooms not reached and the doors with their widths; return the legend's handles.
+
+    Args:
+        axes: the map
+        covered: what the robot reaches, on the same cells: by its disc, and by its footprint where plans keep that clear
+        scale: inches per metre of the map
+    """
+    last, count = covered[-1], len(covered)
+    shapes = [" by its disc", " only by its footprint"] if count > 1 else [""]
+    reached = [*(f"reached{shape}" for shape in shapes), "not reached"]
+    areas = np.select([~last.floor, *(each.reached for each in covered)], [-1, *range(count)], count)
+    passed = np.array([[door.passed for door in each.doors] for each in covered] + [[True] * len(last.doors)])
+    firsts = passed.argmax(axis=0)
+    paint = np.zeros((*areas.shape, 4))
     handles: list[Any] = []
-    for cells, colour, label in (
-        (covered.reached & covered.floor, colours.GOOD, "reached"),
-        (missed, colours.DOUBT, "room not reached"),
-    ):
-        if cells.any():
-            tint = (*(channel / 255 for channel in colour), 0.34)
-            layer = np.zeros((rows, cols, 4))
-            layer[cells] = tint
-            axes.imshow(layer, origin="lower", extent=place, interpolation="nearest", zorder=1.5)
+    markers: list[Any] = []
+    labelled: list[Point] = []
+    for k, (colour, door_colour, marker) in enumerate((*REACHED[:count], MISSED)):
+        here = areas == k
+        paint[here] = (*(channel / 255 for channel in colour), 0.34)
+        label = f"{reached[k]}: {share_of(here, last.floor):.0%} of the floor"
+        if here.any():
             handles.append(Patch(facecolor=hexed(colour), alpha=0.34, label=label))
-    few = len(covered.doors) <= MOST_LABELS
-    for passed, colour, label in ((True, colours.GOOD, "door passed"), (False, colours.BAD, "door not passed")):
-        doors = [door for door in covered.doors if door.passed == passed]
-        style = {"color": hexed(colour), "ms": 6, "mec": "white", "mew": 0.6, "ls": "none", "zorder": 8}
-        if doors:
-            at = np.array([door.at for door in doors])
-            handles += axes.plot(*at.T, "o" if passed else "X", label=label, **style)
-        for door in doors if few else ():
-            note = axes.annotate(
-                f"{door.width:.2f}", door.at, (5, 4), textcoords="offset points", fontsize=7.5, color=hexed(colour)
-            )
-            note.set(zorder=9, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8})
-    return handles
+        doors = [door for door, first in zip(last.doors, firsts.tolist(), strict=True) if first == k]
+        label = f"door passed{shapes[k]}" if k < count else "door not passed"
+        style = {"color": hexed(door_colour), "ms": 6, "mec": "white", "mew": 0.6, "ls": "none", "zorder": 9}
+        markers += axes.plot(*np.array([door.at for door in doors]).T, marker, label=label, **style) if doors else []
+        for door in doors:
+            if any((np.abs(np.subtract(door.at, other)) * scale < LABEL).all() for other in labelled):
+                continue
+            labelled.append(door.at)
+            place: dict[str, Any] = {"xytext": (5, 4), "textcoords": "offset points", "zorder": 8}
+            note = axes.annotate(f"{door.width:.2f} m", door.at, fontsize=7.5, color=hexed(door_colour), **place)
+            note.set(bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8})
+    x0, y0 = (np.asarray(last.by.origin) - last.by.cell / 2).tolist()
+    rows, cols = (side * last.by.cell for side in areas.shape)
+    axes.imshow(paint, origin="lower", extent=(x0, x0 + cols, y0, y0 + rows), interpolation="nearest", zorder=1.5)
+    return [*handles, *markers]
 
 
 def _circles(centres: Floats, radii: Floats) -> list[Path]:

@@ -33,6 +33,7 @@ FILES = {"plan": "plan", "tour": "tour", "history": "history", "bars": "field-ba
 MAX_BARS = 40
 #: Characters of a reason per inch, and the height of its lines [inches].
 LETTERS, LINE = 13.0, 0.165
+BESIDE = 2.9  # width of a legend beside the map [inches]
 #: Note below the initial plan of a mapless robot.
 FIRST = "Initial plan of a mapless robot, from its first scan: unknown ground counts as free."
 
@@ -45,7 +46,7 @@ def plan_figure(
     path: str | Path | None = None,
     *,
     mapped: bool = True,
-    covered: Coverage | None = None,
+    covered: Sequence[Coverage] = (),
     dpi: float = 160,
 ) -> Figure:
     """Draw a plan on the map, over the planner's field, with path lengths by iteration of an iterative planner.
@@ -57,7 +58,7 @@ def plan_figure(
         robot: the robot to draw at the start
         path: the file to write; its suffix selects PNG, PDF or SVG; None: no file
         mapped: whether the robot has a map
-        covered: what the robot reaches, drawn below the path
+        covered: what the robot reaches by each of its shapes, drawn below the path instead of the no-go area
         dpi: pixels per inch
 
     Returns:
@@ -67,12 +68,14 @@ def plan_figure(
         InputError: a suffix other than .png, .pdf and .svg.
     """
     scene = Scene.planned(task, robot, grid, mapped=mapped)
+    scene = dataclasses.replace(scene, inflate=0.0) if covered else scene
     cells, line = (grid.xy(plan.cells), grid.xy(plan.line)) if len(plan.cells) else (np.empty((0, 2)),) * 2
     shown = scene.map_bounds(line)
     iterations = len(plan.history)
     wide, high = map_size(scene, shown)
     wide += 0.9 if plan.field is not None else 0.0
-    wide_all = wide + (4.6 if iterations else 0.6)
+    beside = bool(covered) and high > wide  # the legend of a tall map
+    wide_all = wide + (4.6 if iterations else 0.6) + BESIDE * beside
     note = _note_below(plan, mapped=mapped)
     below = textwrap.wrap(note, round(LETTERS * wide_all)) if note else []
     with sheet(path, (wide_all, high + 0.9 + (0.4 + LINE * len(below) if below else 0.0)), dpi) as figure:
@@ -81,7 +84,7 @@ def plan_figure(
         if plan.field is not None:
             draw_field(figure, chart, grid, plan.field)
         draw_map(chart, scene, floor=plan.field is None)
-        handles: list[Any] = [] if covered is None else draw_coverage(chart, grid, covered)
+        handles: list[Any] = draw_coverage(chart, covered, high / (shown[3] - shown[1])) if covered else []
         if len(plan.cells):
             handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
             handles += chart.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
@@ -89,7 +92,9 @@ def plan_figure(
         if below:
             colour = hexed(MUTED if len(plan.cells) else BAD)
             figure.supxlabel("\n".join(below), x=0.012, ha="left", fontsize=9, weight="bold", color=colour)
-        draw_legend(chart, handles, scene)
+        place = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "ncols": 1, "borderaxespad": 1.0} if beside else {}
+        chart.set_anchor("W" if beside else "C")
+        draw_legend(chart, handles, scene, **place)
         if iterations:
             _draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
         length = f"{plan.cost:.2f} m" if len(plan.cells) else plan.status.value

@@ -137,6 +137,19 @@ def blocked_headings(x: float, y: float, corners: Array, reach: float, discs: Ar
 
 
 @kernel
+def turn_clear(
+    x: float, y: float, yaw: float, turn: float, corners: Array, reach: float, discs: Array, bounds: Array
+) -> bool:
+    """Return whether an outline touches nothing on a whole turn on the spot."""
+    blocked = blocked_headings(x, y, corners, reach, discs, bounds)
+    for i in range(blocked.shape[0]):
+        after = (yaw + min(turn, 0.0) - blocked[i, 0]) % TURN  # from the interval's start to the turn's lower end
+        if after <= blocked[i, 1] - blocked[i, 0] or after + abs(turn) >= TURN:
+            return False
+    return True
+
+
+@kernel
 def with_interval(rows: Array, n: int, low: float, high: float) -> Array:
     """Write an interval into row n, with its start in [0, 2π); return the table, which grows if it is full."""
     if n == rows.shape[0]:

@@ -72,10 +72,8 @@ def turn_clear(
         discs: x, y and radius of each disc (M, 3) [m]
         bounds: the walls: xmin, ymin, xmax, ymax [m]
     """
-    low, high = free_headings(x, y, outline, discs, bounds).reshape(-1, 2).T
-    after = (yaw + min(turn, 0.0) - low) % TURN  # from each interval's start to the turn's lower end
-    all_free = len(low) == 1 and high[0] - low[0] >= TURN
-    return bool(all_free or np.any((after > 0) & (after + abs(turn) < high - low)))
+    walls = np.asarray(bounds, dtype=np.float64)
+    return bool(kernels.turn_clear(x, y, yaw, turn, outline.corners, outline.reach, discs, walls))
 
 
 def sweep_clearance(
