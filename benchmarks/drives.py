@@ -24,7 +24,7 @@ import numpy as np
 from antdrive.planners import Query, load_planner, pull_taut
 from antdrive.planners.anyangle.tangent import shortest
 from antdrive.planners.smoothing._kernels_smooth import encloses
-from antdrive.robots import load_robot
+from antdrive.robots import RobotSpec, load_robot
 from antdrive.runs.pool import call_all
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import measure, tracking_error
@@ -43,6 +43,7 @@ class Result(NamedTuple):
         outcome: how the drive ended
         succeeded: whether the robot reached the goal and its log proves that nothing was touched
         contacts: how many contacts the log holds
+        shape: the shape that plans kept clear, disc or footprint; empty without a rollout
         metrics: every metric by name; empty without a rollout
         optimum: length of the exact shortest path among the inflated discs [m]
         errors: distances from the route near a speed [m], by speed [m/s]
@@ -52,21 +53,23 @@ class Result(NamedTuple):
     outcome: str
     succeeded: bool
     contacts: int
+    shape: str
     metrics: dict[str, float]
     optimum: float
     errors: dict[float, list[float]]
 
 
-def drive(name: str, task: Any, planner: str, robot: str, **settings: Any) -> Result:
+def drive(name: str, task: Any, planner: str, robot: str | RobotSpec, **settings: Any) -> Result:
     """Drive once, discarding the rollout."""
     done = run(Scenario.of(task, planner, robot, **settings))
     log = done.rollout
     if log is None:
-        return Result(name, done.outcome.name, False, 0, {}, math.nan, {})
+        return Result(name, done.outcome.name, False, 0, "", {}, math.nan, {})
     error, speed = tracking_error(log), log.twist[:, 0]
     near = {v: error[np.abs(speed - v) < 0.1 * v][::8].tolist() for v in (0.5, 1.0, 2.0)}
     optimum = log.record.plan.euclidean_optimum_m or math.inf
-    return Result(name, done.outcome.name, done.succeeded, len(log.contacts), measure(log), optimum, near)
+    shape = log.record.shape
+    return Result(name, done.outcome.name, done.succeeded, len(log.contacts), shape, measure(log), optimum, near)
 
 
 def percentile(values: Sequence[float], share: float) -> str:

@@ -8,7 +8,16 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import PlanStatus, Query, check_plan, load_planner, replanner_for
+from antdrive.planners import (
+    PLANNERS,
+    PlanStatus,
+    Query,
+    agent_for,
+    capabilities_of,
+    check_plan,
+    load_planner,
+    replanner_for,
+)
 from antdrive.worlds import DIRECTIONS, Disc, Task, World, rasterise
 from antdrive.worlds.headings import Outline, free_headings, sweep_clearance
 
@@ -151,7 +160,10 @@ def test_blocked_cells_lose_the_moves_into_and_out_of_them(made):
     _, grid, label, edges = made
     rng, cols = np.random.default_rng(5), grid.shape[1]
     blocked = rng.random(grid.shape) < 0.15
-    left = grid.without(blocked)
+    at = tuple(np.argwhere(grid.free)[0].tolist())
+    replanner = replanner_for(load_planner("astar"), Query(grid, at, at), rng)
+    replanner.block(np.argwhere(blocked))
+    left = replanner.query.grid
     assert left.free.tolist() == (grid.free & ~blocked).tolist()
     kept = {
         node: [(k, to) for k, to in moves if not blocked[node[0]] and not blocked[to[0]]]
@@ -172,8 +184,12 @@ def test_blocked_cells_lose_the_moves_into_and_out_of_them(made):
     assert 5 < found < 40
 
 
-def test_replanners_by_cells_refuse_turns(made):
+def test_planners_for_the_disc_and_agents_refuse_turns(made):
     _, grid, *_ = made
     at = tuple(np.argwhere(grid.free)[0].tolist())
-    with pytest.raises(ValueError, match="query: has a grid with turns"):
-        replanner_for(load_planner("astar"), Query(grid, at, at), np.random.default_rng(0))
+    for name in (name for name in PLANNERS if not capabilities_of(load_planner(name)).turns):
+        with pytest.raises(ValueError, match=r"^planner: \w+ plans for the disc; the grid has turns"):
+            replanner_for(load_planner(name), Query(grid, at, at), np.random.default_rng(0))
+    for name in ("astar", "mmas-dstar"):
+        with pytest.raises(ValueError, match=r"^query: has a grid with turns; agents know cells, not headings"):
+            agent_for(load_planner(name), Query(grid, at, at), np.random.default_rng(0))

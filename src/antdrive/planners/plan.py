@@ -110,6 +110,14 @@ class Query:
         return self.start_label if self.grid.turns else self.start[0] * self.grid.shape[1] + self.start[1]
 
     @property
+    def start_headings(self) -> tuple[int, ...]:
+        """The headings of the start's node on a grid with turns, as indices of `DIRECTIONS`; none without turns."""
+        if not self.grid.turns or self.start_label < 0:
+            return ()
+        row = self.start[0] * self.grid.shape[1] + self.start[1]
+        return tuple(np.flatnonzero(self.grid.turns.label[row] == self.start_label).tolist())
+
+    @property
     def goal_cell(self) -> int:
         """The goal as a flat cell."""
         return self.goal[0] * self.grid.shape[1] + self.goal[1]
@@ -122,6 +130,8 @@ class Query:
         for key, cell in (("start", self.start), ("goal", self.goal)):
             if not self.grid.free[cell]:
                 return f"the {key} cell ({cell[0]}, {cell[1]}) is blocked"
+        if self.grid.turns and self.start_label < 0:
+            return f"the start cell ({self.start[0]}, {self.start[1]}) is blocked at the robot's heading"
         return None
 
 
@@ -327,7 +337,8 @@ class Capabilities:
         needs_world: plans among the world's discs, so the query must have a task
         needs_motions: plans in space and time among the query's motions, and returns a `TimedPlan`
         own_replanner: has a method `replanner(query, rng)`; other planners plan from scratch after every change
-        cell_by_cell: has a method `agent(query, rng)` for driving; for other planners the robot follows the route
+        cell_by_cell: has a method `agent(query, rng)` for driving among movers, which knows cells, not headings; for other
+            planners the robot follows the route
         deterministic: draws no random numbers, so every seed gives the same plan
         turns: plans on grids with turns, for the robot's footprint; other planners plan for the disc around it
     """

@@ -28,12 +28,12 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
     any-angle planners. Planners that need discs or motions have none.
 
     Raises:
-        ValueError: the planner needs discs or motions, or the grid has turns.
+        ValueError: the planner needs discs or motions, or the grid has turns and the planner plans for the disc.
         PlannerError: the planner raised an exception.
     """
-    if query.grid.turns:
-        raise FieldError("query", "has a grid with turns; replanners know cells, not headings")
     can = capabilities_of(planner)
+    if query.grid.turns and not can.turns:
+        raise FieldError("planner", f"{type(planner).__name__} plans for the disc; the grid has turns")
     for needed, what in ((can.needs_world, "the world's discs"), (can.needs_motions, "known motions")):
         if needed:
             raise FieldError(
@@ -140,10 +140,14 @@ class CellByCellPlanner(Planner, Protocol):
 def agent_for(planner: Planner, query: Query, rng: np.random.Generator) -> OnlineAgent:
     """Return the planner's own agent if it has one, else an agent that follows replanned paths.
 
+    Agents know cells, not headings.
+
     Raises:
-        ValueError: the planner needs discs or motions.
+        ValueError: the planner needs discs or motions, or the grid has turns.
         PlannerError: the planner raised an exception.
     """
+    if query.grid.turns:
+        raise FieldError("query", "has a grid with turns; agents know cells, not headings")
     if capabilities_of(planner).cell_by_cell:
         with planner_errors(planner):
             return _of_kind(OnlineAgent, planner, cast(CellByCellPlanner, planner).agent(query, rng))

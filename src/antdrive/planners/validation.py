@@ -204,10 +204,9 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
     bits = _bits()[tuple(np.clip(steps, -1, 1).T + 1)]
     bits[(np.abs(steps) > 1).any(axis=1)] = 8
     invalid = bits == 8
-    if grid.turns and not invalid.any():
-        invalid |= ~_turns_along(query, cells, bits)
-    elif not off_grid:
-        invalid |= grid.moves[tuple(cells[:-1].T)].astype(np.int64) >> bits & 1 == 0
+    if not off_grid and not (grid.turns and invalid.any()):
+        nodes = grid.nodes_along(query.start_node, cells)[:-1]
+        invalid |= grid.graph.mask[nodes].astype(np.int64) >> bits & 1 == 0
     if invalid.any():
         k = int(invalid.argmax())
         why = "is no allowed move" if bits[k] < 8 else "does not lead to a neighbour"
@@ -216,18 +215,6 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
     if not off_grid and not _same(result.cost, cost):
         return f"cost: {result.cost:.9g} m, but the cells are {cost:.9g} m long"
     return ""
-
-
-def _turns_along(query: Query, cells: Any, bits: Any) -> Any:
-    """Return which moves along cells the turns of a grid allow, up to the first that they do not (N - 1,)."""
-    turns, cols, node = query.grid.turns, query.grid.shape[1], query.start_node
-    allowed = np.ones(len(bits), dtype=np.bool_)
-    for n, (k, (row, col)) in enumerate(zip(bits.tolist(), cells[1:].tolist(), strict=True)):
-        if not int(turns.moves[node]) >> k & 1:
-            allowed[n] = False
-            break
-        node = int(turns.label[row * cols + col, k])
-    return allowed
 
 
 def check_step(query: Query, cell: Cell, to: Any) -> str:
@@ -258,12 +245,9 @@ def _is_cell(value: Any) -> bool:
 
 def _bits() -> Any:
     """Return the bit of `Grid.moves` by row and column step, each + 1 (3, 3); 8 where there is no step."""
-    from antdrive.worlds import DIRECTIONS  # imports the compiler
+    from antdrive.worlds.grid import HEADINGS  # imports the compiler
 
-    bits = np.full((3, 3), 8)
-    for bit, (row, col) in enumerate(DIRECTIONS):
-        bits[row + 1, col + 1] = bit
-    return bits
+    return HEADINGS
 
 
 def _cell(cell: Any) -> str:

@@ -10,7 +10,7 @@ import dataclasses
 import math
 from typing import NamedTuple
 
-from antdrive.planners import GridPlanner, capabilities_of
+from antdrive.planners import GridPlanner
 from antdrive.robots import LIMITERS, Avoidance
 from antdrive.robots.default_margin import line_margin
 from antdrive.robots.lidar import Lidar
@@ -116,7 +116,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
         usual_margin=s.usual_margin,
         cell=s.planning_cell,
         smoothing=s.driven_smoothing,
-        footprint=s.footprint,
+        footprint=s.footprint if s.plans_footprints else "disc",
         hz=s.control_hz,
         seed=s.seed,
         motions=s.trajectories.motions if s.timed else (),
@@ -148,7 +148,7 @@ def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
     policy, avoidance = s.replanning, avoidance_of(s)
     if policy is None or not moving:
         return OneRoute(route_planner(s))
-    kind = CellByCell if capabilities_of(s.planner).cell_by_cell and policy.around_movers else Replanning
+    kind = CellByCell if s.cell_by_cell else Replanning
     return kind(route_planner(s), policy, movers, s.robot.radius + avoidance.min_clearance if avoidance else 0.0)
 
 

@@ -55,11 +55,9 @@ def on_other_routes(s: Scenario, key: str) -> str:
 
 def with_one_shape(s: Scenario, key: str) -> str:
     """Return a reason for a robot that is a disc, and for a planner that plans for the disc."""
-    from antdrive.planners import capabilities_of
-
     if s.robot.footprint.is_disc:
         return f"{s.robot.name} is a disc"
-    if s.footprint != "auto" and not capabilities_of(s.planner).turns:
+    if s.footprint != "auto" and not s.plans_footprints:
         return f"{s.planner_label} plans for the disc around the robot"
     return ""
 

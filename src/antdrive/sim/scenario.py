@@ -138,11 +138,12 @@ class Scenario(Settings):
         if self.map == "given" and self.localisation == "matching":
             raise FieldError("localisation", "matching: needs map none, since scans are matched to the occupancy map")
         can = capabilities_of(self.planner)
-        if self.footprint == "exact" and not can.turns and not self.robot.footprint.is_disc:
+        if self.footprint == "exact" and not self.plans_footprints and not self.robot.footprint.is_disc:
+            among = " among movers" if can.turns else ""
             raise FieldError(
                 "footprint",
-                f"exact: {self.planner_label} plans for the disc around the robot; `antdrive planners` lists those that plan "
-                "for its footprint",
+                f"exact: {self.planner_label} plans for the disc around the robot{among}; `antdrive planners` lists those that "
+                "plan for its footprint",
             )
         if self.map == "none" and can.needs_motions:
             raise FieldError(
@@ -314,6 +315,17 @@ class Scenario(Settings):
     def timed(self) -> bool:
         """Whether the planner plans in space and time, among movers."""
         return bool(self.driven_world.movers) and capabilities_of(self.planner).needs_motions
+
+    @property
+    def cell_by_cell(self) -> bool:
+        """Whether the planner decides cell by cell, among movers on a map."""
+        around = self.map == "given" and self.moving and self.replanning is not None and self.replanning.around_movers
+        return around and capabilities_of(self.planner).cell_by_cell
+
+    @property
+    def plans_footprints(self) -> bool:
+        """Whether plans may keep the robot's footprint clear; a planner that decides cell by cell knows no headings."""
+        return capabilities_of(self.planner).turns and not self.cell_by_cell
 
     @property
     def driven_smoothing(self) -> str:

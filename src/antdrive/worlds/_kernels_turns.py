@@ -49,6 +49,27 @@ def before_move(graph: MoveGraph, node: int, k: int) -> Any:
     return np.int64(graph.label[graph.cell[node] - step, k]) if len(graph.cell) else node - step
 
 
+# Inner loops pass arrays: to take them from a graph there costs more than the search.
+
+
+@inline
+def beside(cell: Array, label: Array, cols: int, node: int, k: int) -> Any:
+    """Return the node in direction k from which the opposite move, if it is allowed, leads to a node with turns; else -1.
+
+    Beyond the first or last column it is a node of the next row, whose move is not allowed.
+    """
+    there = cell[node] + DROW[k] * cols + DCOL[k]
+    joined = label[cell[node], (k + 4) & 7] == node and 0 <= there < len(label)
+    return np.int64(label[there, (k + 4) & 7]) if joined else np.int64(NOWHERE)
+
+
+@inline
+def behind(mask: Array, cell: Array, label: Array, cols: int, node: int, k: int) -> Any:
+    """Return the node in direction k from which the opposite move leads to a node with turns; -1 without one."""
+    before = beside(cell, label, cols, node, k)
+    return before if before >= 0 and mask[before] >> ((k + 4) & 7) & 1 else np.int64(NOWHERE)
+
+
 @kernel
 def count_labels(bits: Array) -> int:
     """Return the number of nodes: one for each cell, and one for each further label of a cell."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,9 @@ from antdrive.worlds.world import World
 
 #: The eight moves by bit of `Grid.moves`, as (row, column) steps: E, NE, N, NW, W, SW, S, SE.
 DIRECTIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
+
+#: The index in `DIRECTIONS` by row and column step, each + 1 (3, 3); 8 where there is no step.
+HEADINGS: npt.NDArray[np.int64] = np.array([(5, 6, 7), (4, 8, 0), (3, 2, 1)])
 
 
 def _none(*shape: int, dtype: npt.DTypeLike = np.int32) -> npt.NDArray[Any]:
@@ -77,20 +80,6 @@ class Turns:
             array.setflags(write=False)
         return cls(outline, cell, label, moves, joints)
 
-    def without(self, blocked: npt.NDArray[np.bool_]) -> Turns:
-        """Return the turns without the moves out of or into some cells.
-
-        Args:
-            blocked: the cells (R, C)
-        """
-        cols, shut = blocked.shape[1], blocked.ravel()
-        moves = np.where(shut[self.cell], 0, self.moves).astype(np.uint8)
-        for k, (row, col) in enumerate(DIRECTIONS):
-            nodes = np.flatnonzero(moves >> k & 1)
-            moves[nodes[shut[self.cell[nodes] + row * cols + col]]] &= ~np.uint8(1 << k)
-        moves.setflags(write=False)
-        return replace(self, moves=moves)
-
 
 #: The turns of a disc.
 NO_TURNS = Turns()
@@ -132,6 +121,20 @@ class Grid:
         marked = np.flatnonzero(nodes)
         return self.turns.cell[marked].astype(np.int64) if self.turns else marked
 
+    def nodes_along(self, start: int, cells: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+        """Return the nodes (N,) of a path along cells; after a move that is not allowed they are undefined.
+
+        Args:
+            start: the path's first node
+            cells: (row, col) of each cell (N, 2)
+        """
+        flat: npt.NDArray[np.int64] = cells[:, 0].astype(np.int64) * self.shape[1] + cells[:, 1]
+        if self.turns:
+            steps = np.diff(cells.astype(np.int64), axis=0)
+            flat[1:] = self.turns.label[flat[1:], HEADINGS[steps[:, 0] + 1, steps[:, 1] + 1]]
+            flat[0] = start
+        return flat
+
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
@@ -169,16 +172,6 @@ class Grid:
         row = math.floor((y - self.origin[1]) / self.cell + 0.5)
         col = math.floor((x - self.origin[0]) / self.cell + 0.5)
         return min(max(row, 0), rows - 1), min(max(col, 0), cols - 1)
-
-    def without(self, blocked: npt.NDArray[np.bool_]) -> Grid:
-        """Return a grid with turns with some of its cells (R, C) blocked."""
-        turns = self.turns.without(blocked)
-        moves = np.zeros(blocked.size, dtype=np.uint8)
-        np.bitwise_or.at(moves, turns.cell, turns.moves)
-        free, moves = self.free & ~blocked, moves.reshape(self.shape)
-        free.setflags(write=False)
-        moves.setflags(write=False)
-        return replace(self, free=free, moves=moves, turns=turns)
 
     def _repr_html_(self) -> str:
         from antdrive.worlds.svg import card, cells_svg

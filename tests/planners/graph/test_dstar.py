@@ -114,7 +114,7 @@ def test_a_blocked_corridor_raises_the_costs_of_paths_through_it():
     assert repair.result().cost == 9
     repair.block([(1, 6)])
     assert repair.result().cost == 4 + 9 + 4
-    heights = repair._h.reshape(7, 12)
+    heights = repair._arrays[0].reshape(7, 12)
     assert heights[1, 1] == 17 * STRAIGHT
     assert heights[1, 5] >= NEVER  # RAISE; costs that the robot does not need are not computed
     assert heights[1, 7] == 3 * STRAIGHT  # between the block and the goal nothing changed
@@ -128,7 +128,7 @@ def test_a_new_gap_lowers_the_costs_of_cells_behind_it():
     repair.result()
     repair.clear([(1, 6)])
     assert repair.result().cost == 9
-    assert repair._h.reshape(7, 12)[1, 5] == 5 * STRAIGHT
+    assert repair._arrays[0].reshape(7, 12)[1, 5] == 5 * STRAIGHT
 
 
 def test_a_change_away_from_the_path_is_not_processed():
@@ -148,14 +148,15 @@ def test_backpointers_of_processed_states_lead_to_the_goal():
             tell(cells)
             world.free[tuple(cells.T)] = value
         agree(repair, world)
-        floor = int(repair._heap[0, 0]) if repair._state[0] else NEVER
-        settled = np.flatnonzero((repair._h < min(floor, NEVER)) & (repair._place < 0) & (repair._h > 0))
+        floor = int(repair._arrays[2][0, 0]) if repair._state[0] else NEVER
+        h, back, _, place = repair._arrays
+        settled = np.flatnonzero((h < min(floor, NEVER)) & (place < 0) & (h > 0))
         for cell in settled:
-            k = int(repair._back[cell])
+            k = int(back[cell])
             row, col = divmod(int(cell), 30)
             parent = (row + DIRECTIONS[k][0]) * 30 + col + DIRECTIONS[k][1]
             assert repair.query.grid.moves[row, col] >> k & 1
-            assert repair._h[cell] == repair._h[parent] + COST[k]
+            assert h[cell] == h[parent] + COST[k]
 
 
 @pytest.mark.parametrize("size", [1, 2])

@@ -201,7 +201,7 @@ def test_a_warm_started_colony_takes_a_fraction_of_the_work_and_stays_near_the_o
 def test_trails_are_evened_out_by_distance():
     trail = np.full((49, 8), 2.0)
     trail[0] = 10.0
-    even_out(trail, (7, 7), np.array([24]), 2)  # the middle of 7 x 7
+    even_out(trail, Grid.from_free(np.ones((7, 7))), np.array([24]), 2)  # the middle
     shown = trail[:, 0].reshape(7, 7)
     expected = np.full((7, 7), 2.0)
     expected[1:6, 1:6] = 2 + 8 / 3

@@ -10,11 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.planners import PlanResult, PlanStatus
 from antdrive.robots import PursuitState, Twist
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, hit_within, point_at
 from antdrive.sim.driving.drive import Driver
+from antdrive.sim.driving.exploring import TURNABLE
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of
@@ -26,7 +28,7 @@ from antdrive.sim.policy import SCANNED
 from antdrive.sim.rebuild import rebuilt
 from antdrive.sim.sensing import Scanner
 from antdrive.views.map_reconstruction import MapReconstruction
-from antdrive.worlds import Cruising, Disc, Task, World, generate, load_task
+from antdrive.worlds import Cruising, Disc, Route, Task, World, generate, load_task
 from tests.records import changed
 
 POSTS = tuple(Disc(3.0, 0.15 * k, 0.075) for k in range(14))  # a row that leaves a gap at the top
@@ -98,6 +100,70 @@ def test_the_drive_can_be_replayed_and_rebuilt(drive, log):
     assert found.problems == ()
     assert rebuilt(log.record).sensing == drive.scenario.sensing
     assert run(rebuilt(log.record)).rollout.digest == log.digest
+
+
+def turning_room(robot, side):
+    """A robot at rest on a route with a turn by 90 degrees; a post almost closes the turn."""
+    corner = math.radians(45) + math.atan2(robot.footprint.half_width, robot.footprint.half_length)
+    away = robot.radius + side + 0.05
+    post = Disc(3.0 + away * math.cos(corner), 2.0 + away * math.sin(corner), 0.05)
+    world = World("room", (0.0, 0.0, 6.0, 6.0), (post,))
+    guide = compose(scenario(robot, Task(world, (3.0, 2.0, 0.0), (3.0, 5.0)), footprint="exact")).guide
+    route = Route(np.array([(3.0, 2.0), (3.0, 5.0)]), kind="taut", turns=np.array([math.pi / 2, 0.0]))
+    tracked = guide._prepare(route, world, side)
+    command, state = Twist(0.0, 0.0), PursuitState()
+    for _ in range(5):
+        command, state = guide._routes.controller.step(tracked, (3.0, 2.0, 0.0), command, state)
+    return command.yaw_rate
+
+
+def test_the_controller_makes_the_turns_of_plans_for_the_footprint(jackal):
+    assert turning_room(jackal, TURNABLE - 0.003) > 0  # some of it is for the position at which the robot stops
+    assert turning_room(jackal, TURNABLE - 0.012) == 0  # it refuses turns of plans closer to hits
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_plans_for_the_footprint_keep_less_margin_only_without_a_path(jackal, noise, monkeypatch):
+    """Room for the controller's turns comes before none at all."""
+    guide, margins = compose(scenario(jackal, footprint="exact", noise=noise)).guide, []
+
+    def around(task, grid, avoided):
+        margins.append(grid.turns.outline.reach - jackal.footprint.rounding)
+        return PlanResult(status=PlanStatus.NO_PATH)
+
+    monkeypatch.setattr(guide._routes, "around", around)
+    guide.plan(TASK.start)
+    wide, planned = guide._routes.outline_margins
+    assert margins == pytest.approx([*dict.fromkeys((wide, planned)), TURNABLE, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("pose", "led", "outlined"),
+    [
+        ((0.8, 0.8, 0.0), True, [False, True]),  # room for the disc
+        ((2.62, 0.8, 0.0), False, [False, True]),  # closer to a post than the disc's radius
+        ((2.62, 0.8, 0.0), True, [True, False]),
+    ],
+)
+def test_where_the_disc_does_not_fit_the_footprint_leads_on(jackal, pose, led, outlined, monkeypatch):
+    guide, found = compose(scenario(jackal)).guide, []
+
+    def around(task, grid, avoided):
+        found.append(bool(grid.turns))
+        return PlanResult(status=PlanStatus.NO_PATH)
+
+    monkeypatch.setattr(guide._routes, "around", around)
+    guide._routes.footprint_margin = 0.03 if led else None
+    guide.plan(pose)
+    assert list(dict.fromkeys(found)) == outlined
+
+
+@pytest.mark.parametrize(("turns", "stalled"), [(True, False), (False, True)])
+def test_a_turn_on_the_spot_is_no_stall_on_a_route_with_turns(jackal, turns, stalled):
+    recovery = Recovery(None, jackal, (0.0, 0.0, 0.0), 60)
+    for second in range(5):
+        recovery.note_progress(second, (0.0, 0.0, 1.0 * second), waiting=False, backwards=False, turns=turns)
+    assert recovery.stalled(4.0) is stalled
 
 
 def test_an_estimate_that_a_scan_moved_before_the_robot_drove_is_certified(jackal):

@@ -17,14 +17,17 @@ from antdrive.planners import (
     TimedPlan,
     capabilities_of,
     load_planner,
+    replanner_for,
 )
 from antdrive.robots import Footprint, Twist
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, route_planner
 from antdrive.sim.driving.replanning import CellByCell
+from antdrive.sim.driving.routes import outlined_grid_of
 from antdrive.sim.driving.rules import MAX_LAG, KeepToSchedule, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
+from antdrive.worlds.world import by_geometry
 from tests.records import changed
 
 # A wall with two gates; the path through the nearer gate is shorter.
@@ -438,3 +441,28 @@ def test_a_plan_for_a_footprint_keeps_away_from_movers_in_its_way(turtlebot):
 def test_auto_takes_the_footprint_on_cells_that_the_planner_can_search(robot, world, planner, cell):
     grid = route_planner(Scenario.of(world, planner, robot)).chosen_grid()
     assert (grid.cell if grid.turns else None) == cell
+
+
+@pytest.mark.parametrize("planner", ["dstar-lite", "dstar"])
+@pytest.mark.parametrize("mapped", [True, False])
+def test_plans_for_a_footprint_are_repaired_and_as_short_as_those_from_scratch(planner, mapped, turtlebot, monkeypatch):
+    """The robot passes the first gate and meets movers; without a map the posts come into view meanwhile."""
+    long = replace(turtlebot, footprint=Footprint(half_length=0.3, half_width=0.15))
+    scenario = Scenario.of(TASK, planner, long, footprint="exact")
+    repaired, scratch = route_planner(scenario), route_planner(replace(scenario, planner=load_planner("astar")))
+    made = []
+    monkeypatch.setattr(
+        "antdrive.sim.driving.routes.replanner_for", lambda *args: made.append(args) or replanner_for(*args)
+    )
+    repaired.mapped = mapped
+    for turn, discs in enumerate(((), (Disc(4.0, 3.0, 0.45),), (Disc(4.0, 3.0, 0.45), Disc(5.0, 4.0, 0.3)), ())):
+        known = len(POSTS) if mapped else 4 * turn
+        hall = replace(HALL, obstacles=POSTS[:known])
+        task = replace(TASK, world=hall, start=(1.0 + 0.5 * turn, 3.0, 0.2 * turn))
+        grid = outlined_grid_of(by_geometry(hall), 0.05, long.footprint, 0.03)
+        seen = discs if mapped else ()
+        plans = [one.around(task, grid, seen) for one in (repaired, scratch)]
+        assert plans[0].solved
+        assert plans[0].cost == pytest.approx(plans[1].cost)
+    assert repaired.plan_error == ""
+    assert [type(planner).__name__ for planner, *_ in made].count(type(scenario.planner).__name__) == 1

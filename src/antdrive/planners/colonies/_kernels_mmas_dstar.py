@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
+from antdrive.planners.colonies._kernels_colony import after, offsets
 from antdrive.worlds._kernels import DCOL, DROW, Array, kernel
+from antdrive.worlds._kernels_turns import MoveGraph, behind
 
 FIFTHS = np.array([5, 7, 5, 7, 5, 7, 5, 7], dtype=np.int64)  # cost of each move, 1 or 1.4, in fifths
 
@@ -35,23 +38,31 @@ def close_gates(free: Array, moves: Array, start_row: int, start_col: int, goal_
 
 
 @kernel
-def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float, pheromone: Array) -> int:
-    """Spread pheromone, `retained` times the cost of the path to the goal, until the start's is final.
+def propagate(graph: MoveGraph, start: int, goal: int, retained: float, pheromone: Array) -> int:
+    """Spread pheromone, `retained` times the cost of the path to the goal cell, until the start node's is final.
 
-    Returns the number of cells that received some; the others have inf, 10000 in the paper. Cells leave the open list
+    Returns the number of nodes that received some; the others have inf, 10000 in the paper. Cells leave the open list
     in the order of cost, as in D*. Costs are multiples of 1/5, so the list is a ring of eight buckets, each a
     linked list.
     """
+    mask, cell, label, cols = graph.mask, graph.cell, graph.label, graph.cols
+    offset, turning = offsets(cols), len(cell) > 0
     cost = np.full(len(mask), -1, dtype=np.int64)
     closed = np.zeros(len(mask), dtype=np.bool_)
     head = np.full(8, -1, dtype=np.int64)
-    entry_cell = np.empty(8 * len(mask) + 1, dtype=np.int32)
-    entry_next = np.empty(8 * len(mask) + 1, dtype=np.int64)
+    entry_cell = np.empty(8 * len(mask) + 8, dtype=np.int32)
+    entry_next = np.empty(8 * len(mask) + 8, dtype=np.int64)
     pheromone[:] = np.inf
-    cost[goal], pheromone[goal] = 0, 0.0
-    entry_cell[0], entry_next[0] = goal, -1
-    head[0] = 0
-    entries, waiting, level, reached = 1, 1, 0, 1
+    head[0] = -1
+    entries, level = 0, 0
+    for k in range(8):
+        node = np.int64(label[goal, k]) if turning else goal
+        if node >= 0 and cost[node] < 0:
+            cost[node], pheromone[node] = 0, 0.0
+            entry_cell[entries], entry_next[entries] = node, head[0]
+            head[0] = entries
+            entries += 1
+    waiting, reached = entries, entries
     while waiting > 0 and not closed[start]:
         entry = head[level & 7]
         if entry < 0:
@@ -59,14 +70,19 @@ def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float
             continue
         head[level & 7] = entry_next[entry]
         waiting -= 1
-        i = np.int64(entry_cell[entry])
+        i: Any = np.int64(entry_cell[entry])
         if closed[i]:
             continue
         closed[i] = True
         for k in range(8):
-            if not mask[i] & (1 << k):
+            if turning:
+                j = behind(mask, cell, label, cols, i, k)
+                if j < 0:
+                    continue
+            elif mask[i] & (1 << k):
+                j = i + offset[k]
+            else:
                 continue
-            j = i + offset[k]
             price = cost[i] + FIFTHS[k]
             if cost[j] >= 0 and cost[j] <= price:
                 continue
@@ -81,28 +97,39 @@ def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float
 
 @kernel
 def decide(
-    mask: Array, offset: Array, cols: int, here: int, goal: int, alpha: float, beta: float, pheromone: Array
-) -> int:
-    """Return the allowed neighbour with the smallest pheromone^alpha * distance^beta; -1 if none has pheromone."""
+    mask: Array,
+    to: Array,
+    cell: Array,
+    cols: int,
+    here: int,
+    goal: int,
+    alpha: float,
+    beta: float,
+    pheromone: Array,
+) -> Any:
+    """Return the allowed next node with the smallest pheromone^alpha * distance^beta; -1 if none has pheromone."""
     r1, c1 = goal // cols, goal % cols
-    least, to = np.inf, -1
+    least = np.inf
+    best: Any = np.int64(-1)
     for k in range(8):
         if not mask[here] & (1 << k):
             continue
-        j = here + offset[k]
+        j = after(to, here, k)
         if j == goal:
-            to = j
+            best = j
             break
-        price = alpha * math.log(pheromone[j]) + beta * math.log(math.hypot(r1 - j // cols, c1 - j % cols))
+        at = cell[j] if len(cell) else j
+        price = alpha * math.log(pheromone[j]) + beta * math.log(math.hypot(r1 - at // cols, c1 - at % cols))
         if price < least:
-            least, to = price, j
-    return to
+            least, best = price, j
+    return best
 
 
 @kernel
 def descend(
     mask: Array,
-    offset: Array,
+    to: Array,
+    cell: Array,
     cols: int,
     start: int,
     goal: int,
@@ -111,19 +138,19 @@ def descend(
     pheromone: Array,
     walk: Array,
 ) -> int:
-    """Fill `walk` with cells, each the last one's neighbour with the smallest pheromone^alpha * distance^beta.
+    """Fill `walk` with nodes, each after the last one the next with the smallest pheromone^alpha * distance^beta.
 
-    Returns their number; it is negative if the walk would return to one of its cells.
+    Returns their number; it is negative if the walk would return to one of its nodes.
     """
     been = np.zeros(len(mask), dtype=np.bool_)
     walk[0], n = start, 1
     been[start] = True
     i = start
     while i != goal:
-        to = decide(mask, offset, cols, i, goal, alpha, beta, pheromone)
-        if to < 0 or been[to]:
+        j = decide(mask, to, cell, cols, i, goal, alpha, beta, pheromone)
+        if j < 0 or been[j]:
             return -n
-        i = to
+        i = j
         been[i] = True
         walk[n] = i
         n += 1

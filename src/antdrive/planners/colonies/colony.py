@@ -20,6 +20,7 @@ from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Query
 
 if TYPE_CHECKING:  # importing a grid loads the compiler
+    from antdrive.worlds._kernels_turns import MoveGraph
     from antdrive.worlds.grid import Turns
 
 Flat = npt.NDArray[np.int32]  # flat cell indices
@@ -52,6 +53,13 @@ class ColonyGraph:
             _kernels_colony.table_of(grid.graph, kept, goal, mask, to)
             mask.setflags(write=False)  # as a grid's
         return cls(mask, to, grid.shape, query.start_node, goal, grid.turns)
+
+    @property
+    def moves(self) -> MoveGraph:
+        """Nodes and their moves, for compiled code that follows them both ways."""
+        from antdrive.worlds._kernels_turns import MoveGraph
+
+        return MoveGraph(self.mask, self.turns.cell, self.turns.label, self.shape[1])
 
     def cell_of(self, node: int) -> tuple[int, int]:
         """Return the (row, col) of a node."""

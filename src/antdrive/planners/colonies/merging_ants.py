@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +23,11 @@ from antdrive.planners.colonies.colony import (
     Walks,
     Weights,
 )
-from antdrive.planners.graph.incremental import CachedReplanner
+from antdrive.planners.graph.incremental import CachedReplanner, extended
 from antdrive.planners.plan import Capabilities, PlanResult, Query
+
+if TYPE_CHECKING:  # importing a grid loads the compiler
+    from antdrive.worlds import Grid
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +150,6 @@ class MergingAnts(MaxMinAnts):
         """Return the shortest path on `graph` over the arcs of these `tours` and of the `best` one."""
         from antdrive.planners.colonies import _kernels_colony
         from antdrive.planners.graph import _kernels_search
-        from antdrive.worlds._kernels_turns import MoveGraph
 
         moves = np.zeros_like(graph.mask)
         for walks in (tours, best):
@@ -155,7 +158,7 @@ class MergingAnts(MaxMinAnts):
         moves &= graph.mask  # the best tour may predate the last change of the grid
         moves.setflags(write=False)  # the search is compiled for read-only moves, like a grid's
         cells, straight, diagonal, _ = _kernels_search.shortest_path(
-            MoveGraph(moves, graph.turns.cell, graph.turns.label, graph.shape[1]), graph.start, graph.goal, True
+            graph.moves._replace(mask=moves), graph.start, graph.goal, True
         )
         if not len(cells):
             return None
@@ -212,14 +215,17 @@ class WarmStartedColony(CachedReplanner):
         warm = self._memory.tour is not None
         planner = self._brief if warm else self._planner
         if warm and self._memory.trail is not None and len(changed):
-            even_out(self._memory.trail, query.grid.shape, changed, self._reach)
+            self._memory.trail = even_out(self._memory.trail, query.grid, changed, self._reach)
         answer = planner.answer(query, planner.resume(query, self._rng, self._memory))
         return dataclasses.replace(answer, options=dataclasses.asdict(planner))
 
 
-def even_out(trail: Floats, shape: tuple[int, int], changed: npt.NDArray[np.int64], reach: int) -> None:
-    """Move trails at distance d from changed cells towards the strongest trail by a fraction 1 - d / (reach + 1)."""
-    near = np.zeros(shape, dtype=np.bool_)
+def even_out(trail: Floats, grid: Grid, changed: npt.NDArray[np.int64], reach: int) -> Floats:
+    """Move trails at distance d from changed cells towards the strongest trail by a fraction 1 - d / (reach + 1).
+
+    Returns the trails, with those of nodes that the grid got since (nodes, 8).
+    """
+    near = np.zeros(grid.shape, dtype=np.bool_)
     near.ravel()[changed] = True
     fraction = near / (reach + 1.0)
     for _ in range(reach):  # the neighbourhood grows by one cell per pass, so nearer cells count more often
@@ -228,7 +234,10 @@ def even_out(trail: Floats, shape: tuple[int, int], changed: npt.NDArray[np.int6
         near[:, 1:] |= near[:, :-1].copy()
         near[:, :-1] |= near[:, 1:].copy()
         fraction += near / (reach + 1.0)
-    here = np.flatnonzero(fraction)
     strongest = float(trail.max())
+    of_nodes = fraction.ravel()[grid.turns.cell] if grid.turns else fraction.ravel()
+    trail = extended(trail, strongest, len(of_nodes))
+    here = np.flatnonzero(of_nodes)
     if math.isfinite(strongest):
-        trail[here] += fraction.ravel()[here, np.newaxis] * (strongest - trail[here])
+        trail[here] += of_nodes[here, np.newaxis] * (strongest - trail[here])
+    return trail

@@ -64,7 +64,7 @@ class MaxMinDStar(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(cell_by_cell=True, deterministic=True)
+        return Capabilities(cell_by_cell=True, deterministic=True, turns=True)
 
     def agent(self, query: Query, rng: np.random.Generator) -> PheromoneAgent:
         """Return hasan's robot at the query's start; it does not use `rng`."""
@@ -87,11 +87,11 @@ class MaxMinDStar(GridPlanner):
             reason="; ".join(filter(None, (*notes, note))),
             work=work,
             work_unit=unit,
-            field=_finite(pheromone).reshape(graph.shape),
+            field=-graph.draw(-_finite(pheromone), np.empty(graph.shape)),
         )
 
     def spread(self, query: Query) -> tuple[ColonyGraph, Floats, int, list[str]]:
-        """Return the ant's graph, the pheromone (cells,), the number of cells that received some, and remarks."""
+        """Return the ant's graph, the pheromone (nodes,), the number of nodes that received some, and remarks."""
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
 
         graph, work = ColonyGraph.of(query), 0
@@ -101,21 +101,22 @@ class MaxMinDStar(GridPlanner):
         if self.gates:
             moves = query.grid.moves.copy()
             closed = kernels.close_gates(query.grid.free, moves, *query.start, *query.goal)
-            moves.setflags(write=False)
-            gated = dataclasses.replace(graph, mask=moves.ravel())
-            work = kernels.propagate(gated.mask, graph.to, graph.start, graph.goal, retained, pheromone)
+            mask = graph.mask & graph.of_nodes(moves)
+            mask.setflags(write=False)  # as a grid's
+            gated = dataclasses.replace(graph, mask=mask)
+            work = kernels.propagate(gated.moves, graph.start, graph.goal, retained, pheromone)
             if math.isfinite(pheromone[graph.start]):
                 return gated, pheromone, work, notes
             notes.append(f"reopened {closed} gate cells; without them there is no path")
-        work += kernels.propagate(graph.mask, graph.to, graph.start, graph.goal, retained, pheromone)
+        work += kernels.propagate(graph.moves, graph.start, graph.goal, retained, pheromone)
         return graph, pheromone, work, notes
 
     def walk(self, graph: ColonyGraph, pheromone: Floats) -> tuple[Flat, str]:
-        """Return the flat cells of the path to the goal, and a remark on changes of the exponents.
+        """Return the nodes of the path to the goal, and a remark on changes of the exponents.
 
         Args:
             graph: the ant's graph
-            pheromone: the pheromone of each cell (cells,), from `spread`
+            pheromone: the pheromone of each node (nodes,), from `spread`
         """
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
 
@@ -123,7 +124,16 @@ class MaxMinDStar(GridPlanner):
         size, note = 0, ""
         for circles, (alpha, beta) in enumerate(self.exponents()):
             size = kernels.descend(
-                graph.mask, graph.to, graph.shape[1], graph.start, graph.goal, alpha, beta, pheromone, walk
+                graph.mask,
+                graph.to,
+                graph.turns.cell,
+                graph.shape[1],
+                graph.start,
+                graph.goal,
+                alpha,
+                beta,
+                pheromone,
+                walk,
             )
             if circles:
                 note = f"the ant went in circles {circles} times: {self.describe_exponents(alpha, beta)}"
@@ -160,7 +170,8 @@ class PheromoneAgent(SteppingAgent):
 
     The robot moves to the allowed neighbour with the smallest `pheromone^alpha * distance^beta`. Before it returns
     to a cell visited with the current exponents, it detects a cycle and takes the next exponents of
-    `MaxMinDStar.exponents`. If blocked cells still stop it, it respreads pheromone around them.
+    `MaxMinDStar.exponents`. If blocked cells still stop it, it respreads pheromone around them. It knows cells, not
+    headings, so it moves for the disc around the robot.
     """
 
     def __init__(self, planner: MaxMinDStar, query: Query) -> None:
@@ -212,7 +223,15 @@ class PheromoneAgent(SteppingAgent):
         graph = self._graph
         return int(
             self._kernels.decide(
-                mask, graph.to, graph.shape[1], here, graph.goal, self._alpha, self._beta, self._pheromone
+                mask,
+                graph.to,
+                graph.turns.cell,
+                graph.shape[1],
+                here,
+                graph.goal,
+                self._alpha,
+                self._beta,
+                self._pheromone,
             )
         )
 
@@ -231,7 +250,8 @@ class PheromoneAgent(SteppingAgent):
         retained = 1.0 - self._planner.evaporation
         for graph in (self._graph, ColonyGraph.of(self._query)):
             pheromone, mask = np.empty_like(self._pheromone), self._open_moves(graph, blocked)
-            self.stats.propagated += int(self._kernels.propagate(mask, graph.to, here, graph.goal, retained, pheromone))
+            moves = graph.moves._replace(mask=mask)
+            self.stats.propagated += int(self._kernels.propagate(moves, here, graph.goal, retained, pheromone))
             if math.isfinite(pheromone[here]):
                 self._graph, self._pheromone = graph, pheromone
                 self._forget_visits(here)

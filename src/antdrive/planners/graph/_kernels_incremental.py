@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.worlds._kernels import DCOL, DROW, Array, inline, kernel
+from antdrive.worlds._kernels import DCOL, DROW, Array, doubled, inline, kernel
+from antdrive.worlds._kernels_turns import NOWHERE, MoveGraph, after_move
 
 # Costs are integers, so keys are exact. STRAIGHT is a Pell number: DIAGONAL / STRAIGHT differs from sqrt(2) by
 # 2e-19, and sums of fewer than a billion steps compare like a + b sqrt(2).
@@ -34,6 +35,22 @@ def offsets(cols: int) -> Array:
     for k in range(8):
         offset[k] = DROW[k] * cols + DCOL[k]
     return offset
+
+
+# A graph's arrays in the inner loop of a search halve its speed. So searches call these functions for graphs with turns, and
+# use offsets without.
+
+
+@kernel
+def successor(u: int, k: int, graph: MoveGraph) -> Any:
+    """Return the node that allowed move k leads to from u, with turns."""
+    return after_move(graph, u, k)
+
+
+@kernel
+def cost_through(u: int, k: int, graph: MoveGraph, g: Array) -> Any:
+    """Return the cost to the goal through allowed move k of u, with turns."""
+    return g[after_move(graph, u, k)] + COST[k]
 
 
 # The heap holds rows of (first key, second key, cell), the smallest first. `place` holds the row of each
@@ -109,10 +126,10 @@ def take(heap: Array, place: Array, size: int, cell: int) -> int:
 
 
 @inline
-def moves_between_free(free: Array, r: int, c: int) -> int:
+def moves_between_free(free: Array, r: int, c: int, turning: bool) -> int:
     """Return the moves of a cell between free cells.
 
-    A diagonal also needs both its orthogonal neighbours free.
+    Without turns a diagonal also needs both its orthogonal neighbours free.
     """
     rows, cols = free.shape
     mask = 0
@@ -121,55 +138,139 @@ def moves_between_free(free: Array, r: int, c: int) -> int:
             rn, cn = r + DROW[k], c + DCOL[k]
             if rn < 0 or rn >= rows or cn < 0 or cn >= cols or not free[rn, cn]:
                 continue
-            if k & 1 and not (free[r, cn] and free[rn, c]):
+            if k & 1 and not turning and not (free[r, cn] and free[rn, c]):
                 continue
             mask |= 1 << k
     return mask
 
 
 @kernel
-def closed_moves(free: Array, moves: Array, closed: Array) -> None:
-    """Fill `closed` with the forbidden moves between free cells."""
+def closed_moves(free: Array, moves: Array, turning: bool, closed: Array) -> None:
+    """Fill `closed` with the forbidden moves: without turns those between free cells, with turns all."""
     rows, cols = free.shape
     for r in range(rows):
         for c in range(cols):
-            closed[r, c] = moves_between_free(free, r, c) & ~moves[r, c]
+            able = 255 if turning else moves_between_free(free, r, c, turning)
+            closed[r, c] = able & ~moves[r, c]
+
+
+@inline
+def give_moves(cell: int, able: int, label: Array, mask: Array) -> None:
+    """Give the nodes of a cell its moves: move k is that of the label of heading k."""
+    for k in range(8):
+        node = label[cell, k]
+        if node >= 0:
+            mask[node] = (mask[node] & ~(1 << k)) | (able & (1 << k))
 
 
 @kernel
-def mark(free: Array, closed: Array, moves: Array, cells: Array, value: bool, changed: Array) -> tuple[int, int]:
+def mark(
+    free: Array, closed: Array, moves: Array, label: Array, mask: Array, cells: Array, value: bool, changed: Array
+) -> tuple[int, int]:
     """Make cells (N, 2) free or blocked, and list in `changed` the cells whose moves changed.
 
-    Returns their number, and the index of the first cell outside the grid or -1. If a cell lies outside, nothing
-    changes.
+    With turns, a cell without a label stays blocked, and `mask` has the moves of the nodes. Returns the number of changed cells,
+    and the index of the first cell outside the grid or -1. If a cell lies outside, nothing changes.
     """
     rows, cols = free.shape
+    turning = len(label) > 0
     count = 0
     for n in range(len(cells)):
         if cells[n, 0] < 0 or cells[n, 0] >= rows or cells[n, 1] < 0 or cells[n, 1] >= cols:
             return 0, n
     for n in range(len(cells)):
-        free[cells[n, 0], cells[n, 1]] = value
+        r, c = cells[n, 0], cells[n, 1]
+        free[r, c] = value and (not turning or label[r * cols + c].max() >= 0)
     for n in range(len(cells)):
         for r in range(max(0, cells[n, 0] - 1), min(rows, cells[n, 0] + 2)):
             for c in range(max(0, cells[n, 1] - 1), min(cols, cells[n, 1] + 2)):
-                mask = moves_between_free(free, r, c) & ~closed[r, c]
-                if mask != moves[r, c]:
-                    moves[r, c] = mask
+                able = moves_between_free(free, r, c, turning) & ~closed[r, c]
+                if able != moves[r, c]:
+                    moves[r, c] = able
                     changed[count] = r * cols + c
                     count += 1
+                    if turning:
+                        give_moves(r * cols + c, able, label, mask)
     return count, -1
 
 
 @kernel
-def adopt(moves: Array, new: Array, changed: Array) -> int:
-    """Replace the moves by new ones and list in `changed` the cells where they differ; returns their number."""
+def adopt(moves: Array, new: Array, relabelled: Array, changed: Array) -> int:
+    """Replace the moves by new ones and list in `changed` the cells where they differ, or lead to other nodes.
+
+    `relabelled` marks the cells whose labels changed (cells,); it is empty without turns. Returns the number of changed cells.
+    """
     rows, cols = moves.shape
     count = 0
     for r in range(rows):
         for c in range(cols):
-            if moves[r, c] != new[r, c]:
+            differs = moves[r, c] != new[r, c]
+            if len(relabelled) and not differs:
+                for rn in range(max(0, r - 1), min(rows, r + 2)):
+                    for cn in range(max(0, c - 1), min(cols, c + 2)):
+                        differs |= relabelled[rn * cols + cn]
+            if differs:
                 moves[r, c] = new[r, c]
                 changed[count] = r * cols + c
                 count += 1
     return count
+
+
+@kernel
+def nodes_of_cells(cell: Array, cells: int) -> Array:
+    """Return the nodes of each cell in order of their numbers (cells, 8), -1 after the last; `cell` is that of each node."""
+    own = np.full((cells, 8), NOWHERE, dtype=np.int32)
+    for node in range(len(cell)):
+        i, count = cell[node], 0
+        while own[i, count] >= 0:
+            count += 1
+        own[i, count] = node
+    return own
+
+
+@kernel
+def relabel(label: Array, new: Array, own: Array, cell: Array, relabelled: Array) -> Array:
+    """Replace the labels by those of a grid with other numbers of its nodes, and mark the cells that they differ in.
+
+    The labels of a cell are the nodes `own` (cells, 8) that it had before, in order; it gets more if it never had as many. So
+    nodes keep their numbers where nothing changed. Returns the cells of all nodes: `cell`, extended by those of new nodes.
+    """
+    size = len(cell)
+    for i in range(len(label)):
+        relabelled[i] = False
+        last, most, same = NOWHERE, NOWHERE, True
+        for k in range(8):
+            most = max(most, new[i, k])
+            same &= new[i, k] == label[i, k]
+        if same:
+            continue
+        rank = 0
+        while last < most:  # the labels in order of their nodes
+            node = most
+            for k in range(8):
+                if last < new[i, k] < node:
+                    node = new[i, k]
+            if own[i, rank] < 0:
+                own[i, rank] = size
+                if size == len(cell):
+                    cell = doubled(cell)
+                cell[size] = i
+                size += 1
+            for k in range(8):
+                if new[i, k] == node and label[i, k] != own[i, rank]:
+                    label[i, k] = own[i, rank]
+                    relabelled[i] = True
+            last, rank = node, rank + 1
+        for k in range(8):
+            if new[i, k] < 0 and label[i, k] >= 0:
+                label[i, k] = NOWHERE
+                relabelled[i] = True
+    return cell[:size].copy()
+
+
+@kernel
+def move_masks(moves: Array, label: Array, mask: Array) -> None:
+    """Fill the moves `mask` (nodes,) of all nodes."""
+    mask[:] = 0
+    for i in range(len(label)):
+        give_moves(i, moves[i], label, mask)

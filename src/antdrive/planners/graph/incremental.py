@@ -9,8 +9,9 @@ import abc
 import dataclasses
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,6 @@ from antdrive.planners.graph.search import UNREACHABLE
 from antdrive.planners.plan import (
     Capabilities,
     Cell,
-    Cells,
     GridPlanner,
     Planner,
     PlanResult,
@@ -45,8 +45,11 @@ class Replanner(Protocol):
         """The current query. Its grid is a read-only view that reflects every edit."""
         ...
 
-    def move(self, start: Cell) -> None:
+    def move(self, start: Cell, heading: int = 0) -> None:
         """Set the robot's cell `start`, which need not be on the path.
+
+        On a grid with turns, the start's node is the label of a heading, an index of `DIRECTIONS`. Other replanners need no
+        `heading`.
 
         Raises:
             ValueError: the cell lies outside the grid.
@@ -68,7 +71,7 @@ class Replanner(Protocol):
         ...
 
     def change(self, grid: Grid) -> int:
-        """Replace the grid with another of the same shape.
+        """Replace the grid with another of the same shape, with turns exactly if the first has.
 
         Returns the number of cells whose moves changed.
         """
@@ -97,23 +100,30 @@ class CachedReplanner(abc.ABC):
         from antdrive.planners.graph import _kernels_incremental  # imported here because it loads the compiler
 
         self._common = _kernels_incremental
-        self._free, self._moves = query.grid.free.copy(), query.grid.moves.copy()
+        grid, turns = query.grid, query.grid.turns
+        self._free, self._moves = grid.free.copy(), grid.moves.copy()
+        # With turns, nodes keep their numbers when labels change, unlike those of rasterised grids.
+        self._cell, self._label, self._masks = turns.cell, turns.label, turns.moves.copy()
+        self._own = self._common.nodes_of_cells(turns.cell, len(turns.label))  # nodes of each cell, also unused ones
+        self._heading = next(iter(query.start_headings), 0)
         # Moves that the grid forbids although the cells are free; computed on first use.
         self._closed: npt.NDArray[np.uint8] | None = None
         self._edited = np.empty(self._moves.size, dtype=np.int64)  # buffer for the cells of one edit
         self._edits: list[npt.NDArray[np.int64]] = []  # the cells of each edit since the last answer
-        self._query = dataclasses.replace(query, grid=self._view(query.grid), task=None)
+        self._query = dataclasses.replace(query, grid=self._view(grid), task=None)
         self._last: PlanResult | None = None
+        self._last_start = query.start_node
 
     @property
     def query(self) -> Query:
         """The current query. Its grid is a read-only view that reflects every edit."""
         return self._query
 
-    def move(self, start: Cell) -> None:
-        """Set the robot's cell `start`, which need not be on the path."""
-        if start != self._query.start:
-            self._query = dataclasses.replace(self._query, start=start, unreachable="")
+    def move(self, start: Cell, heading: int = 0) -> None:
+        """Set the robot's cell `start`, which need not be on the path, and with turns a heading of its node."""
+        self._heading = heading
+        if (start, label := self._label_at(start)) != (self._query.start, self._query.start_label):
+            self._query = dataclasses.replace(self._query, start=start, start_label=label, unreachable="")
 
     def block(self, cells: npt.ArrayLike) -> int:
         """Mark cells (N, 2) as blocked; returns the number of cells whose moves changed."""
@@ -122,17 +132,31 @@ class CachedReplanner(abc.ABC):
     def clear(self, cells: npt.ArrayLike) -> int:
         """Mark cells (N, 2) as free; returns the number of cells whose moves changed.
 
-        Moves that the grid forbids between free cells stay forbidden.
+        Moves that the grid forbids between free cells stay forbidden, with turns also those of cells that it blocks.
         """
         return self._mark(cells, True)
 
     def change(self, grid: Grid) -> int:
-        """Replace the grid with another of the same shape; returns the number of cells whose moves changed."""
+        """Replace the grid with another of the same shape, with turns exactly if the first has.
+
+        Returns the number of cells whose moves changed. With turns, the robot's node becomes the label of its last heading.
+        """
         if grid.shape != self._query.grid.shape:
             raise FieldError("grid", f"must have the shape {self._query.grid.shape}, got {grid.shape}")
+        if bool(grid.turns) != bool(self._query.grid.turns):
+            raise FieldError("grid", "must have turns exactly if the first grid has")
         self._free[:] = grid.free
         self._closed = None
-        return self._record(int(self._common.adopt(self._moves, grid.moves, self._edited)))
+        relabelled = np.empty(len(self._label), dtype=np.bool_)
+        if grid.turns:
+            self._label = self._label.copy()
+            self._cell = self._common.relabel(self._label, grid.turns.label, self._own, self._cell.copy(), relabelled)
+            self._masks = np.empty(len(self._cell), dtype=np.uint8)
+            self._common.move_masks(grid.moves.ravel(), self._label, self._masks)
+            label = self._label_at(self._query.start)
+            self._query = dataclasses.replace(self._query, grid=self._view(grid), start_label=label)
+        count = int(self._common.adopt(self._moves, grid.moves, relabelled, self._edited))
+        return self._record(count)
 
     def result(self) -> PlanResult:
         """Return the path from the robot's cell; `work` and `wall_s` are those of this call."""
@@ -143,6 +167,7 @@ class CachedReplanner(abc.ABC):
         answer = self._remaining_path()
         if answer is None:
             answer = self._last = self._replan(self._query, self._take_edits())
+            self._last_start = self._query.start_node
         return dataclasses.replace(answer, wall_s=time.perf_counter() - started)
 
     @abc.abstractmethod
@@ -153,7 +178,8 @@ class CachedReplanner(abc.ABC):
         """Return the rest of the last path if nothing has changed and the robot is on it."""
         if self._edits or self._last is None or not self._last.solved:
             return None
-        here = np.flatnonzero((self._last.cells == self._query.start).all(axis=1))
+        nodes = self._query.grid.nodes_along(self._last_start, self._last.cells)
+        here = np.flatnonzero(nodes == self._query.start_node)
         if not len(here):
             return None
         rest = self._last.cells[here[0] :]
@@ -162,18 +188,34 @@ class CachedReplanner(abc.ABC):
     def _index(self, cell: Cell) -> int:
         return int(cell[0] * self._moves.shape[1] + cell[1])
 
+    def _label_at(self, cell: Cell) -> int:
+        """Return the node of a cell's label of the robot's heading on a grid with turns; -1 without one."""
+        flat = self._index(cell)
+        return int(self._label[flat, self._heading]) if 0 <= flat < len(self._label) else -1
+
+    def _nodes(self, cells: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """Return all nodes of flat cells."""
+        if not len(self._own):
+            return cells
+        nodes = self._own[cells].astype(np.int64).ravel()
+        return np.asarray(nodes[nodes >= 0])
+
     def _view(self, like: Grid) -> Grid:
-        free, moves = self._free.view(), self._moves.view()
-        free.setflags(write=False)
-        moves.setflags(write=False)
-        return dataclasses.replace(like, free=free, moves=moves)
+        free, moves, masks = self._free.view(), self._moves.view(), self._masks.view()
+        for array in (free, moves, masks, self._cell, self._label):
+            array.setflags(write=False)
+        turns = dataclasses.replace(like.turns, cell=self._cell, label=self._label, moves=masks)
+        grid = dataclasses.replace(like, free=free, moves=moves, turns=turns)
+        self._graph = grid.graph
+        return grid
 
     def _mark(self, cells: npt.ArrayLike, free: bool) -> int:
         if self._closed is None:
             self._closed = np.empty_like(self._moves)
-            self._common.closed_moves(self._free, self._moves, self._closed)
+            self._common.closed_moves(self._free, self._moves, len(self._label) > 0, self._closed)
         rc = np.asarray(cells, dtype=np.int64).reshape(-1, 2)
-        count, outside = map(int, self._common.mark(self._free, self._closed, self._moves, rc, free, self._edited))
+        grid = self._free, self._closed, self._moves, self._label, self._masks
+        count, outside = map(int, self._common.mark(*grid, rc, free, self._edited))
         if outside >= 0:
             row, col = rc[outside]
             rows, cols = self._moves.shape
@@ -194,21 +236,43 @@ class CachedReplanner(abc.ABC):
 
 
 class IncrementalSearch(CachedReplanner):
-    """A search that repairs its result after an edit."""
+    """A search from the goal that repairs its result after an edit.
+
+    Args:
+        query: the initial query
+        kernels: the compiled search
+        state: how many numbers it keeps
+        values: type and initial value of each array that it keeps by node, besides its heap
+    """
+
+    def __init__(self, query: Query, kernels: Any, state: int, values: Sequence[tuple[type, int]]) -> None:
+        super().__init__(query)
+        nodes = len(self._graph.mask)
+        self._kernels, self._goal = kernels, query.goal_cell
+        self._goals = np.array(query.grid.nodes_at(query.goal), dtype=np.int64)
+        self._state = np.empty(state, dtype=np.int64)
+        self._initial = [initial for _, initial in values] + [0, -1]
+        self._arrays: list[npt.NDArray[Any]] = [np.empty(nodes, dtype=kind) for kind, _ in values]
+        self._arrays += [np.empty((nodes, 3), dtype=np.int64), np.empty(nodes, dtype=np.int32)]  # the heap, rows in it
 
     def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
-        cells, diagonal, work = self._repair(changed, self._index(query.start))
+        if len(self._graph.mask) > len(self._arrays[0]):  # with turns, cells got more labels
+            room = len(self._graph.mask) * 5 // 4
+            self._arrays = [extended(*one, room) for one in zip(self._arrays, self._initial, strict=True)]
+        nodes, start = self._nodes(changed), query.start_node
+        cells, diagonal, work = self._kernels.repair(nodes, self._graph, start, self._goal, self._state, *self._arrays)
         if not len(cells):
             return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work=work)
         cost = query.grid.cell * (len(cells) - 1 - diagonal + math.sqrt(2.0) * diagonal)
         return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=cost, work=work)
 
-    @abc.abstractmethod
-    def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
-        """Return the path from a cell after edits, its number of diagonal steps, and the number of expanded cells.
 
-        The path is empty if there is none.
-        """
+def extended(array: npt.NDArray[Any], initial: float, rows: int) -> npt.NDArray[Any]:
+    """Return an array with rows of an initial value added up to a number of rows."""
+    if len(array) == rows:
+        return array
+    more = np.full((rows - len(array), *array.shape[1:]), initial, dtype=array.dtype)
+    return np.concatenate((array, more))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,7 +282,7 @@ class IncrementalPlanner(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(own_replanner=True, deterministic=True)
+        return Capabilities(own_replanner=True, deterministic=True, turns=True)
 
     @abc.abstractmethod
     def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:
@@ -248,24 +312,11 @@ class DStarSearch(IncrementalSearch):
     """D*: Dijkstra's algorithm from the goal, with RAISE and LOWER states that propagate changes."""
 
     def __init__(self, query: Query) -> None:
-        super().__init__(query)
-        from antdrive.planners.graph import _kernels_dstar
+        from antdrive.planners.graph import _kernels_dstar as kernels
+        from antdrive.planners.graph._kernels_incremental import NEVER
 
-        self._kernels = _kernels_dstar
-        cells = self._moves.size
-        self._goal = self._index(query.goal)
-        self._state = np.empty(1, dtype=np.int64)  # the length of the OPEN list
-        self._h = np.empty(cells, dtype=np.int64)
-        self._back = np.empty(cells, dtype=np.uint8)
-        self._heap = np.empty((cells, 3), dtype=np.int64)
-        self._place = np.empty(cells, dtype=np.int32)
-        self._kernels.begin(self._goal, self._state, self._h, self._back, self._heap, self._place)
-
-    def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
-        path: tuple[Cells, int, int] = self._kernels.repair(
-            changed, self._moves, start, self._goal, self._state, self._h, self._back, self._heap, self._place
-        )
-        return path
+        super().__init__(query, kernels, 1, [(np.int64, NEVER), (np.uint8, 8)])
+        kernels.begin(self._goals, self._state, *self._arrays)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,23 +339,9 @@ class DStarLiteSearch(IncrementalSearch):
     """D* Lite: the optimised version (Figure 4 of the paper) in exact integer costs."""
 
     def __init__(self, query: Query) -> None:
-        super().__init__(query)
-        from antdrive.planners.graph import _kernels_dstar_lite
+        from antdrive.planners.graph import _kernels_dstar_lite as kernels
+        from antdrive.planners.graph._kernels_incremental import NEVER
 
-        self._kernels = _kernels_dstar_lite
-        cells = self._moves.size
-        self._goal = self._index(query.goal)
-        self._state = np.empty(3, dtype=np.int64)  # the queue's size, k_m, s_last
-        self._g = np.empty(cells, dtype=np.int64)
-        self._rhs = np.empty(cells, dtype=np.int64)
-        self._heap = np.empty((cells, 3), dtype=np.int64)
-        self._place = np.empty(cells, dtype=np.int32)
-        self._kernels.begin(
-            self._moves, self._index(query.start), self._goal, self._state, self._g, self._rhs, self._heap, self._place
-        )
-
-    def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
-        path: tuple[Cells, int, int] = self._kernels.repair(
-            changed, self._moves, start, self._goal, self._state, self._g, self._rhs, self._heap, self._place
-        )
-        return path
+        super().__init__(query, kernels, 3, [(np.int64, NEVER)] * 2)
+        start, cols = self._index(query.start), query.grid.shape[1]
+        kernels.begin(cols, start, self._goal, self._goals, self._state, *self._arrays)

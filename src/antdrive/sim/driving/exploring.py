@@ -42,7 +42,10 @@ from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, ras
 from antdrive.worlds.world import PointWorld
 
 GROWTH = (4.0, 16.0)  # extent of the planning area beyond start and goal; the second if no path is found [m]
-MARGINS = (1.0, 0.0)  # fractions of the margin that plans keep; the second if no route exists or it is long
+MARGINS = (
+    1.0,
+    0.0,
+)  # fractions of the margin that plans for the disc keep; the second if no route exists or it is long
 FAIR = 1.25  # a route longer than the straight line by more than this factor is long
 DETOUR = 1.15  # a route with less margin must be shorter by this factor
 CORRIDOR = 1.2  # smoothing considers obstacles within this distance of the plan, beyond the inflation [m]
@@ -54,6 +57,9 @@ ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hits than to mapped obstacles [m]
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
+TURNABLE = (
+    0.025  # plans for the footprint keep this margin if they can: the controller refuses turns closer to hits [m]
+)
 LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
 
@@ -132,24 +138,41 @@ class Exploration(RouteGuide):
         """
         straight = math.dist(pose[:2], self._task.goal)
         best: tuple[Grid, PlanResult] | None = None
-        for outlined, growth in (
-            (shape, growth) for shape in self._routes.shapes for growth in GROWTH[: 1 if shape else 2]
-        ):
-            for share in MARGINS:
+        for outlined, growth in self._searches(pose):
+            for margin in self._margins(outlined):
                 task = self._known(pose, self._bounds(growth, pose))
-                grid = self._grid(task, share * self._routes.margin, outlined=outlined)
+                grid = self._grid(task, margin, outlined=outlined)
                 answer = self._routes.around(task, grid, avoided)
                 if answer.status is PlanStatus.INVALID:
                     return grid, answer
                 if best is None or answer.cost < best[1].cost / DETOUR:
                     best = grid, answer
-                if answer.cost <= FAIR * straight:
+                if answer.solved and (outlined or answer.cost <= FAIR * straight):
                     break
             assert best is not None
             if best[1].solved:
                 break
         assert best is not None
         return best
+
+    def _searches(self, pose: Pose) -> list[tuple[bool, float]]:
+        """Return the shapes to plan for, whether the footprint, and the extents of the planning area [m], in turn.
+
+        Once the footprint led into a passage that is too narrow for the disc, plans from there are for the footprint first: a
+        route of the disc begins with a move aside.
+        """
+        shapes = self._routes.shapes
+        if self._routes.footprint_margin is not None and len(shapes) > 1:
+            world = self._known(pose, self._bounds(GROWTH[0], pose)).world
+            if point_clearance(world, np.array([pose[:2]]))[0] < self._robot.radius:
+                shapes = shapes[::-1]
+        return [(shape, growth) for shape in shapes for growth in GROWTH[: 1 if shape else 2]]
+
+    def _margins(self, outlined: bool) -> tuple[float, ...]:
+        """Return the margins to plan with, in turn [m]."""
+        if outlined:
+            return tuple(dict.fromkeys((*self._routes.outline_margins, min(TURNABLE, self._routes.margin), 0.0)))
+        return tuple(share * self._routes.margin for share in MARGINS)
 
     def _grid(self, task: Task, margin: float, *, outlined: bool = False) -> Grid:
         """Return the grid for the disc or for the footprint."""
@@ -262,7 +285,8 @@ class Exploration(RouteGuide):
             return SCANNED if recovery.scan_turn.done else ""
         if self.lost:
             return LOST if now - self._planned_at >= INTERVAL else ""
-        recovery.note_progress(now, pose, waiting=waiting, backwards=tracked.backwards)
+        turns = tracked.route.turns is not None
+        recovery.note_progress(now, pose, waiting=waiting, backwards=tracked.backwards, turns=turns)
         if tracked.route is recovery.route:
             over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
             return (BACKED if tracked.backwards else MADE_ROOM) if over else ""

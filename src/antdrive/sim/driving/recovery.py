@@ -15,6 +15,7 @@ from antdrive.worlds import Route
 
 STALL_TIME = 2.5  # a robot that stays within `STALL_DISTANCE` for this long has stalled [s]
 STALL_DISTANCE = 0.06  # [m]
+STALL_TURN = 0.3  # a robot on a route with turns has not stalled while it turns farther than this [rad]
 HELD_TIME = 0.5  # a robot held by the stopping constraint for this long makes a scan turn [s]
 TRAIL = 0.05  # spacing of the points of the driven track [m]
 LENGTHS = (0.4, 0.8, 1.5)  # distances of successive attempts to back off [m]
@@ -84,15 +85,20 @@ class Recovery:
         self.backwards = False
         self._survey, self._robot, self._hz = survey, robot, hz
         self._trail: list[tuple[float, float]] = []
-        self._rest = (0.0, start[:2])
+        self._rest = (0.0, start)
         self._held_since = math.inf
         self._wanted: Twist | None = None
         self._stalls, self._stalled_at = 0, start[:2]
         self._turned_at = (math.inf, math.inf)
 
-    def note_progress(self, now: float, pose: Pose, *, waiting: bool, backwards: bool) -> None:
-        """Note whether the robot moves, and extend its track unless it follows the track back."""
-        if waiting or math.dist(self._rest[1], pose[:2]) > STALL_DISTANCE:
+    def note_progress(self, now: float, pose: Pose, *, waiting: bool, backwards: bool, turns: bool) -> None:
+        """Note whether the robot moves, and extend its track unless it follows the track back.
+
+        Turns on the spot count only on a route that has them: on others, the robot may turn back and forth.
+        """
+        x, y, yaw = self._rest[1]
+        turned = turns and abs(math.remainder(pose[2] - yaw, 2 * math.pi)) > STALL_TURN
+        if waiting or turned or math.dist((x, y), pose[:2]) > STALL_DISTANCE:
             self.note_rest(now, pose)
         if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
             self._trail.append(pose[:2])
@@ -107,7 +113,7 @@ class Recovery:
 
     def note_rest(self, now: float, pose: Pose) -> None:
         """Restart the count of the time without motion."""
-        self._rest = now, pose[:2]
+        self._rest = now, pose
 
     def stalled(self, now: float) -> bool:
         """Return whether the robot has stalled."""

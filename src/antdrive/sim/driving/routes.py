@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 LONGER = 1.1  # the disc's way may be this much longer than the footprint's
 FINE = 0.05  # largest cell of plans for a footprint [m]
-KEPT = 4  # replanners kept for repair: two margins for each of two bounds
+KEPT = 6  # replanners kept for repair: two margins for each of two bounds, and for the footprint
 
 
 @dataclass(eq=False, kw_only=True)
@@ -84,7 +84,7 @@ class RoutePlanner:
     def restart(self) -> None:
         """Discard all replanners, and restart the random stream of replans."""
         self.rng = random_stream(self.seed, "replanner")
-        self._kept: dict[tuple[float, float, Bounds], tuple[Replanner, Cell, npt.NDArray[np.bool_]]] = {}
+        self._kept: dict[tuple[float, float, bool, Bounds], tuple[Replanner, Cell, npt.NDArray[np.bool_]]] = {}
 
     @property
     def inflate(self) -> float:
@@ -167,8 +167,6 @@ class RoutePlanner:
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
             return self.plan(query, self.rng)
         closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
-        if grid.turns:  # a replanner knows cells, not the robot's heading
-            return self.plan(dataclasses.replace(query, grid=grid.without(closed)), self.rng)
         with planner_errors(self.planner):
             # Without a map, movers change so many cells that repair is no faster than a new search.
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
@@ -178,7 +176,7 @@ class RoutePlanner:
 
     def _replanner(self, query: Query, closed: npt.NDArray[np.bool_], *, kept: bool) -> Replanner:
         """Return a replanner with the closed cells, kept per grid or new."""
-        key = query.grid.cell, query.grid.inflate, bounds_of(query.grid)
+        key = query.grid.cell, query.grid.inflate, bool(query.grid.turns), bounds_of(query.grid)
         replanner, goal, before = self._kept.get(key, (None, None, closed)) if kept else (None, None, closed)
         if replanner is None or goal != query.goal:
             replanner, before = replanner_for(self.planner, query, self.rng), np.zeros_like(closed)
@@ -189,7 +187,7 @@ class RoutePlanner:
         for tell, cells in ((replanner.clear, before & ~closed), (replanner.block, closed & ~before)):
             if cells.any():
                 tell(np.argwhere(cells))
-        replanner.move(query.start)
+        replanner.move(query.start, *query.start_headings[:1])
         if kept:
             self._kept[key] = replanner, query.goal, closed
         return replanner
