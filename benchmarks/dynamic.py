@@ -5,6 +5,7 @@ Tables:
 - dynabarn: ten DynaBARN worlds, each started at ten times, by policy
 - random: worlds with 1 to 10 movers as fast as the robot; every failure is listed with its seed
 - hasan: drives of the cases in hasan's paper
+- people: the catalogue's four worlds with people, with and without a map, beside the same drives without people
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from antdrive.base.plane import polyline_length
 from antdrive.planners import Query, plan_in_time
 from antdrive.robots import load_robot
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, run
 from antdrive.sim.log.sights import tracked_rows
+from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.worlds import (
     Cruising,
     Disc,
@@ -234,7 +237,89 @@ def hasan(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
     yield from table(f"planner | case | {HEADS}", rows)
 
 
-TABLES = {"dynabarn": dynabarn, "random": random, "hasan": hasan}
+class Way(NamedTuple):
+    """What a robot did on its way.
+
+    Attributes:
+        certified: whether it succeeded certified
+        end: how the drive ended
+        length: driven length [m]
+        duration: simulated time [s]
+        replans: replans that movers triggered
+        reverse: longest way backwards that was not driven forwards again [m]
+        backwards: highest speed backwards [m/s]
+        near: highest speed with a mover ahead within 1 m [m/s]
+    """
+
+    certified: bool
+    end: str
+    length: float
+    duration: float
+    replans: int
+    reverse: float
+    backwards: float
+    near: float
+
+
+def way_of(task: Task, robot: str, **settings: Any) -> Way:
+    """Drive once and return what the robot did."""
+    spec = load_robot(robot)
+    spec = dataclasses.replace(spec, lidar=spec.lidar or load_robot("jackal").lidar)
+    done = run(Scenario.of(task, "dstar-lite", spec, **settings))
+    log = done.rollout
+    if log is None:
+        return Way(False, done.outcome.key, math.nan, math.nan, 0, math.nan, math.nan, math.nan)
+    speeds, reverse, furthest = log.twist[:, 0], 0.0, 0.0
+    for speed in speeds.tolist():
+        reverse = max(0.0, reverse - speed / log.record.physics_hz)
+        furthest = max(furthest, reverse)
+    to = log.movers - log.pose[:, None, :2]
+    gaps = np.hypot(to[..., 0], to[..., 1]) - [mover.radius for mover in task.world.movers] - spec.radius
+    ahead = to[..., 0] * np.cos(log.pose[:, 2:3]) + to[..., 1] * np.sin(log.pose[:, 2:3]) > 0
+    near = speeds[((gaps < 1.0) & ahead).any(axis=1)].max(initial=0.0)
+    replans = sum(replan.trigger in (OBSTRUCTED, WAITED, TRAFFIC) for replan in log.record.replans)
+    end = done.outcome.key if done.succeeded or done.outcome is not Outcome.SUCCEEDED else "not certified"
+    return Way(done.succeeded, end, polyline_length(log.pose[:, :2]), float(log.t[-1]), replans, furthest,
+               max(0.0, -float(speeds.min())), float(near))  # fmt: skip
+
+
+def people(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
+    """Drive the worlds with people, and the same worlds without. The warehouse robot carries the jackal's lidar."""
+    names = [name for name in list_worlds() if name.startswith("people-")][: most or None]
+    cases = [
+        (name, robot, map, noise)
+        for name in names
+        for robot in ("jackal", "warehouse", "turtlebot4")[: most or None]
+        for map in ("given", "none")[: most or None]
+        for noise in (0.0, 1.0)[: most or None]
+        if only in f"{name} {robot} {map}"
+    ]
+    calls = []
+    for name, robot, map, noise in cases:
+        settings: dict[str, Any] = {"noise": noise, "time_limit": 300.0}
+        if map == "none":
+            settings |= {"map": map, "localisation": "matching"}
+        task = load_task(name)
+        alone = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=()))
+        calls += [partial(way_of, each, robot, **settings) for each in (task, alone)]
+    got = call_all(calls, jobs)
+    rows = []
+    for case, among, free in zip(cases, got[::2], got[1::2], strict=True):
+        name, robot, map, noise = case
+        figures = [
+            f"{among.length / free.length:.2f}", f"{among.duration:.1f} s", f"{free.duration:.1f} s",
+            str(among.replans), f"{among.reverse:.2f} m", f"{among.backwards:.2f} m/s", f"{among.near:.2f} m/s",
+        ]  # fmt: skip
+        rows.append(
+            [f"`{name}`", f"`{robot}`", map, f"{noise:g}", "certified" if among.certified else among.end, *figures]
+        )
+    yield from table(
+        "world | robot | map | noise | end | length / free | time | free time | replans | reverse | backwards | near ahead",
+        rows,
+    )
+
+
+TABLES = {"dynabarn": dynabarn, "random": random, "hasan": hasan, "people": people}
 
 
 def main() -> None:

@@ -22,7 +22,9 @@ PASSABLE = {
     "hasan-3c": (True, False), "hasan-3c-moving": (True, False), "hasan-4d": (True, True),
     "hasan-4d-moving": (True, True), "hasan-5e": (True, True), "hasan-5e-moving": (True, True),
     "hasan-5f": (True, False), "hasan-5f-moving": (True, False), "no-path": (False, False),
-    "office": (True, True), "plaza-moving": (True, True), "slalom": (True, True), "u-trap": (True, True),
+    "office": (True, True), "people-aisle": (True, True), "people-corridor": (True, True),
+    "people-crossing": (True, True), "people-doorway": (True, True), "plaza-moving": (True, True),
+    "slalom": (True, True), "u-trap": (True, True),
 }  # fmt: skip
 #: Grid points of the thesis' listings, 0.5 m each.
 ACO = [(4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)]

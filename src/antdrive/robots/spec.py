@@ -116,6 +116,7 @@ class RobotSpec:
         max_wheel_speed: limit of each wheel's speed [rad/s]
         wheel_torque: highest torque of each wheel's motor [N m]
         wheel_friction: Coulomb friction coefficient of the wheels on the floor
+        near_speed: highest speed near movers ahead, see `Avoidance.near_distance` [m/s]
         noise: the robot's noise at noise level 1
         source: origin of these values
         lidar: the robot's lidar; None: no lidar
@@ -138,6 +139,9 @@ class RobotSpec:
     max_wheel_speed: Annotated[float, Interval(ge=0.1, le=1e4)]
     wheel_torque: Annotated[float, Interval(ge=1e-6, le=1e6)]
     wheel_friction: Annotated[float, Interval(ge=0.1, le=100.0)] = 1.5
+    near_speed: Annotated[float, Interval(ge=0.05, le=10.0)] = dataclasses.field(
+        default=0.8, metadata={"omit_if_default": True}
+    )
     noise: Noise = Noise()
     source: str | None = None
     lidar: Lidar | None = dataclasses.field(default=None, metadata={"omit_if_default": True})

@@ -81,8 +81,9 @@ class MapReconstruction:
 
     def _empty_map(self, pose: Pose) -> OccupancyMap:
         record = self._rollout.record
-        horizon = horizon_of(tracks_movers=record.perception is not None and record.perception.kind == "lidar")
-        seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon, goal=record.task.goal)
+        moving = record.perception is not None and record.perception.kind == "lidar"
+        horizon = horizon_of(tracks_movers=moving)
+        seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon, goal=record.task.goal, moving=moving)
         movers = np.column_stack((self._rollout.movers[0], [mover.radius for mover in record.world.movers]))
         seen.mark_free(pose[:2], turning_room(record.robot.radius), record.world, movers)
         return seen

@@ -13,7 +13,7 @@ from antdrive.robots.control.avoidance import _weights
 from antdrive.worlds import Disc, Route, World
 
 ROBOT, AVOIDANCE = load_robot("turtlebot"), Avoidance()
-TABLE = AVOIDANCE._candidates(ROBOT, AvoidanceState((1.0, 0.3, 0.4, 0.4, 0.3, 0.0), 0.2), 0.6)
+TABLE = AVOIDANCE._candidates(ROBOT, AvoidanceState((1.0, 0.3, 0.4, 0.4, 0.3, 0.0), 0.2), 0.6, math.inf, math.inf)
 near = st.floats(-2.5, 2.5)
 speed = st.floats(-0.9, 0.9)
 
@@ -101,10 +101,12 @@ def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked):
     assert tight > 50  # the limits are worth having
 
 
-def test_no_candidate_goes_backwards_faster_than_it_may():
-    whole = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf)
+def test_no_candidate_is_faster_than_it_may():
+    whole = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, math.inf, math.inf)
+    speeds = [kernels.SPEED, kernels.NEXT_SPEED]
     for share in (0.0, 0.3, 0.6, 1.0):
-        table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, share * ROBOT.max_speed)
-        fast = whole[:, [kernels.SPEED, kernels.NEXT_SPEED]].min(axis=1) < -share * ROBOT.max_speed - 1e-9
-        assert np.array_equal(table, whole[~fast])
-        assert fast.any() == (share < 1.0)
+        most = share * ROBOT.max_speed
+        table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, math.inf, most)
+        assert np.array_equal(table[:, speeds], np.maximum(whole[:, speeds], -most))
+        table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, most, math.inf)
+        assert np.array_equal(table[:, speeds], np.clip(whole[:, speeds], -most, most))

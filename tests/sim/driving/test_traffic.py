@@ -17,6 +17,7 @@ from antdrive.sim.driving.movers_ahead import (
     FAST,
     MIXING,
     SLACK,
+    MoversAhead,
     MoversSeenAhead,
     TrackedTraffic,
     Traffic,
@@ -396,3 +397,34 @@ def test_a_robot_without_a_map_drives_round_busy_ground(jackal):
     assert done.succeeded, (done.outcome, done.reason)
     middle = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 8.0) < 2.0]
     assert np.abs(middle[:, 1] - 9.0).min() > 4.0
+
+
+class AlwaysObstructed(MoversAhead):
+    """Movers that obstruct every route."""
+
+    def _obstructed(self, *_):
+        return True
+
+
+@given(way=st.lists(st.floats(1.0, 15.0), min_size=1, max_size=60))
+def test_movers_make_at_most_three_replans_for_a_metre_of_progress(way):
+    """The robot jumps to and fro on a line; only ground nearer to its goal than ever is progress."""
+    movers = AlwaysObstructed(None, ReplanPolicy(), (15.0, 6.0), GRID, 60, None)
+    reached, replanned = 0.0, []
+    for tick, x in enumerate(way):
+        pose = (x, 6.0, 0.0)
+        reached = max(reached, x)
+        movers.observe(tick, pose, False)
+        if movers.trigger(tick, pose, None, 0.0):
+            replanned.append(reached)
+    assert all(after - before >= 1.0 - 1e-9 for before, after in zip(replanned, replanned[3:], strict=False))
+    assert len(replanned) >= min(3, len(way))
+
+
+def test_a_robot_that_has_waited_replans_again():
+    movers = AlwaysObstructed(None, ReplanPolicy(), (15.0, 6.0), GRID, 60, None)
+    due = []
+    for tick in range(360):
+        movers.observe(tick, POSE, True)
+        due.append(movers.trigger(tick, POSE, None, 0.0))
+    assert [each for each in due if each] == [OBSTRUCTED] * 3 + [WAITED] * 2

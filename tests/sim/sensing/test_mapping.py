@@ -1,5 +1,6 @@
 """The map holds every hit, calls free only what beams have passed, and lets go of what has moved on."""
 
+import dataclasses
 import math
 
 import hypothesis
@@ -262,6 +263,24 @@ def test_a_reset_map_keeps_the_free_ground_around_a_place_and_nothing_else(place
         axis=1,
     )
     assert np.array_equal(new.arrays.unseen, squares)
+
+
+@pytest.mark.parametrize("fan", [4.7, 2 * math.pi])
+def test_a_walker_beyond_the_range_of_free_ground_leaves_no_trail(fan):
+    """Posts stay, and so do few hits beside them; a map of things that all stand keeps the trail."""
+    eye = dataclasses.replace(EYE, field_of_view=fan, max_range=9.0)
+    posts = np.array([[6.5, 1.5, 0.3], [5.5, -2.5, 0.3]])
+    for moving in (True, False):
+        grid = OccupancyMap(eye, 0.05, moving=moving)
+        assert grid.trust < 4.0
+        for y in np.linspace(-2.0, 2.0, 81):
+            ranges = Scanner(eye, np.vstack((posts, [(5.0, y, 0.25)]))).scan((0.0, 0.0, 0.0))
+            grid.insert((0.0, 0.0, 0.0), ranges)
+        discs = grid.discs()
+        trail = (abs(discs[:, 0] - 5.0) < 0.3) & (discs[:, 1] < 1.2)
+        assert (np.count_nonzero(trail) < 6) if moving else (np.count_nonzero(trail) > 30)
+        assert inside(posts[:, :2] - (0.3, 0.0), discs + (0.0, 0.0, 0.1)).all()
+        assert not grid.seen_free[cell_of(grid, 5.0, -1.0)]
 
 
 def test_hits_of_a_mover_can_be_cleared_and_its_beams_omitted():

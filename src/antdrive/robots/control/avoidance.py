@@ -7,6 +7,14 @@ sequences of two constant twists, forwards or backwards, within the robot's dyna
 IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing still is only
 one of the candidates, so the robot moves out of the path of an approaching mover.
 
+Near movers ahead the robot keeps its `near_speed`, and it reverses slowly and not far. These limits cause no contact that a
+robot without them avoids:
+
+- Where every candidate within them ends in a contact, they are lifted step by step, so a predicted contact has the same escapes.
+- A prediction that is wrong could hide a contact. They hold only where movers move as predicted: a mover with another observed
+  velocity, as among ground-truth positions, lifts them all. So does a mover faster than people: speed is the way out.
+- A robot that crosses the lane of a mover that comes faster than `near_speed` is not slowed, nor one that leaves a mover behind.
+
 If a nearby mover turns, there may be no candidate that keeps the minimum clearance. While the robot can still stop in time,
 it takes the candidate with the latest contact. After that it takes the one that stays farthest from movers, and
 stops only if every candidate ends in a contact. T. Fraichard and
@@ -30,6 +38,9 @@ from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
 from antdrive.robots.spec import Footprint, RobotSpec
 
 SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progress [m per m/s]
+WALKING = 1.5  # movers faster than this are not people [m/s]
+SURPRISE = 0.1  # a mover has another velocity than predicted if they differ by more than this [m/s]
+CROSSING = 0.5  # a robot crosses a mover's lane if the sine of the angle between both headings exceeds this
 PERSISTENCE = 0.05  # value of keeping the last decision, in metres of progress [m]
 
 
@@ -39,10 +50,12 @@ class AvoidanceState(NamedTuple):
     Attributes:
         candidate: the pair of twists being executed, a row of the candidate table; empty if there is none
         remaining: remaining time of its first twist [s]
+        reversed: distance driven backwards and not yet forwards again [m]
     """
 
     candidate: tuple[float, ...] = ()
     remaining: float = 0.0
+    reversed: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +73,9 @@ class Avoidance:
         reversal_time: prediction horizon for a mover's sudden reversal [s]
         reversal_margin: clearance to a reversing mover beyond `min_clearance` [m]
         reversal_weight: cost of each metre below this clearance [m/m]; 0 ignores reversals
+        near_distance: gap to a mover below which the robot keeps its `near_speed`, unless a contact follows [m]
+        reverse_speed: highest speed backwards, unless a contact follows [m/s]
+        reverse_distance: longest way backwards, unless a contact follows [m]
 
     Raises:
         ValueError: a setting is out of range.
@@ -75,6 +91,9 @@ class Avoidance:
     reversal_time: float = 0.6
     reversal_margin: float = 0.05
     reversal_weight: float = 6.0
+    near_distance: float = 1.0
+    reverse_speed: float = 0.3
+    reverse_distance: float = 0.5
 
     def __post_init__(self) -> None:
         for key in ("horizon", "step"):
@@ -100,6 +119,7 @@ class Avoidance:
         state: AvoidanceState,
         places: Floats,
         radii: Floats,
+        velocities: Floats | None = None,
         speed_limit: float = math.inf,
         backwards: float = math.inf,
     ) -> tuple[Twist, bool, AvoidanceState]:
@@ -115,25 +135,77 @@ class Avoidance:
             state: the state returned in the previous period
             places: the movers' predicted positions at the `prediction_times` (K + 1, M, 2) [m]
             radii: their radii (M,) [m]
+            velocities: their observed velocities (M, 2) [m/s]; None: as predicted
             speed_limit: speed limit from the schedule of a timed plan [m/s]
             backwards: maximum reverse speed, for a robot that cannot see behind; ignored if obeying it causes a contact [m/s]
         """
-        candidates = self._candidates(spec, state, speed_limit, backwards)
-        situation = (
-            *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
-            tracked.limits, tracked.tuning._replace(period=self.step),
-            _weights(self, tracked.tuning.robot_radius, spec.footprint), places, radii,
-        )  # fmt: skip
-        chosen, contact = kernels.choose(*situation)
-        if chosen == 0 and contact == math.inf:
-            return wanted, False, AvoidanceState()
-        if contact < math.inf and backwards < spec.max_speed:
-            return self.avoid(tracked, spec, pose, last, before, wanted, state, places, radii, speed_limit)
-        stopping = abs(last.speed) / tracked.limits.acceleration
-        if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
+        period, limits = tracked.tuning.period, tracked.limits
+        state = state._replace(reversed=max(0.0, state.reversed - last.speed * period))
+        predicted = (places[1] - places[0]) / self.step
+        near = self.speed_near(spec, pose, last, places[0], predicted, radii)
+        left = max(self.reverse_distance - state.reversed, 0.0)
+        slow = min(self.reverse_speed, math.sqrt(2 * limits.acceleration * left), backwards)
+        tuning = tracked.tuning._replace(period=self.step)
+        weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
+        observed = predicted if velocities is None else velocities
+        limits_of = [(near, slow), (near, backwards), (math.inf, backwards), (math.inf, math.inf)]
+        if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
+            del limits_of[:2]
+        for fastest, reverse in dict.fromkeys(limits_of):
+            candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
+            situation = (
+                *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
+                limits, tuning, weights, places, radii,
+            )  # fmt: skip
+            chosen, contact = kernels.choose(*situation)
+            if contact == math.inf:
+                break
+        if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
+            return wanted, False, AvoidanceState(reversed=state.reversed)
+        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(tracked, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
-        twist, state = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
-        return twist, True, state
+        twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
+        return twist, True, after._replace(reversed=state.reversed)
+
+    def speed_near(
+        self, spec: RobotSpec, pose: Pose, last: Twist, places: Floats, velocities: Floats, radii: Floats
+    ) -> float:
+        """Return the highest speed at which the robot can slow to its `near_speed` before it is near a mover [m/s].
+
+        Movers behind the robot do not count, nor movers whose lane it crosses before them: those that come faster than
+        `near_speed`, while the robot's heading leads out of the strip that they sweep. There, slowing down is the danger.
+
+        Args:
+            spec: the robot
+            pose: its estimated pose
+            last: the command of the previous period
+            places: the movers' positions (M, 2) [m]
+            velocities: their velocities (M, 2) [m/s]
+            radii: their radii (M,) [m]
+        """
+        if not len(radii) or spec.near_speed >= spec.max_speed:
+            return math.inf
+        heading = np.array((math.cos(pose[2]), math.sin(pose[2])))
+        to, speeds = places - pose[:2], np.hypot(*velocities.T)
+        away, moving = np.maximum(np.hypot(*to.T), 1e-9), np.maximum(speeds, 1e-9)
+        closing = np.maximum(-(velocities * to).sum(axis=1) / away, 0.0)
+        aside = np.abs(_cross(to, velocities)) / moving - radii - spec.radius - self.min_clearance
+        crosses = (closing > spec.near_speed) & (aside < 0) & (np.abs(_cross(heading, velocities)) > CROSSING * moving)
+        counts = (to @ heading > 0) & ~crosses
+        gap = away - radii - spec.radius - self.near_distance - (closing + abs(last.speed)) * self.step
+        both = closing + spec.near_speed
+        # With x beyond `near_speed`: closing x / a + (x^2 + 2 near_speed x) / (2 a) <= gap.
+        more = np.sqrt(both**2 + 2 * spec.max_acceleration * np.maximum(gap, 0.0)) - both
+        return spec.near_speed + float(more.min(initial=math.inf, where=counts))
+
+    def _must_dodge(
+        self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, predicted: Floats, radii: Floats
+    ) -> bool:
+        """Return whether a mover that may come near soon is faster than people, or has another velocity than predicted."""
+        speeds, off_by = np.hypot(*observed.T), np.hypot(*(observed - predicted).T)
+        gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
+        soon = gap < self.horizon * (speeds + spec.max_speed)
+        return bool((soon & ((speeds > WALKING) | (off_by > SURPRISE))).any())
 
     def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
@@ -142,21 +214,27 @@ class Avoidance:
         return 2 * self.step if close else 0.0
 
     def _candidates(
-        self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, backwards: float = math.inf
+        self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float
     ) -> Floats:
-        """Return the candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
+        """Return the candidates (N, 6) up to a speed and a reverse speed [m/s]; row 0 keeps the speed limit, row 1 is the
+        last decision."""
         table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
-        if backwards < spec.max_speed:
-            slowest = table[:, [kernels.SPEED, kernels.NEXT_SPEED]].min(axis=1)
-            table = table[slowest >= -backwards - 1e-9]
-        if not state.candidate and speed_limit >= spec.max_speed:
+        fastest, reverse = min(fastest, spec.max_speed), min(reverse, spec.max_speed)
+        if not state.candidate and min(speed_limit, fastest, reverse) >= spec.max_speed:
             return table
         table = table.copy()
         table[0, kernels.SPEED] = min(spec.max_speed, speed_limit)
         if state.candidate:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining
+        speeds = [kernels.SPEED, kernels.NEXT_SPEED]
+        table[:, speeds] = np.clip(table[:, speeds], -min(reverse, fastest), fastest)
         return table
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Return the cross products of vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _execute(
@@ -190,6 +268,9 @@ _NOT_NEGATIVE = (
     "reversal_time",
     "reversal_margin",
     "reversal_weight",
+    "near_distance",
+    "reverse_speed",
+    "reverse_distance",
 )
 
 

@@ -24,6 +24,7 @@ from antdrive.worlds import Disc, Grid, World, rasterise
 if TYPE_CHECKING:
     from antdrive.sim.driving.survey import Survey
 
+REPLANS, PROGRESS = 3, 1.0  # at most so many replans around movers for so much progress towards the goal [m]
 MIXING = 2.0  # after this time a mover's position is an independent sample of where movers go [s]
 MEMORY = 2.0  # time constant of the mean traffic in a lidar's view [s]
 FADING = 30.0  # time constant with which the highest traffic seen fades [s]
@@ -224,11 +225,13 @@ class MoversAhead:
         self._predictor, self._policy, self._goal, self._grid, self._hz = movers, policy, goal, grid, hz
         self._traffic, self._blockage = traffic, blockage
         self._waiting_since = math.nan
+        self._nearest, self._replanned = math.inf, [math.inf] * REPLANS
 
     def observe(self, tick: int, pose: Pose, waiting: bool) -> None:
         """Note the perceived movers and the waiting time of one control period."""
         if self._traffic is not None:
             self._traffic.observe(tick, pose[:2])
+        self._nearest = min(self._nearest, math.dist(pose[:2], self._goal))
         if not waiting:
             self.reset_wait()
         elif math.isnan(self._waiting_since):
@@ -239,17 +242,26 @@ class MoversAhead:
         self._waiting_since = math.nan
 
     def trigger(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> str:
-        """Return why movers make a new route due; empty if they do not."""
+        """Return why movers make a new route due; empty if they do not.
+
+        After `REPLANS` around movers for a metre of progress towards the goal, the robot keeps its route until it has waited
+        or traffic grows.
+        """
         policy = self._policy
         if tick / self._hz - self._waiting_since >= policy.max_wait:
             self.reset_wait()
             return WAITED
-        if close_route(self.discs(tick, pose), tracked, arc, policy.obstruction_range, self._grid.inflate):
+        if self._replanned[-REPLANS] - self._nearest >= PROGRESS and self._obstructed(tick, pose, tracked, arc):
+            self._replanned.append(self._nearest)
             return OBSTRUCTED
         traffic = self._traffic
         if traffic is None or not traffic.grown(self._grid.cell) or not self.heavy(tick, pose):
             return ""
         return TRAFFIC if self.zones(tick, pose, self._around(pose))[-1].crossed(tracked, arc) else ""
+
+    def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
+        """Return whether movers will cover the route ahead."""
+        return close_route(self.discs(tick, pose), tracked, arc, self._policy.obstruction_range, self._grid.inflate)
 
     def heavy(self, tick: int, pose: Pose) -> bool:
         """Return whether traffic is heavy enough to plan around zones."""

@@ -57,6 +57,10 @@ class PerceivedMovers(abc.ABC):
         _, places, velocities, radii = self._near(tick, position)
         return places + ahead[:, None, None] * velocities, radii
 
+    def velocities(self, tick: int, position: Point) -> Floats:
+        """Return the observed velocities of the perceived movers (M, 2) [m/s]."""
+        return self._near(tick, position)[2]
+
     def within_range(self, tick: int, position: Point) -> Numbers:
         """Return the numbers (P,) of the perceived movers."""
         return self._near(tick, position)[0]
@@ -85,6 +89,14 @@ class GroundTruth(PerceivedMovers):
         perceived, _, _, radii = self._near(tick, position)
         positions = self._trajectories.positions(ahead + tick / self._hz)
         return np.ascontiguousarray(positions[:, perceived]), radii
+
+    def velocities(self, tick: int, position: Point) -> Floats:
+        """Return the velocities of the perceived movers (M, 2) [m/s]; those of exact positions, since the last period."""
+        if self._perception.kind != "positions":
+            return super().velocities(tick, position)
+        perceived, places, _, _ = self._near(tick, position)
+        before = self._trajectories.positions(np.array([max(tick - 1, 0) / self._hz]))[0, perceived]
+        return np.asarray((places - before) * self._hz)
 
     def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
         """Return the numbers (P,) of the perceived movers, and all positions (M, 2) [m]."""

@@ -173,6 +173,7 @@ class Avoid:
             self._state,
             movers,
             radii - self._guide.clearance_reduction(tick, pose[:2]),
+            self._movers.velocities(tick, pose[:2]),
             speed_limit=step.speed_limit,
             backwards=self._backwards,
         )

@@ -234,9 +234,9 @@ class Survey(Scans):
         self._turning_room = turning_room(robot.radius)
         self._goal = goal
         self.tracking = tracking
-        self.map = OccupancyMap(
-            self.lidar, MAP_CELL, start[:2], horizon_of(tracks_movers=tracking is not None), goal=goal
-        )
+        moving = tracking is not None
+        horizon = horizon_of(tracks_movers=moving)
+        self.map = OccupancyMap(self.lidar, MAP_CELL, start[:2], horizon, goal=goal, moving=moving)
         self.map.mark_free(start[:2], self._turning_room, sensor.world, sensor.movers_at_start)
         self._recent = math.ceil(RECENT * self.lidar.rate)
         self._matcher = ScanMatcher(self.lidar, FAR if tracking is None else FAR_AMONG_MOVERS) if matching else None

@@ -332,6 +332,44 @@ def seen_beyond(
 
 
 @kernel
+def see_far(
+    x: float, y: float, cos: float, sin: float, beams: Array, ranges: Array, closed: bool, trust: float, scan: int,
+    arrays: tuple[Array, ...], changed: Array, count: int,
+) -> int:  # fmt: skip
+    """Lower the log-odds of hits beyond `trust` that the scan has passed on both sides, as `see_through` does nearer.
+
+    Cells without hits become unknown, since beams are too far apart there to observe free ground. Rows of `changed` follow
+    `count`; return their new number.
+    """
+    fan, m = Fan((x, y, cos, sin), beams, ranges, closed), MapArrays(*arrays)
+    cell, number = m.frame[2], beams.shape[0]
+    first = math.atan2(beams[0, 1], beams[0, 0])
+    spacing = (math.atan2(beams[1, 1], beams[1, 0]) - first) % (2.0 * math.pi)
+    crossed, crossings = np.empty((m.count[0], 3), dtype=np.int32), 0
+    for i in range(m.count[0]):
+        dx, dy = m.frame[0] + (m.cells[i, 1] + 0.5) * cell - x, m.frame[1] + (m.cells[i, 0] + 0.5) * cell - y
+        if dx * dx + dy * dy <= trust * trust or m.cells[i, 3] == scan:
+            continue
+        angle = math.atan2(cos * dy - sin * dx, cos * dx + sin * dy)
+        beam = int(round((angle - first) % (2.0 * math.pi) / spacing))
+        if beam >= number and not closed:
+            continue
+        m.cells[i, 3] = scan
+        crossed[crossings, 0], crossed[crossings, 1], crossed[crossings, 2] = (
+            m.cells[i, 0],
+            m.cells[i, 1],
+            beam % number,
+        )
+        crossings += 1
+    after = see_through(crossed[:crossings], scan, fan, m, changed, count)
+    for j in range(count, after):
+        row, col = changed[j, 0], changed[j, 1]
+        m.free[row, col] = False
+        m.unseen[row >> SHIFT, col >> SHIFT] += 1
+    return after
+
+
+@kernel
 def vacate(row: int, col: int, m: MapArrays) -> None:
     """Remove an occupied cell from the list; it becomes free ground."""
     m.occupied[row, col], m.free[row, col] = False, True

@@ -66,6 +66,7 @@ class OccupancyMap:
         bounds: the fixed bounds of the map [m]; None: it grows as needed
         goal: the robot's goal [m], included in the layout of a growing map; None: no goal
         share: every `share`-th scan is entered as a whole; None: about 12 per second
+        moving: whether hits beyond `trust` may be those of movers, so that beams clear them there as well
     """
 
     def __init__(
@@ -77,7 +78,9 @@ class OccupancyMap:
         bounds: Bounds | None = None,
         share: int | None = None,
         goal: Point | None = None,
+        moving: bool = False,
     ) -> None:
+        self._moving = moving
         self.share = max(1, round(lidar.rate / OFTEN)) if share is None else share
         self.turns = max(1, math.floor(lidar.rate / self.share / EACH_WAY))
         require_positive("cell", cell)
@@ -153,6 +156,11 @@ class OccupancyMap:
             x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, turn, turns, mask,
             self.horizon, self.trust, self.scans, self._plain, self._changed,
         )  # fmt: skip
+        if self._moving and not rest:
+            count = kernels.see_far(
+                x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self.trust, self.scans,
+                self._plain, self._changed, count,
+            )  # fmt: skip
         self._spare -= count
         return self._changed[:count].copy()
 
@@ -229,7 +237,7 @@ class OccupancyMap:
         x, y = (
             low + cell * math.floor((at - half - low) / cell) + half for at, low in zip(place, self.origin, strict=True)
         )
-        new = OccupancyMap(self._lidar, cell, (x, y), self.horizon, share=self.share, goal=goal)
+        new = OccupancyMap(self._lidar, cell, (x, y), self.horizon, share=self.share, goal=goal, moving=self._moving)
         new._take_over(self, place, radius)
         return new
 
