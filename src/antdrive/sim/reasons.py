@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from antdrive.base.plane import format_position
-from antdrive.planners import Query
+from antdrive.planners import Query, capabilities_of
 from antdrive.planners.graph.search import reachable
 from antdrive.robots.clearance import obstacle_name
 from antdrive.robots.default_margin import LEAST
@@ -72,7 +72,8 @@ def _what_it_takes(s: RoutePlanner, passes: float) -> str:
     if s.turns and width <= gap:
         needs += "; between cells, by straight moves and turns on the spot, it does not get through"
     if not s.turns:
-        others = "" if s.footprint == "disc" or width > gap else "; astar plans for the footprint"
+        able = capabilities_of(s.planner).turns
+        others = "" if able or width > gap else "; astar plans for the footprint"
         needs = f"plans use the disc of {robot.name}; {needs}{others}"
     return f"{needs}{'; ' * bool(helps)}{helps}"
 

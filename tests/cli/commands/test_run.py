@@ -110,13 +110,15 @@ def test_a_start_that_overlaps_an_obstacle_is_shown(antdrive, tmp_path):
     world = World("tight", (0, 0, 6, 4), (Disc(2.5, 1.8, 0.4),))
     save_task(Task(world, (3.0, 2.0, 0.0), (5.3, 2.0)), tmp_path / "tight.yaml")
     _, out, _ = antdrive("worlds", "show", "tight.yaml")
-    assert "passable           no" in out
-    assert "start for turtlebot overlaps obstacles[0] at" in out
+    assert re.search("^passable +no", out, re.MULTILINE)
+    assert re.search(r"^start for turtlebot +overlaps obstacles\[0\] at", out, re.MULTILINE)
     (line,) = [line for line in out.splitlines() if line.startswith("start is free for  ")]
-    free = line.removeprefix("start is free for  ").split(", ")
+    free = line.removeprefix("start is free for  ").lstrip().split(", ")
     for robot in list_robots():
-        assert (f"start for {robot} overlaps" in out) != (robot in free)
-    assert f"start is free for  {', '.join(list_robots())}" in antdrive("worlds", "show", "gate")[1]
+        assert bool(re.search(f"^start for {robot} +overlaps", out, re.MULTILINE)) != (robot in free)
+    assert re.search(
+        f"^start is free for +{', '.join(list_robots())}$", antdrive("worlds", "show", "gate")[1], re.MULTILINE
+    )
     starts = json.loads(antdrive("worlds", "show", "gate", "--json")[1])["starts"]
     assert starts == dict.fromkeys(list_robots(), "")
 

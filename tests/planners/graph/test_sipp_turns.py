@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from antdrive.base.plane import wrap_angle
-from antdrive.planners import Query, check_plan, plan_in_time
+from antdrive.planners import AStar, Query, check_plan, plan_in_time, replanner_for
 from antdrive.worlds import DIRECTIONS, Disc, Task, World, rasterise
 from antdrive.worlds.headings import Outline, sweep_clearance, turn_clear
 from tests.planners.graph.test_sipp import ABOVE, BELOW, SPEED, TICK, first_tick, some_mover
@@ -134,7 +134,10 @@ def test_a_turn_goes_the_long_way_round_where_the_short_one_is_not_free():
     closed = np.ones((7, 7), dtype=np.bool_)
     closed[[2, 2, 3], [1, 2, 3]] = False
     for discs, eighths in (((), 1), ((post,), 7)):
-        grid = rasterise(World("post", (0.0, 0.0, 2.8, 2.8), discs), CELL, 0.27, nose).without(closed)
+        grid = rasterise(World("post", (0.0, 0.0, 2.8, 2.8), discs), CELL, 0.27, nose)
+        edited = replanner_for(AStar(), Query(grid, (2, 1), (3, 3)), np.random.default_rng(0))
+        edited.block(np.argwhere(closed))
+        grid = edited.query.grid
         query = Query(grid, (2, 1), (3, 3), start_label=int(grid.turns.label[2 * 7 + 1, 0]))
         plan = plan_in_time(query, (), speed=SPEED, yaw_rate=YAW_RATE)
         assert plan.duration == pytest.approx(CELL * (1 + math.sqrt(2)) / SPEED + eighths * TURN)
