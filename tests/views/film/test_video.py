@@ -70,7 +70,7 @@ def test_a_film_has_the_frames_size_rate_and_format_it_claims(filmed):
     assert len(frames) == info.frames == 21 + 20
     assert frames.shape[2:0:-1] == info.size == SIZE
     assert "Video: h264" in stream
-    assert "yuv420p" in stream
+    assert re.search(r"yuv420p\(tv, bt709\b", stream)
     assert ", 20 fps" in stream
     assert imageio_ffmpeg.count_frames_and_secs(str(info.path))[0] == info.frames
     head, checked = info.path.read_bytes(), ffmpeg("-v", "error", "-i", info.path, "-f", "null", "-")
@@ -227,7 +227,8 @@ def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):
 
 
 def test_an_encoder_that_dies_is_reported(drive, tmp_path, monkeypatch):
-    monkeypatch.setitem(film_options.ENCODERS, ".mp4", ("-c:v", "no-such-codec"))
+    broken = film_options.ENCODERS[".mp4"]._replace(options=("-c:v", "no-such-codec"))
+    monkeypatch.setitem(film_options.ENCODERS, ".mp4", broken)
     with pytest.raises(InputError, match=r"drive\.mp4: cannot be written \(.*no-such-codec"):
         film(drive, tmp_path / "drive.mp4", size=SIZE)
     assert not list(tmp_path.iterdir())
