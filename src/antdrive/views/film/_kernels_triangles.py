@@ -40,6 +40,7 @@ def draw_mesh(
     ambient and the diffuse light.
     """
     corners = np.empty((vertices.shape[0], 6))  # projected by `lens`, then the normal
+    spots = np.empty((vertices.shape[0], 2))  # column and row of the corners ahead of the camera
     for i in range(vertices.shape[0]):
         point = (vertices[i, 0], vertices[i, 1], vertices[i, 2])
         out = (normals[i, 0], normals[i, 1], normals[i, 2])
@@ -49,8 +50,15 @@ def draw_mesh(
         for k in range(3):
             corners[i, k] = lens[k, 0] * wx + lens[k, 1] * wy + lens[k, 2] * wz + lens[k, 3]
             corners[i, 3 + k] = place[k, 0] * out[0] + place[k, 1] * out[1] + place[k, 2] * out[2]
+        for k in range(2):
+            spots[i, k] = corners[i, k] / corners[i, 2] if corners[i, 2] >= NEAREST else math.inf
     cut = np.empty((4, 6))
     for t in range(triangles.shape[0]):
+        i, j, m = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if max(max(spots[i, 0], spots[j, 0]), spots[m, 0]) < math.inf and (spots[j, 0] - spots[i, 0]) * (
+            spots[m, 1] - spots[i, 1]
+        ) >= (spots[m, 0] - spots[i, 0]) * (spots[j, 1] - spots[i, 1]):  # the inside faces the camera
+            continue
         count = 0
         for n in range(3):
             here, there = corners[triangles[t, n]], corners[triangles[t, (n + 1) % 3]]
