@@ -170,4 +170,4 @@ class Playback:
         return x, y, float(at - past.max())
 
     def _row(self, at: float) -> int:
-        return int(np.clip(np.searchsorted(self.t, at + 1e-9, side="right") - 1, 0, len(self.t) - 1))
+        return min(max(int(np.searchsorted(self.t, at + 1e-9, side="right")) - 1, 0), len(self.t) - 1)
