@@ -35,7 +35,7 @@ class Schedule:
     arc: Floats  # distances along the route at those times (N,) [m]
     corners: Floats = field(
         default_factory=lambda: np.empty(0)
-    )  # those at which the robot stops by itself, to turn on the spot [m]
+    )  # arcs at which the robot stops to turn on the spot [m]
 
     @classmethod
     def of(cls, plan: TimedPlan, route: Route) -> Schedule:
