@@ -55,9 +55,8 @@ ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hits than to mapped obstacles [m]
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
-TURNABLE = (
-    0.025  # plans for the footprint keep this margin if possible: the controller refuses turns closer to hits [m]
-)
+#: Plans for the footprint keep this margin if possible: the controller refuses turns closer to hits [m].
+TURNABLE = 0.025
 LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
 
