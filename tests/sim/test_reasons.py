@@ -146,3 +146,9 @@ def test_a_line_where_the_grid_has_no_path_is_driven_and_recorded(turtlebot, mar
     assert done.succeeded, done.reason
     assert done.rollout.record.plan.cost_m is None
     assert done.rollout.record.plan.length_m > 4.0 - 1e-9
+
+
+def test_a_planner_in_space_and_time_is_not_told_of_paths_that_ignore_movers(jackal):
+    robot = replace(jackal, name="cart", footprint=Footprint.rectangle(0.9, 0.6))
+    reason = run(Scenario.of("people-corridor", "sipp", robot, options={"horizon": 1.0})).reason
+    assert reason.endswith("no path past the movers reaches the goal within 1 s")
