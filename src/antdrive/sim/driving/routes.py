@@ -227,7 +227,7 @@ class OneRoute(RouteGuide):
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
         """Check an external plan on the grid of `first`."""
-        if plan.status is PlanStatus.INVALID:
+        if not plan.solved:
             return grid, plan
         return grid, self._drivable(grid, self._routes.checked(self._routes.query(grid, self._routes.task), plan))
 
