@@ -267,13 +267,15 @@ class MoversAhead:
         """Return whether traffic is heavy enough to plan around zones."""
         return self._traffic is not None and self._traffic.rate(tick, pose[:2]) > self._policy.max_traffic
 
-    def discs(self, tick: int, pose: Pose) -> list[Disc]:
+    def discs(self, tick: int, pose: Pose, wider: float = 0.0) -> list[Disc]:
         """Return the discs that movers will cover soon; they close neither the robot's position nor the goal.
 
-        Discs are larger where the robot has waited beside a mover.
+        `wider` [m] is added to their radii. Discs are larger where the robot has waited beside a mover.
         """
         ends = np.array([pose[:2], self._goal])
-        covered = covered_discs(self._predictor, tick, ends, self._policy.prediction_time, self._grid)
+        covered = covered_discs(
+            self._predictor, tick, ends, self._policy.prediction_time, self._grid, wider=max(wider, 0.0)
+        )
         return covered if self._blockage is None else covered + self._blockage.discs(tick, ends)
 
     def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
