@@ -149,7 +149,7 @@ class Avoidance:
         tuning = tracked.tuning._replace(period=self.step)
         weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
         observed = predicted if velocities is None else velocities
-        limits_of = [(near, slow), (near, backwards), (math.inf, backwards), (math.inf, math.inf)]
+        limits_of = [(near, slow), (math.inf, slow), (math.inf, backwards), (math.inf, math.inf)]
         if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
             del limits_of[:2]
         for fastest, reverse in dict.fromkeys(limits_of):

@@ -31,6 +31,7 @@ FADING = 30.0  # time constant with which the highest traffic seen fades [s]
 FAST = 0.75  # movers tracked by lidar count as traffic above this fraction of the robot's top speed
 SOON = 0.1  # speeds are those of predictions over this time [s]
 STRAY = 0.1  # movers are expected up to this far beyond the box [m]
+ASIDE = 1.5  # longest way of the footprint around movers for which the robot has not waited, as a multiple of the straight line
 OPENING = 2.0  # half the width of the corridor that stays open for the robot and the goal [cells]
 
 
@@ -282,6 +283,14 @@ class MoversAhead:
         """Return the zones that movers roam, largest first: the estimated box, then the observed one."""
         assert self._traffic is not None
         return self._traffic.zones(tick, pose[:2], self._goal, grid)
+
+    def is_fair(self, plan: PlanResult, pose: Pose, grid: Grid, trigger: str) -> bool:
+        """Return whether there is a plan around movers that is worth its length.
+
+        A long way of the footprint, behind furniture, is not until the robot has waited: movers in motion make room.
+        """
+        longest = math.inf if trigger == WAITED or not grid.turns else ASIDE
+        return plan.solved and plan.cost <= longest * math.dist(pose[:2], self._goal)
 
     def plan_around_zones(
         self, pose: Pose, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]

@@ -125,7 +125,10 @@ class Replanning(OneRoute):
             plan = self._routes.around(task, self._grid, discs)
         grid = self._grid
         if not plan.solved and discs and self._routes.turns:
-            plan, grid = self._routes.beside(task, self._ahead.discs(tick, pose, self._keeps - self._grid.inflate))
+            wide = self._ahead.discs(tick, pose, self._keeps - self._grid.inflate)
+            beside, outlined = self._routes.beside(task, wide)
+            if self._ahead.is_fair(beside, pose, outlined, trigger):
+                plan, grid = beside, outlined
         route = None
         if plan.solved and len(plan.cells) and not self._routes.plan_error:
             # A timed plan has times for its cells only, so its route must follow them.
