@@ -72,8 +72,7 @@ def gaps_to(foot, start, end, mover, mover_end, share):
 @settings(max_examples=60, deadline=None)
 @given(foot=st.sampled_from(list(FEET)), start=pose, end=pose, mover=point, mover_end=point, radius=st.floats(0.1, 0.5))
 def test_an_outline_keeps_its_own_distance(foot, start, end, mover, mover_end, radius):
-    """Steps are as long as a mover and a robot of 2 m/s make them. A contact comes no later than in samples, and no pose is missed
-    by more than half of the distance between two checked ones."""
+    """A closest pose is missed by at most half of the distance between two checked ones."""
     foot, start = FEET[foot], np.array(start)
     end, mover_end = start + 0.1 * np.array(end), np.array(mover) + 0.1 * np.array(mover_end)
     weights, places = weights_of(foot), np.array([[mover], [mover_end]])

@@ -238,9 +238,7 @@ def passes_within(
 
 
 @kernel
-def meets_obstacle(
-    trail: Array, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float
-) -> bool:
+def meets_obstacle(trail: Array, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float) -> bool:
     """Return whether a trail that was followed without obstacle checks comes too close to an obstacle."""
     required = least_clearance(trail, obstacles, tuning)
     k, steps = 0, trail.shape[0] - 1

@@ -211,9 +211,7 @@ class Avoidance:
         soon = gap < self.horizon * (speeds + spec.max_speed)
         return bool((soon & ((speeds > WALKING) | (off_by > SURPRISE))).any())
 
-    def _too_late(
-        self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats
-    ) -> float:
+    def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
         return 2 * self.step if kernels.is_close(*pose, places, radii, weights) else 0.0
 
