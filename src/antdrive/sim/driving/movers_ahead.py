@@ -328,9 +328,9 @@ class MoversSeenAhead(MoversAhead):
         super().__init__(tracked, policy, goal, grid, hz, self._roamed)
         self._survey = survey
 
-    def discs(self, tick: int, pose: Pose) -> list[Disc]:
+    def discs(self, tick: int, pose: Pose, wider: float = 0.0) -> list[Disc]:
         """Return the discs that movers will cover soon; they close neither the robot's position nor the goal."""
-        return super().discs(tick, pose) if len(self._predictor.within_range(tick, pose[:2])) else []
+        return super().discs(tick, pose, wider) if len(self._predictor.within_range(tick, pose[:2])) else []
 
     def _around(self, pose: Pose) -> Grid:
         (x, y), (gx, gy) = pose[:2], self._goal
