@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import dataclasses
 import json
 import os
 import statistics
@@ -56,28 +55,10 @@ def drive(path: str, seed: int) -> dict[str, Any]:
 
 def film_rate(movers: int, size: tuple[int, int], seconds: float) -> dict[str, Any]:
     """Film a drive through a hall with movers. Return the frames per second."""
-    import numpy as np
-
-    from antdrive.sim import Scenario, run
     from antdrive.views.film.video import film
-    from antdrive.worlds import Cruising, Task, World
+    from benchmarks.film import cut, hall_drive
 
-    rng, found = np.random.default_rng(1), list[Any]()
-    while len(found) < movers:
-        x, y = rng.uniform(0.5, 19.5, 2).tolist()
-        angle, speed = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 0.7)
-        if abs(y - 10) > 2:
-            found.append(
-                Cruising(
-                    radius=0.3, position=(x, y), velocity=(speed * float(np.cos(angle)), speed * float(np.sin(angle)))
-                )
-            )
-    task = Task(World("hall", (0, 0, 20, 20), movers=tuple(found)), (1, 10, 0), (19, 10))
-    log = run(Scenario.of(task, "astar", avoidance=None, replanning=None)).rollout
-    assert log is not None
-    rows = np.arange(round(seconds * 240) + 1) % len(log.t)
-    arrays = {name: getattr(log, name)[rows] for name in ("pose", "twist", "command", "clearance", "limiter", "movers")}
-    part = dataclasses.replace(log, t=np.arange(len(rows)) / 240, contacts=np.empty((0, 4)), **arrays)
+    part = cut(hall_drive(movers), seconds)
     with tempfile.TemporaryDirectory() as folder:
         started = time.process_time()
         info = film(part, Path(folder) / "a.mp4", size=size, jobs=1)
@@ -94,11 +75,12 @@ def serve() -> None:
 
 
 class Checkout:
-    """A process that runs the antdrive of a checkout."""
+    """A process that serves requests by this script and antdrive of a checkout."""
 
     def __init__(self, root: Path, python: str) -> None:
-        environment = {**os.environ, "PYTHONPATH": str(root), "OPENBLAS_NUM_THREADS": "1"}
-        command = [python, str(Path(__file__).resolve()), "--serve"]
+        path = f"{root / 'src'}{os.pathsep}{root}"
+        environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+        command = [python, str(root / "benchmarks" / "cost.py"), "--serve"]
         self._process = subprocess.Popen(
             command, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
