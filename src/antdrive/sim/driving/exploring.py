@@ -177,7 +177,7 @@ class Exploration(RouteGuide):
         outline = [outline_of(robot.footprint, margin)] if outlined else []
         return rasterise(task.world, cell, robot.radius + margin, *outline)
 
-    def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
+    def _plan_around(self, tick: int, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""
         movers = self._movers
         if movers is None:
@@ -192,7 +192,7 @@ class Exploration(RouteGuide):
         discs = movers.discs(tick, pose)
         if discs:
             grid, answer = self.plan(pose, discs)
-            if answer.solved:
+            if movers.is_fair(answer, pose, grid, trigger):
                 return grid, answer, discs
         return (*self.plan(pose), [])
 
@@ -318,7 +318,7 @@ class Exploration(RouteGuide):
         if self._failures >= PATIENCE and trigger != SCANNED:
             self._failures = 0
             self.survey.reset(pose)
-        grid, plan, avoided = self._plan_around(tick, pose)
+        grid, plan, avoided = self._plan_around(tick, pose, trigger)
         self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0
