@@ -7,15 +7,13 @@ own file, but not of kernels that it calls in other files.
 Each entry is one file, written atomically, with its key beside the machine code. numba uses an index and numbered files: it
 reserves a number before writing the file, so two processes that compile at once take the same number, and a process may run
 code of older sources or for other types. A process that needs an entry which another one compiles waits for it.
-
-A kernel has two kinds of entries: its intermediate code, which calling kernels include, and its machine code with a wrapper
-for calls from Python. numba makes machine code of every function, also of those that only kernels call.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import gc
 import hashlib
 import inspect
 import os
@@ -26,23 +24,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
-from llvmlite.binding import Linkage, parse_bitcode
+import numba
 from numba.core import config
-from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Flags, _make_subtarget, compile_extra
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.environment import lookup_environment
-from numba.core.event import trigger_event
-from numba.core.registry import CPUDispatcher, cpu_target
-from numba.core.sigutils import normalize_signature
-from numba.core.typing import make_concrete_template
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from antdrive.base import kernel_cache
 from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
 
-_NumbaLibrary: Any = JITCodeLibrary
-_environment: Any = lookup_environment
 _settings: Any = config  # its attributes are set on import
 LOCK = "antdrive-compiling.lock"  # in each folder of machine code
 PATIENCE = 120.0  # longest wait for another process that compiles the same entry [s]
@@ -54,17 +42,12 @@ _SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 
 def kernel(function: F) -> F:
     """Compile a function on its first call and cache it on disk."""
-    return _compiled(function)
+    return _cached(numba.njit(**_SETTINGS)(function), function)
 
 
 def inline(function: F) -> F:
     """Return a kernel that is always inlined into its callers."""
-    return _compiled(function, inline="always")
-
-
-def _compiled(function: F, **options: Any) -> F:
-    # Has the function's signature.
-    return function if config.DISABLE_JIT else _Kernel(function, **_SETTINGS, **options)  # type: ignore[return-value]
+    return _cached(numba.njit(inline="always", **_SETTINGS)(function), function)
 
 
 class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
@@ -108,9 +91,8 @@ class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    def __init__(self, function: Callable[..., Any], kind: str = "") -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self._kind = kind
         entries = self._cache_file  # type: ignore[has-type]
         name = entries._index_name.removesuffix(".nbi")
         self._saved: set[Any] = set()  # the dispatcher asks to save what the compiler has saved or loaded
@@ -127,9 +109,6 @@ class _Cache(FunctionCache):  # type: ignore[misc]
                 self.flush()
             return None
 
-    def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return super()._index_key(sig, codegen), self._kind
-
     def path_of(self, sig: Any, target_context: Any) -> Path:
         """Return the file of an entry."""
         entries: _Entries = self._cache_file
@@ -144,163 +123,38 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
 
 class _Compiler:
-    """The compiler of one kernel for calls from Python: adds a wrapper to the lowered kernel and makes its machine code."""
+    """The compiler of one kernel: reports each entry, and compiles none that another process is compiling."""
 
-    def __init__(self, dispatcher: _Kernel) -> None:
-        self._dispatcher, self._compiler = dispatcher, dispatcher._compiler
+    def __init__(self, dispatcher: Any, cache: _Cache) -> None:
+        self._compiler, self._context, self._cache = dispatcher._compiler, dispatcher.targetctx, cache
+        self._name = dispatcher.py_func.__name__
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._compiler, name)
 
     def compile(self, args: Any, return_type: Any) -> Any:
-        kernel, context = self._dispatcher, self._dispatcher.targetctx
-        with kernel.alone(kernel._cache, args):
-            found = kernel._cache.load_overload(args, context)
+        with _only_here(self._cache.path_of(args, self._context)):
+            found = self._cache.load_overload(args, self._context)
             if found is not None:
+                self._context.insert_user_function(found.entry_point, found.fndesc, [found.library])
                 return found
-            lowered = kernel.lowered(args)
-            context = _make_subtarget(context, kernel.flags())
-            library = context.codegen().create_library(lowered.fndesc.qualname)
-            library.enable_object_caching()
-            library.add_linking_library(lowered.library)
-            context.create_cpython_wrapper(library, lowered.fndesc, lowered.environment, None, release_gil=True)
-            entry = context.get_executable(library, lowered.fndesc, lowered.environment)
-            made = lowered._replace(library=library, entry_point=entry)
-            kernel._cache.save_overload(args, made)
+            kernel_cache.on_compile(self._name)
+            with _uncollected():
+                made = self._compiler.compile(args, return_type)
+            self._cache.save_overload(args, made)
             return made
 
 
-class _Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A dispatcher whose callers among kernels need no machine code of it: they include its intermediate code."""
-
-    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
-        super().__init__(py_func=function, targetoptions={"nopython": True, "boundscheck": None, **options})
-        self._lowered: dict[Any, Any] = {}
-        self._lowered_cache: Any = NullCache()
-        with contextlib.suppress(RuntimeError):  # no writable folder: every process compiles
-            self._cache = _Cache(function)
-            self._lowered_cache = _Cache(function, "lowered")
-        self._compiler = _Compiler(self)
-
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        signature, args = self._compiler.fold_argument_types(args, kws)
-        self.lowered(tuple(args))
-        name = self.py_func.__name__
-        signatures = [lowered.signature for lowered in self._lowered.values()]
-        return make_concrete_template(f"CallTemplate({name})", key=name, signatures=signatures), signature, args, {}
-
-    def get_overload(self, sig: Any) -> Any:
-        return self._lowered[tuple(normalize_signature(sig)[0])].entry_point
-
-    def lowered(self, args: Any) -> Any:
-        """Return the kernel's intermediate code for argument types, without machine code."""
-        if args not in self._lowered:
-            with global_compiler_lock, self.alone(self._lowered_cache, args):
-                found = self._lowered_cache.load_overload(args, self.targetctx)
-                if found is None:
-                    found = self._lower(args)
-                    self._lowered_cache.save_overload(args, found)
-                else:
-                    self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
-                self._lowered[args] = found
-        return self._lowered[args]
-
-    def _lower(self, args: Any) -> Any:
-        kernel_cache.on_compile(self.py_func.__name__)
-        description = self._compiler.targetdescr
-        with self._compiling_counter, trigger_event("numba:compile", {"dispatcher": self, "args": args}):
-            return compile_extra(
-                description.typing_context,
-                description.target_context,
-                self.py_func,
-                args=args,
-                return_type=None,
-                flags=self.flags(),
-                locals=self.locals,
-                pipeline_class=self._compiler.pipeline_class,
-            )
-
-    def flags(self) -> Any:
-        """Return the flags of a kernel without wrappers."""
-        flags: Any = Flags()
-        self._compiler.targetdescr.options.parse_as_flags(flags, self.targetoptions)
-        flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
-        return flags
-
-    def alone(self, cache: Any, args: Any) -> contextlib.AbstractContextManager[None]:
-        """Wait until no other process makes an entry, and keep others from it."""
-        if isinstance(cache, NullCache):
-            return contextlib.nullcontext()
-        return _only_here(cache.path_of(args, self.targetctx))
-
-
-class _Library(_NumbaLibrary):  # type: ignore[misc]
-    """Code that is optimised and made machine code only where Python calls it.
-
-    numba makes machine code of every function, including those that it then copies into their callers.
-    """
-
-    def add_linking_library(self, library: Any) -> None:
-        if not isinstance(library, _Library):
-            library._ensure_finalized()
-        self._linking_libraries.append(library)
-
-    def get_pointer_to_function(self, name: str) -> int:
-        if not self._finalized and not any(
-            f.name == name and not f.is_declaration for f in self._final_module.functions
-        ):
-            return 0
-        return int(super().get_pointer_to_function(name))
-
-    def _get_module_for_linking(self) -> Any:
-        if self._shared_module is None:
-            if not self._finalized:
-                self._link()
-            self._shared_module = self._final_module.clone()
-            for function in self._shared_module.functions:
-                if not function.is_declaration and function.linkage == Linkage.external:
-                    function.linkage = "linkonce_odr"
-        return self._shared_module
-
-    def _link(self) -> None:
-        for library in dict.fromkeys(self._linking_libraries):
-            self._reload_init.update(library._reload_init)
-            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        self._linking_libraries = []
-
-    def _finalize_final_module(self) -> None:
-        super()._finalize_final_module()
-        for variable in self._final_module.global_variables:
-            if variable.name.startswith("_ZN08NumbaEnv"):
-                environment = _environment(variable.name)
-                if environment is not None:
-                    self._codegen.set_env(variable.name, environment)
-
-    def serialize_using_object_code(self) -> Any:
-        if self._finalized:
-            return super().serialize_using_object_code()
-        return (self.name, "bitcode", self._get_module_for_linking().as_bitcode())
-
-    @classmethod
-    def _unserialize(cls, codegen: Any, state: Any) -> Any:
-        name, kind, data = state
-        if kind != "bitcode":
-            return super()._unserialize(codegen, state)
-        library = codegen.create_library(name)
-        library._final_module = library._shared_module = parse_bitcode(data)
-        return library
-
-
-def _set_environment(codegen: Any, name: str, environment: Any) -> None:
-    """Set the environment of a function that has machine code."""
-    if codegen._engine.get_global_value_address(name):
-        type(codegen).set_env(codegen, name, environment)
-
-
-def _make_lazily() -> None:
-    codegen: Any = cpu_target.target_context.codegen()
-    codegen._library_class = _Library
-    codegen.set_env = functools.partial(_set_environment, codegen)
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """Pause the garbage collector: a compiler makes many objects that live until it ends."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 @contextlib.contextmanager
@@ -337,6 +191,14 @@ def _lock_file(folder: Path) -> int:
     return os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
 
 
+def _cached(dispatcher: Any, function: F) -> F:
+    if hasattr(dispatcher, "enable_caching"):  # with NUMBA_DISABLE_JIT it is the plain function
+        with contextlib.suppress(RuntimeError):  # no writable folder: every process compiles
+            dispatcher._cache = _Cache(function)
+            dispatcher._compiler = _Compiler(dispatcher, dispatcher._cache)
+    return dispatcher  # type: ignore[no-any-return]  # has the function's signature
+
+
 def _choose_folder() -> None:
     folder = cache_folder()
     if folder is not None and folder not in default_folders():
@@ -344,4 +206,3 @@ def _choose_folder() -> None:
 
 
 _choose_folder()
-_make_lazily()

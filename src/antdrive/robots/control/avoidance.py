@@ -10,8 +10,7 @@ one of the candidates, so the robot moves out of the path of an approaching move
 Near movers ahead the robot keeps its `near_speed`, and it reverses slowly and not far. These limits cause no contact that a
 robot without them avoids:
 
-- Where every candidate within them ends in a contact within 1.5 s, they are lifted: first the speed ahead, where the robot sees,
-  then the reverse limit.
+- Where every candidate within them ends in a contact, they are lifted step by step, so a predicted contact has the same escapes.
 - A prediction that is wrong could hide a contact. They hold only where movers move as predicted: a mover with another observed
   velocity, as among ground-truth positions, lifts them all. So does a mover faster than people: speed is the way out.
 - A robot that crosses the lane of a mover that comes faster than `near_speed` is not slowed, nor one that leaves a mover behind.
@@ -42,7 +41,6 @@ from antdrive.robots.spec import Footprint, RobotSpec
 SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progress [m per m/s]
 WALKING = 1.5  # movers faster than this are not people [m/s]
 SURPRISE = 0.1  # a mover has another velocity than predicted if they differ by more than this [m/s]
-IMMINENT = 1.5  # a contact that is less far away lifts the limits near movers [s]
 CROSSING = 0.5  # a robot crosses a mover's lane if the sine of the angle between both headings exceeds this
 PERSISTENCE = 0.05  # value of keeping the last decision, in metres of progress [m]
 
@@ -151,18 +149,17 @@ class Avoidance:
         tuning = tracked.tuning._replace(period=self.step)
         weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
         observed = predicted if velocities is None else velocities
-        hold = {(near, slow): IMMINENT, (math.inf, slow): IMMINENT}
-        lifted = {(math.inf, backwards): math.inf, (math.inf, math.inf): math.inf}
+        limits_of = [(near, slow), (near, backwards), (math.inf, backwards), (math.inf, math.inf)]
         if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
-            hold = {}
-        for (fastest, reverse), enough in (hold | lifted).items():
+            del limits_of[:2]
+        for fastest, reverse in dict.fromkeys(limits_of):
             candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
                 limits, tuning, weights, places, radii,
             )  # fmt: skip
             chosen, contact = kernels.choose(*situation)
-            if contact >= enough:
+            if contact == math.inf:
                 break
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
             return wanted, False, AvoidanceState(reversed=state.reversed)
