@@ -22,6 +22,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.types import Floats, Pose
 from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import RobotSpec
+from antdrive.sim.physics import _kernels_states
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies
 from antdrive.sim.physics.near import NearBodies
@@ -40,6 +41,7 @@ USUAL_RESIDUAL = 1e-7  # solver residual for other wheels, Bullet's default [(ra
 OVERSPEED = 1.5  # bound of a robot's own speed, as a multiple of its top speed
 # Arguments "any other body, the robot's link -1, any link of the other": passing them by name costs 0.4 us a step.
 CHASSIS_AND_ANY = (-1, -1, -2)
+MOTION = 13  # numbers of a motion: position, quaternion, velocity and angular velocity, in the world's frame
 BATCH = 5000  # most bodies built in one call
 MANY_BODIES = 1000  # in worlds with more cylinders, only those near the robot have bodies
 CHECK_EVERY = 8  # physics steps between updates of these bodies
@@ -176,15 +178,37 @@ class Engine:
 
     def step(self) -> list[Contact]:
         """Advance one physics step, and return the chassis's contacts after it."""
-        if self._movers is not None:
-            self._movers.steer(self._steps)
-        if self._near is not None and self._steps % CHECK_EVERY == 0:
-            (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
-            self._near.follow(x, y)
-        self._steps += 1
-        self._p.stepSimulation(self._client)
-        points = self._p.getContactPoints(self._robot, *CHASSIS_AND_ANY, self._client)
-        return self._touching(points) if points else []
+        return [contact for _, contact in self.advance(1, [])[1]]
+
+    def advance(self, steps: int, motion: list[float]) -> tuple[State, list[tuple[int, Contact]]]:
+        """Advance physics steps, and return the state after them and the chassis's contacts, each with its step from 0.
+
+        Args:
+            steps: number of steps, at least 1
+            motion: list to which each step appends the motion of the centre of mass, `MOTION` numbers for `states`
+        """
+        p, robot, number, movers, near = self._p, self._robot, self._client, self._movers, self._near
+        step, points_of = p.stepSimulation, p.getContactPoints
+        place_of, velocity_of = p.getBasePositionAndOrientation, p.getBaseVelocity
+        touched: list[tuple[int, Contact]] = []
+        for k in range(steps):
+            if movers is not None:
+                movers.steer(self._steps)
+            if near is not None and self._steps % CHECK_EVERY == 0:
+                (x, y, _), _ = place_of(robot, number)
+                near.follow(x, y)
+            self._steps += 1
+            step(number)
+            points = points_of(robot, *CHASSIS_AND_ANY, number)
+            if points:
+                touched += [(k, contact) for contact in self._touching(points)]
+            place, quaternion = place_of(robot, number)
+            velocity, rate = velocity_of(robot, number)
+            motion += place
+            motion += quaternion
+            motion += velocity
+            motion += rate
+        return self._axle(place, quaternion, velocity, rate), touched
 
     def contacts(self) -> list[Contact]:
         """Return the chassis's current contacts, without advancing time."""
@@ -193,14 +217,21 @@ class Engine:
 
     def state(self) -> State:
         """Return the pose and velocity of the axle's centre."""
-        p = self._p
-        (x, y, _), (qx, qy, qz, qw) = p.getBasePositionAndOrientation(self._robot, self._client)
-        (vx, vy, _), (_, _, yaw_rate) = p.getBaseVelocity(self._robot, self._client)
+        place = self._p.getBasePositionAndOrientation(self._robot, self._client)
+        return self._axle(*place, *self._p.getBaseVelocity(self._robot, self._client))
+
+    def _axle(self, place: Point3, quaternion: tuple[float, ...], velocity: Point3, rate: Point3) -> State:
+        """Return the state of the axle's centre, for the motion of the centre of mass; `states` takes many steps."""
+        (x, y, _), (qx, qy, qz, qw), (vx, vy, _) = place, quaternion, velocity
         # PyBullet reports the centre of mass below the axle: subtract the offset along the tilted z axis.
         x += 2.0 * (qx * qz + qw * qy) * self._com_drop
         y += 2.0 * (qy * qz - qw * qx) * self._com_drop
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        return State(x, y, yaw, vx * math.cos(yaw) + vy * math.sin(yaw), yaw_rate)
+        return State(x, y, yaw, vx * math.cos(yaw) + vy * math.sin(yaw), rate[2])
+
+    def states(self, motion: Sequence[float]) -> Floats:
+        """Return the states (N, 5) for the motion of N steps, as `State` orders them."""
+        return _kernels_states.axle_states(np.array(motion, dtype=np.float64).reshape(-1, MOTION), self._com_drop)
 
     @property
     def time(self) -> float:
