@@ -10,8 +10,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, NamedTuple, TypeAlias
@@ -26,7 +24,7 @@ from antdrive.sim.physics import _kernels_states
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies
 from antdrive.sim.physics.near import NearBodies
-from antdrive.sim.physics.urdf import CASTER_GAP, CHASSIS_FILE, chassis_mesh, robot_urdf, rolling_radius
+from antdrive.sim.physics.urdf import CASTER_GAP, chassis_mesh, robot_urdf, rolling_radius, urdf_file
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc, World
 
@@ -104,7 +102,6 @@ class Engine:
     def __enter__(self) -> Engine:
         p = self._p = bullet()
         self._client = self._open.enter_context(client())
-        p.resetSimulation(physicsClientId=self._client)
         p.setGravity(0, 0, -9.81, physicsClientId=self._client)
         p.setPhysicsEngineParameter(
             fixedTimeStep=1.0 / self.physics_hz,
@@ -231,7 +228,8 @@ class Engine:
 
     def states(self, motion: Sequence[float]) -> Floats:
         """Return the states (N, 5) for the motion of N steps, as `State` orders them."""
-        return _kernels_states.axle_states(np.array(motion, dtype=np.float64).reshape(-1, MOTION), self._com_drop)
+        rows: Floats = np.array(motion, dtype=np.float64).reshape(-1, MOTION)
+        return np.asarray(_kernels_states.axle_states(rows, self._com_drop))
 
     @property
     def time(self) -> float:
@@ -280,17 +278,9 @@ class Engine:
         # The residual is in rad/s, and smaller spheres turn faster. The client may hold the value of another robot.
         residual = RESIDUAL * gear**2 if gear > 1 else USUAL_RESIDUAL
         p.setPhysicsEngineParameter(solverResidualThreshold=residual, physicsClientId=self._client)
-        text = robot_urdf(self.robot, self._com_drop)
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, "robot.urdf")
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(text)
-            mesh = chassis_mesh(self.robot)
-            if mesh is not None:
-                with open(os.path.join(folder, CHASSIS_FILE), "w", encoding="utf-8") as file:
-                    file.write(mesh)
-            flags = p.URDF_USE_IMPLICIT_CYLINDER | p.URDF_USE_INERTIA_FROM_FILE
-            self._robot = p.loadURDF(path, flags=flags, physicsClientId=self._client)
+        flags = p.URDF_USE_IMPLICIT_CYLINDER | p.URDF_USE_INERTIA_FROM_FILE
+        path = urdf_file(robot_urdf(self.robot, self._com_drop), chassis_mesh(self.robot))
+        self._robot = p.loadURDF(str(path), flags=flags, physicsClientId=self._client)
         for link in range(-1, 4):
             p.changeDynamics(
                 self._robot,
