@@ -97,7 +97,7 @@ class Checkout:
     """A process that runs the antdrive of a checkout."""
 
     def __init__(self, root: Path, python: str) -> None:
-        environment = {**os.environ, "PYTHONPATH": str(root), "OPENBLAS_NUM_THREADS": "1"}
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(root / "src"), str(root)]), "OPENBLAS_NUM_THREADS": "1"}
         command = [python, str(Path(__file__).resolve()), "--serve"]
         self._process = subprocess.Popen(
             command, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
