@@ -55,7 +55,7 @@ class Bullet:
         self._engine = engine
         engine.place(start)
         self.state: State = engine.state()
-        self._motion: list[float] = []  # of each step
+        self._motion: list[bytes] = []  # of each step
         self._in_force: list[tuple[float, ...]] = [(0.0, 0.0, 0, 0.0, 0.0)]  # command, limiter and motor targets
         self._lengths = [1]  # number of rows of each
         self._rows = 1

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+import struct
 from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, NamedTuple, TypeAlias
@@ -39,7 +40,7 @@ USUAL_RESIDUAL = 1e-7  # solver residual for other wheels, Bullet's default [(ra
 OVERSPEED = 1.5  # bound of a robot's own speed, as a multiple of its top speed
 # Arguments "any other body, the robot's link -1, any link of the other": passing them by name costs 0.4 us a step.
 CHASSIS_AND_ANY = (-1, -1, -2)
-MOTION = 13  # numbers of a motion: position, quaternion, velocity and angular velocity, in the world's frame
+MOTION = struct.Struct("13d")  # position, quaternion, velocity and angular velocity of the centre of mass
 BATCH = 5000  # most bodies built in one call
 MANY_BODIES = 1000  # in worlds with more cylinders, only those near the robot have bodies
 CHECK_EVERY = 8  # physics steps between updates of these bodies
@@ -177,16 +178,16 @@ class Engine:
         """Advance one physics step, and return the chassis's contacts after it."""
         return [contact for _, contact in self.advance(1, [])[1]]
 
-    def advance(self, steps: int, motion: list[float]) -> tuple[State, list[tuple[int, Contact]]]:
+    def advance(self, steps: int, motion: list[bytes]) -> tuple[State, list[tuple[int, Contact]]]:
         """Advance physics steps, and return the state after them and the chassis's contacts, each with its step from 0.
 
         Args:
             steps: number of steps, at least 1
-            motion: list to which each step appends the motion of the centre of mass, `MOTION` numbers for `states`
+            motion: list to which each step appends the motion of the centre of mass, for `states`
         """
         p, robot, number, movers, near = self._p, self._robot, self._client, self._movers, self._near
         step, points_of = p.stepSimulation, p.getContactPoints
-        place_of, velocity_of = p.getBasePositionAndOrientation, p.getBaseVelocity
+        pack, place_of, velocity_of = MOTION.pack, p.getBasePositionAndOrientation, p.getBaseVelocity
         touched: list[tuple[int, Contact]] = []
         for k in range(steps):
             if movers is not None:
@@ -201,10 +202,7 @@ class Engine:
                 touched += [(k, contact) for contact in self._touching(points)]
             place, quaternion = place_of(robot, number)
             velocity, rate = velocity_of(robot, number)
-            motion += place
-            motion += quaternion
-            motion += velocity
-            motion += rate
+            motion.append(pack(*place, *quaternion, *velocity, *rate))
         return self._axle(place, quaternion, velocity, rate), touched
 
     def contacts(self) -> list[Contact]:
@@ -226,9 +224,9 @@ class Engine:
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
         return State(x, y, yaw, vx * math.cos(yaw) + vy * math.sin(yaw), rate[2])
 
-    def states(self, motion: Sequence[float]) -> Floats:
+    def states(self, motion: Sequence[bytes]) -> Floats:
         """Return the states (N, 5) for the motion of N steps, as `State` orders them."""
-        rows: Floats = np.array(motion, dtype=np.float64).reshape(-1, MOTION)
+        rows: Floats = np.frombuffer(b"".join(motion)).reshape(-1, 13)
         return np.asarray(_kernels_states.axle_states(rows, self._com_drop))
 
     @property
