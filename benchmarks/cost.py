@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import dataclasses
 import json
 import os
 import statistics
@@ -75,28 +74,10 @@ def bare_physics(log: Any) -> float:
 
 def film_rate(movers: int, size: tuple[int, int], seconds: float) -> dict[str, Any]:
     """Film a drive through a hall with movers. Return the frames per second."""
-    import numpy as np
-
-    from antdrive.sim import Scenario, run
     from antdrive.views.film.video import film
-    from antdrive.worlds import Cruising, Task, World
+    from benchmarks.film import cut, hall_drive
 
-    rng, found = np.random.default_rng(1), list[Any]()
-    while len(found) < movers:
-        x, y = rng.uniform(0.5, 19.5, 2).tolist()
-        angle, speed = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 0.7)
-        if abs(y - 10) > 2:
-            found.append(
-                Cruising(
-                    radius=0.3, position=(x, y), velocity=(speed * float(np.cos(angle)), speed * float(np.sin(angle)))
-                )
-            )
-    task = Task(World("hall", (0, 0, 20, 20), movers=tuple(found)), (1, 10, 0), (19, 10))
-    log = run(Scenario.of(task, "astar", avoidance=None, replanning=None)).rollout
-    assert log is not None
-    rows = np.arange(round(seconds * 240) + 1) % len(log.t)
-    arrays = {name: getattr(log, name)[rows] for name in ("pose", "twist", "command", "clearance", "limiter", "movers")}
-    part = dataclasses.replace(log, t=np.arange(len(rows)) / 240, contacts=np.empty((0, 4)), **arrays)
+    part = cut(hall_drive(movers), seconds)
     with tempfile.TemporaryDirectory() as folder:
         started = time.process_time()
         info = film(part, Path(folder) / "a.mp4", size=size, jobs=1)
@@ -113,15 +94,12 @@ def serve() -> None:
 
 
 class Checkout:
-    """A process that runs the antdrive of a checkout."""
+    """A process that serves requests by this script and antdrive of a checkout."""
 
     def __init__(self, root: Path, python: str) -> None:
-        environment = {
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join([str(root / "src"), str(root)]),
-            "OPENBLAS_NUM_THREADS": "1",
-        }
-        command = [python, str(Path(__file__).resolve()), "--serve"]
+        path = f"{root / 'src'}{os.pathsep}{root}"
+        environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+        command = [python, str(root / "benchmarks" / "cost.py"), "--serve"]
         self._process = subprocess.Popen(
             command, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
@@ -147,7 +125,7 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
     for checkout in checkouts.values():  # loads kernels, with a world outside the table
         checkout.ask("drive", "slalom", 0)
     costs: dict[tuple[str, str], list[float]] = {}
-    bare: dict[tuple[str, str], list[float]] = {}
+    bare: dict[str, list[float]] = {}
     certified = 0
     for k, world in enumerate(worlds):
         for kind, seed in (("first", 0), ("again", 1)):
@@ -156,9 +134,9 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
             found = {name: checkouts[name].ask("drive", str(world), seed) for name in order}
             assert len({answer["digest"] for answer in found.values()}) == 1, f"{world}: the drives differ"
             certified += all(answer["certified"] for answer in found.values())
+            bare.setdefault(kind, []).append(found["here"]["bare"])
             for name, answer in found.items():
                 costs.setdefault((kind, name), []).append(answer["cost"])
-                bare.setdefault((kind, name), []).append(answer["bare"])
     yield f"{len(worlds)} worlds, {PLANNER} with {ROBOT}; {certified} of {2 * len(worlds)} drives certified; all pairs alike"
     columns = " | ".join(f"{name} [ms] | {name} [drives/s] | {name} / bare" for name in checkouts)
     yield f"| drive | {columns} | bare [drives/s] | ratio |"
@@ -167,11 +145,11 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
     for kind in ("first", "again"):
         cells = [
             f"{1e3 * statistics.median(costs[kind, name]):.0f} | {len(worlds) / sum(costs[kind, name]):.1f} | "
-            f"{sum(costs[kind, name]) / sum(bare[kind, name]):.2f}"
+            f"{sum(costs[kind, name]) / sum(bare[kind]):.2f}"
             for name in checkouts
         ]
         ratio = statistics.median(b / a for a, b in zip(costs[kind, "here"], costs[kind, reference], strict=True))
-        yield f"| {kind} | {' | '.join(cells)} | {len(worlds) / sum(bare[kind, 'here']):.1f} | {ratio:.2f} |"
+        yield f"| {kind} | {' | '.join(cells)} | {len(worlds) / sum(bare[kind]):.1f} | {ratio:.2f} |"
 
 
 def films_table(checkouts: dict[str, Checkout], seconds: float, rounds: int) -> Iterator[str]:

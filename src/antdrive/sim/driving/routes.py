@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 LONGER = 1.1  # the disc's way may be this much longer than the footprint's
 FINE = 0.05  # largest cell of plans for a footprint [m]
-KEPT = 6  # replanners kept for repair: two margins for each of two bounds, and for the footprint
+KEPT = 8  # replanners kept for repair: two margins of the disc for each of two bounds, and up to four of the footprint
 
 
 @dataclass(eq=False, kw_only=True)
@@ -227,7 +227,7 @@ class OneRoute(RouteGuide):
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
         """Check an external plan on the grid of `first`."""
-        if plan.status is PlanStatus.INVALID:
+        if not plan.solved:
             return grid, plan
         return grid, self._drivable(grid, self._routes.checked(self._routes.query(grid, self._routes.task), plan))
 
