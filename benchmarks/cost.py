@@ -2,7 +2,8 @@
 
 `--against PATH` runs the same drives in another checkout, in a separate process, alternating world by world. The table shows
 medians and the median ratio within a pair; every pair of drives must agree bit for bit. Drives are timed in processor time,
-films in wall-clock time and in processor time without the encoder. Ratios compare processor times.
+films in wall-clock time and in processor time without the encoder. Ratios compare processor times. The limit of a drive is
+bare physics: its steps and commands alone, after each drive.
 
 - first: a world that is new to the process, read from its YAML file
 - again: the same file with the next seed, in the same process
@@ -50,7 +51,25 @@ def drive(path: str, seed: int) -> dict[str, Any]:
     done = run(Scenario.of(path, PLANNER, ROBOT, seed=seed))
     cost = time.process_time() - started
     assert done.rollout is not None
-    return {"cost": cost, "certified": done.succeeded, "digest": done.rollout.drive_digest}
+    answer = {"cost": cost, "certified": done.succeeded, "digest": done.rollout.drive_digest}
+    return {**answer, "bare": bare_physics(done.rollout)}
+
+
+def bare_physics(log: Any) -> float:
+    """Return the processor time of a drive's physics steps alone, with its commands [s]."""
+    from antdrive.sim.physics.bullet import bullet
+    from antdrive.sim.physics.engine import Engine
+
+    p, record = bullet(), log.record
+    per_period = record.physics_hz // record.control_hz
+    with Engine(record.world, record.robot, physics_hz=record.physics_hz) as engine:
+        engine.place(record.task.start)
+        started = time.process_time()
+        for command in log.command[1::per_period].tolist():
+            engine.command(*command)
+            for _ in range(per_period):
+                p.stepSimulation(engine._client)
+        return time.process_time() - started
 
 
 def film_rate(movers: int, size: tuple[int, int], seconds: float) -> dict[str, Any]:
@@ -106,6 +125,7 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
     for checkout in checkouts.values():  # loads kernels, with a world outside the table
         checkout.ask("drive", "slalom", 0)
     costs: dict[tuple[str, str], list[float]] = {}
+    bare: dict[str, list[float]] = {}
     certified = 0
     for k, world in enumerate(worlds):
         for kind, seed in (("first", 0), ("again", 1)):
@@ -114,19 +134,22 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
             found = {name: checkouts[name].ask("drive", str(world), seed) for name in order}
             assert len({answer["digest"] for answer in found.values()}) == 1, f"{world}: the drives differ"
             certified += all(answer["certified"] for answer in found.values())
+            bare.setdefault(kind, []).append(found["here"]["bare"])
             for name, answer in found.items():
                 costs.setdefault((kind, name), []).append(answer["cost"])
     yield f"{len(worlds)} worlds, {PLANNER} with {ROBOT}; {certified} of {2 * len(worlds)} drives certified; all pairs alike"
-    yield "| drive | " + " | ".join(f"{name} [ms] | {name} [drives/s]" for name in checkouts) + " | ratio |"
-    yield "|---|" + "---|" * (2 * len(checkouts) + 1)
+    columns = " | ".join(f"{name} [ms] | {name} [drives/s] | {name} / bare" for name in checkouts)
+    yield f"| drive | {columns} | bare [drives/s] | ratio |"
+    yield "|---|" + "---|" * (3 * len(checkouts) + 2)
     reference = list(checkouts)[-1]
     for kind in ("first", "again"):
         cells = [
-            f"{1e3 * statistics.median(costs[kind, name]):.0f} | {len(worlds) / sum(costs[kind, name]):.1f}"
+            f"{1e3 * statistics.median(costs[kind, name]):.0f} | {len(worlds) / sum(costs[kind, name]):.1f} | "
+            f"{sum(costs[kind, name]) / sum(bare[kind]):.2f}"
             for name in checkouts
         ]
         ratio = statistics.median(b / a for a, b in zip(costs[kind, "here"], costs[kind, reference], strict=True))
-        yield f"| {kind} | {' | '.join(cells)} | {ratio:.2f} |"
+        yield f"| {kind} | {' | '.join(cells)} | {len(worlds) / sum(bare[kind]):.1f} | {ratio:.2f} |"
 
 
 def films_table(checkouts: dict[str, Checkout], seconds: float, rounds: int) -> Iterator[str]:

@@ -203,10 +203,12 @@ class Avoidance:
         self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, predicted: Floats, radii: Floats
     ) -> bool:
         """Return whether a mover that may come near soon is faster than people, or has another velocity than predicted."""
-        speeds, off_by = np.hypot(*observed.T), np.hypot(*(observed - predicted).T)
+        speeds = np.hypot(*observed.T)
+        unlike = (speeds > WALKING) | (np.hypot(*(observed - predicted).T) > SURPRISE)
+        if not unlike.any():
+            return False
         gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
-        soon = gap < self.horizon * (speeds + spec.max_speed)
-        return bool((soon & ((speeds > WALKING) | (off_by > SURPRISE))).any())
+        return bool((unlike & (gap < self.horizon * (speeds + spec.max_speed))).any())
 
     def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
@@ -228,8 +230,9 @@ class Avoidance:
         if state.candidate:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining
-        speeds = [kernels.SPEED, kernels.NEXT_SPEED]
-        table[:, speeds] = np.clip(table[:, speeds], -min(reverse, fastest), fastest)
+        for column in (kernels.SPEED, kernels.NEXT_SPEED):
+            speeds = table[:, column]
+            np.minimum(np.maximum(speeds, -min(reverse, fastest), out=speeds), fastest, out=speeds)
         return table
 
 
