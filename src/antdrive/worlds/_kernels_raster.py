@@ -19,7 +19,8 @@ from antdrive.worlds._kernels import (
 )
 
 AHEAD = 64  # rows of a list that are searched for the next row of the other
-TALL, WIDE = 32, 64  # rows and columns of a tile; a row of a tile is one word of bits
+NEAR = 0.02  # discs this close in their lists and on the ground are taken for one [m]
+TALL, WIDE = 16, 64  # rows and columns of a tile; a row of a tile is one word of bits
 BESIDE = 2.0  # a disc changes moves of cells up to this far beyond its rim [cells]
 CHANGED = 16  # bit beside the closed moves of a cell that became free or blocked
 
@@ -42,6 +43,11 @@ def differences(old: Array, new: Array, pairs: Array) -> int:
         if gone and come:
             if same(old, i, new, j):
                 i, j = i + 1, j + 1
+                continue
+            apart = abs(old[i, 0] - new[j, 0]) + abs(old[i, 1] - new[j, 1])
+            if apart < NEAR:  # one disc that was measured again
+                pairs[count, 0], pairs[count, 1] = i, j
+                i, j, count = i + 1, j + 1, count + 1
                 continue
             while gone < AHEAD and i + gone < len(old) and not same(old, i + gone, new, j):
                 gone += 1
@@ -104,11 +110,13 @@ def adapt(
         for j in range(dirty.shape[1]):
             if dirty[i, j]:
                 blocked[TALL * i : TALL * (i + 1), j] = 0
+    inside = clear_of_walls(bounds[1], bounds[3], y0, cell, inflate, rows)
+    within = clear_of_walls(bounds[0], bounds[2], x0, cell, inflate, cols)
     near, grazes = near_dirty(new, inflate, x0, y0, cell, cols, dirty, blocked)
     for i in range(dirty.shape[0]):
         for j in range(dirty.shape[1]):
             if dirty[i, j]:
-                free_tile(i, j, bounds, x0, y0, cell, inflate, blocked, closed, free)
+                free_tile(i, j, inside, within, blocked, closed, free)
     for n in range(len(near)):
         x, y, radius = new[near[n]]
         if grazes[n]:
@@ -147,21 +155,31 @@ def near_dirty(
 
 @kernel
 def free_tile(
-    i: int, j: int, bounds: Array, x0: float, y0: float, cell: float, inflate: float, blocked: Array, closed: Array,
-    free: Array,
+    i: int, j: int, inside: Array, within: Array, blocked: Array, closed: Array, free: Array
 ) -> None:  # fmt: skip
-    """Fill in the free cells of a tile, without closed moves; `CHANGED` marks the cells that differ."""
+    """Fill in the free cells of a tile, without closed moves; `CHANGED` marks the cells that differ.
+
+    Args:
+        inside: rows clear of the walls (R,)
+        within: columns clear of the walls (C,)
+    """
     rows, cols = free.shape
     for r in range(TALL * i, min(rows, TALL * (i + 1))):
-        y = y0 + r * cell
-        inside = min(y - bounds[1], bounds[3] - y) > inflate
         bits = blocked[r, j]
         for c in range(WIDE * j, min(cols, WIDE * (j + 1))):
-            x = x0 + c * cell
-            within = min(x - bounds[0], bounds[2] - x) > inflate
-            now = inside & within & ((bits >> np.uint64(c & 63)) & ONE == 0)
-            closed[r, c] = CHANGED * (now != free[r, c])
+            now = inside[r] & within[c] & ((bits >> np.uint64(c & 63)) & ONE == 0)
+            closed[r, c] = np.uint8(now ^ free[r, c]) * np.uint8(CHANGED)
             free[r, c] = now
+
+
+@kernel
+def clear_of_walls(low: float, high: float, begin: float, cell: float, inflate: float, count: int) -> Array:
+    """Return which cells in a row from `begin` on keep their distance from both walls (count,)."""
+    out = np.empty(count, dtype=np.bool_)
+    for n in range(count):
+        at = begin + n * cell
+        out[n] = min(at - low, high - at) > inflate
+    return out
 
 
 @kernel
