@@ -216,8 +216,10 @@ class Avoidance:
     def _candidates(
         self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float
     ) -> Floats:
-        """Return the candidates (N, 6) up to a speed and a reverse speed [m/s]; row 0 keeps the speed limit, row 1 is the
-        last decision."""
+        """Return the candidates (N, 6) within speed limits [m/s].
+
+        Row 0 keeps the speed limit, row 1 is the last decision.
+        """
         table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
         fastest, reverse = min(fastest, spec.max_speed), min(reverse, spec.max_speed)
         if not state.candidate and min(speed_limit, fastest, reverse) >= spec.max_speed:

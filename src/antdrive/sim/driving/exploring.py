@@ -42,10 +42,8 @@ from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, ras
 from antdrive.worlds.world import PointWorld
 
 GROWTH = (4.0, 16.0)  # extent of the planning area beyond start and goal; the second if no path is found [m]
-MARGINS = (
-    1.0,
-    0.0,
-)  # fractions of the margin that plans for the disc keep; the second if no route exists or it is long
+#: Fractions of the margin that plans for the disc keep; the second if no route exists or it is long.
+MARGINS = (1.0, 0.0)
 FAIR = 1.25  # a route longer than the straight line by more than this factor is long
 DETOUR = 1.15  # a route with less margin must be shorter by this factor
 CORRIDOR = 1.2  # smoothing considers obstacles within this distance of the plan, beyond the inflation [m]
@@ -57,9 +55,8 @@ ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hits than to mapped obstacles [m]
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
-TURNABLE = (
-    0.025  # plans for the footprint keep this margin if they can: the controller refuses turns closer to hits [m]
-)
+#: Plans for the footprint keep this margin if possible: the controller refuses turns closer to hits [m].
+TURNABLE = 0.025
 LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import itertools
 import math
 from collections.abc import Sequence
@@ -48,7 +49,8 @@ if TYPE_CHECKING:
 
 LONGER = 1.1  # the disc's way may be this much longer than the footprint's
 FINE = 0.05  # largest cell of plans for a footprint [m]
-KEPT = 6  # grids and replanners kept for repair: two margins for each of two bounds, and for the footprint
+# Grids and replanners kept for repair: two margins of the disc for each of two bounds, and up to four of the footprint.
+KEPT = 8
 
 
 class _Kept(NamedTuple):
@@ -259,7 +261,7 @@ class OneRoute(RouteGuide):
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
         """Check an external plan on the grid of `first`."""
-        if plan.status is PlanStatus.INVALID:
+        if not plan.solved:
             return grid, plan
         return grid, self._drivable(grid, self._routes.checked(self._routes.query(grid, self._routes.task), plan))
 
@@ -317,9 +319,12 @@ def grid_of(world: Keyed[World], cell: float, inflate: float) -> Grid:
 def by_contents(grid: Grid, task: Task) -> Keyed[tuple[Grid, Task]]:
     """Return a grid and a task as a cache key over their bits: cells, numbers, walls and static cylinders."""
     numbers = bits(grid.cell, *grid.origin, grid.inflate, *task.start, *task.goal, task.goal_tolerance)
-    turns = grid.turns.label.tobytes(), grid.turns.outline.corners.tobytes(), grid.turns.outline.reach
-    cells = grid.shape, grid.free.tobytes(), grid.moves.tobytes(), turns
-    return Keyed((grid, task), (numbers, cells, by_geometry(task.world)))
+    turns = grid.turns
+    arrays = grid.free, grid.moves, turns.label, turns.moves, turns.joints, turns.outline.corners
+    sha = hashlib.sha256()  # the arrays of a large grid take 16 MB
+    for array in arrays:
+        sha.update(np.ascontiguousarray(array).data)
+    return Keyed((grid, task), (numbers, grid.shape, sha.digest(), turns.outline.reach, by_geometry(task.world)))
 
 
 def bounds_of(grid: Grid) -> Bounds:
