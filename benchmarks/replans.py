@@ -9,6 +9,7 @@ in turn; *ratio* is its time for all replans over that of this checkout, the med
 - search: change of the replanner, plan and check
 - smooth: smoothing
 - prepare: preparation for the controller
+- rest: everything else, with the choice of obstacles beside the route
 - changed: cells that differ from the replan before, the median share
 """
 
@@ -120,7 +121,8 @@ def driven(checkout: Path, size: int, planner: str) -> list[dict[str, float]]:
     done = subprocess.run(
         command, env=os.environ | {"PYTHONPATH": str(folder.resolve())}, capture_output=True, text=True, check=True
     )
-    return json.loads(done.stdout)
+    replans: list[dict[str, float]] = json.loads(done.stdout)
+    return replans
 
 
 def rows(given: argparse.Namespace) -> Iterator[list[str]]:
@@ -139,6 +141,7 @@ def rows(given: argparse.Namespace) -> Iterator[list[str]]:
 
 
 def total(replans: list[dict[str, float]]) -> float:
+    """Return the time of replans [ms]."""
     return sum(sum(row[name] for name in (*NAMES, "rest")) for row in replans)
 
 
