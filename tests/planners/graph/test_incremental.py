@@ -222,6 +222,27 @@ def test_a_local_change_takes_a_fraction_of_the_work(planner):
 
 
 @BOTH
+def test_named_changes_give_the_same_plans_as_comparing_grids(planner):
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        free = rng.random((30, 40)) < 0.8
+        free[[1, -2], [1, -2]] = True
+        query = Query(Grid.from_free(free), (1, 1), (28, 38))
+        one, other = (planner.replanner(query, RNG) for _ in range(2))
+        for _ in range(5):
+            one.result(), other.result()
+            grid = Grid.from_free(free ^ (rng.random(free.shape) < 0.02))
+            before = one.query.grid
+            cells = np.flatnonzero((grid.free != before.free) | (grid.moves != before.moves))
+            assert one.change(grid, cells) == other.change(grid)
+            np.testing.assert_array_equal(one.query.grid.free, grid.free)
+            np.testing.assert_array_equal(one.query.grid.moves, grid.moves)
+            a, b = one.result(), other.result()
+            np.testing.assert_array_equal(a.cells, b.cells)
+            assert (a.cost, a.work) == (b.cost, b.work)
+
+
+@BOTH
 def test_misuse_is_refused_and_changes_nothing(planner):
     replanner = planner.replanner(open_ground(), RNG)
     with pytest.raises(ValueError, match=r"^cells: \(3, 12\) is outside the grid of 12 rows and 12 columns"):

@@ -14,12 +14,13 @@ from antdrive.planners import PlanResult, PlanStatus
 from antdrive.robots import PursuitState, Twist
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
-from antdrive.sim.driving._kernels_hits import beside, hit_within, point_at
+from antdrive.sim.driving._kernels_hits import beside, hit_within, near_polyline, point_at
 from antdrive.sim.driving.drive import Driver
 from antdrive.sim.driving.exploring import TURNABLE
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of
+from antdrive.sim.driving.routes import RoutePlanner, bounds_of
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
@@ -28,8 +29,9 @@ from antdrive.sim.policy import SCANNED
 from antdrive.sim.rebuild import rebuilt
 from antdrive.sim.sensing import Scanner
 from antdrive.views.map_reconstruction import MapReconstruction
-from antdrive.worlds import Cruising, Disc, Route, Task, World, generate, load_task
+from antdrive.worlds import Cruising, Disc, Route, Task, World, generate, load_task, rasterise
 from tests.records import changed
+from tests.worlds.oracles import segment_distances
 
 POSTS = tuple(Disc(3.0, 0.15 * k, 0.075) for k in range(14))  # a row that leaves a gap at the top
 ROOM = World("room", (0.0, 0.0, 6.0, 4.0), POSTS)
@@ -55,6 +57,49 @@ def test_the_robot_finds_the_gap_and_touches_nothing(drive, log):
     assert drive.succeeded, (drive.outcome, drive.reason, drive.certificate)
     assert log.pose[:, 1].max() > 2.3  # where the gap is
     assert log.record.sensing.map == "none"
+
+
+@pytest.mark.parametrize("planner", ["astar", "dstar-lite"])
+def test_replans_see_the_grid_of_the_whole_map(jackal, planner, monkeypatch):
+    """Updated grids equal rasterised ones."""
+    compared = []
+
+    def observed(routes, world, margin):
+        grid = inner(routes, world, margin)
+        whole = rasterise(world, routes.cell, routes.robot.radius + margin)
+        compared.append(np.array_equal(grid.free, whole.free) and np.array_equal(grid.moves, whole.moves))
+        return grid
+
+    inner = RoutePlanner.observed
+    monkeypatch.setattr(RoutePlanner, "observed", observed)
+    seen = run(scenario(jackal, planner=planner, noise=0.0, localisation="true"))
+    assert seen.succeeded
+    assert len(compared) >= 2
+    assert all(compared)
+
+
+def test_the_first_grid_does_not_follow_the_map(jackal):
+    guide = compose(scenario(jackal)).guide
+    grid, _ = guide.first()
+    free, moves = grid.free.copy(), grid.moves.copy()
+    guide._routes.observed(World("more", bounds_of(grid), (Disc(2.0, 2.0, 0.5),)), grid.inflate - jackal.radius)
+    guide.plan(TASK.start)
+    np.testing.assert_array_equal(grid.free, free)
+    np.testing.assert_array_equal(grid.moves, moves)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 200), st.floats(0.0, 1.0))
+def test_discs_near_a_polyline_are_those_by_force(seed, points, distance):
+    rng = np.random.default_rng(seed)
+    line = np.cumsum(rng.normal(0, 0.5, (points, 2)), axis=0)
+    discs = np.column_stack([rng.uniform(line.min() - 2, line.max() + 2, (60, 2)), rng.uniform(0.01, 0.5, 60)])
+    apart = segment_distances(discs[:, :2], line[:-1], line[1:]).min(axis=0) - discs[:, 2] - distance
+    found = near_polyline(line, discs, distance)
+    kept = (discs[:, None] == found[None]).all(axis=2).any(axis=1)
+    sure = np.abs(apart) > 1e-9
+    np.testing.assert_array_equal(kept[sure], apart[sure] < 0)
+    np.testing.assert_array_equal(discs[kept], found)
 
 
 def test_the_log_holds_scans_and_what_was_seen(log, tmp_path):

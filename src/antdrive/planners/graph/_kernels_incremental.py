@@ -217,6 +217,22 @@ def adopt(moves: Array, new: Array, relabelled: Array, changed: Array) -> int:
 
 
 @kernel
+def adopt_cells(free: Array, moves: Array, new_free: Array, new_moves: Array, cells: Array, changed: Array) -> int:
+    """Replace some cells, free or not, and their moves by new ones, and list in `changed` those whose moves differ.
+
+    Return their number. The grids are flat.
+    """
+    count = 0
+    for i in cells:
+        free[i] = new_free[i]
+        if moves[i] != new_moves[i]:
+            moves[i] = new_moves[i]
+            changed[count] = i
+            count += 1
+    return count
+
+
+@kernel
 def nodes_of_cells(cell: Array, cells: int) -> Array:
     """Return the nodes of each cell in order of their numbers (cells, 8), -1 after the last; `cell` is that of each node."""
     own = np.full((cells, 8), NOWHERE, dtype=np.int32)

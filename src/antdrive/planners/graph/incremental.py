@@ -70,9 +70,10 @@ class Replanner(Protocol):
         """
         ...
 
-    def change(self, grid: Grid) -> int:
+    def change(self, grid: Grid, cells: npt.NDArray[np.int64] | None = None) -> int:
         """Replace the grid with another of the same shape, with turns exactly if the first has.
 
+        Only the flat `cells` (K,), in ascending order, may differ from the grid before, themselves or their moves; None: all.
         Returns the number of cells whose moves changed.
         """
         ...
@@ -136,17 +137,22 @@ class CachedReplanner(abc.ABC):
         """
         return self._mark(cells, True)
 
-    def change(self, grid: Grid) -> int:
+    def change(self, grid: Grid, cells: npt.NDArray[np.int64] | None = None) -> int:
         """Replace the grid with another of the same shape, with turns exactly if the first has.
 
-        Returns the number of cells whose moves changed. With turns, the robot's node becomes the label of its last heading.
+        Only the flat `cells` (K,), in ascending order, may differ from the grid before, themselves or their moves; None: all.
+        With turns all cells are compared, and the robot's node becomes the label of its last heading.
+        Returns the number of cells whose moves changed.
         """
         if grid.shape != self._query.grid.shape:
             raise FieldError("grid", f"must have the shape {self._query.grid.shape}, got {grid.shape}")
         if bool(grid.turns) != bool(self._query.grid.turns):
             raise FieldError("grid", "must have turns exactly if the first grid has")
-        self._free[:] = grid.free
         self._closed = None
+        if cells is not None and not grid.turns:
+            grids = self._free.ravel(), self._moves.ravel(), grid.free.ravel(), grid.moves.ravel()
+            return self._record(int(self._common.adopt_cells(*grids, cells, self._edited)))
+        self._free[:] = grid.free
         relabelled = np.empty(len(self._label), dtype=np.bool_)
         if grid.turns:
             self._label = self._label.copy()

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from antdrive.worlds._kernels import ROUNDING, Array, kernel
+from antdrive.worlds._kernels import ROUNDING, Array, inline, kernel
 
 BLOCK = 8  # points of a route that share one rectangle
 
@@ -17,36 +17,54 @@ def near_polyline(xy: Array, discs: Array, distance: float) -> Array:
     out = np.empty_like(discs)
     count = 0
     links = xy.shape[0] - 1
-    blocks = np.empty(((links + BLOCK - 1) // BLOCK, 4))  # rectangles around BLOCK links each
-    for b in range(blocks.shape[0]):
-        some = xy[BLOCK * b : min(BLOCK * (b + 1), links) + 1]
-        blocks[b, 0], blocks[b, 1] = some[:, 0].min() - ROUNDING, some[:, 0].max() + ROUNDING
-        blocks[b, 2], blocks[b, 3] = some[:, 1].min() - ROUNDING, some[:, 1].max() + ROUNDING
+    blocks = around_links(xy, BLOCK)
+    groups = around_links(xy, BLOCK * BLOCK)
     for j in range(discs.shape[0]):
-        reach = distance + discs[j, 2]
+        x, y, reach = discs[j, 0], discs[j, 1], distance + discs[j, 2]
         near = False
-        for b in range(blocks.shape[0]):
-            if discs[j, 0] < blocks[b, 0] - reach or discs[j, 0] > blocks[b, 1] + reach:
+        for g in range(groups.shape[0]):
+            if beyond(x, y, reach, groups[g]):
                 continue
-            if discs[j, 1] < blocks[b, 2] - reach or discs[j, 1] > blocks[b, 3] + reach:
-                continue
-            for i in range(BLOCK * b, min(BLOCK * (b + 1), links)):
-                ax, ay = xy[i, 0], xy[i, 1]
-                dx, dy = xy[i + 1, 0] - ax, xy[i + 1, 1] - ay
-                px, py = discs[j, 0] - ax, discs[j, 1] - ay
-                if max(abs(px), abs(py)) > reach + abs(dx) + abs(dy):
+            for b in range(BLOCK * g, min(BLOCK * (g + 1), blocks.shape[0])):
+                if beyond(x, y, reach, blocks[b]):
                     continue
-                length2 = dx * dx + dy * dy
-                t = min(1.0, max(0.0, (px * dx + py * dy) / length2)) if length2 > 0.0 else 0.0
-                ex, ey = px - t * dx, py - t * dy
-                if ex * ex + ey * ey <= reach * reach:
-                    near = True
+                for i in range(BLOCK * b, min(BLOCK * (b + 1), links)):
+                    ax, ay = xy[i, 0], xy[i, 1]
+                    dx, dy = xy[i + 1, 0] - ax, xy[i + 1, 1] - ay
+                    px, py = x - ax, y - ay
+                    if max(abs(px), abs(py)) > reach + abs(dx) + abs(dy):
+                        continue
+                    length2 = dx * dx + dy * dy
+                    t = min(1.0, max(0.0, (px * dx + py * dy) / length2)) if length2 > 0.0 else 0.0
+                    ex, ey = px - t * dx, py - t * dy
+                    if ex * ex + ey * ey <= reach * reach:
+                        near = True
+                        break
+                if near:
                     break
             if near:
                 out[count] = discs[j]
                 count += 1
                 break
     return out[:count].copy()
+
+
+@kernel
+def around_links(xy: Array, size: int) -> Array:
+    """Return rectangles around each `size` consecutive links of a polyline: x_min, x_max, y_min, y_max (B, 4)."""
+    links = xy.shape[0] - 1
+    out = np.empty(((links + size - 1) // size, 4))
+    for b in range(out.shape[0]):
+        some = xy[size * b : min(size * (b + 1), links) + 1]
+        out[b, 0], out[b, 1] = some[:, 0].min() - ROUNDING, some[:, 0].max() + ROUNDING
+        out[b, 2], out[b, 3] = some[:, 1].min() - ROUNDING, some[:, 1].max() + ROUNDING
+    return out
+
+
+@inline
+def beyond(x: float, y: float, reach: float, box: Array) -> bool:
+    """Return whether a rectangle x_min, x_max, y_min, y_max is farther from a point than a reach, in x or in y."""
+    return bool(x < box[0] - reach or x > box[1] + reach or y < box[2] - reach or y > box[3] + reach)
 
 
 @kernel

@@ -116,9 +116,9 @@ class Exploration(RouteGuide):
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start on the map of the first scan. Later plans do not depend on it."""
-        first = self.plan(self._task.start)
+        grid, plan = self.plan(self._task.start)
         self._routes.restart()
-        return first
+        return dataclasses.replace(grid, free=grid.free.copy(), moves=grid.moves.copy()), plan
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
         """Check an external plan on the grid of `first`, which has the obstacles of the first scan."""
@@ -173,9 +173,10 @@ class Exploration(RouteGuide):
 
     def _grid(self, task: Task, margin: float, *, outlined: bool = False) -> Grid:
         """Return the grid for the disc or for the footprint."""
-        robot, cell = self._robot, self._routes.cell
-        outline = [outline_of(robot.footprint, margin)] if outlined else []
-        return rasterise(task.world, cell, robot.radius + margin, *outline)
+        if not outlined:
+            return self._routes.observed(task.world, margin)
+        robot = self._robot
+        return rasterise(task.world, self._routes.cell, robot.radius + margin, outline_of(robot.footprint, margin))
 
     def _plan_around(self, tick: int, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""

@@ -8,7 +8,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +39,7 @@ from antdrive.sim.driving.rules import Schedule
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.reasons import no_path_reason
 from antdrive.worlds import Disc, Grid, MoverMotion, Route, Task, World, rasterise
+from antdrive.worlds.raster import Raster
 from antdrive.worlds.world import by_geometry
 
 if TYPE_CHECKING:
@@ -48,7 +49,21 @@ if TYPE_CHECKING:
 
 LONGER = 1.1  # the disc's way may be this much longer than the footprint's
 FINE = 0.05  # largest cell of plans for a footprint [m]
-KEPT = 8  # replanners kept for repair: two margins of the disc for each of two bounds, and up to four of the footprint
+# Grids and replanners kept for repair: two margins of the disc for each of two bounds, and up to four of the footprint.
+KEPT = 8
+
+
+class _Kept(NamedTuple):
+    """A replanner with what it was told last."""
+
+    replanner: Replanner
+    goal: Cell
+    closed: npt.NDArray[np.int64]  # flat cells (K,), in ascending order
+    grid: Grid
+    updates: int  # of the raster of the grid
+
+
+NO_CELLS = np.empty(0, dtype=np.int64)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -80,12 +95,13 @@ class RoutePlanner:
     def __post_init__(self) -> None:
         self.plan_error = ""
         self.footprint_margin: float | None = None
+        self._rasters: dict[tuple[Bounds, float], Raster] = {}
         self.restart()
 
     def restart(self) -> None:
         """Discard all replanners, and restart the random stream of replans."""
         self.rng = random_stream(self.seed, "replanner")
-        self._kept: dict[tuple[float, float, bool, Bounds], tuple[Replanner, Cell, npt.NDArray[np.bool_]]] = {}
+        self._kept: dict[tuple[float, float, bool, Bounds], _Kept] = {}
 
     @property
     def inflate(self) -> float:
@@ -167,7 +183,7 @@ class RoutePlanner:
             return unreachable
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
             return self.plan(query, self.rng)
-        closed = closed_cells(query, discs, zone) if moving else np.zeros_like(grid.free)
+        closed = np.flatnonzero(closed_cells(query, discs, zone)) if moving else NO_CELLS
         with planner_errors(self.planner):
             # Without a map, movers change so many cells that repair is no faster than a new search.
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
@@ -181,22 +197,40 @@ class RoutePlanner:
         grid = outlined_grid_of(world, min(self.cell, FINE), self.robot.footprint, margin)
         return self.plan(Query.between(grid, task), self.rng), grid
 
-    def _replanner(self, query: Query, closed: npt.NDArray[np.bool_], *, kept: bool) -> Replanner:
-        """Return a replanner with the closed cells, kept per grid or new."""
-        key = query.grid.cell, query.grid.inflate, bool(query.grid.turns), bounds_of(query.grid)
-        replanner, goal, before = self._kept.get(key, (None, None, closed)) if kept else (None, None, closed)
-        if replanner is None or goal != query.goal:
-            replanner, before = replanner_for(self.planner, query, self.rng), np.zeros_like(closed)
-            if kept and len(self._kept) >= KEPT:  # bounds change with a robot that leaves them
+    def observed(self, world: World, margin: float) -> Grid:
+        """Return the grid of a map's discs for the disc, updated where they changed; valid until the next call."""
+        key = world.bounds, self.robot.radius + margin
+        if key not in self._rasters:
+            if len(self._rasters) >= KEPT:  # bounds change with a robot that leaves them
+                del self._rasters[next(iter(self._rasters))]
+            self._rasters[key] = Raster(world.bounds, self.cell, key[1])
+        self._rasters[key].update(world.discs)
+        return self._rasters[key].grid
+
+    def _replanner(self, query: Query, closed: npt.NDArray[np.int64], *, kept: bool) -> Replanner:
+        """Return a replanner with the closed flat cells, kept per grid or new."""
+        grid = query.grid
+        key = grid.cell, grid.inflate, bool(grid.turns), bounds_of(grid)
+        raster = next((raster for raster in self._rasters.values() if raster.grid is grid), None)
+        last = self._kept.get(key) if kept else None
+        if last is None or last.goal != query.goal:
+            replanner, before = replanner_for(self.planner, query, self.rng), NO_CELLS
+            if kept and len(self._kept) >= KEPT:
                 del self._kept[next(iter(self._kept))]
-        elif not self.mapped:
-            replanner.change(query.grid)
-        for tell, cells in ((replanner.clear, before & ~closed), (replanner.block, closed & ~before)):
-            if cells.any():
-                tell(np.argwhere(cells))
+        else:
+            replanner, before = last.replanner, last.closed
+            if not self.mapped:
+                known = raster is not None and last.grid is grid
+                replanner.change(grid, raster.changed_since(last.updates) if raster is not None and known else None)
+        for tell, cells in (
+            (replanner.clear, np.setdiff1d(before, closed)),
+            (replanner.block, np.setdiff1d(closed, before)),
+        ):
+            if len(cells):
+                tell(np.column_stack(np.divmod(cells, grid.shape[1])))
         replanner.move(query.start, *query.start_headings[:1])
         if kept:
-            self._kept[key] = replanner, query.goal, closed
+            self._kept[key] = _Kept(replanner, query.goal, closed, grid, raster.updates if raster is not None else 0)
         return replanner
 
     def prepared(self, route: Route, world: World, margin: float, *options: Any, **settings: Any) -> TrackedPath:
