@@ -2,7 +2,8 @@
 
 `--against PATH` runs the same drives in another checkout, in a separate process, alternating world by world. The table shows
 medians and the median ratio within a pair; every pair of drives must agree bit for bit. Drives are timed in processor time,
-films in wall-clock time and in processor time without the encoder. Ratios compare processor times.
+films in wall-clock time and in processor time without the encoder. Ratios compare processor times. The limit of a drive is
+bare physics: its steps and commands alone, after each drive.
 
 - first: a world that is new to the process, read from its YAML file
 - again: the same file with the next seed, in the same process
@@ -15,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import dataclasses
 import json
 import os
 import statistics
@@ -51,33 +51,33 @@ def drive(path: str, seed: int) -> dict[str, Any]:
     done = run(Scenario.of(path, PLANNER, ROBOT, seed=seed))
     cost = time.process_time() - started
     assert done.rollout is not None
-    return {"cost": cost, "certified": done.succeeded, "digest": done.rollout.drive_digest}
+    answer = {"cost": cost, "certified": done.succeeded, "digest": done.rollout.drive_digest}
+    return {**answer, "bare": bare_physics(done.rollout)}
+
+
+def bare_physics(log: Any) -> float:
+    """Return the processor time of a drive's physics steps alone, with its commands [s]."""
+    from antdrive.sim.physics.bullet import bullet
+    from antdrive.sim.physics.engine import Engine
+
+    p, record = bullet(), log.record
+    per_period = record.physics_hz // record.control_hz
+    with Engine(record.world, record.robot, physics_hz=record.physics_hz) as engine:
+        engine.place(record.task.start)
+        started = time.process_time()
+        for command in log.command[1::per_period].tolist():
+            engine.command(*command)
+            for _ in range(per_period):
+                p.stepSimulation(engine._client)
+        return time.process_time() - started
 
 
 def film_rate(movers: int, size: tuple[int, int], seconds: float) -> dict[str, Any]:
     """Film a drive through a hall with movers. Return the frames per second."""
-    import numpy as np
-
-    from antdrive.sim import Scenario, run
     from antdrive.views.film.video import film
-    from antdrive.worlds import Cruising, Task, World
+    from benchmarks.film import cut, hall_drive
 
-    rng, found = np.random.default_rng(1), list[Any]()
-    while len(found) < movers:
-        x, y = rng.uniform(0.5, 19.5, 2).tolist()
-        angle, speed = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 0.7)
-        if abs(y - 10) > 2:
-            found.append(
-                Cruising(
-                    radius=0.3, position=(x, y), velocity=(speed * float(np.cos(angle)), speed * float(np.sin(angle)))
-                )
-            )
-    task = Task(World("hall", (0, 0, 20, 20), movers=tuple(found)), (1, 10, 0), (19, 10))
-    log = run(Scenario.of(task, "astar", avoidance=None, replanning=None)).rollout
-    assert log is not None
-    rows = np.arange(round(seconds * 240) + 1) % len(log.t)
-    arrays = {name: getattr(log, name)[rows] for name in ("pose", "twist", "command", "clearance", "limiter", "movers")}
-    part = dataclasses.replace(log, t=np.arange(len(rows)) / 240, contacts=np.empty((0, 4)), **arrays)
+    part = cut(hall_drive(movers), seconds)
     with tempfile.TemporaryDirectory() as folder:
         started = time.process_time()
         info = film(part, Path(folder) / "a.mp4", size=size, jobs=1)
@@ -94,11 +94,12 @@ def serve() -> None:
 
 
 class Checkout:
-    """A process that runs the antdrive of a checkout."""
+    """A process that serves requests by this script and antdrive of a checkout."""
 
     def __init__(self, root: Path, python: str) -> None:
-        environment = {**os.environ, "PYTHONPATH": str(root), "OPENBLAS_NUM_THREADS": "1"}
-        command = [python, str(Path(__file__).resolve()), "--serve"]
+        path = f"{root / 'src'}{os.pathsep}{root}"
+        environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+        command = [python, str(root / "benchmarks" / "cost.py"), "--serve"]
         self._process = subprocess.Popen(
             command, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
@@ -124,6 +125,7 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
     for checkout in checkouts.values():  # loads kernels, with a world outside the table
         checkout.ask("drive", "slalom", 0)
     costs: dict[tuple[str, str], list[float]] = {}
+    bare: dict[str, list[float]] = {}
     certified = 0
     for k, world in enumerate(worlds):
         for kind, seed in (("first", 0), ("again", 1)):
@@ -132,19 +134,22 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
             found = {name: checkouts[name].ask("drive", str(world), seed) for name in order}
             assert len({answer["digest"] for answer in found.values()}) == 1, f"{world}: the drives differ"
             certified += all(answer["certified"] for answer in found.values())
+            bare.setdefault(kind, []).append(found["here"]["bare"])
             for name, answer in found.items():
                 costs.setdefault((kind, name), []).append(answer["cost"])
     yield f"{len(worlds)} worlds, {PLANNER} with {ROBOT}; {certified} of {2 * len(worlds)} drives certified; all pairs alike"
-    yield "| drive | " + " | ".join(f"{name} [ms] | {name} [drives/s]" for name in checkouts) + " | ratio |"
-    yield "|---|" + "---|" * (2 * len(checkouts) + 1)
+    columns = " | ".join(f"{name} [ms] | {name} [drives/s] | {name} / bare" for name in checkouts)
+    yield f"| drive | {columns} | bare [drives/s] | ratio |"
+    yield "|---|" + "---|" * (3 * len(checkouts) + 2)
     reference = list(checkouts)[-1]
     for kind in ("first", "again"):
         cells = [
-            f"{1e3 * statistics.median(costs[kind, name]):.0f} | {len(worlds) / sum(costs[kind, name]):.1f}"
+            f"{1e3 * statistics.median(costs[kind, name]):.0f} | {len(worlds) / sum(costs[kind, name]):.1f} | "
+            f"{sum(costs[kind, name]) / sum(bare[kind]):.2f}"
             for name in checkouts
         ]
         ratio = statistics.median(b / a for a, b in zip(costs[kind, "here"], costs[kind, reference], strict=True))
-        yield f"| {kind} | {' | '.join(cells)} | {ratio:.2f} |"
+        yield f"| {kind} | {' | '.join(cells)} | {len(worlds) / sum(bare[kind]):.1f} | {ratio:.2f} |"
 
 
 def films_table(checkouts: dict[str, Checkout], seconds: float, rounds: int) -> Iterator[str]:

@@ -1,13 +1,17 @@
 """Frame rate of rendering and encoding films: `python -m benchmarks.film`.
 
+`--parts` measures films in new processes with start-up, and start-up, painter and encoder alone;
 `--memory` measures the peak memory of films of ten seconds and of five minutes, each in its own process;
 `--sight` measures the cost of showing the occupancy map of a mapless robot.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import os
 import resource
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -20,23 +24,105 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.film.shot import Shot
-from antdrive.views.film.video import film, process_count
-from benchmarks.markdown import command_line
+from antdrive.views.film.video import encoding, film, frame_times, process_count
+from antdrive.worlds import Cruising, Task, World
+from benchmarks.markdown import command_line, print_table
 
-SMALLEST = ("--rounds 1 --seconds 0.2 --frames 2", "--sight --rounds 1 --frames 2", "--memory --seconds 0.2")
+SMALLEST = (
+    "--rounds 1 --seconds 0.2 --frames 2",
+    "--parts --rounds 1 --seconds 0.2",
+    "--sight --rounds 1 --frames 2",
+    "--memory --seconds 0.2",
+)
 SIZES = ((640, 480), (1280, 720))
+PARTS = ((0, SIZES[0]), (6, SIZES[0]), (0, SIZES[1]))  # movers and size of each film
 
 
 def cut(rollout: Rollout, seconds: float) -> Rollout:
     """Return the first `seconds` of a run, repeating a shorter run."""
-    import dataclasses
-
     step = float(rollout.t[1] - rollout.t[0])
     rows = np.arange(round(seconds / step) + 1) % len(rollout.t)
     arrays = {
         name: getattr(rollout, name)[rows] for name in ("pose", "twist", "command", "clearance", "limiter", "movers")
     }
     return dataclasses.replace(rollout, t=np.arange(len(rows)) * step, contacts=np.empty((0, 4)), **arrays)
+
+
+def hall_drive(movers: int) -> Rollout:
+    """Return a drive through a hall of 20 m with movers beside the route."""
+    rng, found = np.random.default_rng(1), list[Cruising]()
+    while len(found) < movers:
+        x, y = rng.uniform(0.5, 19.5, 2).tolist()
+        angle, speed = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 0.7)
+        velocity = (speed * float(np.cos(angle)), speed * float(np.sin(angle)))
+        if abs(y - 10) > 2:
+            found.append(Cruising(radius=0.3, position=(x, y), velocity=velocity))
+    task = Task(World("hall", (0, 0, 20, 20), movers=tuple(found)), (1, 10, 0), (19, 10))
+    log = run(Scenario.of(task, "astar", avoidance=None, replanning=None)).rollout
+    assert log is not None
+    return log
+
+
+def parts(rounds: int, seconds: float) -> None:
+    """Print the rates of films, each in a new process, and the costs of their parts."""
+    found: dict[int, list[dict[str, float]]] = {k: [] for k in range(len(PARTS))}
+    with tempfile.TemporaryDirectory() as folder:
+        logs = [cut(hall_drive(movers), seconds).save(Path(folder) / f"{movers}.npz") for movers, _ in PARTS]
+        for _ in range(rounds):
+            for k, (_, size) in enumerate(PARTS):
+                code = f"from benchmarks.film import part; part({str(logs[k])!r}, {size})"
+                done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+                found[k].append(json.loads(done.stdout))
+    print(f"{seconds:g} s of film in the hall, camera oblique; median of {rounds}; CPU: processor time")
+    heads = "movers | size | film [frames/s] | start-up [s] | CPU [s] | "
+    heads += "painter [frames/s] | CPU [ms] | encoder [frames/s] | CPU [ms]"
+    names = {"film": ".0f", "start": ".2f", "start_cpu": ".2f"}
+    names |= {"painter": ".0f", "painter_cpu": ".2f", "encoder": ".0f", "encoder_cpu": ".2f"}
+    print_table(
+        heads,
+        (
+            [str(movers), f"{size[0]}×{size[1]}"]
+            + [format(statistics.median(one[name] for one in found[k]), style) for name, style in names.items()]
+            for k, (movers, size) in enumerate(PARTS)
+        ),
+    )
+
+
+def part(log: str, size: tuple[int, int]) -> None:
+    """Print the rate of a film in this new process, and the costs of start-up, painter and encoder, as JSON."""
+
+    def clocks() -> tuple[float, float, float]:
+        times = os.times()
+        return time.perf_counter(), time.process_time(), times.children_user + times.children_system
+
+    rollout, first = Rollout.load(log), list[tuple[float, float, float]]()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.mp4"
+        started = clocks()
+        info = film(rollout, path, size=size, jobs=1, progress=lambda _: first.append(clocks()) if not first else None)
+        shot, again = Shot(rollout, size=size), Shot(rollout, size=size)
+        times = frame_times(shot.playback.duration, info.fps, 1.0)
+        before_painter = clocks()
+        for at in times:
+            shot.frame(at)
+        after_painter = clocks()
+        frames = [again.frame(at) for at in times]
+        before_encoder = clocks()
+        with encoding(path, size, info.fps) as send:
+            for frame in frames:
+                send(frame)
+        end = clocks()
+    count = len(frames)
+    found = {
+        "film": info.frames / info.wall_s,
+        "start": first[0][0] - started[0],
+        "start_cpu": first[0][1] - started[1],
+    }
+    found |= {"painter": count / (after_painter[0] - before_painter[0])}
+    found |= {"painter_cpu": 1e3 * (after_painter[1] - before_painter[1]) / count}
+    found |= {"encoder": count / (end[0] - before_encoder[0])}
+    found |= {"encoder_cpu": 1e3 * sum(end[k] - before_encoder[k] for k in (1, 2)) / count}
+    print(json.dumps(found))
 
 
 def speed(rollout: Rollout, rounds: int, seconds: float) -> None:
@@ -80,8 +166,6 @@ def peak(path: str, camera: str, seconds: float) -> None:
 
 def sight(rounds: int, frames: int) -> None:
     """Print the processor time per frame of a mapless drive, with and without its occupancy map."""
-    import dataclasses
-
     log = run(Scenario.of("forest", "astar", "jackal", map="none", localisation="matching", noise=1.0, seed=1)).rollout
     assert log is not None
     plain = dataclasses.replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
@@ -102,6 +186,7 @@ def sight(rounds: int, frames: int) -> None:
 def main() -> None:
     given = command_line(
         __doc__,
+        parts=(False, "measure films with start-up, and their parts, instead"),
         memory=(False, "measure peak memory instead of the rate"),
         sight=(False, "measure frames that show what the robot has seen instead"),
         rounds=(3, "of each film"),
@@ -110,6 +195,9 @@ def main() -> None:
     )
     if given.sight:
         sight(given.rounds, given.frames)
+        return
+    if given.parts:
+        parts(given.rounds, given.seconds)
         return
     log = run(Scenario.of("forest")).rollout
     assert log is not None

@@ -1,16 +1,21 @@
 """Cost of the drive loop relative to bare physics: `make bench`.
 
-The same world, robot and commands are stepped twice in turn: by the whole loop (control, contacts,
-clearance, log) and by `stepSimulation` alone. The table shows the median over all rounds of the ratio
-within a round.
+The same world, robot and commands are stepped three times in turn: by the whole loop (control, contacts,
+clearance, log), by `stepSimulation` alone, and with the contacts, pose and velocity that the log has of each step. The last is
+the limit: PyBullet has no call that returns more than one of them. The table shows processor time, and the median over all
+rounds of the ratio within a round.
 
-A second table compares the loop among 24 movers that the robot avoids with the loop in the same hall without movers.
+A second table compares the loop among 24 movers that the robot avoids with the loop in the same hall without movers. Its limit
+is the loop among movers that the robot does not see. `--against PATH` then runs the benchmark of another checkout.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import statistics
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -21,12 +26,14 @@ from antdrive.sim.driving.drive import OnePath, follow
 from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.driving.rules import Avoid
 from antdrive.sim.physics.bullet import bullet
-from antdrive.sim.physics.engine import Engine
+from antdrive.sim.physics.engine import CHASSIS_AND_ANY, Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
 from benchmarks.markdown import command_line
 
 SMALLEST = ("--rounds 1",)
 MOVERS = 24
+#: Runs a checkout's benchmark in processor time; older ones use wall-clock time.
+OTHER = "import runpy, time; time.perf_counter = time.process_time; runpy.run_module('benchmarks.loop', run_name='__main__')"
 
 
 def task_among(count: int, size: tuple[float, float] = (20.0, 20.0), radius: float = 0.1) -> Task:
@@ -75,11 +82,11 @@ def table_of_movers(route: Route, rounds: int) -> None:
             ):
                 told = GroundTruth(motions, Perception(), 60)
                 avoid = Avoid(Avoidance(), told, OnePath(), task, robot, 60)
-                started = time.perf_counter()
+                started = time.process_time()
                 rules = [avoid] if name.endswith("avoided") else []
                 log = follow(engine, controller, tracked, task, limit=30, rules=rules)
                 if turn:
-                    costs.setdefault(name, []).append((time.perf_counter() - started) / (len(log.t) - 1) * 1e6)
+                    costs.setdefault(name, []).append((time.process_time() - started) / (len(log.t) - 1) * 1e6)
     print("\nloop                     us/step   / no movers")
     for name, values in costs.items():
         ratio = statistics.median(a / b for a, b in zip(values, costs["no movers"], strict=True))
@@ -87,10 +94,11 @@ def table_of_movers(route: Route, rounds: int) -> None:
 
 
 def main() -> None:
-    rounds = command_line(__doc__, rounds=(9, "of each measurement")).rounds
+    options = command_line(__doc__, rounds=(9, "of each measurement"), against=("", "root of another checkout"))
+    rounds = options.rounds
     robot, controller = load_robot("turtlebot"), PurePursuit()
     p = bullet()
-    print("discs   bare us/step   loop us/step   loop / bare   x real time   step / step among 10")
+    print("discs   bare us/step   loop us/step   loop / bare   limit / bare   x real time   step / step among 10")
     engines, stack = {}, contextlib.ExitStack()
     for count in (10, 100, 400):
         task = task_among(count)
@@ -99,34 +107,53 @@ def main() -> None:
         engines[count] = (stack.enter_context(Engine(task.world, robot)), task, tracked)
     bare: dict[int, list[float]] = {count: [] for count in engines}
     loop: dict[int, list[float]] = {count: [] for count in engines}
+    read: dict[int, list[float]] = {count: [] for count in engines}
     for turn in range(rounds + 1):
         for count, (engine, task, tracked) in engines.items():
-            started = time.perf_counter()
+            started = time.process_time()
             log = follow(engine, controller, tracked, task, limit=120)
-            middle = time.perf_counter()
+            middle = time.process_time()
             assert log.outcome.name == "SUCCEEDED", log.outcome
             commands = log.command[1::4].tolist()
             engine.place(task.start)
             steps, client = len(log.t) - 1, engine._client
-            before = time.perf_counter()
+            before = time.process_time()
             for command in commands:
                 engine.command(*command)
                 for _ in range(4):
                     p.stepSimulation(client)
-            ended = time.perf_counter()
+            ended = time.process_time()
+            engine.place(task.start)
+            reading = time.process_time()
+            for command in commands:
+                engine.command(*command)
+                for _ in range(4):
+                    p.stepSimulation(client)
+                    p.getContactPoints(engine._robot, *CHASSIS_AND_ANY, client)
+                    p.getBasePositionAndOrientation(engine._robot, client)
+                    p.getBaseVelocity(engine._robot, client)
+            was_read = time.process_time()
             if turn:  # the first round compiles and fills caches
                 loop[count].append((middle - started) / steps * 1e6)
                 bare[count].append((ended - before) / steps * 1e6)
+                read[count].append((was_read - reading) / steps * 1e6)
     for count in engines:
-        ratio = statistics.median(a / b for a, b in zip(loop[count], bare[count], strict=True))
+        ratio, limit = (
+            statistics.median(a / b for a, b in zip(some[count], bare[count], strict=True)) for some in (loop, read)
+        )
         growth = statistics.median(a / b for a, b in zip(bare[count], bare[10], strict=True))
         us = statistics.median(loop[count])
         print(
-            f"{count:5}   {statistics.median(bare[count]):12.1f}   {us:12.1f}   {ratio:11.2f}   {1e6 / 240 / us:11.0f}"
-            f"   {growth:20.2f}"
+            f"{count:5}   {statistics.median(bare[count]):12.1f}   {us:12.1f}   {ratio:11.2f}   {limit:12.2f}"
+            f"   {1e6 / 240 / us:11.0f}   {growth:20.2f}"
         )
     table_of_movers(route, rounds)
     stack.close()
+    if options.against:
+        root = os.path.abspath(options.against)
+        path = os.pathsep.join([os.path.join(root, "src"), root])
+        print(f"\n{root}", flush=True)
+        subprocess.run([sys.executable, "-c", OTHER], cwd=root, env={**os.environ, "PYTHONPATH": path}, check=False)
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ def test_a_bar_counts_the_kernels(monkeypatch, capsys):
         for name in ("astar", "smooth"):
             kernel_cache.on_compile(name)
         progress(0.5)
-    assert "driving, after compiling 2 kernels once" in capsys.readouterr().err
+    assert "driving (kernels compiled once: 2)" in capsys.readouterr().err
     assert kernel_cache.on_compile is outside
 
 

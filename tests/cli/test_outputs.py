@@ -161,7 +161,7 @@ def test_a_finished_drive_stays_without_space_for_its_views(refused, antdrive, s
 
 
 def test_an_encoder_that_dies_names_the_film(refused, small, monkeypatch):
-    monkeypatch.setitem(video.ENCODERS, ".mp4", ("-c:v", "nosuch"))
+    monkeypatch.setitem(video.ENCODERS, ".mp4", video.ENCODERS[".mp4"]._replace(options=("-c:v", "nosuch")))
     said = refused("run", small, "--no-figures", "-o", "r", "--film", "r/film.mp4")
     assert said.startswith("antdrive: r/film.mp4: cannot be written (ffmpeg failed to write the film (")
 

@@ -10,7 +10,7 @@ from antdrive.robots.default_margin import LEAST, RESERVE, STEP, default_margin,
 from antdrive.robots.spec import Noise
 from antdrive.runs.margins.choice import predicted_loss
 from antdrive.runs.margins.loss import loss_on_course
-from antdrive.sim import run
+from antdrive.sim import Scenario, run
 from antdrive.sim.log.margin import has_default
 from antdrive.sim.scenario import LossFactors
 from antdrive.sim.settings import SMOOTHINGS
@@ -95,3 +95,14 @@ def test_the_margin_of_lines_grows_with_noise_from_the_least(name):
     assert margins == sorted(margins)
     assert margins[0] == LEAST
     assert margins[1] < margins[3]
+
+
+@pytest.mark.parametrize(
+    ("settings", "line", "planned"),
+    [({}, True, True), ({"margin": 0.02}, False, True), ({"margin": 0.2}, False, True)],
+    ids=["default", "narrow", "wide"],
+)
+def test_a_margin_that_was_set_holds_for_the_footprint_too(settings, line, planned):
+    s = Scenario.of("gate", robot="warehouse", noise=1.0, **settings)
+    of_lines = line_margin(s.robot, s.controller, 1.0)
+    assert s.outline_margins == (of_lines,) * line + (s.planned_margin,) * planned

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import kernel_cache
 from antdrive.base.errors import InputError
 from antdrive.runs import pool
 from antdrive.runs.campaigns.campaign import make_campaign
@@ -198,3 +199,16 @@ def test_a_process_goes_on_with_its_world_then_takes_a_fresh_one_then_helps():
     waiting = queue(runs, 40)
     worlds = [waiting.chunk(world)[0].group for world in (None, "a", None, "b", "b")]
     assert worlds == ["a", "a", "b", "c", "a"]
+
+
+def compiling(number):
+    kernel_cache.on_compile(f"kernel {number}")
+    return number
+
+
+def test_kernels_that_workers_compile_are_reported_here(monkeypatch):
+    reported = []
+    monkeypatch.setattr(kernel_cache, "on_compile", reported.append)
+    with Pool(2) as pool:
+        assert sorted(pool.results(compiling, range(3))) == [0, 1, 2]
+    assert sorted(reported) == ["kernel 0", "kernel 1", "kernel 2"]

@@ -9,7 +9,7 @@ import pytest
 
 from antdrive.planners import AStar, GridPlanner, PlanResult, PlanStatus
 from antdrive.robots import Footprint
-from antdrive.sim import Outcome, Scenario, run
+from antdrive.sim import Outcome, Scenario, plan, run
 from antdrive.worlds import Disc, Task, World, load_task
 from tests.records import changed
 
@@ -65,7 +65,9 @@ def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_n
     )
     assert len(reason) < 350
     assert run(gate(robot, 0.95, cell=0.05)).succeeded, "the footprint passes"
-    narrow = run(gate(robot, 0.62, cell=0.05)).reason
+    tight = gate(robot, 0.62, cell=0.05)
+    narrow = run(tight).reason
+    assert run(tight, planned=plan(tight)).reason == narrow, "as whole as in `antdrive plan`"
     assert "on cells of 0.05 m, nor for its rectangle of 0.9 x 0.6 m; " in narrow
     assert narrow.endswith("; its rectangle of 0.9 x 0.6 m needs 0.66 m straight ahead, more than the 0.62 m there")
     exact = run(gate(robot, 0.62, cell=0.05, footprint="exact")).reason
@@ -144,3 +146,9 @@ def test_a_line_where_the_grid_has_no_path_is_driven_and_recorded(turtlebot, mar
     assert done.succeeded, done.reason
     assert done.rollout.record.plan.cost_m is None
     assert done.rollout.record.plan.length_m > 4.0 - 1e-9
+
+
+def test_a_planner_in_space_and_time_is_not_told_of_paths_that_ignore_movers(jackal):
+    robot = replace(jackal, name="cart", footprint=Footprint.rectangle(0.9, 0.6))
+    reason = run(Scenario.of("people-corridor", "sipp", robot, options={"horizon": 1.0})).reason
+    assert reason.endswith("no path past the movers reaches the goal within 1 s")

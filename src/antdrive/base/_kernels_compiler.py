@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import gc
 import hashlib
 import inspect
 import os
@@ -138,9 +139,22 @@ class _Compiler:
                 self._context.insert_user_function(found.entry_point, found.fndesc, [found.library])
                 return found
             kernel_cache.on_compile(self._name)
-            made = self._compiler.compile(args, return_type)
+            with _uncollected():
+                made = self._compiler.compile(args, return_type)
             self._cache.save_overload(args, made)
             return made
+
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """Pause the garbage collector: a compiler makes many objects that live until it ends."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 @contextlib.contextmanager

@@ -52,7 +52,7 @@ def _progress(
         def compiles(_: str) -> None:
             nonlocal kernels
             kernels += 1
-            rows.update(task, description=f"{label}, after compiling {kernels} kernels once")
+            rows.update(task, description=f"{label} (kernels compiled once: {kernels})")
 
         before, kernel_cache.on_compile = kernel_cache.on_compile, compiles
         try:

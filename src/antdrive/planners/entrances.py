@@ -52,9 +52,9 @@ def entrance(grid: Grid, task: Task, nearest: npt.NDArray[np.int32]) -> int:
     """Return the node by which the robot enters a grid with turns from its exact start; -1 if it cannot.
 
     A lead turns on the spot, drives straight to the centre of the node's cell, and turns to a heading of the node. The node
-    is the first with a clear lead from which moves lead to a goal, by way and turn.
-    Only where no lead forwards reaches such a node the
-    robot leaves backwards, by at most `MAX_BACKWARDS`. Where no such node is near, it is any node of the nearest free cell.
+    is the first, in the order of way and turn, with a clear lead from which moves lead to a goal. Only where no lead forwards
+    reaches such a node, the robot leaves backwards, by at most `MAX_BACKWARDS`. Where no such node is near, it is any node of
+    the nearest free cell.
 
     Args:
         grid: a grid with turns

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, NoReturn, TypeVar
 
-from antdrive.base import supervision
+from antdrive.base import kernel_cache, supervision
 from antdrive.base.errors import InputError
 
 Item = TypeVar("Item")
@@ -184,6 +184,13 @@ class _Raised:
 
 
 @dataclass(frozen=True)
+class _Compiles:
+    """A message that a worker compiles a kernel."""
+
+    kernel: str
+
+
+@dataclass(frozen=True)
 class _Fault:
     """A sentence about user code that ended a worker, from the worker's supervisor."""
 
@@ -242,6 +249,9 @@ class Pool:
                         continue
                     if isinstance(answer, _Fault):
                         worker.fault = answer.sentence
+                        continue
+                    if isinstance(answer, _Compiles):
+                        kernel_cache.on_compile(answer.kernel)
                         continue
                     if isinstance(answer, _Raised):
                         raise answer.error
@@ -402,7 +412,12 @@ def serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
             pipe.send_bytes(_packed(_Fault(sentence)))
         os._exit(1)
 
+    def compiles(kernel: str) -> None:
+        with contextlib.suppress(OSError):
+            pipe.send_bytes(_packed(_Compiles(kernel)))
+
     supervision.arm(report)
+    kernel_cache.on_compile = compiles
     with contextlib.suppress(EOFError, OSError):  # the parent closed the pipe, or died
         pipe.send(None)
         while True:

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from antdrive.planners import GridPlanner
 from antdrive.robots import LIMITERS, Avoidance
-from antdrive.robots.default_margin import line_margin
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.drive import full_turn, no_scan
 from antdrive.sim.driving.exploring import Exploration
@@ -112,7 +111,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
         robot=s.robot,
         controller=s.controller,
         margin=s.planned_margin,
-        outline_margins=(max(s.planned_margin, line_margin(s.robot, s.controller, s.noise)), s.planned_margin),
+        outline_margins=s.outline_margins,
         usual_margin=s.usual_margin,
         cell=s.planning_cell,
         smoothing=s.driven_smoothing,

@@ -28,7 +28,8 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
         disc = f"{_shape(robot)} with a margin of {grid.turns.outline.reach - robot.footprint.rounding:.3g} m"
     if reachable(Query.between(grid, s.task)):
         says = f": {said}" if said else ""
-        return f"{s.planner_label} found no path for {disc}{says}; astar finds one on these cells of {grid.cell:g} m"
+        finds = "" if s.motions else f"; astar finds one on these cells of {grid.cell:g} m"  # astar ignores motions
+        return f"{s.planner_label} found no path for {disc}{says}{finds}"
     start = f"no path for {disc} on cells of {grid.cell:g} m"
     if s.turns and not grid.turns:
         start += f", nor for {_shape(robot)}"

@@ -18,7 +18,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_position
 from antdrive.planners import Planner, capabilities_of
 from antdrive.robots import RobotSpec, overlap_at
-from antdrive.robots.default_margin import default_margin
+from antdrive.robots.default_margin import default_margin, line_margin
 from antdrive.sim.log.record import (
     DriveRecord,
     MarginRecord,
@@ -277,6 +277,18 @@ class Scenario(Settings):
         """Default margin for robot, controller, noise and smoothing [m]."""
         factors = self.loss_factors
         return default_margin(factors.robot, factors.controller, factors.noise, factors.smoothing)
+
+    @property
+    def outline_margins(self) -> tuple[float, ...]:
+        """Clearances of plans for the footprint, in turn until there is a path [m].
+
+        A margin that was set holds for them too. Before the default, and before one calibrated on drives of the disc, comes the
+        margin of lines.
+        """
+        margin, of_disc = self.planned_margin, self.chosen is not None and self.footprint == "auto"
+        if margin != self.usual_margin and not of_disc:
+            return (margin,)
+        return tuple(dict.fromkeys((max(margin, line_margin(self.robot, self.controller, self.noise)), margin)))
 
     @property
     def driven_world(self) -> World:

@@ -57,7 +57,7 @@ class Scene:
             record.robot,
             unseen=np.arange(len(world.obstacles)) >= len(world.obstacles) - len(record.unseen),
             inflate=record.inflate if record.footprint_margin is None else record.footprint_margin,
-            margin=record.margin if record.footprint_margin is None else record.footprint_margin,
+            margin=record.kept_margin,
             outlined=record.footprint_margin is not None,
             mapped=not record.exploring,
             mover_radii=tuple(mover.radius for mover in world.movers),

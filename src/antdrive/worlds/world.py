@@ -40,6 +40,13 @@ class Disc:
     height: Size = 1.0
 
     def __post_init__(self) -> None:
+        if (
+            math.isfinite(self.x)
+            and math.isfinite(self.y)
+            and 0 < self.radius < math.inf
+            and 0 < self.height < math.inf
+        ):
+            return
         for key in ("x", "y", "radius", "height"):
             require_finite(key, getattr(self, key))
         for key in ("radius", "height"):

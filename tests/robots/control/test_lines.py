@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots.control import _kernels_lines
 from antdrive.robots.control.speed_limits import BACKWARDS
 from antdrive.worlds import Disc, Route, World
 from tests.robots.control.test_pursuit import DT, OPEN, follow
@@ -106,6 +107,23 @@ def test_variants_of_the_path_still_arrive(variant):
             yaw + command.yaw_rate * DT,
         )
     assert math.dist(pose[:2], route.xy[-1]) < 0.05
+
+
+@pytest.mark.parametrize("route", [polyline([1.0, 1.0], [2.0, 0.0]), Route([(0, 0), (2, 0.3), (4, 0)])])
+@pytest.mark.parametrize("robot", sorted(ROBOTS))
+def test_the_packed_path_gives_the_kernel_every_value_in_its_place(route, robot):
+    tracked = PurePursuit().prepare(route, World("disc", OPEN.bounds, (Disc(2, 1, 0.25),)), ROBOTS[robot], 0.03, DT)
+    numbers = iter(np.linspace(0.1, 0.9, 100).tolist())  # distinct, so that a swap shows
+    parts = [
+        part._replace(**{key: next(numbers) for key, value in part._asdict().items() if isinstance(value, float)})
+        for part in (tracked.samples, tracked.obstacles, tracked.limits, tracked.tuning)
+    ]
+    samples, obstacles, limits, tuning = parts
+    packed = replace(tracked, samples=samples, obstacles=obstacles, limits=limits, tuning=tuning).packed
+    for found, meant in zip(_kernels_lines.unpacked(*packed), parts, strict=True):
+        assert found._fields == meant._fields
+        for value, other in zip(found, meant, strict=True):
+            np.testing.assert_array_equal(value, other)
 
 
 def test_avoidance_stops_the_robot_for_a_mover_on_its_line():

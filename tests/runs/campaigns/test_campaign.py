@@ -204,6 +204,15 @@ def test_the_floor_counts_only_where_the_largest_robot_gets(tmp_path):
     assert 30 <= share < 50, "one room of two"
 
 
+def test_random_tasks_of_a_planner_that_knows_no_headings_among_movers_are_drawn_for_the_disc():
+    worlds = ["people-doorway", "office"]
+    campaign = {"worlds": worlds, "planners": ["mmas-dstar"], "robots": ["warehouse"], "tasks": {"random": 12}}
+    expansion = expand(make_campaign(campaign))
+    assert expansion.remarks[0].endswith("by its disc or by footprint (warehouse)")
+    tasks = [job.case.place.task for job in expansion.jobs if job.case.place.world == "people-doorway"]
+    assert not any((task.start[0] < 6) != (task.goal[0] < 6) for task in tasks), "a disc of 0.7 m closes the door"
+
+
 @pytest.mark.parametrize(
     ("planners", "robots", "more", "how"),
     [

@@ -231,3 +231,30 @@ def test_physics_and_the_closed_form_may_disagree_in_two_ways():
     judged = {(felt, overlap): Pass(felt, overlap) for felt in (False, True) for overlap in (-1.0, 1.0)}
     assert [case for case, found in judged.items() if found.missed] == [(False, 1.0)]
     assert [case for case, found in judged.items() if found.false] == [(True, -1.0)]
+
+
+def test_a_control_period_has_the_bits_of_single_steps(spec):
+    """The compiled states equal those of `Engine.state`, which share no code; contacts carry their step."""
+    world = World("wall", (0, -2, 6, 2), (Disc(spec.radius + 1.2, 0.05, 0.1),))
+    commands = [(min(spec.max_speed, 0.8), 0.3 * (-1) ** k) for k in range(60)]
+    with Engine(world, spec) as engine:
+        engine.place((0.8, 0.0, 0.1))
+        single, contacts = [], []
+        for k, command in enumerate(commands):
+            engine.command(*command)
+            for j in range(4):
+                contacts += [(4 * k + j, contact) for contact in engine.step()]
+                single.append(engine.state())
+    with Engine(world, spec) as engine:
+        engine.place((0.8, 0.0, 0.1))
+        motion, together, last = [], [], []
+        for k, command in enumerate(commands):
+            engine.command(*command)
+            state, touched = engine.advance(4, motion)
+            last.append(state)
+            together += [(4 * k + step, contact) for step, contact in touched]
+        states = engine.states(motion)
+    assert contacts
+    assert together == contacts
+    assert states.tobytes() == np.array(single).tobytes()
+    assert last == single[3::4]

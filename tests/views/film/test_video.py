@@ -70,7 +70,7 @@ def test_a_film_has_the_frames_size_rate_and_format_it_claims(filmed):
     assert len(frames) == info.frames == 21 + 20
     assert frames.shape[2:0:-1] == info.size == SIZE
     assert "Video: h264" in stream
-    assert "yuv420p" in stream
+    assert re.search(r"yuv420p\(tv, bt709\b", stream)
     assert ", 20 fps" in stream
     assert imageio_ffmpeg.count_frames_and_secs(str(info.path))[0] == info.frames
     head, checked = info.path.read_bytes(), ffmpeg("-v", "error", "-i", info.path, "-f", "null", "-")
@@ -114,6 +114,22 @@ def test_the_band_fits_every_size(drive, size):
         assert layout.height < 0.35 * size[1]
     shot = Shot(drive, camera="top", size=size, note="certified: min clearance 0.043 m")
     assert shot.frame(0.5).shape == (size[1], size[0], 3)
+
+
+def test_a_band_does_not_depend_on_what_it_showed_before(drive):
+    def band():
+        return Shot(drive, camera="top", size=SIZE, note="certified")._band
+
+    shown = [(9.96, 0.5, 0.123, 0.1), (10.0, 0.5, 12.123, -0.01), (10.1, 1.25, 0.123, -0.01), (10.1, 1.0, 0.1, -0.01)]
+    kept = band()
+    before = None
+    for numbers, status in zip(shown, [overlay.SLOWED, overlay.DRIVING, overlay.DRIVING, overlay.SLOWED], strict=True):
+        pictures = [np.zeros((kept.layout.height, SIZE[0], 3), dtype=np.uint8) for _ in range(2)]
+        for one, picture in zip((kept, band()), pictures, strict=True):
+            one.draw(overlay.drive_values(*numbers), status, picture)
+        assert np.array_equal(*pictures)
+        assert before is None or (pictures[0] != before).any()
+        before = pictures[0]
 
 
 DRIFTED = (
@@ -227,7 +243,8 @@ def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):
 
 
 def test_an_encoder_that_dies_is_reported(drive, tmp_path, monkeypatch):
-    monkeypatch.setitem(film_options.ENCODERS, ".mp4", ("-c:v", "no-such-codec"))
+    broken = film_options.ENCODERS[".mp4"]._replace(options=("-c:v", "no-such-codec"))
+    monkeypatch.setitem(film_options.ENCODERS, ".mp4", broken)
     with pytest.raises(InputError, match=r"drive\.mp4: cannot be written \(.*no-such-codec"):
         film(drive, tmp_path / "drive.mp4", size=SIZE)
     assert not list(tmp_path.iterdir())

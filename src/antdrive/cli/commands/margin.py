@@ -64,9 +64,5 @@ def _prediction(log: "Rollout") -> dict[str, float | None] | None:
     record = log.record
     if record.margin_choice is None:
         return None
-    loss = (
-        None
-        if record.world.movers or record.unseen
-        else (record.footprint_margin or record.margin) - certify(log).bound
-    )
+    loss = None if record.world.movers or record.unseen else record.kept_margin - certify(log).bound
     return {**dataclasses.asdict(record.margin_choice), "footprint_loss_m": loss}

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.checks import suggest
 from antdrive.base.errors import InputError
@@ -11,6 +11,9 @@ from antdrive.cli import options
 from antdrive.cli.console import show, table
 from antdrive.cli.options import argument
 from antdrive.cli.output import plain
+
+if TYPE_CHECKING:
+    from antdrive.planners.plan import Capabilities
 
 
 def planners(
@@ -28,7 +31,7 @@ def planners(
     facts = {
         name: {
             "about": describe(planner),
-            "plans_for": "footprint" if capabilities_of(planner).turns else "disc",
+            "plans_for": _shape(capabilities_of(planner)),
             "options": {key: plain(value) for key, value in _options(planner).items()},
             "meanings": meanings_of(type(planner)),
         }
@@ -37,13 +40,19 @@ def planners(
     show(json, facts, _details(facts) if names else _list(facts))
 
 
+def _shape(can: "Capabilities") -> str:
+    """Return the shapes that plans of a planner keep clear."""
+    if can.turns and can.cell_by_cell:
+        return "disc, footprint without movers"
+    return "disc or footprint" if can.turns else "disc"
+
+
 def _list(facts: Mapping[str, Any]) -> Iterator[str]:
     yield from table(("planner", "about"), ((name, one["about"]) for name, one in facts.items()))
     yield ""
-    shapes = {"footprint": "disc or footprint", "disc": "disc"}
     rows = (
-        (words, ", ".join(name for name, one in facts.items() if one["plans_for"] == shape))
-        for shape, words in shapes.items()
+        (shape, ", ".join(name for name, one in facts.items() if one["plans_for"] == shape))
+        for shape in dict.fromkeys(one["plans_for"] for one in facts.values())
     )
     yield from table(("plan for", "planners"), rows)
     yield "options: antdrive planners NAME"
@@ -52,7 +61,7 @@ def _list(facts: Mapping[str, Any]) -> Iterator[str]:
 def _details(facts: Mapping[str, Any]) -> Iterator[str]:
     for name, one in facts.items():
         yield f"{name}: {one['about']}"
-        yield f"  plans for the {one['plans_for']}"
+        yield f"  plans for: {one['plans_for']}"
         rows = [(key, str(value), one["meanings"].get(key, "")) for key, value in one["options"].items()]
         yield from table(("option", "default", "meaning"), rows) if rows else ("  no options",)
 

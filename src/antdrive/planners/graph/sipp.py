@@ -184,10 +184,8 @@ def _ready(query: Query, speed: float, yaw_rate: float) -> Floats:
     outlines = grid.turns.outline, outline_at(task, grid.turns.outline)
     for k in np.flatnonzero(own).tolist():
         facing = clear_lead(task, (x, y), k * EIGHTH, outlines[1]).heading
-        before, after = (
-            turn_at(task.start, facing, task, outlines),
-            turn_at((x, y, facing), k * EIGHTH, task, outlines),
-        )
+        before = turn_at(task.start, facing, task, outlines)
+        after = turn_at((x, y, facing), k * EIGHTH, task, outlines)
         ready[k] = (abs(before) + abs(after)) / yaw_rate + math.dist((x, y), task.start[:2]) / speed
     return ready
 

@@ -32,6 +32,7 @@ import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
+from antdrive.robots.clearance import outline_of
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control._kernels_pursuit import reachable_twist
 from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
@@ -162,7 +163,7 @@ class Avoidance:
                 break
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
             return wanted, False, AvoidanceState(reversed=state.reversed)
-        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(tracked, pose, places[0], radii)):
+        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(weights, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
         twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
         return twist, True, after._replace(reversed=state.reversed)
@@ -202,22 +203,24 @@ class Avoidance:
         self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, predicted: Floats, radii: Floats
     ) -> bool:
         """Return whether a mover that may come near soon is faster than people, or has another velocity than predicted."""
-        speeds, off_by = np.hypot(*observed.T), np.hypot(*(observed - predicted).T)
+        speeds = np.hypot(*observed.T)
+        unlike = (speeds > WALKING) | (np.hypot(*(observed - predicted).T) > SURPRISE)
+        if not unlike.any():
+            return False
         gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
-        soon = gap < self.horizon * (speeds + spec.max_speed)
-        return bool((soon & ((speeds > WALKING) | (off_by > SURPRISE))).any())
+        return bool((unlike & (gap < self.horizon * (speeds + spec.max_speed))).any())
 
-    def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
+    def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
-        away = np.hypot(*(places - pose[:2]).T) - radii
-        close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
-        return 2 * self.step if close else 0.0
+        return 2 * self.step if kernels.is_close(*pose, places, radii, weights) else 0.0
 
     def _candidates(
         self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float
     ) -> Floats:
-        """Return the candidates (N, 6) up to a speed and a reverse speed [m/s]; row 0 keeps the speed limit, row 1 is the
-        last decision."""
+        """Return the candidates (N, 6) within speed limits [m/s].
+
+        Row 0 keeps the speed limit, row 1 is the last decision.
+        """
         table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
         fastest, reverse = min(fastest, spec.max_speed), min(reverse, spec.max_speed)
         if not state.candidate and min(speed_limit, fastest, reverse) >= spec.max_speed:
@@ -227,8 +230,9 @@ class Avoidance:
         if state.candidate:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining
-        speeds = [kernels.SPEED, kernels.NEXT_SPEED]
-        table[:, speeds] = np.clip(table[:, speeds], -min(reverse, fastest), fastest)
+        for column in (kernels.SPEED, kernels.NEXT_SPEED):
+            speeds = table[:, column]
+            np.minimum(np.maximum(speeds, -min(reverse, fastest), out=speeds), fastest, out=speeds)
         return table
 
 
@@ -308,7 +312,8 @@ def _instants(horizon: float, step: float) -> Floats:
 
 @functools.lru_cache(maxsize=64)
 def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kernels.AvoidanceWeights:
-    """Return the settings for a robot with a given circumscribed radius [m]."""
+    """Return the settings for a robot whose circle counts with a given radius [m]."""
+    outline = outline_of(footprint, 0.0)
     return kernels.AvoidanceWeights(
         step=avoidance.step,
         min_distance=radius + avoidance.min_clearance,
@@ -321,5 +326,7 @@ def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kerne
         reversal_time=avoidance.reversal_time,
         reversal_distance=radius + avoidance.min_clearance + avoidance.reversal_margin,
         reversal_weight=avoidance.reversal_weight,
-        narrowest=footprint.inner_radius,
+        radius=footprint.radius,
+        corners=outline.corners,
+        rounding=outline.reach,
     )

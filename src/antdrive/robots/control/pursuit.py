@@ -10,6 +10,7 @@ A route with turns (`Route.turns`) is followed line by line instead, with the sa
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -113,10 +114,23 @@ class TrackedPath:
     tuning: PursuitTuning
     backwards: bool = False
 
-    @property
+    @functools.cached_property
     def length(self) -> float:
         """Length of the route [m]."""
         return float(self.samples.arc[-1])
+
+    @functools.cached_property
+    def packed(self) -> tuple[Floats, ...]:
+        """The path as the kernel takes it in every control period: arrays, the last of which holds all numbers.
+
+        The dispatcher takes a third of the time of a period's kernel to walk through named tuples of numbers.
+        """
+        *samples, backwards = self.samples
+        *obstacles, side = self.obstacles
+        tuning = self.tuning._asdict()
+        corners = tuning.pop("corners")
+        numbers = np.array([backwards, side, *self.limits, *tuning.values()])
+        return *samples, *obstacles, corners, numbers
 
     def with_obstacles(self, obstacles: ObstacleIndex) -> TrackedPath:
         """Return the path with other obstacles.
@@ -249,10 +263,9 @@ class PurePursuit:
             reversed_ = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
             ahead, after = self.step(replace(tracked, backwards=False), *reversed_, state)
             return Twist(-ahead.speed, ahead.yaw_rate), after
-        speed, yaw_rate, arc, turning, limiter = _kernels_lines.advance(
-            *pose, *command, state.arc, state.turning,
-            tracked.samples, tracked.obstacles, tracked.limits, tracked.tuning,
-        )  # fmt: skip
+        speed, yaw_rate, arc, turning, limiter = _kernels_lines.advance_packed(
+            *pose, *command, state.arc, state.turning, *tracked.packed
+        )
         return Twist(speed, yaw_rate), PursuitState(arc, turning, limiter)
 
     def _samples(

@@ -99,8 +99,8 @@ def _remarks(tasks: Sequence[NamedTask], skipped: Sequence[str]) -> Iterator[str
     if floors:
         least, most = min(floors, key=floors.__getitem__), max(floors.values())
         share = f"{floors[least]:.0%}" if len(floors) == 1 else f"{floors[least]:.0%} (world {least}) to {most:.0%}"
-        outlined = ", ".join(next(iter(origins.values())).outlined)
-        how = f"by footprint ({outlined})" if outlined else "by its disc"
+        shapes = dict.fromkeys(", ".join(origin.outlined) for origin in origins.values())
+        how = " or ".join(f"by footprint ({outlined})" if outlined else "by its disc" for outlined in shapes)
         yield f"random tasks are drawn from {share} of the connected floor: where the largest robot gets with its margin, {how}"
 
 

@@ -249,8 +249,8 @@ def campaign_tasks(
 ) -> Iterator[NamedTask]:
     """Yield the tasks of a campaign: each world with each of its starts and goals."""
     if isinstance(campaign.tasks, RandomTasks):
-        outlined = _outlined(campaign, robots, planners)
         for world in _each_once(worlds):
+            outlined = _outlined(campaign, world.task.world, robots, planners)
             yield from _drawn(campaign, campaign.tasks, world, robots, outlined)
     elif campaign.entry.tasks == NAMED:
         for world in worlds:
@@ -268,11 +268,12 @@ def campaign_tasks(
 
 
 def _outlined(
-    campaign: Campaign, robots: Sequence[RobotSpec], planners: Sequence[PlannerVariant]
+    campaign: Campaign, world: World, robots: Sequence[RobotSpec], planners: Sequence[PlannerVariant]
 ) -> tuple[RobotSpec, ...]:
-    """Return the robots that plan for their footprint with every planner and setting of a campaign."""
+    """Return the robots that plan for their footprint in a world with every planner and setting of a campaign."""
+    able = [capabilities_of(load_planner(one.source, **one.given)) for one in planners]
     outlined = all(entry.get("footprint") != "disc" for entry in campaign.settings)
-    outlined = outlined and all(capabilities_of(load_planner(one.source, **one.given)).turns for one in planners)
+    outlined = outlined and all(can.turns and not (can.cell_by_cell and world.movers) for can in able)
     return tuple(robot for robot in robots if outlined and not robot.footprint.is_disc)
 
 

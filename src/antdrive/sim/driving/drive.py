@@ -119,8 +119,8 @@ class Driver(Decider):
 
     def arrives(self, tick: int, estimate: Pose, state: State) -> Ending | None:
         """End the drive of a robot that stands at the goal, once it has had a command."""
-        twist, task = (state.speed, state.yaw_rate), self._task
-        at_goal = tick > 0 and arrived(estimate, twist, self.step.command, task.goal, task.goal_tolerance)
+        task = self._task
+        at_goal = tick > 0 and arrived(estimate, state[3:], self.step.command, task.goal, task.goal_tolerance)
         return self._arrival(estimate, state) if at_goal else None
 
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
@@ -167,8 +167,8 @@ class Driver(Decider):
 
     def _end_of_route(self, tick: int, pose: Pose, state: State, last: Twist) -> Ending | None:
         """End the drive of a robot that stands at the end of its route, unless it can still reach the goal."""
-        left, still = self.path.length - self.step.pursuit.arc, stopped((state.speed, state.yaw_rate), last)
-        if left > self.path.goal_distance or not still or any(self.step.command):
+        path, (command, pursuit, *_) = self.path, self.step
+        if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(state[3:], last):
             return None
         ending, guide, task = self._arrival(pose, state), self._guide, self._task
         if math.dist(pose[:2], task.goal) <= task.goal_tolerance:

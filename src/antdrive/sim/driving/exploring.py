@@ -42,10 +42,8 @@ from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, ras
 from antdrive.worlds.world import PointWorld
 
 GROWTH = (4.0, 16.0)  # extent of the planning area beyond start and goal; the second if no path is found [m]
-MARGINS = (
-    1.0,
-    0.0,
-)  # fractions of the margin that plans for the disc keep; the second if no route exists or it is long
+#: Fractions of the margin that plans for the disc keep; the second if no route exists or it is long.
+MARGINS = (1.0, 0.0)
 FAIR = 1.25  # a route longer than the straight line by more than this factor is long
 DETOUR = 1.15  # a route with less margin must be shorter by this factor
 CORRIDOR = 1.2  # smoothing considers obstacles within this distance of the plan, beyond the inflation [m]
@@ -57,9 +55,8 @@ ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hits than to mapped obstacles [m]
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
-TURNABLE = (
-    0.025  # plans for the footprint keep this margin if they can: the controller refuses turns closer to hits [m]
-)
+#: Plans for the footprint keep this margin if possible: the controller refuses turns closer to hits [m].
+TURNABLE = 0.025
 LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
 
@@ -180,7 +177,7 @@ class Exploration(RouteGuide):
         outline = [outline_of(robot.footprint, margin)] if outlined else []
         return rasterise(task.world, cell, robot.radius + margin, *outline)
 
-    def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
+    def _plan_around(self, tick: int, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""
         movers = self._movers
         if movers is None:
@@ -195,7 +192,7 @@ class Exploration(RouteGuide):
         discs = movers.discs(tick, pose)
         if discs:
             grid, answer = self.plan(pose, discs)
-            if answer.solved:
+            if movers.is_fair(answer, pose, grid, trigger):
                 return grid, answer, discs
         return (*self.plan(pose), [])
 
@@ -321,7 +318,7 @@ class Exploration(RouteGuide):
         if self._failures >= PATIENCE and trigger != SCANNED:
             self._failures = 0
             self.survey.reset(pose)
-        grid, plan, avoided = self._plan_around(tick, pose)
+        grid, plan, avoided = self._plan_around(tick, pose, trigger)
         self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0

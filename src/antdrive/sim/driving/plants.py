@@ -17,7 +17,7 @@ from antdrive.sim.driving.parts import Ending, Step
 from antdrive.sim.log.contacts import Attribution
 from antdrive.sim.log.ending import rows_after_contact
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.physics.engine import Contact, Engine, State
+from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import Trajectories
 
 
@@ -55,9 +55,13 @@ class Bullet:
         self._engine = engine
         engine.place(start)
         self.state: State = engine.state()
-        self._rows: list[tuple[float, ...]] = [(*self.state, 0.0, 0.0, 0, 0.0, 0.0)]
+        self._motion: list[bytes] = []  # of each step
+        self._in_force: list[tuple[float, ...]] = [(0.0, 0.0, 0, 0.0, 0.0)]  # command, limiter and motor targets
+        self._lengths = [1]  # number of rows of each
+        self._rows = 1
         self._contacts: list[tuple[float, ...]] = []
-        self._add_contacts(engine.contacts())
+        self._start = [*self.state]
+        self._contacts += [(0, *contact) for contact in engine.contacts()]
 
     @property
     def touched(self) -> bool:
@@ -78,25 +82,26 @@ class Bullet:
         return self._drive(Ending(Outcome.TIMED_OUT))
 
     def _log(self, steps: int, in_force: tuple[float, ...]) -> None:
-        engine, rows = self._engine, self._rows
-        for _ in range(steps):
-            contacts = engine.step()
-            self.state = engine.state()
-            rows.append((*self.state, *in_force))
-            if contacts:
-                self._add_contacts(contacts)
+        self.state, contacts = self._engine.advance(steps, self._motion)
+        if contacts:
+            self._contacts += [(self._rows + step, *contact) for step, contact in contacts]
+        self._rows += steps
+        self._in_force.append(in_force)
+        self._lengths.append(steps)
 
     def finish(self, ending: Ending) -> Drive:
         """Return the whole log. After a contact the robot brakes first, and the contact is attributed to it or to the mover."""
         if self.touched:
             self._engine.command(0.0, 0.0)
-            self._log(rows_after_contact(self._engine.physics_hz), (0.0, 0.0, self._rows[-1][7], 0.0, 0.0))
+            self._log(rows_after_contact(self._engine.physics_hz), (0.0, 0.0, self._in_force[-1][2], 0.0, 0.0))
         return self._drive(ending)
 
     def _drive(self, ending: Ending) -> Drive:
-        engine, rows = self._engine, np.array(self._rows)
-        t = np.arange(len(rows)) / engine.physics_hz
-        pose, twist = np.ascontiguousarray(rows[:, :3]), np.ascontiguousarray(rows[:, 3:5])
+        engine = self._engine
+        states = np.concatenate([[self._start], engine.states(self._motion)])
+        in_force = np.repeat(np.array(self._in_force, dtype=np.float64), self._lengths, axis=0)
+        t = np.arange(self._rows) / engine.physics_hz
+        pose, twist = np.ascontiguousarray(states[:, :3]), np.ascontiguousarray(states[:, 3:])
         clearance = footprint_clearance(engine.world, engine.robot.footprint, pose)
         movers = engine.mover_track(len(t))
         contacts = np.array(self._contacts, dtype=np.float64).reshape(-1, 4)
@@ -111,16 +116,13 @@ class Bullet:
             t=t,
             pose=pose,
             twist=twist,
-            command=np.ascontiguousarray(rows[:, 5:7]),
+            command=np.ascontiguousarray(in_force[:, :2]),
             clearance=clearance,
-            limiter=rows[:, 7].astype(np.uint8),
+            limiter=in_force[:, 2].astype(np.uint8),
             movers=movers,
             contacts=contacts,
-            actuated=np.ascontiguousarray(rows[:, 8:10]),
+            actuated=np.ascontiguousarray(in_force[:, 3:]),
         )
-
-    def _add_contacts(self, contacts: list[Contact]) -> None:
-        self._contacts += [(len(self._rows) - 1, *contact) for contact in contacts]
 
 
 class Kinematic:

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 LONGER = 1.1  # the disc's way may be this much longer than the footprint's
 FINE = 0.05  # largest cell of plans for a footprint [m]
-KEPT = 6  # replanners kept for repair: two margins for each of two bounds, and for the footprint
+KEPT = 8  # replanners kept for repair: two margins of the disc for each of two bounds, and up to four of the footprint
 
 
 @dataclass(eq=False, kw_only=True)
@@ -175,6 +175,12 @@ class RoutePlanner:
         # A replanner knows cells only; it cannot tell that the first cell is unreachable for the robot.
         return unreachable if query.unreachable else self.checked(query, answer)
 
+    def beside(self, task: Task, discs: Sequence[Disc]) -> tuple[PlanResult, Grid]:
+        """Plan from scratch for the footprint, among obstacles and discs. Return the plan and its grid."""
+        world, margin = by_geometry(with_obstacles(task, discs).world), self.outline_margins[0]
+        grid = outlined_grid_of(world, min(self.cell, FINE), self.robot.footprint, margin)
+        return self.plan(Query.between(grid, task), self.rng), grid
+
     def _replanner(self, query: Query, closed: npt.NDArray[np.bool_], *, kept: bool) -> Replanner:
         """Return a replanner with the closed cells, kept per grid or new."""
         key = query.grid.cell, query.grid.inflate, bool(query.grid.turns), bounds_of(query.grid)
@@ -227,7 +233,7 @@ class OneRoute(RouteGuide):
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
         """Check an external plan on the grid of `first`."""
-        if plan.status is PlanStatus.INVALID:
+        if not plan.solved:
             return grid, plan
         return grid, self._drivable(grid, self._routes.checked(self._routes.query(grid, self._routes.task), plan))
 

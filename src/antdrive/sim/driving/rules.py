@@ -33,9 +33,8 @@ class Schedule:
 
     t: Floats  # times (N,) [s]
     arc: Floats  # distances along the route at those times (N,) [m]
-    corners: Floats = field(
-        default_factory=lambda: np.empty(0)
-    )  # those at which the robot stops by itself, to turn on the spot [m]
+    # Distances along the route at which the robot stops to turn on the spot (C,) [m].
+    corners: Floats = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def of(cls, plan: TimedPlan, route: Route) -> Schedule:

@@ -168,6 +168,7 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
     xmin, ymin, xmax, ymax = world.bounds
     discs = world.discs
     x, y, yaw = rollout.pose.T
+    place, unturned = x + 1j * y, np.exp(-1j * yaw)
     rotation = np.abs(np.stack([np.cos(yaw), np.sin(yaw)]))
     reach_x = half @ rotation + rounding
     reach_y = half[::-1] @ rotation + rounding
@@ -176,12 +177,12 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
         best = _polygon_to_walls(foot.corners, rollout.pose, world.bounds).min(axis=1) - rounding
 
     def distance(rows: npt.NDArray[np.int64], centres: npt.NDArray[np.complex128], radii: Floats) -> Floats:
-        body = (centres - (x + 1j * y)[rows, None]) * np.exp(-1j * yaw[rows, None])  # in the robot's frame
+        body = (centres - place[rows, None]) * unturned[rows, None]  # in the robot's frame
         if foot.corners:
             return _polygon_to_points(foot.corners, body) - rounding - radii
-        over = np.stack([np.abs(body.real) - half[0], np.abs(body.imag) - half[1]])
-        outside = np.linalg.norm(np.maximum(over, 0.0), axis=0)
-        return np.asarray(outside + np.minimum(over.max(axis=0), 0.0) - rounding - radii)
+        ahead, aside = np.abs(body.real) - half[0], np.abs(body.imag) - half[1]
+        outside = np.sqrt(np.maximum(ahead, 0.0) ** 2 + np.maximum(aside, 0.0) ** 2)
+        return np.asarray(outside + np.minimum(np.maximum(ahead, aside), 0.0) - rounding - radii)
 
     for block, near in _blocks(rollout.pose[:, :2], foot.radius, discs):
         centres = (near[:, 0] + 1j * near[:, 1])[None]
@@ -229,9 +230,10 @@ def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.
     count = 0
     for first in range(0, len(places), BLOCK):
         block = places[first : first + BLOCK]
-        spread = float(np.hypot(*(block - block[0]).T).max())
+        spread = math.sqrt(float(((block - block[0]) ** 2).sum(axis=1).max()))
         # The distances of centre and footprint differ by at most the radius.
-        away = np.hypot(discs[:, 0] - block[0, 0], discs[:, 1] - block[0, 1]) - discs[:, 2]
+        dx, dy = discs[:, 0] - block[0, 0], discs[:, 1] - block[0, 1]
+        away = np.sqrt(dx * dx + dy * dy) - discs[:, 2]
         near = discs[away <= away.min() + 2 * spread + radius + SAME_CLEARANCE]
         count += len(block) * len(near)
         if count > MAX_NEAR_DISTANCES:

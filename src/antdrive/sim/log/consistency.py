@@ -109,7 +109,8 @@ def _room(rollout: Rollout, points: Floats) -> Floats:
     discs = world.discs
     for rows in np.array_split(np.arange(len(points)), 1 + len(points) * len(discs) // 1_000_000):
         some = points[rows]
-        gaps = np.hypot(some[:, :1] - discs[:, 0], some[:, 1:] - discs[:, 1]) - discs[:, 2]
+        dx, dy = some[:, :1] - discs[:, 0], some[:, 1:] - discs[:, 1]
+        gaps = np.sqrt(dx * dx + dy * dy) - discs[:, 2]  # a third of the time of hypot
         room[rows] = np.minimum(room[rows], gaps.min(axis=1, initial=math.inf))
     return np.asarray(room)
 
@@ -254,12 +255,14 @@ def _check_followed(rollout: Rollout, end: int) -> Iterator[str]:
     if record.world.movers or len(rollout.route) < 2:
         return
     every = max(1, record.physics_hz // 20)
-    places = rollout.pose[:end:every, :2]
-    best = np.full(len(places), np.inf)
-    for a, b in zip(rollout.route[:-1], rollout.route[1:], strict=True):
-        along = b - a
-        share = np.clip((places - a) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
-        best = np.minimum(best, np.hypot(*(a + share[:, None] * along - places).T))
+    x, y = rollout.pose[:end:every, :2].T[..., None]
+    best = np.full(len(x), np.inf)
+    legs = np.concatenate([rollout.route[:-1], np.diff(rollout.route, axis=0)], axis=1)
+    for some in np.array_split(legs, 1 + len(x) * len(legs) // 1_000_000):
+        ax, ay, dx, dy = some.T
+        share = np.clip(((x - ax) * dx + (y - ay) * dy) / np.maximum(dx * dx + dy * dy, 1e-300), 0.0, 1.0)
+        off = (x - ax - share * dx) ** 2 + (y - ay - share * dy) ** 2
+        best = np.minimum(best, np.sqrt(off.min(axis=1, initial=math.inf)))
     most = record.robot.radius + AWAY_TIME * record.robot.max_speed + NEAR * record.cell
     if not best.max() <= most:
         t = float(rollout.t[int(best.argmax()) * every])

@@ -97,7 +97,7 @@ def budget(rollout: Rollout) -> Budget:
     Unseen cylinders are omitted.
     """
     record, true = rollout.record, rollout.pose
-    margin = record.margin if record.footprint_margin is None else record.footprint_margin
+    margin = record.kept_margin
     estimated = rollout.estimate if len(rollout.estimate) else true
     planned, cutting, turning = estimated.copy(), np.empty(len(true), dtype=np.bool_), rollout.command[:, 0] == 0
     for rows, route in rollout.legs():

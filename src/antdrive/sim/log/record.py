@@ -356,6 +356,11 @@ class DriveRecord:
         """The shape that plans kept clear: footprint if any did, else disc."""
         return "disc" if self.footprint_margin is None else "footprint"
 
+    @property
+    def kept_margin(self) -> float:
+        """Clearance that plans keep from the footprint if any did, else from the disc [m]."""
+        return self.margin if self.footprint_margin is None else self.footprint_margin
+
     @classmethod
     def held(cls, setting: str) -> bool:
         """Return whether a key of the record holds a setting."""

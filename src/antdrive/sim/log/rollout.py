@@ -364,10 +364,12 @@ class Rollout:
                 yield f"{name}: must have the shape {_shape_text(shape)}, found {array.shape}"
             elif array.dtype != np.dtype(dtype):
                 yield f"{name}: must hold {np.dtype(dtype)}, found {array.dtype}"
-            elif not np.isfinite(array).all():
-                yield f"{name}: must hold finite numbers, found others"
-            elif array.size and float(np.abs(array.astype(np.float64)).max()) > MAX_VALUE:
-                yield f"{name}: must hold numbers within {MAX_VALUE:g}, found others"
+            elif array.size:
+                most = max(-float(array.min()), float(array.max()))  # both are nan if a value is
+                if not math.isfinite(most):
+                    yield f"{name}: must hold finite numbers, found others"
+                elif most > MAX_VALUE:
+                    yield f"{name}: must hold numbers within {MAX_VALUE:g}, found others"
         if len(self.route) < 2:
             yield f"route: must have two points or more, found {len(self.route)}"
         yield from self._scan_problems(rows)

@@ -10,8 +10,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-import os
-import tempfile
+import struct
 from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, NamedTuple, TypeAlias
@@ -22,10 +21,11 @@ from antdrive.base.errors import FieldError
 from antdrive.base.types import Floats, Pose
 from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import RobotSpec
+from antdrive.sim.physics import _kernels_states
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies
 from antdrive.sim.physics.near import NearBodies
-from antdrive.sim.physics.urdf import CASTER_GAP, CHASSIS_FILE, chassis_mesh, robot_urdf, rolling_radius
+from antdrive.sim.physics.urdf import CASTER_GAP, chassis_mesh, robot_urdf, rolling_radius, urdf_file
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc, World
 
@@ -40,6 +40,7 @@ USUAL_RESIDUAL = 1e-7  # solver residual for other wheels, Bullet's default [(ra
 OVERSPEED = 1.5  # bound of a robot's own speed, as a multiple of its top speed
 # Arguments "any other body, the robot's link -1, any link of the other": passing them by name costs 0.4 us a step.
 CHASSIS_AND_ANY = (-1, -1, -2)
+MOTION = struct.Struct("13d")  # position, quaternion, velocity and angular velocity of the centre of mass
 BATCH = 5000  # most bodies built in one call
 MANY_BODIES = 1000  # in worlds with more cylinders, only those near the robot have bodies
 CHECK_EVERY = 8  # physics steps between updates of these bodies
@@ -102,7 +103,6 @@ class Engine:
     def __enter__(self) -> Engine:
         p = self._p = bullet()
         self._client = self._open.enter_context(client())
-        p.resetSimulation(physicsClientId=self._client)
         p.setGravity(0, 0, -9.81, physicsClientId=self._client)
         p.setPhysicsEngineParameter(
             fixedTimeStep=1.0 / self.physics_hz,
@@ -176,15 +176,34 @@ class Engine:
 
     def step(self) -> list[Contact]:
         """Advance one physics step, and return the chassis's contacts after it."""
-        if self._movers is not None:
-            self._movers.steer(self._steps)
-        if self._near is not None and self._steps % CHECK_EVERY == 0:
-            (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
-            self._near.follow(x, y)
-        self._steps += 1
-        self._p.stepSimulation(self._client)
-        points = self._p.getContactPoints(self._robot, *CHASSIS_AND_ANY, self._client)
-        return self._touching(points) if points else []
+        return [contact for _, contact in self.advance(1, [])[1]]
+
+    def advance(self, steps: int, motion: list[bytes]) -> tuple[State, list[tuple[int, Contact]]]:
+        """Advance physics steps, and return the state after them and the chassis's contacts, each with its step from 0.
+
+        Args:
+            steps: number of steps, at least 1
+            motion: list to which each step appends the motion of the centre of mass, for `states`
+        """
+        p, robot, number, movers, near = self._p, self._robot, self._client, self._movers, self._near
+        step, points_of = p.stepSimulation, p.getContactPoints
+        pack, place_of, velocity_of = MOTION.pack, p.getBasePositionAndOrientation, p.getBaseVelocity
+        touched: list[tuple[int, Contact]] = []
+        for k in range(steps):
+            if movers is not None:
+                movers.steer(self._steps)
+            if near is not None and self._steps % CHECK_EVERY == 0:
+                (x, y, _), _ = place_of(robot, number)
+                near.follow(x, y)
+            self._steps += 1
+            step(number)
+            points = points_of(robot, *CHASSIS_AND_ANY, number)
+            if points:
+                touched += [(k, contact) for contact in self._touching(points)]
+            place, quaternion = place_of(robot, number)
+            velocity, rate = velocity_of(robot, number)
+            motion.append(pack(*place, *quaternion, *velocity, *rate))
+        return self._axle(place, quaternion, velocity, rate), touched
 
     def contacts(self) -> list[Contact]:
         """Return the chassis's current contacts, without advancing time."""
@@ -193,14 +212,22 @@ class Engine:
 
     def state(self) -> State:
         """Return the pose and velocity of the axle's centre."""
-        p = self._p
-        (x, y, _), (qx, qy, qz, qw) = p.getBasePositionAndOrientation(self._robot, self._client)
-        (vx, vy, _), (_, _, yaw_rate) = p.getBaseVelocity(self._robot, self._client)
+        place = self._p.getBasePositionAndOrientation(self._robot, self._client)
+        return self._axle(*place, *self._p.getBaseVelocity(self._robot, self._client))
+
+    def _axle(self, place: Point3, quaternion: tuple[float, ...], velocity: Point3, rate: Point3) -> State:
+        """Return the state of the axle's centre, for the motion of the centre of mass; `states` takes many steps."""
+        (x, y, _), (qx, qy, qz, qw), (vx, vy, _) = place, quaternion, velocity
         # PyBullet reports the centre of mass below the axle: subtract the offset along the tilted z axis.
         x += 2.0 * (qx * qz + qw * qy) * self._com_drop
         y += 2.0 * (qy * qz - qw * qx) * self._com_drop
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        return State(x, y, yaw, vx * math.cos(yaw) + vy * math.sin(yaw), yaw_rate)
+        return State(x, y, yaw, vx * math.cos(yaw) + vy * math.sin(yaw), rate[2])
+
+    def states(self, motion: Sequence[bytes]) -> Floats:
+        """Return the states (N, 5) for the motion of N steps, as `State` orders them."""
+        rows: Floats = np.frombuffer(b"".join(motion)).reshape(-1, 13)
+        return np.asarray(_kernels_states.axle_states(rows, self._com_drop))
 
     @property
     def time(self) -> float:
@@ -249,17 +276,9 @@ class Engine:
         # The residual is in rad/s, and smaller spheres turn faster. The client may hold the value of another robot.
         residual = RESIDUAL * gear**2 if gear > 1 else USUAL_RESIDUAL
         p.setPhysicsEngineParameter(solverResidualThreshold=residual, physicsClientId=self._client)
-        text = robot_urdf(self.robot, self._com_drop)
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, "robot.urdf")
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(text)
-            mesh = chassis_mesh(self.robot)
-            if mesh is not None:
-                with open(os.path.join(folder, CHASSIS_FILE), "w", encoding="utf-8") as file:
-                    file.write(mesh)
-            flags = p.URDF_USE_IMPLICIT_CYLINDER | p.URDF_USE_INERTIA_FROM_FILE
-            self._robot = p.loadURDF(path, flags=flags, physicsClientId=self._client)
+        flags = p.URDF_USE_IMPLICIT_CYLINDER | p.URDF_USE_INERTIA_FROM_FILE
+        path = urdf_file(robot_urdf(self.robot, self._com_drop), chassis_mesh(self.robot))
+        self._robot = p.loadURDF(str(path), flags=flags, physicsClientId=self._client)
         for link in range(-1, 4):
             p.changeDynamics(
                 self._robot,

@@ -78,7 +78,8 @@ def plan_figure(
     wide_all = wide + (4.6 if iterations else 0.6) + BESIDE * beside
     note = _note_below(plan, mapped=mapped)
     below = textwrap.wrap(note, round(LETTERS * wide_all)) if note else []
-    with sheet(path, (wide_all, high + 0.9 + (0.4 + LINE * len(below) if below else 0.0)), dpi) as figure:
+    above = 0.9 + (0.4 if covered and not beside else 0.0)  # the title, and a legend of up to three rows
+    with sheet(path, (wide_all, high + above + (0.4 + LINE * len(below) if below else 0.0)), dpi) as figure:
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0], label="map")
         if plan.field is not None:

@@ -40,6 +40,7 @@ def draw_mesh(
     ambient and the diffuse light.
     """
     corners = np.empty((vertices.shape[0], 6))  # projected by `lens`, then the normal
+    spots = np.empty((vertices.shape[0], 2))  # column and row of the corners ahead of the camera
     for i in range(vertices.shape[0]):
         point = (vertices[i, 0], vertices[i, 1], vertices[i, 2])
         out = (normals[i, 0], normals[i, 1], normals[i, 2])
@@ -49,8 +50,16 @@ def draw_mesh(
         for k in range(3):
             corners[i, k] = lens[k, 0] * wx + lens[k, 1] * wy + lens[k, 2] * wz + lens[k, 3]
             corners[i, 3 + k] = place[k, 0] * out[0] + place[k, 1] * out[1] + place[k, 2] * out[2]
+        for k in range(2):
+            spots[i, k] = corners[i, k] / corners[i, 2] if corners[i, 2] >= NEAREST else math.inf
     cut = np.empty((4, 6))
     for t in range(triangles.shape[0]):
+        i, j, m = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if max(max(spots[i, 0], spots[j, 0]), spots[m, 0]) < math.inf:  # nothing to cut off
+            down = (spots[j, 0] - spots[i, 0]) * (spots[m, 1] - spots[i, 1])
+            if down < (spots[m, 0] - spots[i, 0]) * (spots[j, 1] - spots[i, 1]):  # the outside faces the camera
+                _fill(image, depth, seg, scale, light, corners[i], corners[j], corners[m], colour)
+            continue
         count = 0
         for n in range(3):
             here, there = corners[triangles[t, n]], corners[triangles[t, (n + 1) % 3]]
@@ -81,18 +90,20 @@ def _fill(
     top = max(0.0, math.ceil(min(ay, min(by, cy))))
     bottom = min(height - 1.0, math.floor(max(ay, max(by, cy))))
     # The corners' weights are linear along a row: start + slope * column.
-    slope_a, slope_b = (by - cy) / area, (cy - ay) / area
+    share = 1.0 / area
+    slope_a, slope_b = (by - cy) * share, (cy - ay) * share
     slope_c = -slope_a - slope_b
+    run_a, run_b, run_c = 1.0 / slope_a, 1.0 / slope_b, 1.0 / slope_c  # infinite where a weight is constant
     for row in range(int(top), int(bottom) + 1):
-        start_a = ((bx * cy - cx * by) - row * (bx - cx)) / area
-        start_b = ((cx * ay - ax * cy) - row * (cx - ax)) / area
+        start_a = ((bx * cy - cx * by) - row * (bx - cx)) * share
+        start_b = ((cx * ay - ax * cy) - row * (cx - ax)) * share
         start_c = 1.0 - start_a - start_b
         low, high = 0.0, width - 1.0
-        for start, slope in ((start_a, slope_a), (start_b, slope_b), (start_c, slope_c)):
+        for start, slope, run in ((start_a, slope_a, run_a), (start_b, slope_b, run_b), (start_c, slope_c, run_c)):
             if slope > 0.0:
-                low = max(low, -(start + EDGE) / slope)
+                low = max(low, -(start + EDGE) * run)
             elif slope < 0.0:
-                high = min(high, -(start + EDGE) / slope)
+                high = min(high, -(start + EDGE) * run)
             elif start < -EDGE:
                 high = -1.0
         if low > high:

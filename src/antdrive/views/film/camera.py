@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -52,12 +53,12 @@ class Camera:
         near, far = float(depth.min()) - cz, float(depth.max()) - cz
         return cls(view, _perspective(tan_x, tan_y, max(0.5 * near, 1e-2), 1.5 * far + 1.0), size)
 
-    @property
+    @cached_property
     def full(self) -> Floats:
         """World to clip space (4, 4)."""
         return self.projection @ self.view
 
-    @property
+    @cached_property
     def ground(self) -> Floats:
         """Homography (3, 3) from points (x, y, 1) on the ground to pixels."""
         return self.plane(0.0)
@@ -70,7 +71,7 @@ class Camera:
         width, height = self.size
         return np.array([0.5 * width * (clip[3] + clip[0]), 0.5 * height * (clip[3] - clip[1]), clip[3]])
 
-    @property
+    @cached_property
     def pixel(self) -> float:
         """Width of a pixel on the ground in the middle of the picture [m]."""
         width, height = self.size

@@ -44,7 +44,9 @@ class Playback:
         self.t = rollout.t if len(rollout.t) else np.zeros(1)
         pose = rollout.pose if len(rollout.pose) else np.array([scene.start])
         self._pose = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
+        self._columns = np.ascontiguousarray(self._pose.T)
         self._twist = rollout.twist if len(rollout.twist) else np.zeros((rows, 2))
+        self._forward = np.ascontiguousarray(self._twist[:, 0])
         self._clearance = rollout.clearance if len(rollout.clearance) else np.full(rows, np.nan)
         self._least = np.minimum.accumulate(self._clearance)
         self._driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[:, :2], axis=0).T))])
@@ -86,13 +88,13 @@ class Playback:
 
     def pose(self, at: float) -> tuple[float, float, float]:
         """Return the robot's x, y [m] and unwrapped heading [rad]."""
-        x, y, yaw = (float(np.interp(at, self.t, column)) for column in self._pose.T)
+        x, y, yaw = (float(np.interp(at, self.t, column)) for column in self._columns)
         return x, y, yaw
 
     def camera_target(self, at: float) -> tuple[float, float]:
         """Return the target of a following camera [m]: the robot's mean position around a time."""
         moments = at + CAMERA_WINDOW * np.linspace(-1, 1, 25)
-        x, y = (float(np.interp(moments, self.t, self._pose[:, axis]).mean()) for axis in (0, 1))
+        x, y = (float(np.interp(moments, self.t, column).mean()) for column in self._columns[:2])
         return x, y
 
     def wheels(self, at: float) -> tuple[float, float]:
@@ -138,7 +140,7 @@ class Playback:
 
     def speed(self, at: float) -> float:
         """Return the measured forward speed [m/s]."""
-        return float(np.interp(at, self.t, self._twist[:, 0])) + 0.0  # never -0.0
+        return float(np.interp(at, self.t, self._forward)) + 0.0  # never -0.0
 
     def clearance(self, at: float) -> float:
         """Return the distance from the robot to the nearest obstacle, mover or wall [m]."""
@@ -156,8 +158,8 @@ class Playback:
         """Return points (N, 2) [m] of the path driven between two times, and the speeds (N,) there [m/s]."""
         count = max(2, math.ceil((until - since) * 60) + 1)
         moments = np.linspace(since, until, count)
-        points = np.column_stack([np.interp(moments, self.t, self._pose[:, axis]) for axis in (0, 1)])
-        return points, np.interp(moments, self.t, self._twist[:, 0])
+        points = np.column_stack([np.interp(moments, self.t, column) for column in self._columns[:2]])
+        return points, np.interp(moments, self.t, self._forward)
 
     def contact(self, at: float) -> tuple[float, float, float] | None:
         """Return the point x, y of the first contact [m] and the time since the latest one [s]; None before any."""
@@ -168,4 +170,4 @@ class Playback:
         return x, y, float(at - past.max())
 
     def _row(self, at: float) -> int:
-        return int(np.clip(np.searchsorted(self.t, at + 1e-9, side="right") - 1, 0, len(self.t) - 1))
+        return min(max(int(np.searchsorted(self.t, at + 1e-9, side="right")) - 1, 0), len(self.t) - 1)

@@ -85,7 +85,7 @@ class Shot:
     def frame(self, at: float) -> Picture:
         """Return the frame (H, W, 3) at a time of the run [s]."""
         slow = self.slow_motion is not None and self.slow_motion[0] <= at < self.slow_motion[1]
-        return self._with_band(self.view(at), at, overlay.SLOWED if slow else overlay.DRIVING)
+        return self._with_band(self.view(at), self._values(at), overlay.SLOWED if slow else overlay.DRIVING)
 
     def last_frame(self) -> Picture:
         """Return the frame (H, W, 3) at the run's end, with the outcome as a sentence and the certificate."""
@@ -98,12 +98,11 @@ class Shot:
         top = view.shape[0] - verdict.shape[0] - round(1.2 * unit) if low else round(1.2 * unit)
         left = max((view.shape[1] - verdict.shape[1]) // 2, 0 if low else self._legend_width)
         put(view, verdict, left, top)
-        return self._with_band(view, at, OUTCOME_LABELS[self.outcome])
+        return self._with_band(view, self._values(at), OUTCOME_LABELS[self.outcome])
 
     def planning_frame(self, values: overlay.Values, grid: Grid, levels: Floats, path: Floats) -> Picture:
         """Return a frame (H, W, 3) of planning: the planner's field and its best path (N, 2) [m] so far."""
-        view = self.planning_view(grid, levels, path)
-        return np.vstack([view, self._band.draw(values, overlay.PLANNING)])
+        return self._with_band(self.planning_view(grid, levels, path), values, overlay.PLANNING)
 
     def planning_view(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
         """Return the picture of `planning_frame` without the band."""
@@ -152,10 +151,16 @@ class Shot:
         put(view, burst(size, CONTACT), px - size / 2, py - size / 2)
         _put_above(view, label(text, round(0.95 * self._layout.unit), CONTACT), px, py - size)
 
-    def _with_band(self, view: Picture, at: float, status: tuple[str, Colour]) -> Picture:
+    def _values(self, at: float) -> overlay.Values:
         playback = self.playback
-        values = overlay.drive_values(at, playback.speed(at), playback.clearance(at), playback.min_clearance(at))
-        return np.vstack([view, self._band.draw(values, status)])
+        return overlay.drive_values(at, playback.speed(at), playback.clearance(at), playback.min_clearance(at))
+
+    def _with_band(self, view: Picture, values: overlay.Values, status: tuple[str, Colour]) -> Picture:
+        height = len(view)
+        picture = np.empty((height + self._layout.height, *view.shape[1:]), dtype=np.uint8)
+        picture[:height] = view
+        self._band.draw(values, status, picture[height:])
+        return picture
 
     def _put_legend(self, view: Picture) -> None:
         if self._legend is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import os
 import re
@@ -104,7 +105,12 @@ class WorldFile(BaseModel):
 
 def list_worlds() -> Mapping[str, Path]:
     """Return the files of the package's worlds by name."""
-    return dict(sorted((path.stem, path) for path in _CATALOG.glob("*.yaml")))
+    return dict(_files_of(_CATALOG))
+
+
+@functools.cache
+def _files_of(catalog: Path) -> Mapping[str, Path]:
+    return dict(sorted((path.stem, path) for path in catalog.glob("*.yaml")))
 
 
 def load_task(world: str | os.PathLike[str], name: str | None = None) -> Task:
