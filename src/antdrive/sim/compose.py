@@ -82,7 +82,7 @@ def compose(s: Scenario) -> Parts:
     if survey:
         # A scan may be one scan period old, and commands are delayed.
         reaction = 1 / hz + 1 / survey.lidar.rate + s.robot.noise.scaled(s.noise).delay
-        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_held))
+        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_command))
     return Parts(
         localiser,
         scans.scan if scans else no_scan,

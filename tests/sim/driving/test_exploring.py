@@ -16,16 +16,16 @@ from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, hit_within, near_polyline, point_at
 from antdrive.sim.driving.drive import Driver
-from antdrive.sim.driving.exploring import TURNABLE
+from antdrive.sim.driving.exploring import INTERVAL, TURNABLE
 from antdrive.sim.driving.parts import Step
-from antdrive.sim.driving.recovery import Recovery, ScanTurn
+from antdrive.sim.driving.recovery import IDLE_TIME, Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of
 from antdrive.sim.driving.routes import RoutePlanner, bounds_of
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.physics.engine import State
-from antdrive.sim.policy import SCANNED
+from antdrive.sim.policy import SCANNED, STALLED
 from antdrive.sim.rebuild import rebuilt
 from antdrive.sim.sensing import Scanner
 from antdrive.views.map_reconstruction import MapReconstruction
@@ -586,24 +586,62 @@ def test_a_scan_turn_goes_both_ways_where_one_is_not_free(jackal, left, right, t
 def test_a_robot_makes_one_scan_turn_per_place(jackal, turtlebot):
     recovery = Recovery(survey_of(jackal, 9.0, 9.0), jackal, HERE, 60)
     assert not recovery.held(0.0, HERE)  # it sees enough to begin with
-    recovery.note_held(1.0, FORWARD)
-    recovery.note_held(1.4, FORWARD)
+    recovery.note_command(1.0, FORWARD)
+    recovery.note_command(1.4, FORWARD)
     assert [recovery.held(now, HERE) for now in (1.4, 1.6)] == [False, True]
     assert recovery.begin_scan_turn(HERE)
     recovery.end_scan_turn(3.0, HERE)
-    recovery.note_held(3.0, FORWARD)
+    recovery.note_command(3.0, FORWARD)
     assert not recovery.held(9.0, HERE)
     assert not recovery.begin_scan_turn((4.2, 4.0, 1.0))
     assert recovery.held(9.0, (4.4, 4.0, 1.0))
-    recovery.note_held(9.1, None)
+    recovery.note_command(9.1, None)
     assert not recovery.held(9.2, (4.4, 4.0, 1.0))
     around = Recovery(survey_of(turtlebot, 9.0, 9.0), turtlebot, HERE, 60)
-    around.note_held(1.0, FORWARD)
+    around.note_command(1.0, FORWARD)
     assert not around.held(9.0, HERE)  # its lidar sees all around
     assert not around.begin_scan_turn(HERE)
     before_a_post = Recovery(survey_of(jackal, 9.0, 9.0, 0.05), jackal, HERE, 60)
-    before_a_post.note_held(1.0, FORWARD)
+    before_a_post.note_command(1.0, FORWARD)
     assert not before_a_post.held(9.0, HERE)  # there is nothing to see
+
+
+def test_a_robot_stalls_at_once_where_its_controller_stops_it(jackal):
+    recovery = Recovery(survey_of(jackal, 9.0, 9.0), jackal, HERE, 60)
+    recovery.note_command(0.0, None)
+    assert [recovery.stalled(now) for now in (2.4, 2.6)] == [False, True]  # it may be moving back and forth
+    recovery.note_command(1.0, None, idle=True)
+    recovery.note_command(1.4, None, idle=True)
+    assert [recovery.stalled(now) for now in (1.4, 1.6)] == [False, True]
+    recovery.note_rest(1.5, HERE)  # a new route
+    assert [recovery.stalled(now) for now in (1.9, 2.1)] == [False, True]
+    recovery.note_command(2.0, None)
+    assert not recovery.stalled(2.1)
+
+
+def between_walls(gap):
+    """Two walls of posts with a gap each [m], so that a robot turns between them."""
+    posts = []
+    for y, x in ((3.0, 0.5), (4.2, 0.3)):
+        for k in range(18):
+            away = gap / 2 + 0.1 + 0.196 * k
+            posts += [Disc(x + side * away, y, 0.1) for side in (-1, 1) if abs(x + side * away) < 3.2]
+    return Task(World("gaps", (-3.3, -0.7, 3.3, 8.0), tuple(posts)), (0.0, 0.0, 1.57), (0.0, 7.2), cell=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [0.54, 0.58])
+def test_a_robot_stands_briefly_between_gaps_hardly_wider_than_itself(gap):
+    s = Scenario.of(between_walls(gap), "astar", "jackal", noise=1.0, map="none", localisation="matching", seed=1)
+    done = run(s)
+    assert done.succeeded
+    log = done.rollout
+    still = (np.abs(log.command) < 0.02).all(axis=1)
+    rows = np.flatnonzero(np.diff(np.concatenate(([0], still, [0]))))
+    stalls = [r.t for r in log.record.replans if r.trigger == STALLED]
+    longest = (rows[1::2] - rows[::2]).max() / log.record.physics_hz
+    assert stalls
+    assert longest < IDLE_TIME + INTERVAL + 0.05
 
 
 def test_unknown_ground_is_distinguished_from_hits(jackal):
@@ -613,7 +651,7 @@ def test_unknown_ground_is_distinguished_from_hits(jackal):
     exploration = compose(s).guide
     survey, recovery = exploration.survey, exploration._recovery
     for twist, unseen in ((FORWARD, False), (Twist(-0.5, 0.0), True), (Twist(0.001, 1.0), False)):
-        recovery.note_held(0.0, twist)
+        recovery.note_command(0.0, twist)
         seen, open_ = survey.clear_way(HERE, twist, 1.0), survey.clear_way(HERE, twist, 1.0, freespace=True)
         assert seen <= open_
         assert recovery.held_by_unknown(HERE) == unseen, (twist, seen, open_)

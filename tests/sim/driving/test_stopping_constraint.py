@@ -47,7 +47,7 @@ def driven(robot, world, start, wanted, hz, held, *, told=None):
     """
     sensor = SimulatedLidar(Scanner.of(robot.lidar, world), told or world, None, None, hz)
     survey = Survey(sensor, robot, start, (start[0] + 2.0, start[1]))
-    caution = StoppingConstraint(survey, robot, hz, 1 / hz + 1 / robot.lidar.rate, lambda tick, held: None)
+    caution = StoppingConstraint(survey, robot, hz, 1 / hz + 1 / robot.lidar.rate, lambda *noted: None)
     most, sharpest = robot.max_acceleration / hz, robot.max_yaw_acceleration / hz
     pose, last, poses = start, Twist(0.0, 0.0), []
     for tick in range(len(wanted) * held):
@@ -64,7 +64,7 @@ def driven(robot, world, start, wanted, hz, held, *, told=None):
 def limited(last, command, free):
     """What becomes of a command where `free` metres or radians are observed as free, with 0.1 s to react."""
     survey = SimpleNamespace(clear_distance=lambda *_: free, clear_turn=lambda *_: free)
-    return StoppingConstraint(survey, ROBOT, 20, 0.1, lambda tick, held: None).limit((0.0, 0.0, 0.0), last, command)
+    return StoppingConstraint(survey, ROBOT, 20, 0.1, lambda *noted: None).limit((0.0, 0.0, 0.0), last, command)
 
 
 def stopping_distance(speed, braking):
@@ -102,11 +102,21 @@ def test_a_command_passes_only_if_the_whole_stopping_distance_is_free(arc):
 )  # fmt: skip
 def test_a_command_that_the_constraint_stops_is_noted(left, slowed, stands):
     noted, wanted = [], Step(Twist(0.3, 0.1), PursuitState())
-    caution = StoppingConstraint(None, ROBOT, 20, 0.1, lambda tick, held: noted.append((tick, held)))
+    caution = StoppingConstraint(None, ROBOT, 20, 0.1, lambda *note: noted.append(note))
     caution.limit = lambda pose, last, command: (Twist(*left), slowed)
     found = caution.apply(SimpleNamespace(tick=7, pose=(0.0, 0.0, 0.0), before=wanted), wanted)
-    assert noted == [(7, wanted.command if stands else None)]
+    assert [note[:2] for note in noted] == [(7, wanted.command if stands else None)]
     assert found == (Step(Twist(*left), PursuitState(limiter=SIGHT_LIMIT)) if slowed else wanted)
+
+
+@pytest.mark.parametrize("marks", [{}, {"avoids": True}, {"waits": True}])
+@pytest.mark.parametrize("command", [Twist(0.0, 0.0), Twist(0.3, 0.1)])
+def test_only_a_robot_that_its_controller_stops_is_idle(command, marks):
+    noted = []
+    caution = StoppingConstraint(None, ROBOT, 20, 0.1, lambda *note: noted.append(note))
+    caution.limit = lambda pose, last, command: (command, False)
+    caution.apply(SimpleNamespace(tick=7, pose=(0.0, 0.0, 0.0), before=Step()), Step(command, PursuitState(), **marks))
+    assert noted == [(7, None, command == Twist(0.0, 0.0) and not marks)]
 
 
 @pytest.mark.parametrize("arc", ARCS)

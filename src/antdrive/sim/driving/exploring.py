@@ -354,9 +354,9 @@ class Exploration(RouteGuide):
         way = self._prepare(route, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
-    def note_held(self, tick: int, held: Twist | None) -> None:
-        """Note the twist that the stopping constraint reduced to a stop; None if it did not."""
-        self._recovery.note_held(tick / self._hz, held)
+    def note_command(self, tick: int, held: Twist | None, idle: bool) -> None:
+        """Note the twist that the stopping constraint reduced to a stop, None if it did not, and whether the robot is idle."""
+        self._recovery.note_command(tick / self._hz, held, idle)
 
     def failure_note(self, tick: int) -> str:
         """Return a note that the latest searches found no path; empty if one did, or after `LATELY`."""

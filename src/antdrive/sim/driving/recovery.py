@@ -16,6 +16,7 @@ from antdrive.worlds import Route
 STALL_TIME = 2.5  # a robot that stays within `STALL_DISTANCE` for this long has stalled [s]
 STALL_DISTANCE = 0.06  # [m]
 STALL_TURN = 0.3  # a robot on a route with turns has not stalled while it turns farther than this [rad]
+IDLE_TIME = 0.5  # a robot that neither moves nor waits at its controller's command for this long has stalled, too [s]
 HELD_TIME = 0.5  # a robot held by the stopping constraint for this long makes a scan turn [s]
 TRAIL = 0.05  # spacing of the points of the driven track [m]
 LENGTHS = (0.4, 0.8, 1.5)  # distances of successive attempts to back off [m]
@@ -86,7 +87,7 @@ class Recovery:
         self._survey, self._robot, self._hz = survey, robot, hz
         self._trail: list[tuple[float, float]] = []
         self._rest = (0.0, start)
-        self._held_since = math.inf
+        self._held_since = self._idle_since = math.inf
         self._wanted: Twist | None = None
         self._stalls, self._stalled_at = 0, start[:2]
         self._turned_at = (math.inf, math.inf)
@@ -103,8 +104,12 @@ class Recovery:
         if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
             self._trail.append(pose[:2])
 
-    def note_held(self, now: float, held: Twist | None) -> None:
-        """Note the twist that the stopping constraint reduced to a stop; None if it did not."""
+    def note_command(self, now: float, held: Twist | None, idle: bool = False) -> None:
+        """Note the twist that the stopping constraint reduced to a stop, None if it did not, and whether the robot is idle.
+
+        It is idle if its controller stops it, as before a turn for which there is no room, and not a mover or the constraint.
+        """
+        self._idle_since = min(self._idle_since, now) if idle else math.inf
         if held is None:
             self._held_since = math.inf
         elif self._held_since == math.inf:
@@ -117,7 +122,7 @@ class Recovery:
 
     def stalled(self, now: float) -> bool:
         """Return whether the robot has stalled."""
-        return now - self._rest[0] > STALL_TIME
+        return now - self._rest[0] > STALL_TIME or now - max(self._rest[0], self._idle_since) > IDLE_TIME
 
     def held(self, now: float, pose: Pose) -> bool:
         """Return whether a scan turn is due: held by unknown ground for long, or a narrow field of view and no turn so far."""

@@ -26,7 +26,12 @@ class StoppingConstraint:
     """
 
     def __init__(
-        self, survey: Survey, robot: RobotSpec, hz: int, reaction: float, note: Callable[[int, Twist | None], None]
+        self,
+        survey: Survey,
+        robot: RobotSpec,
+        hz: int,
+        reaction: float,
+        note: Callable[[int, Twist | None, bool], None],
     ) -> None:
         self._survey, self._robot, self._period, self._reaction = survey, robot, 1 / hz, reaction
         self._note = note
@@ -35,7 +40,8 @@ class StoppingConstraint:
         """Return the command, slowed where it leads beyond observed free ground."""
         command, slowed = self.limit(now.pose, now.before.command, step.command)
         stands = abs(command.speed) < SLOWEST and abs(command.yaw_rate) < SLOWEST
-        self._note(now.tick, step.command if slowed and stands else None)
+        idle = stands and not (slowed or step.avoids or step.waits)
+        self._note(now.tick, step.command if slowed and stands else None, idle)
         if not slowed:
             return step
         return step._replace(command=command, pursuit=step.pursuit._replace(limiter=SIGHT_LIMIT))
