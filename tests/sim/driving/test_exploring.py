@@ -178,8 +178,7 @@ def test_plans_for_the_footprint_keep_less_margin_only_without_a_path(jackal, no
 
     monkeypatch.setattr(guide._routes, "around", around)
     guide.plan(TASK.start)
-    wide, planned = guide._routes.outline_margins
-    assert margins == pytest.approx([*dict.fromkeys((wide, planned)), TURNABLE, 0.0])
+    assert margins == pytest.approx([*guide._routes.outline_margins, TURNABLE, 0.0])
 
 
 @pytest.mark.parametrize(
