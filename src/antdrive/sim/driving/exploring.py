@@ -178,7 +178,7 @@ class Exploration(RouteGuide):
         robot = self._robot
         return rasterise(task.world, self._routes.cell, robot.radius + margin, outline_of(robot.footprint, margin))
 
-    def _plan_around(self, tick: int, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
+    def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""
         movers = self._movers
         if movers is None:
@@ -193,7 +193,7 @@ class Exploration(RouteGuide):
         discs = movers.discs(tick, pose)
         if discs:
             grid, answer = self.plan(pose, discs)
-            if movers.is_fair(answer, pose, grid, trigger):
+            if answer.solved:
                 return grid, answer, discs
         return (*self.plan(pose), [])
 
@@ -319,7 +319,7 @@ class Exploration(RouteGuide):
         if self._failures >= PATIENCE and trigger != SCANNED:
             self._failures = 0
             self.survey.reset(pose)
-        grid, plan, avoided = self._plan_around(tick, pose, trigger)
+        grid, plan, avoided = self._plan_around(tick, pose)
         self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0
