@@ -357,7 +357,8 @@ def test_stopping_takes_as_long_as_the_slower_of_speed_and_turn(turtlebot):
 
 
 def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
-    nobody = SimpleNamespace(predict=lambda *_: (np.empty((2, 0, 2)), np.empty(0)))
+    none = np.empty((0, 2))
+    nobody = SimpleNamespace(predict=lambda *_: (np.stack([none, none]), np.empty(0)), velocities=lambda *_: none)
     cautious = SimpleNamespace(
         prediction_times=np.array([0.0, 0.1]),
         step=0.1,

@@ -296,6 +296,7 @@ def test_a_mover_on_its_way_onto_the_route_makes_a_new_one_due(jackal):
     movers, tracking = ahead(jackal)
     for start, trigger in (((3.0, 7.5), OBSTRUCTED), ((3.0, 9.0), ""), ((8.0, 7.5), "")):  # here, too late, too far
         tracking.see([(*start, 0.0, -1.0)])
+        movers.observe(tracking.tick, POSE, False)
         assert movers.trigger(tracking.tick, POSE, straight(jackal), 0.0) == trigger, start
 
 

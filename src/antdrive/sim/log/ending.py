@@ -37,13 +37,7 @@ BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good moves less [m]
 
 def stopped(twist: Sequence[float], command: Sequence[float]) -> bool:
     """Return whether the robot stands: neither measured nor commanded to drive or turn."""
-    (speed, yaw_rate), (wanted, turning) = twist, command
-    return (
-        -STOPPED_SPEED < speed < STOPPED_SPEED
-        and -STOPPED_SPEED < yaw_rate < STOPPED_SPEED
-        and -STOPPED_SPEED < wanted < STOPPED_SPEED
-        and -STOPPED_SPEED < turning < STOPPED_SPEED
-    )
+    return all(abs(value) < STOPPED_SPEED for value in (*twist, *command))
 
 
 def arrived(
