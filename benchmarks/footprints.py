@@ -51,7 +51,7 @@ SMALLEST = (
     "lattice drives durations --worlds 1 --jobs 1",
     "plans --random 1",
     "repair --rounds 1",
-    "office --office-tasks 1 --jobs 1",
+    "office --office_tasks 1 --jobs 1",
     "ants --seeds 1",
     "lines --courses 1 --jobs 1",
 )
