@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from antdrive.base import FieldError
-from antdrive.planners.entrances import LEAD, MAX_BACKWARDS, ROOM, clear_turn, ends, lead_heading
+from antdrive.planners.entrances import LEAD, MAX_BACKWARDS, ROOM, TURNING, clear_turn, ends, lead_heading
 from antdrive.worlds import DIRECTIONS, Disc, Task, World, rasterise
 from tests.worlds.headings.oracle import BAND, OUTLINES, gap, sampled
 
@@ -80,7 +80,13 @@ def possible_nodes(grid, task, leading, around):
         return set(grid.nodes_at(cells[0]))
     found = set()
     for most, backwards in ((LEAD, False), (MAX_BACKWARDS, True)):
-        for cell in cells:
+
+        def effort(cell, backwards=backwards):
+            dx, dy = grid.xy([cell])[0] - (x, y)
+            turn = abs(math.remainder(math.atan2(dy, dx) + math.pi * backwards - yaw, 2 * math.pi))
+            return math.hypot(dx, dy) + (TURNING * turn if math.hypot(dx, dy) > ROOM else 0.0)
+
+        for cell in sorted(cells, key=effort):
             to = grid.xy([cell])[0].tolist()
             labels = grid.turns.label[cell[0] * grid.shape[1] + cell[1]].tolist()
             if math.dist(to, (x, y)) > most or not leading & set(labels):

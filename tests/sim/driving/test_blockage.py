@@ -73,11 +73,11 @@ def test_patience_restarts_when_the_mover_moves_on(turtlebot):
 
 @pytest.mark.slow
 def test_a_mover_that_moves_is_never_given_up_on(turtlebot):
-    """It walks to and fro by 0.3 m, and the lane is closed all the time; the robot looks for a way every second."""
+    """It walks to and fro by 0.3 m, and the lane is closed all the time; the robot looks for a way every 1 to 2 s."""
     restless = Keyframed(radius=0.3, keyframes=((0.0, 5.0, 0.6), (3.0, 5.3, 0.6)))
     done = among(restless, robot=turtlebot, time_limit=50.0)
     assert done.outcome is Outcome.TIMED_OUT
-    assert len(done.rollout.record.replans) > 40
+    assert len(done.rollout.record.replans) > 20
 
 
 def test_a_way_that_only_movers_on_the_move_close_is_open(turtlebot):
