@@ -69,7 +69,9 @@ nitpick_ignore_regex = [
     ),
     ("py:.*", r"(typing|collections|pathlib|enum|os|types|abc|contextlib|dataclasses)\.[\w.]+"),
     # Arrays as compiled code takes them; no part of what is offered.
-    ("py:class", r"antdrive\.[\w.]+\._kernels_\w+\.\w+"),
+    ("py:class", r"antdrive\.[\w.]+\._kernels_\w+\.\w+|MoveGraph"),
+    # How `sweep` words the origin of random tasks.
+    ("py:class", r"antdrive\.runs\.campaigns\.job\.TaskOrigin"),
     # How a record's field is read from JSON.
     ("py:.*", r"antdrive\.[\w.]+\.(Annotated|_to_\w+)"),
     # Contents of files, whose keys the pages on formats describe.
