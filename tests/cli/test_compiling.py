@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from antdrive.base import kernel_cache
-from antdrive.cli.compiling import TOGETHER
+from antdrive.cli.compiling import TOGETHER, _plan_with
 from antdrive.cli.console import COMPILING, bar, report_compiling
 from antdrive.planners import PLANNERS
 
@@ -68,3 +68,8 @@ def test_each_group_of_planners_is_known_and_none_is_compiled_twice():
     names = [name for group in TOGETHER for name in group]
     assert set(names) <= set(PLANNERS)
     assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_warm_plans_with_every_planner(name):
+    _plan_with([name])

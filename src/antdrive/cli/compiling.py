@@ -84,7 +84,8 @@ def _plan_with(names: Sequence[str]) -> None:
         one = replace(_scenario(), planner=PLANNERS[name])
         plan(one)
         if capabilities_of(one.planner).turns:
-            plan(replace(one, robot=oblong, footprint="exact"))
+            task = one.task if one.plans_footprints else replace(one.task, world=replace(one.task.world, movers=()))
+            plan(replace(one, task=task, robot=oblong, footprint="exact"))
 
 
 def _drive_and_film() -> None:
