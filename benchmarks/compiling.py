@@ -22,7 +22,7 @@ FIRST = {
     "demo without film": "compare forest -p mmas -p astar",
     "everything": "warm",
 }
-STARTS = ("--help", "planners", "worlds list")
+STARTS = ("--help", "--version", "planners", "worlds list", "robots list")
 ANTDRIVE = (sys.executable, "-m", "antdrive")
 
 
