@@ -399,7 +399,7 @@ def listed() -> str:
     from antdrive.cli.commands.worlds import world_rows
 
     kinds = {"planners": planner_rows(), "worlds": world_rows(), "robots": robot_rows()}
-    return json.dumps({kind: list(rows) for kind, rows in kinds.items()}, indent=1, ensure_ascii=False) + "\n"
+    return "".join("\t".join((kind, *row)) + "\n" for kind, rows in kinds.items() for row in rows)
 
 
 def stale() -> dict[Path, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import select
 import signal
 import sys
 from typing import NoReturn, TextIO
@@ -120,6 +119,8 @@ def _show_list(words: list[str]) -> int | None:
 
 def _is_closed(stream: TextIO) -> bool:
     """Return whether a stream is a pipe whose reading end is closed."""
+    import select
+
     poll = select.poll()
     poll.register(stream.fileno(), 0)  # errors are always reported
     return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))

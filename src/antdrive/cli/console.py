@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import os
-import shlex
 import shutil
 import sys
 import textwrap
@@ -272,4 +271,6 @@ def file_lines(files: Mapping[str, object]) -> Iterator[str]:
 
 def this_command() -> str:
     """Return the running command as typed in a shell."""
+    import shlex
+
     return shlex.join(["antdrive", *sys.argv[1:]])

@@ -1,11 +1,10 @@
 """Lists of planners, worlds and robots, and the version, printed without importing what they list.
 
-`python -m tools.reference` writes the rows of the lists to `listed.json`; a test compares them with the catalogues.
+`python -m tools.reference` writes the rows of the lists to `listed.tsv`; a test compares them with the catalogues.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from antdrive.cli.console import table
 
 Row = Sequence[str]
 Rows = Iterable[Row]
-LISTED = Path(__file__).with_name("listed.json")
+LISTED = Path(__file__).with_name("listed.tsv")
 #: Words of command lines that only list, by what they list.
 LISTS = {
     ("planners",): "planners",
@@ -31,7 +30,8 @@ def lines_of(words: Sequence[str]) -> Iterator[str] | None:
     kind = LISTS.get(tuple(words))
     if kind is None or (kind == "planners" and _planners_are_added()):
         return None
-    return LINES[kind](json.loads(LISTED.read_text(encoding="utf-8"))[kind])
+    lines = LISTED.read_text(encoding="utf-8").splitlines()
+    return LINES[kind]([line.split("\t")[1:] for line in lines if line.startswith(f"{kind}\t")])
 
 
 def version_line() -> str:
