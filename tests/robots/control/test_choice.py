@@ -71,7 +71,7 @@ def test_no_skipped_candidate_is_better(tracked, yaw, aside, v, w, movers):
     tuning = tracked.tuning._replace(period=AVOIDANCE.step)
     here = (0.0, aside, yaw, v, w, 6.2, False)
     situation = (*here, TABLE, tracked.samples, tracked.obstacles, tracked.limits, tuning, weights, places, radii)
-    close, distances = kernels.relevant_movers(0.0, aside, tracked.limits, tuning, weights, places, radii)
+    close, distances = kernels.relevant_movers(0.0, aside, yaw, tracked.limits, tuning, weights, places, radii)
     if len(close):
         assert kernels.choose(*situation) == in_turn(situation, distances, close)
     else:

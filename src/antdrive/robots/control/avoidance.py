@@ -32,6 +32,7 @@ import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
+from antdrive.robots.clearance import outline_of
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control._kernels_pursuit import reachable_twist
 from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
@@ -162,7 +163,7 @@ class Avoidance:
                 break
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
             return wanted, False, AvoidanceState(reversed=state.reversed)
-        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(tracked, pose, places[0], radii)):
+        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(weights, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
         twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
         return twist, True, after._replace(reversed=state.reversed)
@@ -209,11 +210,9 @@ class Avoidance:
         gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
         return bool((unlike & (gap < self.horizon * (speeds + spec.max_speed))).any())
 
-    def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
+    def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
-        away = np.hypot(*(places - pose[:2]).T) - radii
-        close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
-        return 2 * self.step if close else 0.0
+        return 2 * self.step if kernels.is_close(*pose, places, radii, weights) else 0.0
 
     def _candidates(
         self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float
@@ -313,7 +312,8 @@ def _instants(horizon: float, step: float) -> Floats:
 
 @functools.lru_cache(maxsize=64)
 def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kernels.AvoidanceWeights:
-    """Return the settings for a robot with a given circumscribed radius [m]."""
+    """Return the settings for a robot whose circle counts with a given radius [m]."""
+    outline = outline_of(footprint, 0.0)
     return kernels.AvoidanceWeights(
         step=avoidance.step,
         min_distance=radius + avoidance.min_clearance,
@@ -326,5 +326,7 @@ def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kerne
         reversal_time=avoidance.reversal_time,
         reversal_distance=radius + avoidance.min_clearance + avoidance.reversal_margin,
         reversal_weight=avoidance.reversal_weight,
-        narrowest=footprint.inner_radius,
+        radius=footprint.radius,
+        corners=outline.corners,
+        rounding=outline.reach,
     )
