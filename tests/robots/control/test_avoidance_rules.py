@@ -71,7 +71,9 @@ def gaps_to(foot, start, end, mover, mover_end, share):
 
 @settings(max_examples=60, deadline=None)
 @given(foot=st.sampled_from(list(FEET)), start=pose, end=pose, mover=point, mover_end=point, radius=st.floats(0.1, 0.5))
-def test_an_outline_keeps_its_own_distance(foot, start, end, mover, mover_end, radius):
+def test_an_outline_has_contact_at_its_own_distance_and_its_circle_has_the_clearance(
+    foot, start, end, mover, mover_end, radius
+):
     """A closest pose is missed by at most half of the distance between two checked ones."""
     foot, start = FEET[foot], np.array(start)
     end, mover_end = start + 0.1 * np.array(end), np.array(mover) + 0.1 * np.array(mover_end)
@@ -80,11 +82,13 @@ def test_an_outline_keeps_its_own_distance(foot, start, end, mover, mover_end, r
     share, clearance = first_contact(start, end, places, 0, np.array([radius]), NEAR, reach, weights, math.inf)
     f = np.linspace(0, 1, 101)[:, None]
     gaps = gaps_to(foot, start, end, mover, mover_end, f) - radius - 0.1
-    assert gaps.min() - 1e-6 <= clearance <= gaps.min() + CHECKED / 2 + 1e-6
-    if clearance < 0:
+    between = (1 - f) * (np.array(mover) - start[:2]) + f * (np.array(mover_end) - end[:2])
+    assert clearance == pytest.approx(np.hypot(*between.T).min() - reach[0], abs=2e-3)
+    if gaps.min() < -CHECKED / 2:
         assert share <= 1
+    if share <= 1:
         assert gaps[round(100 * share)] < 1e-2
-    else:
+    if gaps.min() > 1e-6:
         assert share == 2
 
 
@@ -230,24 +234,37 @@ def test_a_robot_reverses_slowly_unless_it_would_be_hit(tracked, turtlebot, come
     assert fastest > 0.3 or comes < 1.0
 
 
-@pytest.mark.parametrize(("gap", "passes"), [(0.2, True), (-0.35, False)])
-def test_a_rectangle_passes_a_mover_where_its_circle_does_not(gap, passes):
-    """In a passage of 1.5 m, a mover stands beside the way of a robot of 0.9 x 0.6 m, or on it."""
-    robot = load_robot("warehouse")
-    walls = tuple(Disc(float(x), y, 0.3) for y in (-1.05, 1.05) for x in np.arange(0.0, 8.1, 0.2))
-    route = Route(np.array([(1.0, 0.0), (7.0, 0.0)]))
-    tracked = PurePursuit().prepare(route, World("passage", (-2, -3, 10, 3), walls), robot, 0.03, 1 / 60)
-    mover, avoidance = np.array([[4.0, 0.3 + gap + 0.1]]), Avoidance()
-    places = np.tile(mover, (len(avoidance.prediction_times), 1, 1))
+def passes(walls, mover, speed):
+    """Whether a robot of 0.9 x 0.6 m passes a mover that comes, without contact, in 20 s."""
+    robot, route = load_robot("warehouse"), Route(np.array([(1.0, 0.0), (7.0, 0.0)]))
+    tracked = PurePursuit().prepare(route, World("passage", (-9, -3, 15, 3), walls), robot, 0.03, 1 / 60)
+    avoidance = Avoidance()
     pose, last, pursuit, state = np.array([1.0, 0.0, 0.0]), Twist(0.0, 0.0), PursuitState(), AvoidanceState()
-    for _ in range(12 * 60):
-        here = tuple(pose)
+    for k in range(20 * 60):
+        x = mover[0] - speed * (k / 60 + avoidance.prediction_times)
+        places, here = np.stack([x, np.full(len(x), mover[1])], axis=1)[:, None], tuple(pose)
         wanted, after = PurePursuit().step(tracked, here, last, pursuit)
         last, _, state = avoidance.avoid(
             tracked, robot, here, last, pursuit, wanted, state, places, np.array([0.1])
         )  # fmt: skip
         pursuit = after
         pose += np.array((last.speed * math.cos(pose[2]), last.speed * math.sin(pose[2]), last.yaw_rate)) / 60
-        world = World("with the mover", (-2, -3, 10, 3), (*walls, Disc(4.0, float(mover[0, 1]), 0.1)))
-        assert footprint_clearance(world, robot.footprint, pose[None])[0] > 0
-    assert (pose[0] > 6.0) == passes
+        world = World("with the mover", (-9, -3, 15, 3), (*walls, Disc(*places[0, 0].tolist(), 0.1)))
+        if footprint_clearance(world, robot.footprint, pose[None])[0] <= 0:
+            return False
+    return bool(pose[0] > 6.0)
+
+
+def rows(y):
+    return tuple(Disc(float(x), side * y, 0.3) for side in (-1, 1) for x in np.arange(-8.0, 14.0, 0.25))
+
+
+@pytest.mark.parametrize(("gap", "expected"), [(0.2, True), (-0.35, False)])
+def test_a_rectangle_passes_a_mover_where_its_circle_does_not(gap, expected):
+    """In a passage of 1.5 m, a mover stands beside the robot's way, or on it."""
+    assert passes(rows(1.05), (4.0, 0.4 + gap), 0.0) == expected
+
+
+def test_a_rectangle_passes_a_mover_where_its_circle_has_no_room_to_the_wall():
+    """In a passage of 2.1 m a mover comes along the middle: the circle cannot leave its way far enough."""
+    assert passes(rows(1.35), (8.0, 0.0), 0.5)

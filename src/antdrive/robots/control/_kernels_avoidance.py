@@ -49,6 +49,7 @@ class AvoidanceWeights(NamedTuple):
         radius: circumscribed radius of the robot [m]
         corners: of the robot's outline (K, 2); none for a disc around the axle [m]
         rounding: of that outline [m]
+        outlined: whether the outline is kept from obstacles on every route, not only on those with turns
     """
 
     step: float
@@ -65,6 +66,7 @@ class AvoidanceWeights(NamedTuple):
     radius: float
     corners: Array
     rounding: float
+    outlined: bool
 
 
 class Trail(NamedTuple):
@@ -121,22 +123,19 @@ def distance_to(dx: float, dy: float, yaw: float, weights: AvoidanceWeights) -> 
 @kernel
 def outline_contact(
     start: Array, end: Array, ax: float, ay: float, ux: float, uy: float, reach: float, weights: AvoidanceWeights
-) -> tuple[float, float]:
-    """Return the fraction of a step until the outline is at `reach` from a point, 2 if it never is, and the least distance.
+) -> float:
+    """Return the fraction of a step until the outline is at `reach` from a point, 2 if it never is.
 
     The point moves by (ux, uy) from (ax, ay), relative to the robot's centre. Distances are those of `distance_to`, at poses at
     most `CHECKED` apart.
     """
     turned = end[2] - start[2]
     count = int((math.hypot(ux, uy) + abs(turned) * weights.radius) / CHECKED) + 1
-    share, least = 2.0, math.inf
     for n in range(count + 1):
         f = n / count
-        away = distance_to(ax + f * ux, ay + f * uy, start[2] + f * turned, weights)
-        least = min(least, away)
-        if away < reach and share > 1.0:
-            share = f
-    return share, least
+        if distance_to(ax + f * ux, ay + f * uy, start[2] + f * turned, weights) < reach:
+            return f
+    return 2.0
 
 
 @kernel
@@ -147,8 +146,9 @@ def first_contact(
     """Return the fraction of a step until a mover is at its contact distance, 2 if none is, and the clearance.
 
     The robot moves straight from a pose `start` to `end`, and each mover straight from its position k to the next. The
-    clearance is the least to a mover's surface, beyond `min_distance`; movers without contact farther than `cap` may be
-    omitted. Only where the circle around the robot is too close, its outline is checked.
+    clearance is the least to a mover's surface, beyond `min_distance`, of the circle around the robot: robots prefer more room
+    than their outline needs. Movers without contact farther than `cap` may be omitted. Only where the circle is too close, the
+    outline is checked.
     """
     share, clearance, min_distance = 2.0, math.inf, weights.min_distance
     x0, y0, x1, y1 = start[0], start[1], end[0], end[1]
@@ -164,11 +164,10 @@ def first_contact(
         if dx * dx + dy * dy > matters * matters:
             continue
         away = math.hypot(dx, dy)
-        if weights.corners.shape[0] > 0:
-            touched, away = outline_contact(start, end, ax, ay, ux, uy, reach, weights)
-            share = min(share, touched)
         clearance = min(clearance, away - radii[m] - min_distance)
-        if weights.corners.shape[0] == 0 and away < reach:
+        if away < reach and weights.corners.shape[0] > 0:
+            share = min(share, outline_contact(start, end, ax, ay, ux, uy, reach, weights))
+        elif away < reach:
             over = ax * ax + ay * ay - reach * reach
             root = math.sqrt(max(along * along - length2 * over, 0.0))
             share = min(share, max(0.0, (-along - root) / length2) if over > 0.0 and length2 > 0.0 else 0.0)
@@ -189,12 +188,9 @@ def intrusion(pose: Array, places: Array, k: int, radii: Array, near: Array, wei
 
 
 @kernel
-def least_clearance(trail: Array, path: PathSamples, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
-    """Return the required clearance along a trail, reduced if its start is closer [m].
-
-    It is that of the robot's centre; on a route with turns, that of its outline.
-    """
-    if path.turns.shape[0] == 0:
+def least_clearance(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
+    """Return the required clearance along a trail, of the robot's centre or its outline, reduced if its start is closer [m]."""
+    if not outlined:
         return min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
     discs = nearby(trail[0, 0], trail[0, 1], obstacles)
     here = outline_clearance(trail[:1, :3], discs, obstacles.bounds, tuning)
@@ -206,21 +202,21 @@ def passes_within(
     trail: Array,
     k: int,
     required: float,
-    path: PathSamples,
+    outlined: bool,
     obstacles: ObstacleIndex,
     tuning: PursuitTuning,
     step: float,
 ) -> bool:
     """Return whether the step after row k of a trail comes closer to an obstacle than required.
 
-    A step is straight, or on a route with turns a few poses of the outline.
+    A step is straight, or a few poses of the outline.
     """
-    length, lines = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step, path.turns.shape[0] > 0
-    if abs(length) <= 1e-6 and not lines:
+    length = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step
+    if abs(length) <= 1e-6 and not outlined:
         return False
     discs = nearby(trail[k, 0], trail[k, 1], obstacles)
     distance = segment_clearance(trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1], discs, obstacles.bounds)
-    if not lines or distance >= required + tuning.robot_radius:
+    if not outlined or distance >= required + tuning.robot_radius:
         return bool(distance < required)
     sweep = abs(trail[k + 1, 2] - trail[k, 2]) * tuning.robot_radius
     count = int((abs(length) + sweep) / CHECKED) + 1
@@ -233,13 +229,11 @@ def passes_within(
 
 
 @kernel
-def meets_obstacle(
-    trail: Array, path: PathSamples, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float
-) -> bool:
+def meets_obstacle(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float) -> bool:
     """Return whether a trail that was followed without obstacle checks comes too close to an obstacle."""
-    required = least_clearance(trail, path, obstacles, tuning)
+    required = least_clearance(trail, outlined, obstacles, tuning)
     k, steps = 0, trail.shape[0] - 1
-    while k < steps and not passes_within(trail, k, required, path, obstacles, tuning, step):
+    while k < steps and not passes_within(trail, k, required, outlined, obstacles, tuning, step):
         k += 1
     return bool(k < steps)
 
@@ -248,7 +242,7 @@ def meets_obstacle(
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidate: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
-    step: float, first: int, looks: bool, trail: Array,
+    step: float, first: int, looks: bool, outlined: bool, trail: Array,
 ) -> Trail:  # fmt: skip
     """Follow a candidate from step `first` to the last row of `trail` (K + 1, 5).
 
@@ -260,7 +254,7 @@ def follow(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
         limits.lateral_acceleration, limits.half_track, limits.rim_speed,
     )  # fmt: skip
-    required = least_clearance(trail, path, obstacles, tuning) if looks else 0.0
+    required = least_clearance(trail, outlined, obstacles, tuning) if looks else 0.0
     cos, sin, facing, now = 1.0, 0.0, 0.0, 0.0
     for k in range(trail.shape[0] - 1):
         if k < first:
@@ -280,7 +274,7 @@ def follow(
         x1, y1 = x + length * cos, y + length * sin
         yaw1 = yaw + 0.5 * (w + w1) * step
         trail[k + 1, 0], trail[k + 1, 1], trail[k + 1, 2], trail[k + 1, 3], trail[k + 1, 4] = x1, y1, yaw1, v1, w1
-        if looks and passes_within(trail, k, required, path, obstacles, tuning, step):
+        if looks and passes_within(trail, k, required, outlined, obstacles, tuning, step):
             return Trail(k + 1, True)
         x, y, yaw, v, w, now = x1, y1, yaw1, v1, w1, now + step
     return Trail(trail.shape[0] - 1, False)
@@ -289,7 +283,7 @@ def follow(
 @kernel
 def follow_all(
     s: float, rotating: bool, candidates: Array, path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits,
-    tuning: PursuitTuning, step: float, trails: Array, steps: Array, blocked: Array,
+    tuning: PursuitTuning, step: float, outlined: bool, trails: Array, steps: Array, blocked: Array,
 ) -> None:  # fmt: skip
     """Fill `trails` (N, K + 1, 5), `steps` and `blocked` (N,) for the candidates after the first.
 
@@ -313,7 +307,7 @@ def follow_all(
                 continue
         got = follow(
             trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4], s, rotating,
-            candidate, path, obstacles, limits, tuning, step, first, True, trail,
+            candidate, path, obstacles, limits, tuning, step, first, True, outlined, trail,
         )  # fmt: skip
         steps[n], blocked[n] = got.steps, got.blocked
         if candidate[KIND] == TWO_TWISTS and candidate[DURATION] == math.inf:
@@ -542,12 +536,29 @@ def choose(
     near, contact_distances = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
     if near.shape[0] == 0:
         return 0, math.inf
+    outlined = weights.outlined or path.turns.shape[0] > 0
     count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
     by_step = reachable_by_step(x, y, fastest(v, candidates, limits), weights, places, radii, near, cap)
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
     trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
     own = follow(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, trails[0]
+        x,
+        y,
+        yaw,
+        v,
+        w,
+        s,
+        rotating,
+        candidates[0],
+        path,
+        obstacles,
+        limits,
+        tuning,
+        weights.step,
+        0,
+        True,
+        outlined,
+        trails[0],
     )
     steps[0], blocked[0] = own.steps, own.blocked
     met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
@@ -571,14 +582,14 @@ def choose(
         if not followed[n]:
             follow(
                 x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights.step, 0, False,
-                trails[n],
+                outlined, trails[n],
             )  # fmt: skip
             followed[n] = True
             limit[n] = worth(trails[n, instants - 1], s, window, path, tuning, weights)
             if n <= 1:
                 limit[n] += weights.persistence
             continue
-        if meets_obstacle(trails[n], path, obstacles, tuning, weights.step):
+        if meets_obstacle(trails[n], outlined, obstacles, tuning, weights.step):
             limit[n] = -math.inf
             continue
         met = encounter(
@@ -593,7 +604,7 @@ def choose(
         limit[n] = -math.inf
     if best >= 0:
         return best, math.inf
-    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, trails, steps, blocked)
+    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, outlined, trails, steps, blocked)
     best, latest = 0, -1.0
     for n in range(count):
         met = encounter(
@@ -616,16 +627,33 @@ def best_escape(
     margin, so dodging often avoids the contact.
     """
     near, _ = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
+    outlined = weights.outlined or path.turns.shape[0] > 0
     soon = places[: min(places.shape[0], int(ESCAPE_TIME / weights.step) + 2)]
     bodies, count = radii + weights.radius, candidates.shape[0]
     by_step = reachable_by_step(x, y, math.inf, weights, soon, radii, near, math.inf)
     trails, steps, blocked = np.empty((count, soon.shape[0], 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
     trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
     own = follow(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, trails[0]
+        x,
+        y,
+        yaw,
+        v,
+        w,
+        s,
+        rotating,
+        candidates[0],
+        path,
+        obstacles,
+        limits,
+        tuning,
+        weights.step,
+        0,
+        True,
+        outlined,
+        trails[0],
     )
     steps[0], blocked[0] = own.steps, own.blocked
-    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, trails, steps, blocked)
+    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, outlined, trails, steps, blocked)
     best, most = -1, -math.inf
     for n in range(count):
         if blocked[n]:

@@ -10,7 +10,8 @@ one of the candidates, so the robot moves out of the path of an approaching move
 Near movers ahead the robot keeps its `near_speed`, and it reverses slowly and not far. These limits cause no contact that a
 robot without them avoids:
 
-- Where every candidate within them ends in a contact, they are lifted step by step, so a predicted contact has the same escapes.
+- Where every candidate within them ends in a contact, the robot first keeps its outline from obstacles instead of its circle;
+  then they are lifted step by step, so a predicted contact has the same escapes.
 - A prediction that is wrong could hide a contact. They hold only where movers move as predicted: a mover with another observed
   velocity, as among ground-truth positions, lifts them all. So does a mover faster than people: speed is the way out.
 - A robot that crosses the lane of a mover that comes faster than `near_speed` is not slowed, nor one that leaves a mover behind.
@@ -149,10 +150,15 @@ class Avoidance:
         tuning = tracked.tuning._replace(period=self.step)
         weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
         observed = predicted if velocities is None else velocities
-        limits_of = [(near, slow), (near, backwards), (math.inf, backwards), (math.inf, math.inf)]
+        outlined = not (spec.footprint.is_disc or len(tracked.samples.turns))
+        limits_of = [
+            (near, slow, False), (near, slow, outlined), (near, backwards, outlined), (math.inf, backwards, outlined),
+            (math.inf, math.inf, outlined),
+        ]  # fmt: skip
         if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
-            del limits_of[:2]
-        for fastest, reverse in dict.fromkeys(limits_of):
+            limits_of[:3] = [(math.inf, backwards, False)]
+        for fastest, reverse, by_outline in dict.fromkeys(limits_of):
+            weights = weights._replace(outlined=by_outline)
             candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
@@ -329,4 +335,5 @@ def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kerne
         radius=footprint.radius,
         corners=outline.corners,
         rounding=outline.reach,
+        outlined=False,
     )
