@@ -77,11 +77,12 @@ def facts_of(spec: RobotSpec) -> dict[str, str]:
         f"pose ±{noise.pose_xy:g} m, ±{noise.pose_yaw:g} rad; encoders ±{100 * noise.encoder:g} %; "
         f"slip ±{100 * noise.slip:g} %; delay {noise.delay:g} s"
     )
+    near = f"; {spec.near_speed:g} m/s near movers ahead" if spec.near_speed < spec.max_speed else ""
     return {
         "footprint": footprint_text(spec),
         "body": f"{spec.height:g} m high, {spec.mass:g} kg",
         "wheels": f"radius {spec.wheel_radius:g} m, {spec.track:g} m apart",
-        "speed": f"up to {spec.max_speed:g} m/s, {spec.max_yaw_rate:g} rad/s",
+        "speed": f"up to {spec.max_speed:g} m/s, {spec.max_yaw_rate:g} rad/s{near}",
         "acceleration": f"up to {spec.max_acceleration:g} m/s², {spec.max_yaw_acceleration:g} rad/s²; "
         f"lateral {spec.max_lateral_acceleration:g} m/s²",
         **({} if spec.lidar is None else {"lidar": lidar_text(spec.lidar)}),

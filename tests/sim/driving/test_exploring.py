@@ -16,7 +16,7 @@ from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, hit_within, near_polyline, point_at
 from antdrive.sim.driving.drive import Driver
-from antdrive.sim.driving.exploring import INTERVAL, TURNABLE
+from antdrive.sim.driving.exploring import INTERVAL, SQUEEZED, TURNABLE
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import IDLE_TIME, Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of
@@ -169,7 +169,7 @@ def test_the_controller_makes_the_turns_of_plans_for_the_footprint(jackal):
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_plans_for_the_footprint_keep_less_margin_only_without_a_path(jackal, noise, monkeypatch):
-    """Room for the controller's turns comes before none at all."""
+    """Room for the controller's turns comes before none at all, and that before plans closer to scattered hits."""
     guide, margins = compose(scenario(jackal, footprint="exact", noise=noise)).guide, []
 
     def around(task, grid, avoided):
@@ -178,7 +178,20 @@ def test_plans_for_the_footprint_keep_less_margin_only_without_a_path(jackal, no
 
     monkeypatch.setattr(guide._routes, "around", around)
     guide.plan(TASK.start)
-    assert margins == pytest.approx([*guide._routes.outline_margins, TURNABLE, 0.0])
+    assert margins == pytest.approx([*guide._routes.outline_margins, TURNABLE, 0.0, SQUEEZED])
+
+
+def test_scattered_hits_do_not_close_a_passage_and_the_record_keeps_no_margin(jackal):
+    """Two posts leave 1 cm less than the robot is wide."""
+    half = jackal.footprint.half_width - 0.005
+    posts = tuple(Disc(3.0, 2.025 + side * (half + 0.2 + 0.4 * k), 0.2) for side in (-1, 1) for k in range(6))
+    world = World("passage", (0.0, 0.0, 6.0, 4.0), posts)
+    guide = compose(scenario(jackal, Task(world, (1.0, 2.025, 0.0), (5.0, 2.025)), footprint="exact")).guide
+    guide._known = lambda pose, bounds: replace(guide._task, world=world, start=pose)
+    grid, plan = guide.plan((1.0, 2.025, 0.0))
+    assert plan.solved
+    assert grid.turns.outline.reach == pytest.approx(jackal.footprint.rounding + SQUEEZED)
+    assert guide.footprint_margin == 0.0
 
 
 @pytest.mark.parametrize(

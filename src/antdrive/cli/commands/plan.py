@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from antdrive.worlds import Grid
 
 
-@options.with_settings(("margin", "cell", "seed"))
+@options.with_settings(("margin", "footprint", "cell", "seed"))
 def plan(
     *,
     world: options.World,

@@ -157,9 +157,10 @@ def _lines(results: "SweepResults", reports: Sequence[str]) -> Iterator[str]:
 
     yield f"{results.size} runs ({results.made} new): {results.succeeded} succeeded, certified"
     yield from table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
-    yield ""
-    yield "medians of successful runs (minimum to maximum)"
-    yield from table(("planner", "runs", *MEDIANS.values()), results.medians())
+    if medians := list(results.medians()):
+        yield ""
+        yield "medians of successful runs (minimum to maximum)"
+        yield from table(("planner", "runs", *MEDIANS.values()), medians)
     yield f"  table    {results.path}"
     yield from (f"  report   {file}" for file in reports)
     if not reports:

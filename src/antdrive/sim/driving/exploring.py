@@ -57,6 +57,9 @@ CORNERED = 0.1  # other shapes: additional allowance per metre by which their co
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
 #: Plans for the footprint keep this margin if possible: the controller refuses turns closer to hits [m].
 TURNABLE = 0.025
+#: Scattered hits narrow a passage that is hardly wider than the robot: a last plan for the footprint comes this much closer to
+#: them, so that the robot goes there and sees better. The controller and the stopping constraint still keep it from hits [m].
+SQUEEZED = -0.02
 LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
 
@@ -168,7 +171,9 @@ class Exploration(RouteGuide):
     def _margins(self, outlined: bool) -> tuple[float, ...]:
         """Return the margins to plan with, in turn [m]."""
         if outlined:
-            return tuple(dict.fromkeys((*self._routes.outline_margins, min(TURNABLE, self._routes.margin), 0.0)))
+            return tuple(
+                dict.fromkeys((*self._routes.outline_margins, min(TURNABLE, self._routes.margin), 0.0, SQUEEZED))
+            )
         return tuple(share * self._routes.margin for share in MARGINS)
 
     def _grid(self, task: Task, margin: float, *, outlined: bool = False) -> Grid:

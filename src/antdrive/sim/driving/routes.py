@@ -162,7 +162,7 @@ class RoutePlanner:
         """Return the answer if it is valid; else note the error and return an invalid plan."""
         plan = checked(query, answer)
         if plan.solved and query.grid.turns and self.footprint_margin is None:
-            self.footprint_margin = query.grid.turns.outline.reach - self.robot.footprint.rounding
+            self.footprint_margin = max(query.grid.turns.outline.reach - self.robot.footprint.rounding, 0.0)
         if plan.status is PlanStatus.INVALID:
             self.plan_error = self.plan_error or plan.reason
         return plan
