@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 from antdrive.base import kernel_cache
 
 if TYPE_CHECKING:
+    from antdrive.robots import RobotSpec
     from antdrive.sim.scenario import Scenario
 
 # Planners that share kernels are compiled by one process; the slowest groups come first.
@@ -74,12 +75,18 @@ def _compile(planners: Sequence[str] | None) -> None:
     _drive_and_film() if planners is None else _plan_with(planners)
 
 
+def _oblong() -> RobotSpec:
+    """Return a robot whose plans keep its footprint clear."""
+    from antdrive.robots import Footprint
+
+    return replace(_scenario().robot, footprint=Footprint(half_length=0.2, half_width=0.15))
+
+
 def _plan_with(names: Sequence[str]) -> None:
     from antdrive.planners import PLANNERS, capabilities_of
-    from antdrive.robots import Footprint
     from antdrive.sim.pipeline import plan
 
-    oblong = replace(_scenario().robot, footprint=Footprint(half_length=0.2, half_width=0.15))
+    oblong = _oblong()
     for name in names:
         one = replace(_scenario(), planner=PLANNERS[name])
         plan(one)
@@ -96,6 +103,7 @@ def _drive_and_film() -> None:
 
     _sense()
     log = run(_scenario()).rollout
+    run(replace(_scenario(), robot=_oblong(), footprint="exact"))  # the controller's kernel for lines
     task = _scenario().task
     comes = Cruising(radius=0.2, position=(2.5, 0.75), velocity=(-2.0, 0.0))  # forces an evasive manoeuvre
     run(replace(_scenario(), task=replace(task, world=replace(task.world, movers=(comes,)))))
