@@ -5,12 +5,24 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot, robot_to_dict
-from antdrive.robots.control._kernels_avoidance import first_contact, intrusion
-from antdrive.worlds import Route, World
+from antdrive.robots import (
+    Avoidance,
+    AvoidanceState,
+    Footprint,
+    PurePursuit,
+    PursuitState,
+    Twist,
+    footprint_clearance,
+    load_robot,
+    robot_to_dict,
+)
+from antdrive.robots.control._kernels_avoidance import first_contact, intrusion, is_close
+from antdrive.robots.control._kernels_lines import CHECKED
+from antdrive.robots.control.avoidance import _weights
+from antdrive.worlds import Disc, Route, World
 
 OPEN = World("open", (-20, -20, 20, 20))
 NEAR = np.array([0])
@@ -18,12 +30,26 @@ coordinate = st.floats(-2, 2)
 point = st.tuples(coordinate, coordinate)
 
 
+pose = st.tuples(coordinate, coordinate, st.floats(-3, 3))
+FEET = {
+    "disc": Footprint.disc(0.3),
+    "off the axle": Footprint.disc(0.3, (0.1, 0.05)),
+    "rectangle": Footprint.rectangle(0.9, 0.6),
+    "off-centre": Footprint.rectangle(0.9, 0.6, (0.15, 0.0)),
+}
+
+
+def weights_of(foot, clearance=0.1):
+    return _weights(Avoidance(min_clearance=clearance), foot.radius, foot)
+
+
 @given(start=point, end=point, mover=point, mover_end=point, radius=st.floats(0.1, 0.5), distance=st.floats(0.6, 1.0))
 def test_the_first_contact_is_that_of_sampled_motion(start, end, mover, mover_end, radius, distance):
-    places = np.array([[mover], [mover_end]])
+    places, weights = np.array([[mover], [mover_end]]), weights_of(Footprint.disc(0.05), distance - radius - 0.05)
     share, clearance = first_contact(
-        *start, *end, places, 0, np.array([radius]), NEAR, np.array([distance]), distance - radius, math.inf
-    )
+        np.array([*start, 0.0]), np.array([*end, 1.0]), places, 0, np.array([radius]), NEAR, np.array([distance]),
+        weights, math.inf,
+    )  # fmt: skip
     f = np.linspace(0, 1, 2001)[:, None]
     gap = np.hypot(*((1 - f) * mover + f * mover_end - (1 - f) * start - f * end).T)
     assert clearance == pytest.approx(gap.min() - distance, abs=2e-3)
@@ -35,10 +61,56 @@ def test_the_first_contact_is_that_of_sampled_motion(start, end, mover, mover_en
         assert share == 2
 
 
+def gaps_to(foot, start, end, mover, mover_end, share):
+    """Distances from the footprint to a mover's centre along a step, by another implementation."""
+    poses = (1 - share) * np.array(start) + share * np.array(end)
+    places = (1 - share) * np.array(mover) + share * np.array(mover_end)
+    worlds = (World("", (-99, -99, 99, 99), (Disc(*map(float, place), 1e-3),)) for place in places)
+    return 1e-3 + np.array([footprint_clearance(w, foot, p[None])[0] for w, p in zip(worlds, poses, strict=True)])
+
+
+@settings(max_examples=60, deadline=None)
+@given(foot=st.sampled_from(list(FEET)), start=pose, end=pose, mover=point, mover_end=point, radius=st.floats(0.1, 0.5))
+def test_an_outline_has_contact_at_its_own_distance_and_its_circle_has_the_clearance(
+    foot, start, end, mover, mover_end, radius
+):
+    """A closest pose is missed by at most half of the distance between two checked ones."""
+    foot, start = FEET[foot], np.array(start)
+    end, mover_end = start + 0.1 * np.array(end), np.array(mover) + 0.1 * np.array(mover_end)
+    weights, places = weights_of(foot), np.array([[mover], [mover_end]])
+    reach = np.array([radius + foot.radius + 0.1])
+    share, clearance = first_contact(start, end, places, 0, np.array([radius]), NEAR, reach, weights, math.inf)
+    f = np.linspace(0, 1, 101)[:, None]
+    gaps = gaps_to(foot, start, end, mover, mover_end, f) - radius - 0.1
+    between = (1 - f) * (np.array(mover) - start[:2]) + f * (np.array(mover_end) - end[:2])
+    assert clearance == pytest.approx(np.hypot(*between.T).min() - reach[0], abs=2e-3)
+    if gaps.min() < -CHECKED / 2:
+        assert share <= 1
+    if share <= 1:
+        assert gaps[round(100 * share)] < 1e-2
+    if gaps.min() > 1e-6:
+        assert share == 2
+
+
+@pytest.mark.parametrize("foot", FEET)
+def test_a_mover_is_close_where_the_outline_is(foot):
+    foot, rng = FEET[foot], np.random.default_rng(0)
+    for _ in range(200):
+        here, mover = rng.uniform((-1, -1, -3), (1, 1, 3)), rng.uniform(-1.5, 1.5, 2)
+        gap = gaps_to(foot, here, here, mover, mover, np.zeros((1, 1)))[0] - 0.25
+        if abs(gap - 0.1) > 1e-6:
+            assert is_close(*here, mover[None], np.array([0.25]), weights_of(foot)) == (gap < 0.1)
+
+
 def test_intrusion_is_measured_from_where_a_reversed_mover_would_be():
     places = np.array([[(0.0, 0.0)], [(1.0, 0.0)]])  # reversed, the mover would be at (-1, 0)
-    assert intrusion(-1.0, 0.7, places, 1, np.array([0.3]), NEAR, 0.5) == pytest.approx(0.1)
-    assert intrusion(1.0, 0.0, places, 1, np.array([0.3]), NEAR, 0.5) == 0.0
+    weights = weights_of(Footprint.disc(0.35))
+    assert intrusion(np.array([-1.0, 0.7, 2.0]), places, 1, np.array([0.3]), NEAR, weights) == pytest.approx(0.1)
+    assert intrusion(np.array([1.0, 0.0, 0.0]), places, 1, np.array([0.3]), NEAR, weights) == 0.0
+    beside = weights_of(Footprint.rectangle(0.9, 0.6))
+    for yaw, expected in ((0.0, 0.05), (math.pi / 2, 0.2)):
+        got = intrusion(np.array([-1.0, 0.7, yaw]), places, 1, np.array([0.3]), NEAR, beside)
+        assert got == pytest.approx(expected)
 
 
 @pytest.fixture
@@ -160,3 +232,39 @@ def test_a_robot_reverses_slowly_unless_it_would_be_hit(tracked, turtlebot, come
         x, fastest = x - (comes + last.speed) / 60, max(fastest, -last.speed)
     assert fastest <= most + 1e-9
     assert fastest > 0.3 or comes < 1.0
+
+
+def passes(walls, mover, speed):
+    """Whether a robot of 0.9 x 0.6 m passes a mover that comes, without contact, in 20 s."""
+    robot, route = load_robot("warehouse"), Route(np.array([(1.0, 0.0), (7.0, 0.0)]))
+    tracked = PurePursuit().prepare(route, World("passage", (-9, -3, 15, 3), walls), robot, 0.03, 1 / 60)
+    avoidance = Avoidance()
+    pose, last, pursuit, state = np.array([1.0, 0.0, 0.0]), Twist(0.0, 0.0), PursuitState(), AvoidanceState()
+    for k in range(20 * 60):
+        x = mover[0] - speed * (k / 60 + avoidance.prediction_times)
+        places, here = np.stack([x, np.full(len(x), mover[1])], axis=1)[:, None], tuple(pose)
+        wanted, after = PurePursuit().step(tracked, here, last, pursuit)
+        last, _, state = avoidance.avoid(
+            tracked, robot, here, last, pursuit, wanted, state, places, np.array([0.1])
+        )  # fmt: skip
+        pursuit = after
+        pose += np.array((last.speed * math.cos(pose[2]), last.speed * math.sin(pose[2]), last.yaw_rate)) / 60
+        world = World("with the mover", (-9, -3, 15, 3), (*walls, Disc(*places[0, 0].tolist(), 0.1)))
+        if footprint_clearance(world, robot.footprint, pose[None])[0] <= 0:
+            return False
+    return bool(pose[0] > 6.0)
+
+
+def rows(y):
+    return tuple(Disc(float(x), side * y, 0.3) for side in (-1, 1) for x in np.arange(-8.0, 14.0, 0.25))
+
+
+@pytest.mark.parametrize(("gap", "expected"), [(0.2, True), (-0.35, False)])
+def test_a_rectangle_passes_a_mover_where_its_circle_does_not(gap, expected):
+    """In a passage of 1.5 m, a mover stands beside the robot's way, or on it."""
+    assert passes(rows(1.05), (4.0, 0.4 + gap), 0.0) == expected
+
+
+def test_a_rectangle_passes_a_mover_where_its_circle_has_no_room_to_the_wall():
+    """In a passage of 2.1 m a mover comes along the middle: the circle cannot leave its way far enough."""
+    assert passes(rows(1.35), (8.0, 0.0), 0.5)

@@ -36,7 +36,7 @@ def in_turn(situation, contact_distances, near):
         trail = np.empty((steps + 1, 5))
         trail[0] = x, y, yaw, v, w
         end = kernels.follow(
-            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, True, trail
+            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, True, False, trail
         )  # fmt: skip
         met = kernels.encounter(trail, end, places, radii, near, everyone, contact_distances, weights, math.inf)
         if met.contact < math.inf:
@@ -71,7 +71,7 @@ def test_no_skipped_candidate_is_better(tracked, yaw, aside, v, w, movers):
     tuning = tracked.tuning._replace(period=AVOIDANCE.step)
     here = (0.0, aside, yaw, v, w, 6.2, False)
     situation = (*here, TABLE, tracked.samples, tracked.obstacles, tracked.limits, tuning, weights, places, radii)
-    close, distances = kernels.relevant_movers(0.0, aside, tracked.limits, tuning, weights, places, radii)
+    close, distances = kernels.relevant_movers(0.0, aside, yaw, tracked.limits, tuning, weights, places, radii)
     if len(close):
         assert kernels.choose(*situation) == in_turn(situation, distances, close)
     else:
@@ -93,7 +93,7 @@ def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked):
         for n, candidate in enumerate(TABLE):
             trail = np.empty((steps + 1, 5))
             trail[0] = here
-            motion = (tracked.samples, tracked.obstacles, tracked.limits, tuning, weights.step, 0, True, trail)
+            motion = (tracked.samples, tracked.obstacles, tracked.limits, tuning, weights.step, 0, True, False, trail)
             if not kernels.follow(*here, s, False, candidate, *motion).blocked:
                 worth = kernels.worth(trail[-1], s, window, tracked.samples, tuning, weights)
                 assert worth <= limit[n]

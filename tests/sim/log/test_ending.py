@@ -202,6 +202,30 @@ def test_a_stuck_robot_made_no_progress_for_eight_seconds_of_driving():
         assert (list(false_endings(turns)) == []) is fits
 
 
+def test_a_robot_that_brakes_for_its_turn_counts_as_turning():
+    """As in `StuckClock`: what it drove before that is not within the time without progress."""
+    whole_turn = round(2 * np.pi / still().record.robot.max_yaw_rate * 60)
+    log = creeping(0.0, rows=4 * (60 + 480 + whole_turn) + 1)
+    log = changed(log, "record", limiters=("cruise", "avoid", "rotate", "braking"))
+    log.pose[:, 0] += np.minimum(log.t, 1.0)  # 1 m within the first second
+    for brakes_by, fits in ((3, True), (0, False)):
+        log.limiter[1:241], log.limiter[241:361], log.limiter[361:] = 0, brakes_by, 2
+        assert (list(false_endings(log)) == []) is fits
+
+
+@pytest.mark.parametrize(("back", "farther"), [(0.5, ""), (0.3, "0.2")])
+def test_ground_that_avoidance_gave_up_is_no_progress_when_it_is_regained(back, farther):
+    """Avoidance takes the robot back by 0.5 m; it drives on by that, or farther than it ever was."""
+    log = creeping(0.0, rows=2641)
+    at = np.interp(log.t, [0.0, 2.0, 3.0, 5.0], [1.0, 2.0, 2.0 - back, 2.5 - back])
+    log.pose[:, 0] = at
+    log.limiter[481:721] = 1
+    if farther:
+        assert says(log, f"stuck, but the robot got {farther} m farther in the last 8 s")
+    else:
+        assert list(false_endings(log)) == []
+
+
 def test_periods_are_counted_from_the_end():
     assert ending._sums_to_end(np.array([True, False, True, True])).tolist() == [3, 2, 2, 1]
 

@@ -11,7 +11,7 @@ from antdrive.robots.control._kernels_lines import CHECKED, advance, outline_cle
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, clearance_at, nearby
 from antdrive.robots.control._kernels_path import PathSamples, point_at, project
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, reachable_twist
-from antdrive.worlds._kernels import Array, kernel, segment_clearance
+from antdrive.worlds._kernels import Array, kernel, polygon_distance, segment_clearance
 
 # The columns of a table of candidates.
 KIND = 0  # FOLLOW_ROUTE or TWO_TWISTS
@@ -36,7 +36,7 @@ class AvoidanceWeights(NamedTuple):
 
     Attributes:
         step: time between two predicted instants [s]
-        min_distance: least distance from the robot's centre to a mover's surface [m]
+        min_distance: least distance from the robot to a mover's surface, plus `radius` [m]
         preferred_clearance: clearance beyond `min_distance` above which the cost is zero [m]
         clearance_weight: cost of each metre below the preferred clearance [m/m]
         cross_track_weight: cost of each metre off the route [m/m]
@@ -44,9 +44,12 @@ class AvoidanceWeights(NamedTuple):
         speed_weight: worth of 1 m/s of final speed along the route [s]
         persistence: worth of keeping the last decision [m]
         reversal_time: horizon for a sudden reversal of a mover [s]
-        reversal_distance: least distance from the robot's centre to a reversing mover's surface [m]
+        reversal_distance: least distance from the robot to a reversing mover's surface, plus `radius` [m]
         reversal_weight: cost of each metre below that [m/m]
-        narrowest: least distance from the robot's centre to its outline [m]
+        radius: circumscribed radius of the robot [m]
+        corners: of the robot's outline (K, 2); none for a disc around the axle [m]
+        rounding: of that outline [m]
+        outlined: whether the outline is kept from obstacles on every route, not only on those with turns
     """
 
     step: float
@@ -60,7 +63,10 @@ class AvoidanceWeights(NamedTuple):
     reversal_time: float
     reversal_distance: float
     reversal_weight: float
-    narrowest: float
+    radius: float
+    corners: Array
+    rounding: float
+    outlined: bool
 
 
 class Trail(NamedTuple):
@@ -102,17 +108,50 @@ class Reachable(NamedTuple):
 
 
 @kernel
+def distance_to(dx: float, dy: float, yaw: float, weights: AvoidanceWeights) -> float:
+    """Return the distance from the robot's outline to a point at (dx, dy) from its centre, plus `radius`.
+
+    For a disc it is the distance from its centre, for other outlines no less.
+    """
+    if weights.corners.shape[0] == 0:
+        return math.hypot(dx, dy)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    apart = polygon_distance(cos * dx + sin * dy, cos * dy - sin * dx, weights.corners)
+    return float(apart - weights.rounding + weights.radius)
+
+
+@kernel
+def outline_contact(
+    start: Array, end: Array, ax: float, ay: float, ux: float, uy: float, reach: float, weights: AvoidanceWeights
+) -> float:
+    """Return the fraction of a step until the outline is at `reach` from a point, 2 if it never is.
+
+    The point moves by (ux, uy) from (ax, ay), relative to the robot's centre. Distances are those of `distance_to`, at poses at
+    most `CHECKED` apart.
+    """
+    turned = end[2] - start[2]
+    count = int((math.hypot(ux, uy) + abs(turned) * weights.radius) / CHECKED) + 1
+    for n in range(count + 1):
+        f = n / count
+        if distance_to(ax + f * ux, ay + f * uy, start[2] + f * turned, weights) < reach:
+            return f
+    return 2.0
+
+
+@kernel
 def first_contact(
-    x0: float, y0: float, x1: float, y1: float, places: Array, k: int, radii: Array, near: Array,
-    contact_distances: Array, min_distance: float, cap: float,
+    start: Array, end: Array, places: Array, k: int, radii: Array, near: Array, contact_distances: Array,
+    weights: AvoidanceWeights, cap: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the fraction of a step until a mover is at its contact distance, 2 if none is, and the clearance.
 
-    The robot moves straight from (x0, y0) to (x1, y1), and each mover straight from its position k to the next. The
-    clearance is the least to a mover's surface, beyond `min_distance`; movers without contact farther than `cap` may be
-    omitted.
+    The robot moves straight from a pose `start` to `end`, and each mover straight from its position k to the next. The
+    clearance is the least to a mover's surface, beyond `min_distance`, of the circle around the robot: robots prefer more room
+    than their outline needs. Movers without contact farther than `cap` may be omitted. Only where the circle is too close, the
+    outline is checked.
     """
-    share, clearance = 2.0, math.inf
+    share, clearance, min_distance = 2.0, math.inf, weights.min_distance
+    x0, y0, x1, y1 = start[0], start[1], end[0], end[1]
     for m in near:
         ax, ay = places[k, m, 0] - x0, places[k, m, 1] - y0
         ux, uy = places[k + 1, m, 0] - x1 - ax, places[k + 1, m, 1] - y1 - ay
@@ -126,7 +165,9 @@ def first_contact(
             continue
         away = math.hypot(dx, dy)
         clearance = min(clearance, away - radii[m] - min_distance)
-        if away < reach:
+        if away < reach and weights.corners.shape[0] > 0:
+            share = min(share, outline_contact(start, end, ax, ay, ux, uy, reach, weights))
+        elif away < reach:
             over = ax * ax + ay * ay - reach * reach
             root = math.sqrt(max(along * along - length2 * over, 0.0))
             share = min(share, max(0.0, (-along - root) / length2) if over > 0.0 and length2 > 0.0 else 0.0)
@@ -134,25 +175,22 @@ def first_contact(
 
 
 @kernel
-def intrusion(x: float, y: float, places: Array, k: int, radii: Array, near: Array, distance: float) -> float:
-    """Return how much closer than `distance` a point is to a mover at instant k, if movers reverse at instant 0."""
-    most = 0.0
+def intrusion(pose: Array, places: Array, k: int, radii: Array, near: Array, weights: AvoidanceWeights) -> float:
+    """Return how much closer than its `reversal_distance` a robot is to a mover at instant k, if movers reverse at instant 0."""
+    most, distance = 0.0, weights.reversal_distance
     for m in near:
-        dx = x - (2.0 * places[0, m, 0] - places[k, m, 0])
-        dy = y - (2.0 * places[0, m, 1] - places[k, m, 1])
+        dx = 2.0 * places[0, m, 0] - places[k, m, 0] - pose[0]
+        dy = 2.0 * places[0, m, 1] - places[k, m, 1] - pose[1]
         matters = radii[m] + distance - most + ROUNDING
         if dx * dx + dy * dy <= matters * matters:
-            most = max(most, radii[m] + distance - math.hypot(dx, dy))
+            most = max(most, radii[m] + distance - distance_to(dx, dy, pose[2], weights))
     return most
 
 
 @kernel
-def least_clearance(trail: Array, path: PathSamples, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
-    """Return the required clearance along a trail, reduced if its start is closer [m].
-
-    It is that of the robot's centre; on a route with turns, that of its outline.
-    """
-    if path.turns.shape[0] == 0:
+def least_clearance(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
+    """Return the required clearance along a trail, of the robot's centre or its outline, reduced if its start is closer [m]."""
+    if not outlined:
         return min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
     discs = nearby(trail[0, 0], trail[0, 1], obstacles)
     here = outline_clearance(trail[:1, :3], discs, obstacles.bounds, tuning)
@@ -164,21 +202,21 @@ def passes_within(
     trail: Array,
     k: int,
     required: float,
-    path: PathSamples,
+    outlined: bool,
     obstacles: ObstacleIndex,
     tuning: PursuitTuning,
     step: float,
 ) -> bool:
     """Return whether the step after row k of a trail comes closer to an obstacle than required.
 
-    A step is straight, or on a route with turns a few poses of the outline.
+    A step is straight, or a few poses of the outline.
     """
-    length, lines = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step, path.turns.shape[0] > 0
-    if abs(length) <= 1e-6 and not lines:
+    length = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step
+    if abs(length) <= 1e-6 and not outlined:
         return False
     discs = nearby(trail[k, 0], trail[k, 1], obstacles)
     distance = segment_clearance(trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1], discs, obstacles.bounds)
-    if not lines or distance >= required + tuning.robot_radius:
+    if not outlined or distance >= required + tuning.robot_radius:
         return bool(distance < required)
     sweep = abs(trail[k + 1, 2] - trail[k, 2]) * tuning.robot_radius
     count = int((abs(length) + sweep) / CHECKED) + 1
@@ -191,13 +229,11 @@ def passes_within(
 
 
 @kernel
-def meets_obstacle(
-    trail: Array, path: PathSamples, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float
-) -> bool:
+def meets_obstacle(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float) -> bool:
     """Return whether a trail that was followed without obstacle checks comes too close to an obstacle."""
-    required = least_clearance(trail, path, obstacles, tuning)
+    required = least_clearance(trail, outlined, obstacles, tuning)
     k, steps = 0, trail.shape[0] - 1
-    while k < steps and not passes_within(trail, k, required, path, obstacles, tuning, step):
+    while k < steps and not passes_within(trail, k, required, outlined, obstacles, tuning, step):
         k += 1
     return bool(k < steps)
 
@@ -206,7 +242,7 @@ def meets_obstacle(
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidate: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
-    step: float, first: int, looks: bool, trail: Array,
+    step: float, first: int, looks: bool, outlined: bool, trail: Array,
 ) -> Trail:  # fmt: skip
     """Follow a candidate from step `first` to the last row of `trail` (K + 1, 5).
 
@@ -218,7 +254,7 @@ def follow(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
         limits.lateral_acceleration, limits.half_track, limits.rim_speed,
     )  # fmt: skip
-    required = least_clearance(trail, path, obstacles, tuning) if looks else 0.0
+    required = least_clearance(trail, outlined, obstacles, tuning) if looks else 0.0
     cos, sin, facing, now = 1.0, 0.0, 0.0, 0.0
     for k in range(trail.shape[0] - 1):
         if k < first:
@@ -238,7 +274,7 @@ def follow(
         x1, y1 = x + length * cos, y + length * sin
         yaw1 = yaw + 0.5 * (w + w1) * step
         trail[k + 1, 0], trail[k + 1, 1], trail[k + 1, 2], trail[k + 1, 3], trail[k + 1, 4] = x1, y1, yaw1, v1, w1
-        if looks and passes_within(trail, k, required, path, obstacles, tuning, step):
+        if looks and passes_within(trail, k, required, outlined, obstacles, tuning, step):
             return Trail(k + 1, True)
         x, y, yaw, v, w, now = x1, y1, yaw1, v1, w1, now + step
     return Trail(trail.shape[0] - 1, False)
@@ -247,7 +283,7 @@ def follow(
 @kernel
 def follow_all(
     s: float, rotating: bool, candidates: Array, path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits,
-    tuning: PursuitTuning, step: float, trails: Array, steps: Array, blocked: Array,
+    tuning: PursuitTuning, step: float, outlined: bool, trails: Array, steps: Array, blocked: Array,
 ) -> None:  # fmt: skip
     """Fill `trails` (N, K + 1, 5), `steps` and `blocked` (N,) for the candidates after the first.
 
@@ -271,7 +307,7 @@ def follow_all(
                 continue
         got = follow(
             trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4], s, rotating,
-            candidate, path, obstacles, limits, tuning, step, first, True, trail,
+            candidate, path, obstacles, limits, tuning, step, first, True, outlined, trail,
         )  # fmt: skip
         steps[n], blocked[n] = got.steps, got.blocked
         if candidate[KIND] == TWO_TWISTS and candidate[DURATION] == math.inf:
@@ -286,15 +322,14 @@ def encounter(
     """Return the interaction of a candidate's trail with the movers `near`, step by step those of `by_step`."""
     least, risk, now = math.inf, 0.0, 0.0
     for k in range(end.steps):
-        x1, y1 = trail[k + 1, 0], trail[k + 1, 1]
         share, clearance = first_contact(
-            trail[k, 0], trail[k, 1], x1, y1, places, k, radii, by_step.near[k, : by_step.counts[k]],
-            contact_distances, weights.min_distance, min(cap, least),
+            trail[k], trail[k + 1], places, k, radii, by_step.near[k, : by_step.counts[k]], contact_distances, weights,
+            min(cap, least),
         )  # fmt: skip
         if share <= 1.0:
             return Encounter(now + share * weights.step, least, risk)
         if weights.reversal_weight > 0.0 and now < weights.reversal_time:
-            risk = max(risk, intrusion(x1, y1, places, k + 1, radii, near, weights.reversal_distance))
+            risk = max(risk, intrusion(trail[k + 1], places, k + 1, radii, near, weights))
         if end.blocked and k == end.steps - 1:
             return Encounter(now, least, risk)
         least = min(least, clearance)
@@ -304,7 +339,7 @@ def encounter(
 
 @kernel
 def relevant_movers(
-    x: float, y: float, limits: MotionLimits, tuning: PursuitTuning, weights: AvoidanceWeights, places: Array,
+    x: float, y: float, yaw: float, limits: MotionLimits, tuning: PursuitTuning, weights: AvoidanceWeights, places: Array,
     radii: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Return the movers within the robot's reach (N,), and their contact distances (M,) [m].
@@ -330,7 +365,7 @@ def relevant_movers(
             continue
         near[count] = m
         count += 1
-        away = math.hypot(places[0, m, 0] - x, places[0, m, 1] - y)
+        away = distance_to(places[0, m, 0] - x, places[0, m, 1] - y, yaw, weights)
         contact_distances[m] = radii[m] + weights.min_distance
         if away < contact_distances[m]:
             dx, dy = places[1, m, 0] - places[0, m, 0], places[1, m, 1] - places[0, m, 1]
@@ -338,6 +373,17 @@ def relevant_movers(
             touching = radii[m] + tuning.robot_radius + CONTACT_MARGIN
             contact_distances[m] = max(min(touching, away - 1e-3), away - 1e-3 - START_TIME * speed)
     return near[:count], contact_distances
+
+
+@kernel
+def is_close(x: float, y: float, yaw: float, places: Array, radii: Array, weights: AvoidanceWeights) -> bool:
+    """Return whether a mover at `places` (M, 2) is closer than the minimum."""
+    for m in range(radii.shape[0]):
+        dx, dy = places[m, 0] - x, places[m, 1] - y
+        within = math.hypot(dx, dy) - radii[m] < weights.min_distance
+        if within and distance_to(dx, dy, yaw, weights) - radii[m] < weights.min_distance:
+            return True
+    return False
 
 
 @kernel
@@ -487,15 +533,32 @@ def choose(
     highest bound is followed, which lowers its bound to its worth without movers. When it is first again, it is evaluated
     among obstacles and movers. The search ends when no bound exceeds the best worth.
     """
-    near, contact_distances = relevant_movers(x, y, limits, tuning, weights, places, radii)
+    near, contact_distances = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
     if near.shape[0] == 0:
         return 0, math.inf
+    outlined = weights.outlined or path.turns.shape[0] > 0
     count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
     by_step = reachable_by_step(x, y, fastest(v, candidates, limits), weights, places, radii, near, cap)
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
     trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
     own = follow(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, trails[0]
+        x,
+        y,
+        yaw,
+        v,
+        w,
+        s,
+        rotating,
+        candidates[0],
+        path,
+        obstacles,
+        limits,
+        tuning,
+        weights.step,
+        0,
+        True,
+        outlined,
+        trails[0],
     )
     steps[0], blocked[0] = own.steps, own.blocked
     met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
@@ -519,14 +582,14 @@ def choose(
         if not followed[n]:
             follow(
                 x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights.step, 0, False,
-                trails[n],
+                outlined, trails[n],
             )  # fmt: skip
             followed[n] = True
             limit[n] = worth(trails[n, instants - 1], s, window, path, tuning, weights)
             if n <= 1:
                 limit[n] += weights.persistence
             continue
-        if meets_obstacle(trails[n], path, obstacles, tuning, weights.step):
+        if meets_obstacle(trails[n], outlined, obstacles, tuning, weights.step):
             limit[n] = -math.inf
             continue
         met = encounter(
@@ -541,7 +604,7 @@ def choose(
         limit[n] = -math.inf
     if best >= 0:
         return best, math.inf
-    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, trails, steps, blocked)
+    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, outlined, trails, steps, blocked)
     best, latest = 0, -1.0
     for n in range(count):
         met = encounter(
@@ -561,19 +624,36 @@ def best_escape(
     """Return the candidate that stays farthest from movers in the near future; -1 if all have contact.
 
     A mover that has turned towards the robot may leave no candidate with the least clearance. That clearance includes a
-    margin, and the robot is narrower than its circumscribed circle, so dodging often avoids the contact.
+    margin, so dodging often avoids the contact.
     """
-    near, _ = relevant_movers(x, y, limits, tuning, weights, places, radii)
+    near, _ = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
+    outlined = weights.outlined or path.turns.shape[0] > 0
     soon = places[: min(places.shape[0], int(ESCAPE_TIME / weights.step) + 2)]
-    bodies, count = radii + weights.narrowest, candidates.shape[0]
+    bodies, count = radii + weights.radius, candidates.shape[0]
     by_step = reachable_by_step(x, y, math.inf, weights, soon, radii, near, math.inf)
     trails, steps, blocked = np.empty((count, soon.shape[0], 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
     trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
     own = follow(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, trails[0]
+        x,
+        y,
+        yaw,
+        v,
+        w,
+        s,
+        rotating,
+        candidates[0],
+        path,
+        obstacles,
+        limits,
+        tuning,
+        weights.step,
+        0,
+        True,
+        outlined,
+        trails[0],
     )
     steps[0], blocked[0] = own.steps, own.blocked
-    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, trails, steps, blocked)
+    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, outlined, trails, steps, blocked)
     best, most = -1, -math.inf
     for n in range(count):
         if blocked[n]:

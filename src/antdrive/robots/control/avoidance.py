@@ -10,7 +10,8 @@ one of the candidates, so the robot moves out of the path of an approaching move
 Near movers ahead the robot keeps its `near_speed`, and it reverses slowly and not far. These limits cause no contact that a
 robot without them avoids:
 
-- Where every candidate within them ends in a contact, they are lifted step by step, so a predicted contact has the same escapes.
+- Where every candidate within them ends in a contact, the robot first keeps its outline from obstacles instead of its circle;
+  then they are lifted step by step, so a predicted contact has the same escapes.
 - A prediction that is wrong could hide a contact. They hold only where movers move as predicted: a mover with another observed
   velocity, as among ground-truth positions, lifts them all. So does a mover faster than people: speed is the way out.
 - A robot that crosses the lane of a mover that comes faster than `near_speed` is not slowed, nor one that leaves a mover behind.
@@ -32,6 +33,7 @@ import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
+from antdrive.robots.clearance import outline_of
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control._kernels_pursuit import reachable_twist
 from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
@@ -148,10 +150,15 @@ class Avoidance:
         tuning = tracked.tuning._replace(period=self.step)
         weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
         observed = predicted if velocities is None else velocities
-        limits_of = [(near, slow), (near, backwards), (math.inf, backwards), (math.inf, math.inf)]
+        outlined = not (spec.footprint.is_disc or len(tracked.samples.turns))
+        limits_of = [
+            (near, slow, False), (near, slow, outlined), (near, backwards, outlined), (math.inf, backwards, outlined),
+            (math.inf, math.inf, outlined),
+        ]  # fmt: skip
         if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
-            del limits_of[:2]
-        for fastest, reverse in dict.fromkeys(limits_of):
+            limits_of[:3] = [(math.inf, backwards, False)]
+        for fastest, reverse, by_outline in dict.fromkeys(limits_of):
+            weights = weights._replace(outlined=by_outline)
             candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
@@ -162,7 +169,7 @@ class Avoidance:
                 break
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
             return wanted, False, AvoidanceState(reversed=state.reversed)
-        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(tracked, pose, places[0], radii)):
+        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(weights, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
         twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
         return twist, True, after._replace(reversed=state.reversed)
@@ -209,11 +216,9 @@ class Avoidance:
         gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
         return bool((unlike & (gap < self.horizon * (speeds + spec.max_speed))).any())
 
-    def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
+    def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
-        away = np.hypot(*(places - pose[:2]).T) - radii
-        close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
-        return 2 * self.step if close else 0.0
+        return 2 * self.step if kernels.is_close(*pose, places, radii, weights) else 0.0
 
     def _candidates(
         self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float
@@ -313,7 +318,8 @@ def _instants(horizon: float, step: float) -> Floats:
 
 @functools.lru_cache(maxsize=64)
 def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kernels.AvoidanceWeights:
-    """Return the settings for a robot with a given circumscribed radius [m]."""
+    """Return the settings for a robot whose circle counts with a given radius [m]."""
+    outline = outline_of(footprint, 0.0)
     return kernels.AvoidanceWeights(
         step=avoidance.step,
         min_distance=radius + avoidance.min_clearance,
@@ -326,5 +332,8 @@ def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kerne
         reversal_time=avoidance.reversal_time,
         reversal_distance=radius + avoidance.min_clearance + avoidance.reversal_margin,
         reversal_weight=avoidance.reversal_weight,
-        narrowest=footprint.inner_radius,
+        radius=footprint.radius,
+        corners=outline.corners,
+        rounding=outline.reach,
+        outlined=False,
     )

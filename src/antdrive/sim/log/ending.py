@@ -31,7 +31,8 @@ AT_ROUTE_END = 0.05  # a robot with at most this much of its route left is at it
 BESIDE_END = 1.0  # avoidance may take a robot at most this far off the end of its route [m]
 STAYED = 0.1  # a stuck robot gets at most this much farther in `STUCK_TIME`, straight or along its route [m]
 NEAR_GOAL = 1.5  # a route that ends farther from the goal leads elsewhere, unless within the tolerance [cells]
-AVOID, ROTATE, SIGHT = "avoid", "rotate", "sight"  # names of rules in `record.limiters`
+AVOID, ROTATE = "avoid", "rotate"  # names of rules in `record.limiters`
+TURNS = (ROTATE, "braking", "done", "sight")  # those that may limit a robot that turns on the spot, or brakes for it
 BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good moves less [m]
 
 
@@ -201,7 +202,8 @@ def _at_route_end(rollout: Rollout) -> bool:
 def _counted_rows(rollout: Rollout) -> Rows:
     """Return the ends of the last control periods that add up to `STUCK_TIME`, empty if too few.
 
-    Avoidance does not count. If only turns on the spot add up, the time is that of a full turn more.
+    Avoidance does not count. If only turns on the spot add up, the time is that of a full turn more. A robot that brakes for
+    its turn counts as turning, as in `StuckClock`.
     """
     record, period = rollout.record, _rows_per_period(rollout)
     ends = np.arange(period, len(rollout.t), period)
@@ -212,7 +214,7 @@ def _counted_rows(rollout: Rollout) -> Rows:
     driving = round(STUCK_TIME * record.control_hz)
     turning = driving + round(2 * math.pi / record.robot.max_yaw_rate * record.control_hz)
     avoids = by(AVOID)
-    enough = (_sums_to_end(~avoids & ~by(ROTATE)) >= driving) | (_sums_to_end(by(ROTATE, SIGHT)) >= turning)
+    enough = (_sums_to_end(~avoids & ~by(ROTATE)) >= driving) | (_sums_to_end(by(*TURNS)) >= turning)
     first = int(np.flatnonzero(enough)[-1]) if enough.any() else len(ends)
     return np.asarray(ends[first:][~avoids[first:]])
 
@@ -223,15 +225,18 @@ def _sums_to_end(values: npt.NDArray[np.bool_]) -> Rows:
 
 
 def _progress(rollout: Rollout, rows: Rows) -> float:
-    """Return how far the robot got from the first of the rows, or along its routes if that is less [m]."""
+    """Return how far the robot got from the first of the rows, or along its routes if that is less [m].
+
+    Along a route, only what is beyond the farthest earlier point counts: avoidance may have taken the robot back.
+    """
     places = estimates_of(rollout)[:, :2]
     straight = float(np.hypot(*(places[rows] - places[rows[0]]).T).max())
     gains = [0.0]
     for leg, route in rollout.legs():
         some = rows[(rows >= leg.start) & (rows < leg.stop)]
         if len(some):
-            arcs = _arcs(route, places[some])
-            gains.append(float(arcs.max() - arcs[0]))
+            got = _arcs(route, places[leg.start : some[0] + 1]).max()
+            gains.append(float(_arcs(route, places[some]).max() - got))
     return min(straight, max(gains))
 
 
