@@ -1,7 +1,8 @@
 """Cost of compiling kernels into an empty cache, and of starting commands: `python -m benchmarks.compiling`.
 
 Each command runs in a cache folder of its own; `antdrive warm` compiles everything. Costs are the processor times of the
-command and its children. Starts are compared with `python -c pass`, run alternately; the table has median ratios.
+command and its children. After a run, its log is verified with a full cache. Starts are compared with `python -c pass`, run
+alternately; the table has median ratios.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ FIRST = {
     "demo without film": "compare forest -p mmas -p astar",
     "everything": "warm",
 }
-STARTS = ("--help", "planners", "worlds list")
+STARTS = ("--help", "--version", "planners", "worlds list", "robots list")
 ANTDRIVE = (sys.executable, "-m", "antdrive")
 
 
@@ -57,7 +58,11 @@ def main() -> None:
     for name in options.compile:
         with tempfile.TemporaryDirectory() as folder:
             seconds = cost([*ANTDRIVE, *shlex.split(FIRST[name])], folder)
-            print(f"| {name} | {seconds:.0f} | {len(list(Path(folder).rglob('*.nbc')))} |", flush=True)
+            print(f"| {name} | {seconds:.1f} | {len(list(Path(folder).rglob('*.nbc')))} |", flush=True)
+            logs = list(Path(folder).rglob("rollout.npz"))[:1]
+            for log in logs:  # again: the first time, it compiles
+                again = [cost([*ANTDRIVE, "verify", str(log)], folder) for _ in range(1 + options.rounds)][1:]
+                print(f"| then `verify` of its log | {statistics.median(again):.2f} | |", flush=True)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 Tables:
 
 - dynabarn: ten DynaBARN worlds, each started at ten times, by policy
+- generated: worlds by the rules of DynaBARN, ten of each class, by policy
 - random: worlds with 1 to 10 movers as fast as the robot; every failure is listed with its seed
 - hasan: drives of the cases in hasan's paper
 - people: the catalogue's four worlds with people, with and without a map, beside the same drives without people
@@ -15,7 +16,7 @@ import dataclasses
 import itertools
 import math
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -47,6 +48,13 @@ from tools.shared_data import DYNABARN
 
 SMALLEST = ("--most 1 --jobs 1",)
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
+#: Rules of the generated worlds by class: numbers of movers, their speeds [m/s], and orders of their polynomials.
+RULES = {
+    "easy": ((8, 11), (0.5, 0.95), (1, 3)),
+    "medium": ((16, 18), (1.0, 1.45), (3, 6)),
+    "hard": ((21, 23), (1.5, 1.95), (4, 8)),
+}
+HALF, SAMPLES = 10.0, 10  # half the side of the box that movers cross [m]; evenly spaced keyframes of each
 LATELY = 1.0  # time before a contact in which the mover's motion is reported [s]
 JUMP, TURN = 0.3, 0.7  # mover displacement between two rows that counts as a jump [m]; smallest reported turn [rad]
 START_INTERVAL = 7.3  # between start times of drives in one world [s]
@@ -140,27 +148,70 @@ def dynabarn(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
         missing(f"no worlds at {source}; docs/how-to/data.md says where DynaBARN's are")
     tasks = import_dynabarn(source)[: most or None]
     offsets = [START_INTERVAL * k for k in range(min(most or 10, 10))]
-    cases = [
-        (f"{task.world.name}+{off:g}s", dataclasses.replace(task, world=task.world.later(off)))
-        for task, off in itertools.product(tasks, offsets)
-    ]
+    cases = {
+        kind: {
+            f"{task.world.name}+{off:g}s": dataclasses.replace(task, world=task.world.later(off))
+            for task, off in itertools.product(tasks, offsets)
+            if int(task.world.name.split("-")[1]) in numbers
+        }
+        for kind, numbers in CLASSES.items()
+    }
+    yield from by_policy(cases, jobs, only, tuple(POLICIES))
+
+
+def by_policy(cases: Mapping[str, Mapping[str, Task]], jobs: int, only: str, policies: Sequence[str]) -> Iterator[str]:
+    """Drive tasks by class and name with the jackal, and list the failures of `LISTED` policies."""
     rows, wrong = [], []
-    for policy, settings in POLICIES.items():
+    for policy in policies:
         if only not in policy:
             continue
-        calls = (
-            partial(drive, name, task, **{"planner": "dstar-lite", "robot": "jackal", **settings})
-            for name, task in cases
-        )
-        got = call_all(calls, jobs)
-        for kind, numbers in CLASSES.items():
-            some = [r for r in got if int(r.name.split("-")[1].split("+")[0]) in numbers]
-            rows.append([policy if kind == "easy" else "", kind, *columns(some)])
-        if policy in LISTED:
-            wrong += [f"- {policy}: {r.name}: {r.outcome.key} ({r.reason})" for r in got if not r.certified]
+        for kind, tasks in cases.items():
+            calls = (
+                partial(drive, name, task, **{"planner": "dstar-lite", "robot": "jackal", **POLICIES[policy]})
+                for name, task in tasks.items()
+            )
+            got = call_all(calls, jobs)
+            rows.append([policy if kind == "easy" else "", kind, *columns(got)])
+            if policy in LISTED:
+                wrong += [f"- {policy}: {r.name}: {r.outcome.key} ({r.reason})" for r in got if not r.certified]
     yield from table(f"the robot may | worlds | {HEADS}", rows)
     yield "\nDrives that failed with avoidance and replanning, or by lidar:\n"
     yield from wrong
+
+
+def generated_task(kind: str, seed: int) -> Task:
+    """Generate a world by the rules of DynaBARN: cylinders follow polynomials through random points, over and over.
+
+    A polynomial y(x) leads through order + 1 points with different whole x; its keyframes are these points and evenly spaced
+    ones, up to the edge of the box. Half of the movers run the other way, half swap x and y. Keyframes outside the box are
+    omitted.
+    """
+    rng = np.random.default_rng([seed, *kind.encode()])
+    counts, speeds, orders = RULES[kind]
+    start, goal = (11.0, 0.0, math.pi), (-9.0, 0.0)
+    movers: list[Mover] = []
+    count = int(rng.integers(counts[0], counts[1] + 1))
+    while len(movers) < count:
+        order, speed = int(rng.integers(orders[0], orders[1] + 1)), rng.uniform(*speeds)
+        through = np.sort(rng.choice(np.arange(-9.0, 10.0), order + 1, replace=False))
+        curve = np.polynomial.Polynomial.fit(through, rng.integers(-9, 10, order + 1).astype(float), order)
+        x = np.union1d(through, np.linspace(-HALF, HALF, SAMPLES))
+        places = np.stack([x, curve(x)], axis=1)[np.abs(curve(x)) <= HALF]
+        flipped, swapped = rng.integers(2, size=2)
+        places = places[:: 1 - 2 * int(flipped), :: 1 - 2 * int(swapped)]
+        if len(places) < 5 or math.dist(places[0], start[:2]) < 2.0:
+            continue
+        times = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T) / speed)))
+        frames = tuple((float(t), float(px), float(py)) for t, (px, py) in zip(times, places, strict=True))
+        movers.append(Keyframed(radius=0.5, keyframes=frames, loop="teleport"))
+    world = World(f"{kind}-{seed}", (-12.0, -12.0, 12.0, 12.0), movers=tuple(movers))
+    return Task(world, start, goal, goal_tolerance=1.0, time_limit=100.0)
+
+
+def generated(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
+    """Drive generated worlds with the jackal."""
+    cases = {kind: {f"{kind}-{k}": generated_task(kind, k) for k in range(most or 10)} for kind in RULES}
+    yield from by_policy(cases, jobs, only, LISTED)
 
 
 def random_task(seed: int) -> tuple[Task, int]:
@@ -319,7 +370,7 @@ def people(jobs: int, source: Path, most: int, only: str) -> Iterator[str]:
     )
 
 
-TABLES = {"dynabarn": dynabarn, "random": random, "hasan": hasan, "people": people}
+TABLES = {"dynabarn": dynabarn, "generated": generated, "random": random, "hasan": hasan, "people": people}
 
 
 def main() -> None:
@@ -329,7 +380,7 @@ def main() -> None:
         jobs=(2, "processes"),
         most=(0, "at most so many worlds, moments or seeds of each kind; 0: all"),
         dynabarn=(DYNABARN, "the file of DynaBARN's worlds"),
-        only=("", "dynabarn: only the rows whose name holds this text"),
+        only=("", "only the rows whose name holds this text"),
     )
     print_tables(given.tables, TABLES, given.jobs, given.dynabarn, given.most, given.only)
 

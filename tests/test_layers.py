@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.cli.listings import LISTS
+
 ROOT = Path(__file__).parent.parent / "src" / "antdrive"
 #: A room imports itself and the rooms of lower ranks.
 RANKS = {"base": 0, "worlds": 1, "planners": 2, "robots": 2, "sim": 3, "runs": 4, "views": 5, "cli": 6}
@@ -86,7 +88,7 @@ def test_every_offered_name_exists_and_hides_no_module(room):
 
 
 @pytest.mark.parametrize(
-    "words", [["--help"], ["--version"], ["run", "--help"], ["planners", "--help"], ["robts"]], ids=" ".join
+    "words", [["--help"], ["--version"], ["run", "--help"], ["planners", "--help"], ["robts"], *LISTS], ids=" ".join
 )
 def test_light_commands_import_nothing_heavy(words):
     code = (

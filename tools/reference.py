@@ -1,4 +1,4 @@
-"""Generated parts of the documents: `python -m tools.reference` writes them into their pages.
+"""Generated parts of the documents, and the rows of the command line's lists: `python -m tools.reference` writes them.
 
 A page marks such a part: the lines between `<!-- generated: NAME WORDS -->` and `<!-- end -->` are those of the
 function NAME in `GENERATED`. `--check` writes nothing and lists the pages that differ.
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.records import meanings_of
+from antdrive.cli.listings import LISTED
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -391,6 +392,22 @@ def pages() -> list[Path]:
     return [path for path in found if PART.search(path.read_text(encoding="utf-8"))]
 
 
+def listed() -> str:
+    """Return the file with the rows of the command line's lists."""
+    from antdrive.cli.commands.planners import planner_rows
+    from antdrive.cli.commands.robots import robot_rows
+    from antdrive.cli.commands.worlds import world_rows
+
+    kinds = {"planners": planner_rows(), "worlds": world_rows(), "robots": robot_rows()}
+    return "".join("\t".join((kind, *row)) + "\n" for kind, rows in kinds.items() for row in rows)
+
+
+def stale() -> dict[Path, str]:
+    """Return the files that differ from what this module generates, with their text as it should be."""
+    wanted = {path: written(path.read_text(encoding="utf-8")) for path in pages()} | {LISTED: listed()}
+    return {path: text for path, text in wanted.items() if path.read_text(encoding="utf-8") != text}
+
+
 def main(words: list[str]) -> int:
     """Write or check the generated parts."""
     from antdrive.base.atomic import atomic_write
@@ -398,14 +415,13 @@ def main(words: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.reference", description="Generate parts of pages.")
     parser.add_argument("--check", action="store_true", help="write nothing, list pages that differ")
     check = parser.parse_args(words).check
-    stale = [path for path in pages() if written(path.read_text(encoding="utf-8")) != path.read_text(encoding="utf-8")]
-    for path in stale:
+    found = stale()
+    for path, text in found.items():
         sys.stdout.write(f"{path.relative_to(ROOT)}{' differs' if check else ''}\n")
         if not check:
-            text = written(path.read_text(encoding="utf-8"))
             with atomic_write(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
-    return 1 if check and stale else 0
+    return 1 if check and found else 0
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.base import kernel_cache
-from antdrive.base._kernels_compiler import _Entries
+from antdrive.base._kernels_compiler import _Entries, kernel
 
 MEASURE = (
     "from antdrive.worlds import Disc, World, point_clearance\n"
@@ -243,3 +243,16 @@ def test_of_two_processes_that_need_a_kernel_one_compiles_it(tmp_path):
     assert compiled
     assert len(set(compiled)) == len(compiled)
     assert {out.splitlines()[-1] for out, _ in said} == {said[0][0].splitlines()[-1]}
+
+
+def test_a_call_with_a_literal_has_the_type_of_its_value():
+    @kernel
+    def inner(a):
+        return a + 1
+
+    @kernel
+    def outer(n):
+        return inner(0) + inner(n) + inner(False) + inner(n > 0)
+
+    assert outer(3) == 8
+    assert [str(one) for one in getattr(inner, "signatures", [])] in ([], ["(int64,)", "(bool,)"])

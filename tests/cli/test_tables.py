@@ -124,5 +124,7 @@ def test_every_command_with_a_table_is_here():
         for path in cli.rglob("*.py")
         if path.name != "console.py" and re.search(r"\btable\(", path.read_text())
     }
-    here = {name.partition(":")[0].replace("-", "_") for name in TABLES} | {words[0] for words in LISTS}
-    assert users - {"campaign_tables"} == here
+    here = {name.partition(":")[0].replace("-", "_") for name in TABLES}
+    assert here <= users
+    lists = {words[0] for words in LISTS}  # `listings` has their tables
+    assert users - {"campaign_tables", "listings"} <= here | lists

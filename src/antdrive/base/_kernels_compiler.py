@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core import config
+from numba.core import config, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from antdrive.base import kernel_cache
@@ -123,7 +123,10 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
 
 class _Compiler:
-    """The compiler of one kernel: reports each entry, and compiles none that another process is compiling."""
+    """The compiler of one kernel: reports each entry, and compiles none that another process is compiling.
+
+    A literal argument has the type of its value: numba would compile a call with 0 apart from calls with whole numbers.
+    """
 
     def __init__(self, dispatcher: Any, cache: _Cache) -> None:
         self._compiler, self._context, self._cache = dispatcher._compiler, dispatcher.targetctx, cache
@@ -131,6 +134,11 @@ class _Compiler:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._compiler, name)
+
+    def fold_argument_types(self, args: Any, kws: Any) -> tuple[Any, tuple[Any, ...]]:
+        """Return the signature of a call from another kernel, and its argument types."""
+        signature, folded = self._compiler.fold_argument_types(args, kws)
+        return signature, tuple(map(types.unliteral, folded))
 
     def compile(self, args: Any, return_type: Any) -> Any:
         with _only_here(self._cache.path_of(args, self._context)):

@@ -1,4 +1,4 @@
-"""Optional packages, installed through extras and imported on first use."""
+"""Optional packages: those of extras, imported on first use, and those that add planners."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import importlib
 from typing import Any
 
 from antdrive.base.errors import InputError
+
+#: The entry-point group for planners of other packages: an object with a method `plan`, or its class.
+PLANNER_GROUP = "antdrive.planners"
 
 
 def optional(module: str, extra: str, purpose: str) -> Any:

@@ -6,7 +6,6 @@ code exceeds its limit although the alarm of `guarded` has fired, as in compiled
 
 from __future__ import annotations
 
-import ctypes
 import mmap
 import os
 import signal
@@ -66,6 +65,8 @@ def finish() -> None:
 def _fork(report: Callable[[str], NoReturn]) -> None:
     """Continue in a child process; this one supervises it and does not return."""
     global _page
+    import ctypes  # slow to import, and before the fork
+
     page = mmap.mmap(-1, mmap.PAGESIZE)
     for stream in (sys.stdout, sys.stderr):
         stream.flush()

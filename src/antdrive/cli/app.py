@@ -1,9 +1,8 @@
-"""Entry point of the command line. `antdrive --help` imports no command."""
+"""Entry point of the command line. `antdrive --help` and lists import no command."""
 
 from __future__ import annotations
 
 import os
-import select
 import signal
 import sys
 from typing import NoReturn, TextIO
@@ -36,9 +35,8 @@ def run_command() -> None:
             signal.signal(one, _terminate)
     words = [word for word in sys.argv[1:] if word != DEBUG]
     try:
-        if words in ([], ["-h"], ["--help"]):
-            code = _show_help(words)
-        else:
+        code = _show_help(words) if words in ([], ["-h"], ["--help"]) else _show_list(words)
+        if code is None:
             from antdrive.cli.groups import exit_code_of
 
             code = exit_code_of(words)
@@ -106,8 +104,23 @@ def _show_help(words: list[str]) -> int:
     return SUCCEEDED if words else INVALID_INPUT
 
 
+def _show_list(words: list[str]) -> int | None:
+    """Print what a command line lists. Return the exit code; None if it does more than list."""
+    from antdrive.cli.console import print_line
+    from antdrive.cli.listings import lines_of
+
+    lines = lines_of(words)
+    if lines is None:
+        return None
+    for line in lines:
+        print_line(line)
+    return SUCCEEDED
+
+
 def _is_closed(stream: TextIO) -> bool:
     """Return whether a stream is a pipe whose reading end is closed."""
+    import select
+
     poll = select.poll()
     poll.register(stream.fileno(), 0)  # errors are always reported
     return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))

@@ -1,27 +1,25 @@
-"""Console output: progress bars and errors on stderr; text, tables and JSON on stdout."""
+"""Console output: progress bars and errors on stderr; text, tables and JSON on stdout.
+
+Lists start fast: what they do without is imported on use.
+"""
 
 from __future__ import annotations
 
 import math
 import os
-import shlex
 import shutil
 import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, TextIO
 
-import typer
-
-from antdrive.base import kernel_cache
 from antdrive.base.errors import visible
-from antdrive.base.files import as_json
 
 LAYOUT = "\n\t"  # control characters that lines may hold
 GOOD, BAD = "✓", "✗"  # signs of success and failure
-COLOURS = {GOOD: "green", BAD: "red"}
+COLOURS = {GOOD: "\033[32m{}\033[0m", BAD: "\033[31m{}\033[0m"}  # green and red
 PLAIN = {GOOD: "+", BAD: "x"}  # for streams that cannot encode the signs
 COMPILING = "compiling what this command needs, once per installation"
 LEAST_WRAPPED = 24  # least width of a wrapped column [characters]
@@ -40,6 +38,8 @@ def _progress(
         return
     from rich import progress
     from rich.console import Console
+
+    from antdrive.base import kernel_cache
 
     made = [
         getattr(progress, column)() if column.endswith("Column") else progress.TextColumn(column) for column in columns
@@ -63,6 +63,7 @@ def _progress(
 
 def report_compiling() -> None:
     """Print a line when a kernel compiles; progress bars count them instead."""
+    from antdrive.base import kernel_cache
 
     def compiles(_: str) -> None:
         kernel_cache.on_compile = kernel_cache.ignore
@@ -146,7 +147,7 @@ def duration(seconds: float) -> str:
 def print_error(message: str) -> None:
     """Print one line on stderr; a stderr that cannot take it costs no results."""
     with suppress(OSError):
-        typer.echo(f"antdrive: {visible(message, LAYOUT)}", err=True)
+        _write(sys.stderr, f"antdrive: {visible(message, LAYOUT)}")
 
 
 def print_line(text: str = "") -> None:
@@ -156,11 +157,16 @@ def print_line(text: str = "") -> None:
 
 def _print(text: str) -> None:
     try:
-        typer.echo(text)
+        _write(sys.stdout, text)
     except BrokenPipeError:
         raise
     except OSError as error:
         raise OSError(error.errno, error.strerror, "stdout") from None
+
+
+def _write(stream: TextIO, text: str) -> None:
+    stream.write(f"{text}\n")
+    stream.flush()
 
 
 def _signed(text: str) -> str:
@@ -169,7 +175,7 @@ def _signed(text: str) -> str:
     for one, colour in COLOURS.items():
         if one in text:
             word = one if _encodes(one) else PLAIN[one]
-            text = text.replace(one, typer.style(word, fg=colour) if coloured else word)
+            text = text.replace(one, colour.format(word) if coloured else word)
     return text
 
 
@@ -184,6 +190,8 @@ def _encodes(text: str) -> bool:
 
 def print_json(value: Any) -> None:
     """Print one JSON object on stdout."""
+    from antdrive.base.files import as_json
+
     _print(visible(as_json(value), LAYOUT))
 
 
@@ -263,4 +271,6 @@ def file_lines(files: Mapping[str, object]) -> Iterator[str]:
 
 def this_command() -> str:
     """Return the running command as typed in a shell."""
+    import shlex
+
     return shlex.join(["antdrive", *sys.argv[1:]])

@@ -18,6 +18,7 @@ from antdrive.base.errors import FieldError, InputError, Terminated, input_error
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line, report_compiling
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INTERRUPTED, INVALID_INPUT, SUCCEEDED
+from antdrive.cli.listings import version_line
 from antdrive.cli.options import with_plan_limit
 from antdrive.sim.settings import PANELS
 
@@ -189,9 +190,7 @@ def application() -> Any:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from antdrive.base.version import __version__
-
-        print_line(f"antdrive {__version__}")
+        print_line(version_line())
         raise typer.Exit
 
 

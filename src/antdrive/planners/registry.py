@@ -18,6 +18,7 @@ from typing import Any, Literal, Union
 from antdrive.base import FieldError, InputError
 from antdrive.base.errors import input_error
 from antdrive.base.guarded import OverLimit, UserCode, error_text, one_line, place
+from antdrive.base.optional import PLANNER_GROUP
 from antdrive.base.version import __version__
 from antdrive.planners.anyangle.ga_han import GaHan
 from antdrive.planners.anyangle.hybrid import Hybrid
@@ -47,8 +48,6 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
     }
 )
 
-#: The entry-point group for planners of other packages: an object with a method `plan`, or its class.
-GROUP = "antdrive.planners"
 DECORATOR = "@dataclass(frozen=True, kw_only=True)"
 
 
@@ -228,7 +227,7 @@ def _unknown(name: str, choices: Iterable[str], what: str = "planner") -> str:
 
 def _plugins() -> dict[str, importlib.metadata.EntryPoint]:
     entries: dict[str, importlib.metadata.EntryPoint] = {}
-    for entry in importlib.metadata.entry_points(group=GROUP):
+    for entry in importlib.metadata.entry_points(group=PLANNER_GROUP):
         if entry.name in PLANNERS or (entry.name in entries and entries[entry.name].value != entry.value):
             taken = "antdrive" if entry.name in PLANNERS else _maker(entries[entry.name])
             warnings.warn(

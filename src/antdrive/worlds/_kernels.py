@@ -44,6 +44,37 @@ def doubled_rows(array: Array) -> Array:
 
 
 @kernel
+def span(table: Array, column: int) -> tuple[float, float]:
+    """Return the smallest and the largest value in a column of a table (N, M), N >= 1."""
+    low = high = table[0, column]
+    for i in range(1, table.shape[0]):
+        low, high = min(low, table[i, column]), max(high, table[i, column])
+    return low, high
+
+
+@kernel
+def order_by(table: Array, column: int) -> Array:
+    """Return the order of a table's rows (N, M) by a column."""
+    values = np.empty(table.shape[0], dtype=np.float64)
+    for i in range(table.shape[0]):
+        values[i] = table[i, column]
+    return np.argsort(values)
+
+
+@kernel
+def count_below(values: Array, bound: float, equal: bool) -> int:
+    """Return how many ascending values lie below a bound; `equal`: or on it."""
+    low, high = 0, values.shape[0]
+    while low < high:
+        middle = (low + high) >> 1
+        if values[middle] < bound or (equal and values[middle] == bound):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
 def segment_distance2(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Return the squared distance from a point to the closed segment ab."""
     dx, dy = bx - ax, by - ay

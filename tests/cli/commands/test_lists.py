@@ -1,6 +1,7 @@
 """Commands that list, describe and generate."""
 
 import dataclasses
+import importlib.metadata
 import json
 import math
 import re
@@ -9,6 +10,9 @@ import numpy as np
 import pytest
 
 from antdrive.base.files import as_json
+from antdrive.base.optional import PLANNER_GROUP
+from antdrive.cli.groups import exit_code_of
+from antdrive.cli.listings import LISTS
 from antdrive.planners import PLANNERS
 from antdrive.robots import PurePursuit, RobotSpec
 from antdrive.worlds import Disc, Task, World, list_worlds, load_task, save_task
@@ -25,6 +29,23 @@ def test_every_planner_is_listed_with_its_options(antdrive):
     assert re.search(r"^elitism +100 +e of eq\. 4\.2\.4", out, re.MULTILINE)
     assert "ants guided" not in out.lower().replace("aco-han-elite: ants guided", "")
     assert antdrive("planners", "acohan")[0] == 2
+
+
+@pytest.mark.parametrize("words", LISTS, ids=" ".join)
+def test_a_list_prints_what_its_command_prints(antdrive, capsys, words):
+    code = exit_code_of(list(words))
+    printed = capsys.readouterr()
+    assert antdrive(*words) == (code, *printed)
+    assert printed.out.count("\n") > 5
+
+
+def test_planners_of_other_packages_are_listed(antdrive, monkeypatch):
+    assert antdrive("planners")[1].startswith("planner ")
+    added = importlib.metadata.EntryPoint("mine", "antdrive.planners:AStar", PLANNER_GROUP)
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [added] if group == PLANNER_GROUP else [])
+    code, out, _ = antdrive("planners")
+    assert code == 0
+    assert re.search(r"^mine +The shortest path", out, re.MULTILINE)
 
 
 def test_every_option_of_the_controller_is_listed_with_default_unit_and_meaning(antdrive):

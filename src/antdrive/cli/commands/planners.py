@@ -9,6 +9,7 @@ from antdrive.base.errors import InputError
 from antdrive.base.records import meanings_of
 from antdrive.cli import options
 from antdrive.cli.console import show, table
+from antdrive.cli.listings import Row, planner_lines
 from antdrive.cli.options import argument
 from antdrive.cli.output import plain
 
@@ -21,23 +22,41 @@ def planners(
     json: options.Json = False,
 ) -> None:
     """List the planners, or describe some with their options."""
-    from antdrive.planners import capabilities_of, describe, list_planners
+    from antdrive.planners import list_planners
 
     known = list_planners()
     for name in names or ():
         if name not in known:
             raise InputError(f"{name}: unknown planner; {suggest(name, known)}")
-    chosen = {name: known[name] for name in names or known}
-    facts = {
+    facts = _facts({name: known[name] for name in names or known})
+    show(json, facts, _details(facts) if names else planner_lines(rows_of(facts)))
+
+
+def planner_rows() -> Iterator[Row]:
+    """Yield the rows of the list of built-in planners."""
+    from antdrive.planners import PLANNERS
+
+    return rows_of(_facts(PLANNERS))
+
+
+def rows_of(facts: Mapping[str, Any]) -> Iterator[Row]:
+    """Yield the rows of a list."""
+    return ((name, one["about"], one["plans_for"]) for name, one in facts.items())
+
+
+def _facts(planners: Mapping[str, Any]) -> dict[str, Any]:
+    """Describe planners with their options as plain values."""
+    from antdrive.planners import capabilities_of, describe
+
+    return {
         name: {
             "about": describe(planner),
             "plans_for": _shape(capabilities_of(planner)),
             "options": {key: plain(value) for key, value in _options(planner).items()},
             "meanings": meanings_of(type(planner)),
         }
-        for name, planner in chosen.items()
+        for name, planner in planners.items()
     }
-    show(json, facts, _details(facts) if names else _list(facts))
 
 
 def _shape(can: "Capabilities") -> str:
@@ -45,17 +64,6 @@ def _shape(can: "Capabilities") -> str:
     if can.turns and can.cell_by_cell:
         return "disc, footprint without movers"
     return "disc or footprint" if can.turns else "disc"
-
-
-def _list(facts: Mapping[str, Any]) -> Iterator[str]:
-    yield from table(("planner", "about"), ((name, one["about"]) for name, one in facts.items()))
-    yield ""
-    rows = (
-        (shape, ", ".join(name for name, one in facts.items() if one["plans_for"] == shape))
-        for shape in dict.fromkeys(one["plans_for"] for one in facts.values())
-    )
-    yield from table(("plan for", "planners"), rows)
-    yield "options: antdrive planners NAME"
 
 
 def _details(facts: Mapping[str, Any]) -> Iterator[str]:

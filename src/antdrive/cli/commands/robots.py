@@ -1,29 +1,41 @@
 """`antdrive robots`: list, print, show and import."""
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import summary_of
 from antdrive.cli import options
-from antdrive.cli.console import file_lines, show, table
+from antdrive.cli.console import file_lines, show
+from antdrive.cli.listings import Row, robot_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pair
+
+if TYPE_CHECKING:
+    from antdrive.robots import RobotSpec
 
 
 def list_all(json: options.Json = False) -> None:
     """List the robots in the catalogue."""
-    from antdrive.robots import list_robots, load_robot, robot_to_dict
+    from antdrive.robots import robot_to_dict
 
-    specs = [(load_robot(name), summary_of(path)) for name, path in list_robots().items()]
-    rows = (
-        (spec.name, f"{spec.radius:.3f}", f"{spec.max_speed:g}", f"{spec.max_acceleration:g}", about)
-        for spec, about in specs
-    )
-    heads = ("robot", "radius m", "m/s", "m/s2", "about")
-    facts = {spec.name: {**robot_to_dict(spec), "about": about} for spec, about in specs}
-    show(json, facts, [*table(heads, rows), "details: antdrive robots NAME, antdrive robots show NAME"])
+    facts = {spec.name: {**robot_to_dict(spec), "about": about} for spec, about in _catalogue()}
+    show(json, facts, robot_lines(robot_rows()))
+
+
+def robot_rows() -> Iterator[Row]:
+    """Yield the rows of the list of robots."""
+    for spec, about in _catalogue():
+        yield spec.name, f"{spec.radius:.3f}", f"{spec.max_speed:g}", f"{spec.max_acceleration:g}", about
+
+
+def _catalogue() -> Iterator[tuple["RobotSpec", str]]:
+    """Yield the robots of the catalogue with their summaries."""
+    from antdrive.robots import list_robots, load_robot
+
+    return ((load_robot(name), summary_of(path)) for name, path in list_robots().items())
 
 
 def print_robot(name: Annotated[str, argument("NAME", "Catalogue robot.")], json: options.Json = False) -> None:

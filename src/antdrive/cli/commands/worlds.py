@@ -8,6 +8,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import file_name, summary_of
 from antdrive.cli import options
 from antdrive.cli.console import bar, file_lines, show, table
+from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pair
 from antdrive.cli.scenario_options import Ends, random_world
@@ -31,19 +32,22 @@ UNITS = {
 
 def list_worlds(json: options.Json = False) -> None:
     """List the worlds in the catalogue."""
-    from antdrive.worlds import list_worlds as catalogue
-    from antdrive.worlds import load_task
-
-    known = {name: {**_facts(load_task(name)), "about": summary_of(path)} for name, path in catalogue().items()}
-    heads = ("world", "size m", "obstacles", "movers", "about")
-    rows = (_row(name, facts) for name, facts in known.items())
-    show(json, known, [*table(heads, rows), "details: antdrive worlds show NAME"])
+    show(json, _catalogue(), world_lines(world_rows()))
 
 
-def _row(name: str, facts: Mapping[str, Any]) -> tuple[str, ...]:
-    xmin, ymin, xmax, ymax = facts["bounds"]
-    counts = (str(facts["obstacles"]), str(facts["movers"]))
-    return name, f"{xmax - xmin:g} x {ymax - ymin:g}", *counts, facts["about"]
+def world_rows() -> Iterator[Row]:
+    """Yield the rows of the list of worlds."""
+    for name, facts in _catalogue().items():
+        xmin, ymin, xmax, ymax = facts["bounds"]
+        counts = (str(facts["obstacles"]), str(facts["movers"]))
+        yield name, f"{xmax - xmin:g} x {ymax - ymin:g}", *counts, facts["about"]
+
+
+def _catalogue() -> dict[str, Any]:
+    """Summarise the worlds of the catalogue."""
+    from antdrive.worlds import list_worlds, load_task
+
+    return {name: {**_facts(load_task(name)), "about": summary_of(path)} for name, path in list_worlds().items()}
 
 
 def _facts(task: "Task") -> dict[str, Any]:

@@ -12,7 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.worlds._kernels import Array, doubled, doubled_rows, inline, kernel, segment_distance2
+from antdrive.worlds._kernels import (
+    Array,
+    count_below,
+    doubled,
+    doubled_rows,
+    inline,
+    kernel,
+    order_by,
+    segment_distance2,
+)
 
 EPS = 5e-10  # m: gaps up to this are closed; a line may enter a disc by this much
 TURN = 2.0 * math.pi
@@ -21,6 +30,8 @@ BACK = 1e-7  # rad: smaller backward motion along a rim is rounding and has leng
 SECTORS = 512  # direction sectors, each with the last blocking disc
 JOIN = 32  # covered angles that gather before they are joined
 SAME = 1e-12  # m: tolerance of equal lengths
+LEAVE, REACH, LENGTH, BEST, ENDS = range(5)  # columns of `Lines.values`
+FROM_ARC, DISC, SENSE, ARC, BEFORE, DONE, EARLIER = range(7)  # columns of `Lines.marks`
 
 
 class Rims(NamedTuple):
@@ -93,32 +104,15 @@ class Lines(NamedTuple):
     """The known tangents, one row each, with their search state. Rows at the end may be unused.
 
     Attributes:
-        leave: the angle at which the line leaves its disc
-        reach: the angle at which it reaches the next disc
-        length: its length [m]
-        segment: x, y of its two ends [m] (rows, 4)
-        from_arc: the free arc that it leaves, -1 at the start
-        disc: the disc that it reaches, -1 at the goal
-        turn: the turn around that disc
-        arc: the free arc that it reaches, -1 at the goal
-        before: the previous line on the shortest known path, -1 at the start
-        best: the length of that path, including this line [m]
-        done: whether that path is final
-        earlier: the line expanded before this one to the same arc and turn, -1 if none
+        values: columns LEAVE and REACH, the angles at which the line leaves its disc and reaches the next; LENGTH of the line
+            and BEST, the length of the shortest known path that ends with it [m]; from ENDS on, x, y of its ends [m] (rows, 8)
+        marks: columns FROM_ARC, the free arc that it leaves, -1 at the start; DISC and ARC that it reaches, -1 at the goal;
+            SENSE, the turn around that disc; BEFORE, the previous line on that path, -1 at the start; DONE, 1 if that path is
+            final; EARLIER, the line expanded before this one to the same arc and turn, -1 if none (rows, 7)
     """
 
-    leave: Array
-    reach: Array
-    length: Array
-    segment: Array
-    from_arc: Array
-    disc: Array
-    turn: Array
-    arc: Array
-    before: Array
-    best: Array
-    done: Array
-    earlier: Array
+    values: Array
+    marks: Array
 
 
 class Heap(NamedTuple):
@@ -143,7 +137,7 @@ def wrapped(angle: float) -> float:
 @kernel
 def swept(discs: Array) -> Sweep:
     """Sort the discs by x."""
-    order = np.argsort(discs[:, 0])
+    order = order_by(discs, 0)
     x = np.empty(len(order), dtype=np.float64)
     widest = 0.0
     for p in range(len(order)):
@@ -156,7 +150,7 @@ def swept(discs: Array) -> Sweep:
 def slice_near(sweep: Sweep, x: float, reach: float) -> tuple[int, int]:
     """Return the slice of `Sweep.order` with the discs that may come within `reach` of a point at this x."""
     apart = reach + sweep.widest + 1e-6
-    return int(np.searchsorted(sweep.x, x - apart)), int(np.searchsorted(sweep.x, x + apart, side="right"))
+    return count_below(sweep.x, x - apart, False), count_below(sweep.x, x + apart, True)
 
 
 @inline
@@ -198,11 +192,13 @@ def keep_outer(discs: Array, bounds: Array) -> Array:
     return keep
 
 
-@inline
+@kernel
 def joined(low: Array, high: Array, count: int) -> int:
     """Join the intervals of covered angles that overlap, in place; returns how many remain, sorted."""
     order = np.argsort(low[:count])
-    lows, highs = low[order], high[order]
+    lows, highs = np.empty(count, dtype=np.float64), np.empty(count, dtype=np.float64)
+    for q in range(count):
+        lows[q], highs[q] = low[order[q]], high[order[q]]
     size = 0
     for q in range(count):
         if size and lows[q] <= high[size - 1] + 2.0 * ANGLE:
@@ -564,44 +560,6 @@ def drop_first(heap: Heap, size: int) -> int:
     return size
 
 
-@kernel
-def empty_lines(room: int) -> Lines:
-    """Allocate a table with `room` unused rows."""
-    return Lines(
-        np.empty(room, dtype=np.float64),
-        np.empty(room, dtype=np.float64),
-        np.empty(room, dtype=np.float64),
-        np.empty((room, 4), dtype=np.float64),
-        np.empty(room, dtype=np.int64),
-        np.empty(room, dtype=np.int64),
-        np.empty(room, dtype=np.int64),
-        np.empty(room, dtype=np.int64),
-        np.empty(room, dtype=np.int64),
-        np.empty(room, dtype=np.float64),
-        np.empty(room, dtype=np.bool_),
-        np.empty(room, dtype=np.int64),
-    )
-
-
-@kernel
-def doubled_lines(lines: Lines) -> Lines:
-    """Return the table with twice the rows."""
-    return Lines(
-        doubled(lines.leave),
-        doubled(lines.reach),
-        doubled(lines.length),
-        doubled_rows(lines.segment),
-        doubled(lines.from_arc),
-        doubled(lines.disc),
-        doubled(lines.turn),
-        doubled(lines.arc),
-        doubled(lines.before),
-        doubled(lines.best),
-        doubled(lines.done),
-        doubled(lines.earlier),
-    )
-
-
 @inline
 def least_by(ends: Array, least: float, ax: float, ay: float, bx: float, by: float, length: float) -> float:
     """Return a lower bound of every undiscovered path through the line from a to b.
@@ -631,10 +589,11 @@ def add_tangents(
     i, s, x, y, r = -1, 1, ends[0, 0], ends[0, 1], 0.0
     least = math.hypot(ends[1, 0] - x, ends[1, 1] - y)  # lower bound of every undiscovered path
     if line >= 0:
-        i, s = lines.disc[line], lines.turn[line]
+        i, s = lines.marks[line, DISC], lines.marks[line, SENSE]
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
-        seg = lines.segment[line]
-        least = lines.best[line] + math.hypot(ends[1, 0] - seg[2], ends[1, 1] - seg[3])
+        least = lines.values[line, BEST] + math.hypot(
+            ends[1, 0] - lines.values[line, ENDS + 2], ends[1, 1] - lines.values[line, ENDS + 3]
+        )
     for j in obstacles.goals:
         if j == i and j >= 0:
             continue
@@ -678,13 +637,13 @@ def add_tangents(
             if k != -1:
                 blockers[sector] = k
                 continue
-            lines.leave[count], lines.reach[count], lines.length[count] = leave, reach, length
-            lines.segment[count, 0], lines.segment[count, 1] = ax, ay
-            lines.segment[count, 2], lines.segment[count, 3] = bx, by
-            lines.from_arc[count], lines.arc[count] = from_arc, arc
-            lines.disc[count], lines.turn[count] = j, t
-            lines.before[count], lines.earlier[count] = -1, -1
-            lines.best[count], lines.done[count] = np.inf, False
+            lines.values[count, LEAVE], lines.values[count, REACH], lines.values[count, LENGTH] = leave, reach, length
+            lines.values[count, ENDS], lines.values[count, ENDS + 1] = ax, ay
+            lines.values[count, ENDS + 2], lines.values[count, ENDS + 3] = bx, by
+            lines.marks[count, FROM_ARC], lines.marks[count, ARC] = from_arc, arc
+            lines.marks[count, DISC], lines.marks[count, SENSE] = j, t
+            lines.marks[count, BEFORE], lines.marks[count, EARLIER] = -1, -1
+            lines.values[count, BEST], lines.marks[count, DONE] = np.inf, 0
             count += 1
     return count, checked
 
@@ -696,23 +655,25 @@ def relax(
     """Extend the path ending in `line` by lines `first` to `last`, which leave its disc; returns the heap's new size."""
     g, r = 0.0, 0.0
     if line >= 0:
-        g, r = lines.best[line], obstacles.discs[lines.disc[line], 2]
+        g, r = lines.values[line, BEST], obstacles.discs[lines.marks[line, DISC], 2]
     for e in range(first, last):
-        if lines.done[e]:
+        if lines.marks[e, DONE]:
             continue
         ahead = 0.0
         if line >= 0:
-            arc = lines.arc[line]
-            if lines.from_arc[e] != arc:
+            arc = lines.marks[line, ARC]
+            if lines.marks[e, FROM_ARC] != arc:
                 continue
-            ahead = along_rim(obstacles.rims, arc, lines.turn[line], lines.reach[line], lines.leave[e])
+            ahead = along_rim(
+                obstacles.rims, arc, lines.marks[line, SENSE], lines.values[line, REACH], lines.values[e, LEAVE]
+            )
             if ahead == np.inf:
                 continue
-        length = g + r * ahead + lines.length[e]
-        if length < lines.best[e] - SAME:
-            lines.best[e] = length
-            lines.before[e] = line
-            to_goal = math.hypot(ends[1, 0] - lines.segment[e, 2], ends[1, 1] - lines.segment[e, 3])
+        length = g + r * ahead + lines.values[e, LENGTH]
+        if length < lines.values[e, BEST] - SAME:
+            lines.values[e, BEST] = length
+            lines.marks[e, BEFORE] = line
+            to_goal = math.hypot(ends[1, 0] - lines.values[e, ENDS + 2], ends[1, 1] - lines.values[e, ENDS + 3])
             waiting = push(heap, waiting, length + to_goal, e)
     return waiting
 
@@ -722,27 +683,27 @@ def next_line(obstacles: Obstacles, lines: Lines, latest: Array, heap: Heap, wai
     """Return the most promising line to expand, -1 if there is none, and the heap's new size.
 
     A line is skipped if an earlier expanded line reaches the same point of the rim by a path at most as long.
-    Expanded lines form a linked list per arc and turn, from `latest` (2 A,) on by `Lines.earlier`.
+    Expanded lines form a linked list per arc and turn, from `latest` (2 A,) on by EARLIER.
     """
     while waiting > 0:
         e = heap.line[0]
         waiting = drop_first(heap, waiting)
-        if lines.done[e]:
+        if lines.marks[e, DONE]:
             continue
-        lines.done[e] = True
-        if lines.disc[e] < 0:
+        lines.marks[e, DONE] = 1
+        if lines.marks[e, DISC] < 0:
             return e, waiting
-        arc, turn, r = lines.arc[e], lines.turn[e], obstacles.discs[lines.disc[e], 2]
+        arc, turn, r = lines.marks[e, ARC], lines.marks[e, SENSE], obstacles.discs[lines.marks[e, DISC], 2]
         slot = 2 * arc + (1 if turn > 0 else 0)
         other = latest[slot]
         beaten = False
         while other >= 0 and not beaten:
-            ahead = along_rim(obstacles.rims, arc, turn, lines.reach[other], lines.reach[e])
-            beaten = ahead < np.inf and lines.best[other] + r * ahead <= lines.best[e] + SAME
-            other = lines.earlier[other]
+            ahead = along_rim(obstacles.rims, arc, turn, lines.values[other, REACH], lines.values[e, REACH])
+            beaten = ahead < np.inf and lines.values[other, BEST] + r * ahead <= lines.values[e, BEST] + SAME
+            other = lines.marks[other, EARLIER]
         if beaten:
             continue
-        lines.earlier[e] = latest[slot]
+        lines.marks[e, EARLIER] = latest[slot]
         latest[slot] = e
         return e, waiting
     return -1, waiting
@@ -754,14 +715,14 @@ def way_to(line: int, lines: Lines) -> Array:
     count, e = 0, line
     while e >= 0:
         count += 1
-        e = lines.before[e]
+        e = lines.marks[e, BEFORE]
     way = np.empty((count, 6), dtype=np.float64)
     e = line
     for k in range(count - 1, -1, -1):
         for q in range(4):
-            way[k, q] = lines.segment[e, q]
-        way[k, 4], way[k, 5] = lines.disc[e], lines.turn[e]
-        e = lines.before[e]
+            way[k, q] = lines.values[e, ENDS + q]
+        way[k, 4], way[k, 5] = lines.marks[e, DISC], lines.marks[e, SENSE]
+        e = lines.marks[e, BEFORE]
     return way
 
 
@@ -795,16 +756,17 @@ def shortest_path(discs: Array, bounds: Array, ends: Array, limit: float) -> tup
     rims = free_arcs(discs, bounds)
     near = touchable(discs, rims, ends, limit)
     obstacles = Obstacles(discs, bounds, rims, bins(discs, bounds), gates(discs, bounds, rims), near)
-    lines = empty_lines(max(256, 2 * n + 1))
+    rows = max(256, 2 * n + 1)
+    lines = Lines(np.empty((rows, 8), dtype=np.float64), np.empty((rows, 7), dtype=np.int64))
     span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # the lines that leave each disc by turn; last, the start
     latest = np.full(2 * len(obstacles.rims.begin), -1, dtype=np.int64)
     heap = Heap(np.empty(256, dtype=np.float64), np.empty(256, dtype=np.int64))
     count, waiting, checked, line = 0, 0, 0, -1
     while True:
-        source = 2 * n if line < 0 else 2 * lines.disc[line] + (1 if lines.turn[line] > 0 else 0)
+        source = 2 * n if line < 0 else 2 * lines.marks[line, DISC] + (1 if lines.marks[line, SENSE] > 0 else 0)
         if span[source, 0] < 0:
-            if count + 2 * n + 1 > len(lines.leave):
-                lines = doubled_lines(lines)
+            if count + 2 * n + 1 > len(lines.marks):
+                lines = Lines(doubled_rows(lines.values), doubled_rows(lines.marks))
             span[source, 0] = count
             count, more = add_tangents(obstacles, ends, line, lines, count, limit)
             span[source, 1] = count
@@ -816,5 +778,5 @@ def shortest_path(discs: Array, bounds: Array, ends: Array, limit: float) -> tup
         line, waiting = next_line(obstacles, lines, latest, heap, waiting)
         if line < 0:
             return np.empty((0, 6), dtype=np.float64), np.inf, checked
-        if lines.disc[line] < 0:
-            return way_to(line, lines), lines.best[line], checked
+        if lines.marks[line, DISC] < 0:
+            return way_to(line, lines), lines.values[line, BEST], checked

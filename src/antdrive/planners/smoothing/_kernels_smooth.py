@@ -19,13 +19,16 @@ from antdrive.worlds._kernels import (
     Array,
     boxes_around,
     clearance_up_to,
+    count_below,
     doubled,
     doubled_rows,
     inline,
     is_beyond,
     kernel,
+    order_by,
     polyline_clearance,
     segment_distance2,
+    span,
     wall_distance,
 )
 
@@ -184,20 +187,29 @@ def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
     return True, disc[:count], turn[:count], sweep[:count]
 
 
+@inline
+def longer_axis(table: Array) -> int:
+    """Return the axis along which points (N, 2+) spread more."""
+    left, right = span(table, 0)
+    low, high = span(table, 1)
+    return 1 if high - low > right - left else 0
+
+
 @kernel
 def outermost(discs: Array) -> Array:
     """Return which discs (N, 3) do not lie within another; of equal discs only the first is kept."""
     n = discs.shape[0]
     keep = np.ones(n, dtype=np.bool_)
-    axis = 1 if n > 0 and np.ptp(discs[:, 1]) > np.ptp(discs[:, 0]) else 0  # the axis with the larger spread
-    order = np.argsort(discs[:, axis])
-    x = discs[order, axis]
+    axis = longer_axis(discs) if n > 0 else 0
+    order = order_by(discs, axis)
+    x = np.empty(n, dtype=np.float64)
     largest = 0.0
     for i in range(n):
+        x[i] = discs[order[i], axis]
         largest = max(largest, discs[i, 2])
     for i in range(n):
         reach = largest - discs[i, 2] + NOT_INSIDE
-        for at in range(np.searchsorted(x, discs[i, axis] - 1.01 * reach), n):
+        for at in range(count_below(x, discs[i, axis] - 1.01 * reach, False), n):
             j = order[at]
             if x[at] > discs[i, axis] + 1.01 * reach:
                 break
@@ -571,8 +583,10 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
                 continue
             if crosses(xy, x, y, bx, by):
                 out[i] = share * gap
-    axis = 0 if np.ptp(xy[:, 0]) > np.ptp(xy[:, 1]) else 1  # the axis with the larger spread
-    order = np.argsort(discs[:, axis])
+    left, right = span(xy, 0)
+    low, high = span(xy, 1)
+    axis = 0 if right - left > high - low else 1  # the axis with the larger spread
+    order = order_by(discs, axis)
     widest = 0.0
     away = np.empty(n)  # distance of each centre from the polyline
     for i in range(n):
@@ -629,7 +643,8 @@ def widest(
     All discs (N, 3) grow by the same fraction of `extra`, each by at most its `room`; bisection finds the largest fraction.
     """
     ends = np.empty((2, 2))
-    ends[0], ends[1] = line[0], line[-1]
+    for k in range(2):
+        ends[0, k], ends[1, k] = line[0, k], line[-1, k]
     found, best, curvature = False, np.empty((0, 2)), np.empty(0)
     wider = discs.copy()
     low, high, part = 0.0, 1.0, 1.0
@@ -656,7 +671,8 @@ def widest(
 def near_polyline(xy: Array, discs: Array, reach: float) -> Array:
     """Return which discs (N, 3) come within `reach` of a polyline (M, 2)."""
     near = np.zeros(discs.shape[0], dtype=np.bool_)
-    x_min, y_min, x_max, y_max = xy[:, 0].min(), xy[:, 1].min(), xy[:, 0].max(), xy[:, 1].max()
+    x_min, x_max = span(xy, 0)
+    y_min, y_max = span(xy, 1)
     for k in range(discs.shape[0]):
         q, x, y = discs[k, 2] + reach, discs[k, 0], discs[k, 1]
         if min(min(x - x_min, x_max - x), min(y - y_min, y_max - y)) < -q - ROUNDING:
@@ -671,8 +687,10 @@ def near_polyline(xy: Array, discs: Array, reach: float) -> Array:
 @kernel
 def encloses(there: Array, back: Array, points: Array) -> bool:
     """Return whether the loop along one polyline and back along another winds around any of the points (N, 2+)."""
-    y_min, y_max = min(there[:, 1].min(), back[:, 1].min()), max(there[:, 1].max(), back[:, 1].max())
-    x_max = max(there[:, 0].max(), back[:, 0].max())
+    low, high = span(there, 1)
+    y_min, y_max = span(back, 1)
+    y_min, y_max = min(low, y_min), max(high, y_max)
+    x_max = max(span(there, 0)[1], span(back, 0)[1])
     starts, listed = by_strip(there, back, y_min, y_max)
     for k in range(points.shape[0]):
         x, y = points[k, 0], points[k, 1]
@@ -721,7 +739,8 @@ def by_strip(there: Array, back: Array, y_min: float, y_max: float) -> tuple[Arr
                     else:
                         starts[strip + 1] += 1
         if not filling:
-            starts = np.cumsum(starts)
+            for strip in range(STRIPS):
+                starts[strip + 1] += starts[strip]
             fill = starts.copy()
             listed = np.empty(starts[-1], dtype=np.int64)
     return starts, listed

@@ -248,7 +248,14 @@ def _runs(xy: Floats, world: World, inflate: float) -> Iterator[tuple[Floats, bo
     )  # joined lines have exactly the clearance
     cuts = [0, *(np.flatnonzero(clear[1:] != clear[:-1]) + 1).tolist(), len(clear)]
     for first, last in itertools.pairwise(cuts):
-        yield np.ascontiguousarray(xy[first : last + 1]), bool(clear[first])
+        yield _constant(np.ascontiguousarray(xy[first : last + 1])), bool(clear[first])
+
+
+def _constant(xy: Floats) -> Floats:
+    """Return a read-only view of a line. Kernels compile apart for lines that can be written, so no line is one."""
+    view = xy.view()
+    view.setflags(write=False)
+    return view
 
 
 def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
@@ -276,7 +283,7 @@ def _smoothed(
             break
     if note:
         return Piece(line, np.zeros(len(line)), note=note)
-    piece = Piece(*drawn, "taut")
+    piece = Piece(_constant(drawn[0]), drawn[1], "taut")
     if not extra:
         return piece
     wider = _with_clearance(

@@ -30,6 +30,7 @@ from antdrive.robots.control._kernels_pursuit import (
     reachable_yaw_rate,
     rotation,
     speed_limit,
+    unpacked,
 )
 from antdrive.worlds._kernels import Array, kernel, segment_clearance
 
@@ -65,34 +66,16 @@ def advance(
 
 
 @kernel
-def unpacked(
-    xy: Array, arc: Array, lookahead: Array, speed: Array, curvature: Array, heading: Array, turns: Array,
-    discs: Array, starts: Array, bounds: Array, corners: Array, n: Array,
-) -> tuple[PathSamples, ObstacleIndex, MotionLimits, PursuitTuning]:  # fmt: skip
-    """Return samples, obstacles, limits and tuning of a path in the form of `TrackedPath.packed`."""
-    tuning = PursuitTuning(
-        n[9], n[10], n[11], n[12], n[13], n[14], n[15], n[16], corners, n[17], n[18], n[19], n[20], n[21], n[22], n[23],
-        n[24], n[25], n[26], n[27], n[28],
-    )  # fmt: skip
-    return (
-        PathSamples(xy, arc, lookahead, speed, curvature, heading, turns, n[0]),
-        ObstacleIndex(discs, starts, bounds, n[1]),
-        MotionLimits(n[2], n[3], n[4], n[5], n[6], n[7], n[8]),
-        tuning,
-    )
-
-
-@kernel
-def advance_packed(
+def follow_packed(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, turning: bool,
     xy: Array, arc: Array, lookahead: Array, speed: Array, curvature: Array, heading: Array, turns: Array,
     discs: Array, starts: Array, bounds: Array, corners: Array, n: Array,
 ) -> tuple[float, float, float, bool, int]:  # fmt: skip
-    """Compute one control period along a path in the form of `TrackedPath.packed`."""
+    """Compute one control period along the straights of a path in the form of `TrackedPath.packed`."""
     path, obstacles, limits, tuning = unpacked(
         xy, arc, lookahead, speed, curvature, heading, turns, discs, starts, bounds, corners, n
     )
-    return advance(x, y, yaw, v, w, progress, turning, path, obstacles, limits, tuning)
+    return follow_lines(x, y, yaw, v, w, progress, turning, path, obstacles, limits, tuning)
 
 
 @kernel

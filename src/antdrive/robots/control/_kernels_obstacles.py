@@ -56,12 +56,14 @@ def index_discs(discs: Array, bounds: Array, side: float, distance: float) -> tu
                     if math.hypot(dx, dy) - discs[j, 2] <= distance:
                         b = r * cols + c
                         if filling:
-                            found[fill[b]] = discs[j]
+                            for k in range(3):
+                                found[fill[b], k] = discs[j, k]
                             fill[b] += 1
                         else:
                             starts[b + 1] += 1
         if not filling:
-            starts = np.cumsum(starts)
+            for b in range(len(starts) - 1):
+                starts[b + 1] += starts[b]
             fill = starts.copy()
             found = np.empty((starts[-1], 3))
     return found, starts

@@ -434,3 +434,34 @@ def pursue(
         limiter = BRAKING
         new_v, new_w = full_braking(x, y, yaw, v, w, curvature, required, discs, bounds, limits, tuning)
     return new_v, new_w, s, rotating, limiter
+
+
+@kernel
+def unpacked(
+    xy: Array, arc: Array, lookahead: Array, speed: Array, curvature: Array, heading: Array, turns: Array,
+    discs: Array, starts: Array, bounds: Array, corners: Array, n: Array,
+) -> tuple[PathSamples, ObstacleIndex, MotionLimits, PursuitTuning]:  # fmt: skip
+    """Return samples, obstacles, limits and tuning of a path in the form of `TrackedPath.packed`."""
+    tuning = PursuitTuning(
+        n[9], n[10], n[11], n[12], n[13], n[14], n[15], n[16], corners, n[17], n[18], n[19], n[20], n[21], n[22], n[23],
+        n[24], n[25], n[26], n[27], n[28],
+    )  # fmt: skip
+    return (
+        PathSamples(xy, arc, lookahead, speed, curvature, heading, turns, n[0]),
+        ObstacleIndex(discs, starts, bounds, n[1]),
+        MotionLimits(n[2], n[3], n[4], n[5], n[6], n[7], n[8]),
+        tuning,
+    )
+
+
+@kernel
+def pursue_packed(
+    x: float, y: float, yaw: float, v: float, w: float, progress: float, turning: bool,
+    xy: Array, arc: Array, lookahead: Array, speed: Array, curvature: Array, heading: Array, turns: Array,
+    discs: Array, starts: Array, bounds: Array, corners: Array, n: Array,
+) -> tuple[float, float, float, bool, int]:  # fmt: skip
+    """Compute one control period along a path in the form of `TrackedPath.packed`."""
+    path, obstacles, limits, tuning = unpacked(
+        xy, arc, lookahead, speed, curvature, heading, turns, discs, starts, bounds, corners, n
+    )
+    return pursue(x, y, yaw, v, w, progress, turning, path, obstacles, limits, tuning)

@@ -24,7 +24,7 @@ from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError
 from antdrive.base.records import meanings_of, require_ranges
-from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels_path
+from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import NO_TURNS, PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
@@ -263,9 +263,10 @@ class PurePursuit:
             reversed_ = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
             ahead, after = self.step(replace(tracked, backwards=False), *reversed_, state)
             return Twist(-ahead.speed, ahead.yaw_rate), after
-        speed, yaw_rate, arc, turning, limiter = _kernels_lines.advance_packed(
-            *pose, *command, state.arc, state.turning, *tracked.packed
-        )
+        # Each kind of route has a kernel of its own, so that a drive compiles one.
+        lines = len(tracked.samples.turns)
+        advance = _kernels_lines.follow_packed if lines else _kernels_pursuit.pursue_packed
+        speed, yaw_rate, arc, turning, limiter = advance(*pose, *command, state.arc, state.turning, *tracked.packed)
         return Twist(speed, yaw_rate), PursuitState(arc, turning, limiter)
 
     def _samples(

@@ -43,7 +43,8 @@ def near_polyline(xy: Array, discs: Array, distance: float) -> Array:
                 if near:
                     break
             if near:
-                out[count] = discs[j]
+                for k in range(3):
+                    out[count, k] = discs[j, k]
                 count += 1
                 break
     return out[:count].copy()
