@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.base.plane import polyline_length
 from antdrive.planners import (
     PLANNERS,
     AgentStats,
@@ -19,18 +18,14 @@ from antdrive.planners import (
     capabilities_of,
     load_planner,
     replanner_for,
-    smooth,
 )
 from antdrive.robots import Footprint, Twist
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, route_planner
-from antdrive.sim.driving.blockage import with_obstacles
-from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.replanning import CellByCell
 from antdrive.sim.driving.routes import outlined_grid_of
 from antdrive.sim.driving.rules import MAX_LAG, KeepToSchedule, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
-from antdrive.sim.policy import OBSTRUCTED, WAITED
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from antdrive.worlds.world import by_geometry
 from tests.records import changed
@@ -431,28 +426,6 @@ def test_a_plan_for_a_footprint_keeps_away_from_movers_in_its_way(turtlebot):
         at = grid.xy(plan.cells)
         y = at[np.abs(at[:, 0] - 4.0).argmin(), 1]
         assert abs(y - crosses) < 1.0
-
-
-def test_a_footprint_has_a_way_beside_a_mover_where_the_disc_has_none(turtlebot):
-    passage = Task(World("passage", (0.0, 0.0, 8.0, 1.75), movers=(PLUG,)), (1.0, 0.875, 0.0), (7.0, 0.875))
-    robot = replace(turtlebot, footprint=Footprint(half_length=0.3, half_width=0.15))
-    routes = route_planner(Scenario.of(passage, "dstar-lite", robot))
-    grid, mover = routes.chosen_grid(), [Disc(4.0, 0.875, 0.16)]
-    assert not grid.turns
-    assert not routes.around(passage, grid, mover).solved
-    plan, outlined = routes.beside(passage, mover)
-    assert plan.solved
-    route = smooth(plan, outlined, with_obstacles(passage, mover), kind="clearance")
-    assert route.turns is not None
-    assert polyline_length(route.xy) < 7.0
-    ahead = MoversAhead(None, ReplanPolicy(), passage.goal, grid, 60, None)
-    for length, shape, trigger, fair in (
-        (8.0, outlined, OBSTRUCTED, True),
-        (10.0, outlined, OBSTRUCTED, False),
-        (10.0, outlined, WAITED, True),
-        (10.0, grid, OBSTRUCTED, True),
-    ):
-        assert ahead.is_fair(replace(plan, cost=length), passage.start, shape, trigger) == fair
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,6 @@ FADING = 30.0  # time constant with which the highest traffic seen fades [s]
 FAST = 0.75  # movers tracked by lidar count as traffic above this fraction of the robot's top speed
 SOON = 0.1  # speeds are those of predictions over this time [s]
 STRAY = 0.1  # movers are expected up to this far beyond the box [m]
-ASIDE = 1.5  # longest way of the footprint around movers for which the robot has not waited, as a multiple of the straight line
 OPENING = 2.0  # half the width of the corridor that stays open for the robot and the goal [cells]
 
 
@@ -268,29 +267,19 @@ class MoversAhead:
         """Return whether traffic is heavy enough to plan around zones."""
         return self._traffic is not None and self._traffic.rate(tick, pose[:2]) > self._policy.max_traffic
 
-    def discs(self, tick: int, pose: Pose, wider: float = 0.0) -> list[Disc]:
+    def discs(self, tick: int, pose: Pose) -> list[Disc]:
         """Return the discs that movers will cover soon; they close neither the robot's position nor the goal.
 
-        `wider` [m] is added to their radii. Discs are larger where the robot has waited beside a mover.
+        Discs are larger where the robot has waited beside a mover.
         """
         ends = np.array([pose[:2], self._goal])
-        covered = covered_discs(
-            self._predictor, tick, ends, self._policy.prediction_time, self._grid, wider=max(wider, 0.0)
-        )
+        covered = covered_discs(self._predictor, tick, ends, self._policy.prediction_time, self._grid)
         return covered if self._blockage is None else covered + self._blockage.discs(tick, ends)
 
     def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
         """Return the zones that movers roam, largest first: the estimated box, then the observed one."""
         assert self._traffic is not None
         return self._traffic.zones(tick, pose[:2], self._goal, grid)
-
-    def is_fair(self, plan: PlanResult, pose: Pose, grid: Grid, trigger: str) -> bool:
-        """Return whether there is a plan around movers that is worth its length.
-
-        A long way of the footprint, behind furniture, is not until the robot has waited: movers in motion make room.
-        """
-        longest = math.inf if trigger == WAITED or not grid.turns else ASIDE
-        return plan.solved and plan.cost <= longest * math.dist(pose[:2], self._goal)
 
     def plan_around_zones(
         self, pose: Pose, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]
@@ -328,9 +317,9 @@ class MoversSeenAhead(MoversAhead):
         super().__init__(tracked, policy, goal, grid, hz, self._roamed)
         self._survey = survey
 
-    def discs(self, tick: int, pose: Pose, wider: float = 0.0) -> list[Disc]:
+    def discs(self, tick: int, pose: Pose) -> list[Disc]:
         """Return the discs that movers will cover soon; they close neither the robot's position nor the goal."""
-        return super().discs(tick, pose, wider) if len(self._predictor.within_range(tick, pose[:2])) else []
+        return super().discs(tick, pose) if len(self._predictor.within_range(tick, pose[:2])) else []
 
     def _around(self, pose: Pose) -> Grid:
         (x, y), (gx, gy) = pose[:2], self._goal

@@ -123,17 +123,11 @@ class Replanning(OneRoute):
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
             discs = self._ahead.discs(tick, pose)
             plan = self._routes.around(task, self._grid, discs)
-        grid = self._grid
-        if not plan.solved and discs and self._routes.turns:
-            wide = self._ahead.discs(tick, pose, self._keeps - self._grid.inflate)
-            beside, outlined = self._routes.beside(task, wide)
-            if self._ahead.is_fair(beside, pose, outlined, trigger):
-                plan, grid = beside, outlined
         route = None
         if plan.solved and len(plan.cells) and not self._routes.plan_error:
             # A timed plan has times for its cells only, so its route must follow them.
             smoothing = "none" if self._timed else self._routes.smoothing
-            route = smooth(plan, grid, with_obstacles(task, discs), kind=smoothing)
+            route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
             self._track(plan, route)
         wall_s = time.perf_counter() - started
         if route is None:

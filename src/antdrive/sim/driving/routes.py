@@ -191,12 +191,6 @@ class RoutePlanner:
         # A replanner knows cells only; it cannot tell that the first cell is unreachable for the robot.
         return unreachable if query.unreachable else self.checked(query, answer)
 
-    def beside(self, task: Task, discs: Sequence[Disc]) -> tuple[PlanResult, Grid]:
-        """Plan from scratch for the footprint, among obstacles and discs. Return the plan and its grid."""
-        world, margin = by_geometry(with_obstacles(task, discs).world), self.outline_margins[0]
-        grid = outlined_grid_of(world, min(self.cell, FINE), self.robot.footprint, margin)
-        return self.plan(Query.between(grid, task), self.rng), grid
-
     def observed(self, world: World, margin: float) -> Grid:
         """Return the grid of a map's discs for the disc, updated where they changed; valid until the next call."""
         key = world.bounds, self.robot.radius + margin
