@@ -146,8 +146,43 @@ def test_hits_beyond_the_map_s_horizon_do_not_count():
 
 
 def test_the_errors_of_whole_and_partly_hidden_movers_differ_by_a_factor():
-    rules = MoverTracker(CIRCLE, TrackingPolicy(error=0.03))._rules[True]
-    assert (rules.whole, rules.part) == pytest.approx((0.03**2, 0.09**2))
+    lidar = replace(CIRCLE, sigma=0.04, resolution=0.01)
+    rules = MoverTracker(lidar, TrackingPolicy(error=0.03))._rules[True]
+    assert (rules.whole, rules.part) == pytest.approx((0.05**2 + 0.01**2 / 12, 0.09**2 + 0.04**2 + 0.01**2 / 12))
+
+
+def followed(turned, seed, expecting, count=240, scale=0.01, dt=0.02):
+    """Return how far a track's velocity is off the truth after each measured centre (count,) [m/s]; it turns in the middle."""
+    rng, track, place = np.random.default_rng(seed), np.zeros(1, dtype=_kernels_tracking.TRACK), np.zeros(2)
+    track["spread"], track["variance"], off = 1.0, scale**2, []
+    for k in range(count):
+        heading = turned if k >= count // 2 else 0.0
+        velocity = 1.8 * np.array([math.cos(heading), math.sin(heading)])
+        place = place + dt * velocity
+        _kernels_tracking.predict(track, 1, dt, 9.0, 9.0 * dt**4 / 4, 9.0 * dt**3 / 2)
+        x, y = place + rng.normal(0.0, scale, 2)
+        if expecting:
+            _kernels_tracking.expect_turn(track[0], x, y, scale**2, dt, 2.0)
+        _kernels_tracking.filter_in(track[0], x, y, scale**2)
+        off.append(math.hypot(track[0]["vx"] - velocity[0], track[0]["vy"] - velocity[1]))
+    return np.array(off)
+
+
+@pytest.mark.parametrize("turned", [1.2, 2.6, -2.6, math.pi])
+def test_the_velocity_of_a_mover_that_turns_is_known_after_a_tenth_of_a_second(turned):
+    off, before = (np.median([followed(turned, seed, x) for seed in range(30)], axis=0) for x in (True, False))
+    assert max(off[119], off[150:].max()) < 0.15
+    assert off[124:].max() < 0.5 < before[124]
+
+
+def test_chance_widens_one_track_in_a_thousand():
+    rng, wide = np.random.default_rng(1), 0
+    for x, y in rng.normal(0.0, math.sqrt(2) * 0.01, (20_000, 2)):
+        track = np.zeros(1, dtype=_kernels_tracking.TRACK)
+        track["variance"] = 1e-4
+        _kernels_tracking.expect_turn(track[0], x, y, 1e-4, 0.02, 2.0)
+        wide += int(track[0]["spread"] > 0.0)
+    assert 5 <= wide <= 40
 
 
 def test_a_policy_is_consistent():

@@ -28,6 +28,7 @@ OFTEN = 0.25  # least fraction of scans that hit a partly visible mover
 ALIKE = 0.2  # largest relative difference of its radius from the usual one, without a full view
 THROUGH = 3  # a track that beams pass in this many scans is lost
 SURE = 0.4  # a track counts once its velocity has this standard deviation [m/s]
+TURNED = 13.8  # squared deviation from the prediction, in variances, of which chance exceeds one in a thousand
 SLOW = 0.1  # slower objects have stopped [m/s]
 
 #: Track. Both coordinates have the same variances, so one 2x2 covariance of position and speed serves both.
@@ -404,13 +405,29 @@ def correct(track: Array, cluster: Array, view: View, rules: TrackingRules, usua
     x, y = centre(cluster, view, track["radius"])
     if math.hypot(x - track["x"], y - track["y"]) > CLAIM_MOST + rules.gate:
         return
-    filter_in(track, x, y, variance_of(x, y, view, rules, whole))
+    variance = variance_of(x, y, view, rules, whole)
+    if track["sure"] and (track["moves"] or rules.complete):
+        expect_turn(track, x, y, variance, view.time - track["last"], rules.speed)
+    filter_in(track, x, y, variance)
     track["seen"] += 1
     track["sure"] = track["sure"] or (track["seen"] >= rules.confirmed and track["spread"] < SURE * SURE)
     track["last"] = view.time
     track["through"] = 0
     if not rules.complete:
         judge(track, cluster, view, rules, whole and off <= ROUND and seen < 0.8 * rules.largest, usual[0])
+
+
+@kernel
+def expect_turn(track: Array, x: float, y: float, variance: float, dt: float, speed: float) -> None:
+    """Widen a track whose measured centre contradicts its prediction: its velocity has changed within the last scan's period.
+
+    The new velocity has a standard deviation of `speed` [m/s] in each coordinate, and the change any time within `dt` [s].
+    """
+    dx, dy = x - track["x"], y - track["y"]
+    if dx * dx + dy * dy > TURNED * (track["variance"] + variance):
+        track["variance"] += dt * dt * speed * speed / 3
+        track["mixed"] += dt * speed * speed / 2
+        track["spread"] += speed * speed
 
 
 @kernel

@@ -2,8 +2,9 @@
 
 Each track is a Kalman filter with constant velocity (Y. Bar-Shalom, X. Li, T. Kirubarajan, *Estimation with Applications to
 Tracking and Navigation*, 2001, chapter 6). Tracks that expect points in one cluster share it, so that passing movers keep
-their tracks; the remaining clusters and tracks are associated greedily, nearest first. The given map, or the robot's
-occupancy map, explains hits on static obstacles.
+their tracks; the remaining clusters and tracks are associated greedily, nearest first. A mover far off its prediction has
+turned, so its velocity is unknown again (chapter 11). The given map, or the robot's occupancy map, explains hits on static
+obstacles.
 """
 
 from __future__ import annotations
@@ -155,7 +156,7 @@ class TrackingPolicy:
         gate: largest distance between a cluster and a track's prediction [m]
         speed: highest speed of a mover, which widens the gate of a new track [m/s]
         acceleration: standard deviation of the movers' acceleration [m/s^2]
-        error: standard deviation of a measured centre [m]
+        error: standard deviation of a measured centre, without the lidar's own [m]
         confirmed: scans that must hit a mover before it counts
         way: distance that a mover must cover before it counts [m]; 0 on a given map
         patience: time for which an occluded track is kept [s]
@@ -173,7 +174,7 @@ class TrackingPolicy:
     gate: float = 0.4
     speed: float = 2.0
     acceleration: float = 3.0
-    error: float = 0.02
+    error: float = 0.01
     confirmed: int = 3
     way: float = 0.12
     patience: float = 3.0
@@ -213,6 +214,7 @@ class MoverTracker:
 
     def _rules_where(self, complete: bool) -> kernels.TrackingRules:
         policy, lidar = self.policy, self._lidar
+        measured = lidar.sigma**2 + lidar.resolution**2 / 12
         return kernels.TrackingRules(
             gap=float(policy.gap),
             least=int(policy.least),
@@ -225,8 +227,8 @@ class MoverTracker:
             way=float(policy.way),
             patience=float(policy.patience),
             doubt=float(policy.doubt),
-            whole=(policy.error * 1.0) ** 2,
-            part=(policy.error * PARTIAL) ** 2,
+            whole=policy.error**2 + measured,
+            part=(PARTIAL * policy.error) ** 2 + measured,
             pose_xy=float(self._pose_xy) ** 2,
             pose_yaw=float(self._pose_yaw),
             power=2.0,
