@@ -209,12 +209,8 @@ class Avoidance:
         self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, predicted: Floats, radii: Floats
     ) -> bool:
         """Return whether a mover that may come near soon is faster than people, or has another velocity than predicted."""
-        speeds = np.hypot(*observed.T)
-        unlike = (speeds > WALKING) | (np.hypot(*(observed - predicted).T) > SURPRISE)
-        if not unlike.any():
-            return False
-        gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
-        return bool((unlike & (gap < self.horizon * (speeds + spec.max_speed))).any())
+        most = self.horizon, spec.max_speed, spec.radius
+        return kernels.must_dodge(*pose[:2], places, observed, predicted, radii, WALKING, SURPRISE, *most)
 
     def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
@@ -227,18 +223,16 @@ class Avoidance:
 
         Row 0 keeps the speed limit, row 1 is the last decision.
         """
-        table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
         fastest, reverse = min(fastest, spec.max_speed), min(reverse, spec.max_speed)
-        if not state.candidate and min(speed_limit, fastest, reverse) >= spec.max_speed:
+        table = _limited_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration, fastest, reverse)
+        if not state.candidate and speed_limit >= fastest:
             return table
         table = table.copy()
         table[0, kernels.SPEED] = min(spec.max_speed, speed_limit)
         if state.candidate:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining
-        for column in (kernels.SPEED, kernels.NEXT_SPEED):
-            speeds = table[:, column]
-            np.minimum(np.maximum(speeds, -min(reverse, fastest), out=speeds), fastest, out=speeds)
+        _limit_speeds(table[:2], fastest, reverse)
         return table
 
 
@@ -306,6 +300,23 @@ def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration
                 ahead = (v,) if v else (max_speed, -max_speed)
                 rows += [(kernels.TWO_TWISTS, v, w, duration, next_speed, 0.0) for next_speed in ahead if w]
     return np.array(rows)
+
+
+@functools.lru_cache(maxsize=64)
+def _limited_table(
+    max_speed: float, max_yaw_rate: float, lateral_acceleration: float, fastest: float, reverse: float
+) -> Floats:
+    """Return a robot's candidates (N, 6) within speed limits [m/s], read-only."""
+    table = _candidate_table(max_speed, max_yaw_rate, lateral_acceleration).copy()
+    _limit_speeds(table, fastest, reverse)
+    return table
+
+
+def _limit_speeds(table: Floats, fastest: float, reverse: float) -> None:
+    """Limit the speeds of candidates (N, 6) in place, forwards and backwards [m/s]."""
+    for column in (kernels.SPEED, kernels.NEXT_SPEED):
+        speeds = table[:, column]
+        np.minimum(np.maximum(speeds, -min(reverse, fastest), out=speeds), fastest, out=speeds)
 
 
 @functools.lru_cache(maxsize=64)
