@@ -38,12 +38,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 # IEEE arithmetic (no fastmath), so that results repeat bit for bit. `_nrt` counts references to arrays. Each kernel sets it,
 # because numba would otherwise take that of its first caller.
-_SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+_SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": True}
 
 
 def kernel(function: F) -> F:
     """Compile a function on its first call and cache it on disk."""
-    return _cached(numba.njit(_nrt=True, **_SETTINGS)(function), function)
+    return _cached(numba.njit(**_SETTINGS)(function), function)
 
 
 def leaf(function: F) -> F:
@@ -51,7 +51,7 @@ def leaf(function: F) -> F:
 
     It returns no arrays, makes none, and calls no kernel that returns one, except inlined ones.
     """
-    return _cached(numba.njit(_nrt=False, **_SETTINGS)(function), function)
+    return _cached(numba.njit(**{**_SETTINGS, "_nrt": False})(function), function)
 
 
 def inline(function: F) -> F:
