@@ -2,6 +2,7 @@
 
 import ast
 import gc
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,18 +37,34 @@ def decorated(trees: list[ast.Module]) -> Iterator[tuple[str, ast.FunctionDef]]:
                 yield ast.unparse(node.decorator_list[0]), node
 
 
+def words(node: ast.AST | None) -> set[str]:
+    """Return the words of a piece of code."""
+    return set(re.findall(r"\w+", ast.unparse(node))) if node else set()
+
+
+def holders(trees: list[ast.Module]) -> set[str]:
+    """Return the names of the types that are or hold arrays."""
+    classes = [node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)]
+    found, before = {"Array"}, set[str]()
+    while found != before:
+        before = set(found)
+        for one in classes:
+            if any(isinstance(part, ast.AnnAssign) and words(part.annotation) & found for part in one.body):
+                found.add(one.name)
+    return found
+
+
 def faults(sources: list[str]) -> list[str]:
     """Return the leaf kernels that make, return or receive arrays."""
-    kernels = list(decorated([ast.parse(source) for source in sources]))
-    returning = {
-        node.name for kind, node in kernels if kind == "kernel" and "Array" in ast.unparse(node.returns or node)
-    }
+    trees = [ast.parse(source) for source in sources]
+    kernels, arrays = list(decorated(trees)), holders(trees)
+    returning = {node.name for kind, node in kernels if kind == "kernel" and words(node.returns) & arrays}
     found = []
     for kind, node in kernels:
         if kind != "leaf":
             continue
         called = {ast.unparse(call.func).removeprefix("np.") for call in ast.walk(node) if isinstance(call, ast.Call)}
-        if "Array" in ast.unparse(node.returns or node) or called & (ALLOCATES | returning):
+        if words(node.returns) & arrays or called & (ALLOCATES | returning):
             found.append(node.name)
     return found
 
@@ -64,10 +81,13 @@ def test_leaf_kernels_make_return_and_receive_no_arrays() -> None:
         "def f(a: Array) -> float:\n    return np.zeros(3)[0]",
         "def f(a: Array) -> Array:\n    return a",
         "def f(a: Array) -> float:\n    return made(a)[0]",
+        "class Held(NamedTuple):\n    a: Array\n\ndef f(a: Array) -> Held:\n    return Held(a)",
     ],
 )
 def test_the_search_finds_faults(body: str) -> None:
-    assert faults(["@kernel\ndef made(a: Array) -> Array:\n    return a\n\n@leaf\n" + body]) == ["f"]
+    assert faults(
+        ["@kernel\ndef made(a: Array) -> Array:\n    return a\n\n" + body.replace("def f", "@leaf\ndef f")]
+    ) == ["f"]
 
 
 @leaf

@@ -112,7 +112,7 @@ def carrot_at(x: float, y: float, lookahead: float, s: float, k: int, xy: Array,
         k += 1
 
 
-@kernel
+@leaf
 def clearance_below(most: float, ax: float, ay: float, bx: float, by: float, discs: Array, bounds: Array) -> float:
     """Return the clearance of a segment if it is less than `most`, otherwise a value of at least `most`."""
     best = min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds))
@@ -193,7 +193,7 @@ def clear_lookaheads(
         out[i] = clear
 
 
-@kernel
+@leaf
 def brake_backwards(limit: Array, spacing: float, deceleration: float) -> None:
     """Lower each speed so that braking reaches the next: v_i^2 <= v_{i+1}^2 + 2 a ds."""
     for i in range(limit.shape[0] - 2, -1, -1):
