@@ -43,6 +43,7 @@ SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progres
 WALKING = 1.5  # movers faster than this are not people [m/s]
 SURPRISE = 0.1  # a mover has another velocity than predicted if they differ by more than this [m/s]
 CROSSING = 0.5  # a robot crosses a mover's lane if the sine of the angle between both headings exceeds this
+LANES = (0.2, 0.4, 0.6, 0.8, 1.0)  # distances between the route and lines beside it that the robot may follow [m]
 PERSISTENCE = 0.05  # value of keeping the last decision, in metres of progress [m]
 
 
@@ -157,21 +158,32 @@ class Avoidance:
         ]  # fmt: skip
         if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
             limits_of[:3] = [(math.inf, backwards, False)]
+        given_way = None
         for fastest, reverse, by_outline in dict.fromkeys(limits_of):
             weights = weights._replace(outlined=by_outline)
-            candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
+            candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse, lanes=by_outline)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
                 limits, tuning, weights, places, radii,
             )  # fmt: skip
             chosen, contact = kernels.choose(*situation)
-            if contact == math.inf:
+            if given_way is not None:
+                candidates, chosen, contact = (candidates, chosen, contact) if contact == math.inf else given_way
                 break
+            if contact == math.inf:
+                if not (outlined and not by_outline and near < math.inf and gives_way(candidates, chosen)):
+                    break
+                given_way = candidates, chosen, contact
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
             return wanted, False, AvoidanceState(reversed=state.reversed)
         if contact < max(abs(last.speed) / limits.acceleration, self._too_late(weights, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
-        twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
+        candidate = candidates[chosen] if chosen >= 0 else None
+        if candidate is not None and candidate[kernels.KIND] == kernels.BESIDE_ROUTE:
+            aside = kernels.beside_route(*pose, last.speed, before.arc, candidate, tracked.samples, limits, tracked.tuning)
+            twist = Twist(*reachable_twist(*aside, *last, period, limits))
+            return twist, True, AvoidanceState(tuple(candidate.tolist()), 0.0, state.reversed)
+        twist, after = _execute(candidate, wanted, last, tracked)
         return twist, True, after._replace(reversed=state.reversed)
 
     def speed_near(
@@ -221,13 +233,20 @@ class Avoidance:
         return 2 * self.step if kernels.is_close(*pose, places, radii, weights) else 0.0
 
     def _candidates(
-        self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float
+        self,
+        spec: RobotSpec,
+        state: AvoidanceState,
+        speed_limit: float,
+        fastest: float,
+        reverse: float,
+        *,
+        lanes: bool,
     ) -> Floats:
         """Return the candidates (N, 6) within speed limits [m/s].
 
         Row 0 keeps the speed limit, row 1 is the last decision.
         """
-        table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
+        table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration, lanes)
         fastest, reverse = min(fastest, spec.max_speed), min(reverse, spec.max_speed)
         if not state.candidate and min(speed_limit, fastest, reverse) >= spec.max_speed:
             return table
@@ -240,6 +259,13 @@ class Avoidance:
             speeds = table[:, column]
             np.minimum(np.maximum(speeds, -min(reverse, fastest), out=speeds), fastest, out=speeds)
         return table
+
+
+def gives_way(candidates: Floats, chosen: int) -> bool:
+    """Return whether a candidate slows the robot down."""
+    row = candidates[chosen]
+    last = row[kernels.NEXT_SPEED if row[kernels.KIND] == kernels.TWO_TWISTS and row[kernels.DURATION] < math.inf else kernels.SPEED]
+    return bool(last < candidates[0, kernels.SPEED])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
@@ -285,7 +311,7 @@ _NOT_NEGATIVE = (
 
 
 @functools.cache
-def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
+def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float, lanes: bool) -> Floats:
     """Return a robot's candidates (N, 6): the controller's motion at full and lower speeds, and pairs of twists.
 
     Row 1 is a placeholder for the last decision. The second twist of a pair drives straight or stops.
@@ -305,6 +331,9 @@ def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration
                 rows.append((kernels.TWO_TWISTS, v, w, duration, 0.0, 0.0))
                 ahead = (v,) if v else (max_speed, -max_speed)
                 rows += [(kernels.TWO_TWISTS, v, w, duration, next_speed, 0.0) for next_speed in ahead if w]
+    if lanes:
+        shifts = [side * shift for shift in LANES for side in (1.0, -1.0)]
+        rows += [(kernels.BESIDE_ROUTE, f * max_speed, shift, 0.0, 0.0, 0.0) for f in (1.0, 0.45, 0.2) for shift in shifts]
     return np.array(rows)
 
 
