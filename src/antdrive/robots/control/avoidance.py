@@ -151,7 +151,7 @@ class Avoidance:
         tuning = tracked.tuning._replace(period=self.step)
         weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
         observed = predicted if velocities is None else velocities
-        outlined = not (spec.footprint.is_disc or len(tracked.samples.turns))
+        outlined = not spec.footprint.is_disc
         limits_of = [
             (near, slow, False), (near, slow, outlined), (near, backwards, outlined), (math.inf, backwards, outlined),
             (math.inf, math.inf, outlined),

@@ -183,7 +183,7 @@ class Exploration(RouteGuide):
         robot = self._robot
         return rasterise(task.world, self._routes.cell, robot.radius + margin, outline_of(robot.footprint, margin))
 
-    def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
+    def _plan_around(self, tick: int, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""
         movers = self._movers
         if movers is None:
@@ -197,9 +197,16 @@ class Exploration(RouteGuide):
                 return (grid, *around)
         discs = movers.discs(tick, pose)
         if discs:
-            grid, answer = self.plan(pose, discs)
+            grids: dict[int, Grid] = {}
+
+            def around(discs: list[Disc]) -> PlanResult:
+                grid, answer = self.plan(pose, discs)
+                grids[len(discs)] = grid
+                return answer
+
+            answer, discs = movers.without_long_detour(pose, trigger, discs, around)
             if answer.solved:
-                return grid, answer, discs
+                return grids[len(discs)], answer, discs
         return (*self.plan(pose), [])
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
@@ -324,7 +331,7 @@ class Exploration(RouteGuide):
         if self._failures >= PATIENCE and trigger != SCANNED:
             self._failures = 0
             self.survey.reset(pose)
-        grid, plan, avoided = self._plan_around(tick, pose)
+        grid, plan, avoided = self._plan_around(tick, pose, trigger)
         self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0
