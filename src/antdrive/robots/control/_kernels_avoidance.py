@@ -10,7 +10,13 @@ import numpy as np
 from antdrive.robots.control._kernels_lines import CHECKED, STEEPEST, advance, outline_clearance, wrapped
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, clearance_at, nearby
 from antdrive.robots.control._kernels_path import PathSamples, point_at, project
-from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, reachable_twist, slow_for_curvature
+from antdrive.robots.control._kernels_pursuit import (
+    MotionLimits,
+    PursuitTuning,
+    clip,
+    reachable_twist,
+    slow_for_curvature,
+)
 from antdrive.worlds._kernels import Array, kernel, polygon_distance, segment_clearance
 
 # The columns of a table of candidates.
@@ -31,7 +37,10 @@ START_TIME = 0.25  # for a robot at rest to start moving [s]
 ESCAPE_TIME = 1.2  # horizon of an escape when no candidate keeps its clearance [s]
 ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
 LEVELS = 64  # tabulated distances for progress
-BESIDE_DISTANCE, BESIDE_TIME = 0.5, 0.3  # errors beside the route decay over this distance, or this time at speed [m], [s]
+BESIDE_DISTANCE, BESIDE_TIME = (
+    0.5,
+    0.3,
+)  # errors beside the route decay over this distance, or this time at speed [m], [s]
 ROUTE_END = 0.1  # distance from the route's end below which the heading is ignored [m]
 
 
@@ -544,6 +553,18 @@ def limit_worths(
 
 
 @kernel
+def passes_all(trail: Array, places: Array, near: Array) -> bool:
+    """Return whether the robot comes no closer to any of the movers `near` at the end of its trail."""
+    k = trail.shape[0] - 1
+    for m in near:
+        dx, dy = places[k, m, 0] - trail[k, 0], places[k, m, 1] - trail[k, 1]
+        ux, uy = dx - places[k - 1, m, 0] + trail[k - 1, 0], dy - places[k - 1, m, 1] + trail[k - 1, 1]
+        if dx * ux + dy * uy < 0.0:
+            return False
+    return True
+
+
+@kernel
 def choose(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidates: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
@@ -614,7 +635,10 @@ def choose(
             if n <= 1:
                 limit[n] += weights.persistence
             continue
-        if meets_obstacle(trails[n], outlined, obstacles, tuning, weights.step):
+        beside = candidates[n, KIND] == BESIDE_ROUTE
+        if (beside and not passes_all(trails[n], places, near)) or meets_obstacle(
+            trails[n], outlined, obstacles, tuning, weights.step
+        ):
             limit[n] = -math.inf
             continue
         met = encounter(

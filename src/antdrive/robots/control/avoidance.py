@@ -168,7 +168,8 @@ class Avoidance:
             )  # fmt: skip
             chosen, contact = kernels.choose(*situation)
             if given_way is not None:
-                candidates, chosen, contact = (candidates, chosen, contact) if contact == math.inf else given_way
+                if contact < math.inf or candidates[chosen, kernels.KIND] != kernels.BESIDE_ROUTE:
+                    candidates, chosen, contact = given_way
                 break
             if contact == math.inf:
                 if not (outlined and not by_outline and near < math.inf and gives_way(candidates, chosen)):
@@ -180,7 +181,9 @@ class Avoidance:
             chosen = kernels.best_escape(*situation)
         candidate = candidates[chosen] if chosen >= 0 else None
         if candidate is not None and candidate[kernels.KIND] == kernels.BESIDE_ROUTE:
-            aside = kernels.beside_route(*pose, last.speed, before.arc, candidate, tracked.samples, limits, tracked.tuning)
+            aside = kernels.beside_route(
+                *pose, last.speed, before.arc, candidate, tracked.samples, limits, tracked.tuning
+            )
             twist = Twist(*reachable_twist(*aside, *last, period, limits))
             return twist, True, AvoidanceState(tuple(candidate.tolist()), 0.0, state.reversed)
         twist, after = _execute(candidate, wanted, last, tracked)
@@ -264,7 +267,11 @@ class Avoidance:
 def gives_way(candidates: Floats, chosen: int) -> bool:
     """Return whether a candidate slows the robot down."""
     row = candidates[chosen]
-    last = row[kernels.NEXT_SPEED if row[kernels.KIND] == kernels.TWO_TWISTS and row[kernels.DURATION] < math.inf else kernels.SPEED]
+    last = row[
+        kernels.NEXT_SPEED
+        if row[kernels.KIND] == kernels.TWO_TWISTS and row[kernels.DURATION] < math.inf
+        else kernels.SPEED
+    ]
     return bool(last < candidates[0, kernels.SPEED])
 
 
@@ -333,7 +340,9 @@ def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration
                 rows += [(kernels.TWO_TWISTS, v, w, duration, next_speed, 0.0) for next_speed in ahead if w]
     if lanes:
         shifts = [side * shift for shift in LANES for side in (1.0, -1.0)]
-        rows += [(kernels.BESIDE_ROUTE, f * max_speed, shift, 0.0, 0.0, 0.0) for f in (1.0, 0.45, 0.2) for shift in shifts]
+        rows += [
+            (kernels.BESIDE_ROUTE, f * max_speed, shift, 0.0, 0.0, 0.0) for f in (1.0, 0.45, 0.2) for shift in shifts
+        ]
     return np.array(rows)
 
 
