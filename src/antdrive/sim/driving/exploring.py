@@ -204,7 +204,7 @@ class Exploration(RouteGuide):
                 grids[len(discs)] = grid
                 return answer
 
-            answer, discs = movers.without_long_detour(pose, trigger, discs, around)
+            answer, discs = movers.without_long_detour(pose, trigger, self._robot.max_speed, discs, around)
             if answer.solved:
                 return grids[len(discs)], answer, discs
         return (*self.plan(pose), [])

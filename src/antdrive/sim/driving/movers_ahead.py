@@ -31,7 +31,6 @@ FADING = 30.0  # time constant with which the highest traffic seen fades [s]
 FAST = 0.75  # movers tracked by lidar count as traffic above this fraction of the robot's top speed
 SOON = 0.1  # speeds are those of predictions over this time [s]
 STRAY = 0.1  # movers are expected up to this far beyond the box [m]
-LONGEST = 1.5  # routes around movers in motion are at most this multiple of the route without movers
 OPENING = 2.0  # half the width of the corridor that stays open for the robot and the goal [cells]
 
 
@@ -283,17 +282,18 @@ class MoversAhead:
         return self._traffic.zones(tick, pose[:2], self._goal, grid)
 
     def without_long_detour(
-        self, pose: Pose, trigger: str, discs: list[Disc], plan: Callable[[list[Disc]], PlanResult]
+        self, pose: Pose, trigger: str, speed: float, discs: list[Disc], plan: Callable[[list[Disc]], PlanResult]
     ) -> tuple[PlanResult, list[Disc]]:
-        """Return a plan around discs, and these; without them if the detour is too long.
+        """Return a plan around discs, and these; without them if the detour takes longer than to wait.
 
-        A robot that has waited takes any detour. Before that, it trusts movers in motion to make room.
+        The detour is driven at a speed [m/s]. A robot that has waited takes any detour.
         """
-        answer, straight = plan(discs), math.dist(pose[:2], self._goal)
-        if trigger == WAITED or not answer.solved or answer.cost <= LONGEST * straight:
+        longest = self._policy.max_wait * speed
+        answer = plan(discs)
+        if trigger == WAITED or not answer.solved or answer.cost <= math.dist(pose[:2], self._goal) + longest:
             return answer, discs
         free = plan([])
-        return (free, []) if free.solved and answer.cost > LONGEST * free.cost else (answer, discs)
+        return (free, []) if free.solved and answer.cost > free.cost + longest else (answer, discs)
 
     def plan_around_zones(
         self, pose: Pose, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]

@@ -120,7 +120,7 @@ class Replanning(OneRoute):
             zones = self._ahead.zones(tick, pose, self._grid) if around_movers and self._ahead.heavy(tick, pose) else []
             around = functools.partial(self._routes.around, task, self._grid)
             beside = self._ahead.plan_around_zones(pose, zones, discs, around)
-            plan, discs = beside or self._ahead.without_long_detour(pose, trigger, discs, around)
+            plan, discs = beside or self._ahead.without_long_detour(pose, trigger, self._routes.robot.max_speed, discs, around)
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
             discs = self._ahead.discs(tick, pose)
             plan = self._routes.around(task, self._grid, discs)
