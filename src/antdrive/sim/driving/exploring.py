@@ -197,16 +197,13 @@ class Exploration(RouteGuide):
                 return (grid, *around)
         discs = movers.discs(tick, pose)
         if discs:
-            grids: dict[int, Grid] = {}
-
-            def around(discs: list[Disc]) -> PlanResult:
-                grid, answer = self.plan(pose, discs)
-                grids[len(discs)] = grid
-                return answer
-
-            answer, discs = movers.without_long_detour(pose, trigger, self._robot.max_speed, discs, around)
+            grid, answer = self.plan(pose, discs)
+            if answer.solved and grid.turns:  # a long way: it has turns on the spot
+                free = self.plan(pose)
+                if movers.waiting_is_quicker(answer.cost, free[1].cost, self._robot.max_speed, trigger):
+                    return (*free, [])
             if answer.solved:
-                return grids[len(discs)], answer, discs
+                return grid, answer, discs
         return (*self.plan(pose), [])
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:

@@ -281,19 +281,12 @@ class MoversAhead:
         assert self._traffic is not None
         return self._traffic.zones(tick, pose[:2], self._goal, grid)
 
-    def without_long_detour(
-        self, pose: Pose, trigger: str, speed: float, discs: list[Disc], plan: Callable[[list[Disc]], PlanResult]
-    ) -> tuple[PlanResult, list[Disc]]:
-        """Return a plan around discs, and these; without them if the detour takes longer than to wait.
+    def waiting_is_quicker(self, length: float, free: float, speed: float, trigger: str) -> bool:
+        """Return whether a route around movers [m] takes longer than to wait for them and take the `free` one [m].
 
-        The detour is driven at a speed [m/s]. A robot that has waited takes any detour.
+        Routes are driven at a speed [m/s]. A robot that has waited takes any route.
         """
-        longest = self._policy.max_wait * speed
-        answer = plan(discs)
-        if trigger == WAITED or not answer.solved or answer.cost <= math.dist(pose[:2], self._goal) + longest:
-            return answer, discs
-        free = plan([])
-        return (free, []) if free.solved and answer.cost > free.cost + longest else (answer, discs)
+        return trigger != WAITED and length > free + self._policy.max_wait * speed
 
     def plan_around_zones(
         self, pose: Pose, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]
