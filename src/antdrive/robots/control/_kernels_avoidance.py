@@ -37,10 +37,7 @@ START_TIME = 0.25  # for a robot at rest to start moving [s]
 ESCAPE_TIME = 1.2  # horizon of an escape when no candidate keeps its clearance [s]
 ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
 LEVELS = 64  # tabulated distances for progress
-BESIDE_DISTANCE, BESIDE_TIME = (
-    0.5,
-    0.3,
-)  # errors beside the route decay over this distance, or this time at speed [m], [s]
+BESIDE_DISTANCE, BESIDE_TIME = 0.5, 0.3  # offsets decay over this distance, or this time at speed [m], [s]
 ROUTE_END = 0.1  # distance from the route's end below which the heading is ignored [m]
 
 
@@ -557,9 +554,9 @@ def passes_all(trail: Array, places: Array, near: Array) -> bool:
     """Return whether the robot comes no closer to any of the movers `near` at the end of its trail."""
     k = trail.shape[0] - 1
     for m in near:
-        dx, dy = places[k, m, 0] - trail[k, 0], places[k, m, 1] - trail[k, 1]
-        ux, uy = dx - places[k - 1, m, 0] + trail[k - 1, 0], dy - places[k - 1, m, 1] + trail[k - 1, 1]
-        if dx * ux + dy * uy < 0.0:
+        now = math.hypot(places[k, m, 0] - trail[k, 0], places[k, m, 1] - trail[k, 1])
+        before = math.hypot(places[k - 1, m, 0] - trail[k - 1, 0], places[k - 1, m, 1] - trail[k - 1, 1])
+        if now < before:
             return False
     return True
 
@@ -573,7 +570,8 @@ def choose(
     """Return the index of the chosen candidate (N, 6), and the time of its first contact [s], inf if never.
 
     Row 0 is the controller's motion, row 1 the last decision. Row 0 is chosen if it has the preferred clearance and no
-    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact.
+    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact. A line
+    beside the route has worth only where it leads past all movers.
 
     Obstacles only exclude candidates, and movers only lower their worth. So the search is best-first: the candidate with the
     highest bound is followed, which lowers its bound to its worth without movers. When it is first again, it is evaluated
