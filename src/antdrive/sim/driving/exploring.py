@@ -199,8 +199,8 @@ class Exploration(RouteGuide):
         if discs:
             grid, answer = self.plan(pose, discs)
             if answer.solved and grid.turns:  # a long way: it has turns on the spot
-                free = self.plan(pose)
-                if movers.waiting_is_quicker(answer.cost, free[1].cost, self._robot.max_speed, trigger):
+                free, speed = self.plan(pose), self._robot.max_speed
+                if movers.waiting_is_quicker(tick, pose, trigger, speed, answer.cost, free[1].cost):
                     return (*free, [])
             if answer.solved:
                 return grid, answer, discs

@@ -120,9 +120,8 @@ class Replanning(OneRoute):
         else:
             zones = self._ahead.zones(tick, pose, self._grid) if around_movers and self._ahead.heavy(tick, pose) else []
             around = functools.partial(self._routes.around, task, self._grid)
-            plan, discs = self._ahead.plan_around_zones(pose, zones, discs, around) or self._around(
-                pose, trigger, discs, around
-            )
+            beside = self._ahead.plan_around_zones(pose, zones, discs, around)
+            plan, discs = beside or self._unless_waiting(tick, pose, trigger, discs, around)
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
             discs = self._ahead.discs(tick, pose)
             plan = self._routes.around(task, self._grid, discs)
@@ -141,15 +140,15 @@ class Replanning(OneRoute):
         self.blockage.route_found()
         return self._prepare(route)
 
-    def _around(
-        self, pose: Pose, trigger: str, discs: list[Disc], around: Callable[[list[Disc]], PlanResult]
+    def _unless_waiting(
+        self, tick: int, pose: Pose, trigger: str, discs: list[Disc], around: Callable[[list[Disc]], PlanResult]
     ) -> tuple[PlanResult, list[Disc]]:
         """Return a plan around discs, and these; without them if waiting is quicker."""
-        plan, speed = around(discs), self._routes.robot.max_speed
+        plan, asked = around(discs), (tick, pose, trigger, self._routes.robot.max_speed)
         straight = math.dist(pose[:2], self._task.goal)
-        if plan.solved and self._ahead.waiting_is_quicker(plan.cost, straight, speed, trigger):
+        if plan.solved and self._ahead.waiting_is_quicker(*asked, plan.cost, straight):
             free = around([])
-            if self._ahead.waiting_is_quicker(plan.cost, free.cost, speed, trigger):
+            if self._ahead.waiting_is_quicker(*asked, plan.cost, free.cost):
                 return free, []
         return plan, discs
 
