@@ -7,10 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots.control._kernels_lines import CHECKED, advance, outline_clearance
+from antdrive.robots.control._kernels_lines import CHECKED, STEEPEST, advance, outline_clearance, wrapped
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, clearance_at, nearby
 from antdrive.robots.control._kernels_path import PathSamples, point_at, project, segment_at
-from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, reachable_twist
+from antdrive.robots.control._kernels_pursuit import (
+    MotionLimits,
+    PursuitTuning,
+    clip,
+    reachable_twist,
+    slow_for_curvature,
+)
 from antdrive.worlds._kernels import Array, kernel, leaf, polygon_distance, segment_clearance
 
 # The columns of a table of candidates.
@@ -20,14 +26,18 @@ YAW_RATE = 2  # of the first twist [rad/s]
 DURATION = 3  # of the first twist [s]
 NEXT_SPEED, NEXT_YAW_RATE = 4, 5  # of the second twist
 
-# The kinds of candidates: pure pursuit along the route up to a speed, or one constant twist and then another.
-FOLLOW_ROUTE, TWO_TWISTS = 0.0, 1.0
+SHIFT = YAW_RATE  # of a line beside the route, to the left [m]
+
+# The kinds of candidates: pure pursuit along the route up to a speed, one constant twist and then another, or a line beside
+# the route up to a speed.
+FOLLOW_ROUTE, TWO_TWISTS, BESIDE_ROUTE = 0.0, 1.0, 2.0
 
 CONTACT_MARGIN = 0.005  # contact clearance of movers already closer than the minimum [m]
 START_TIME = 0.25  # for a robot at rest to start moving [s]
 ESCAPE_TIME = 1.2  # horizon of an escape when no candidate keeps its clearance [s]
 ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
 LEVELS = 64  # tabulated distances for progress
+BESIDE_DISTANCE, BESIDE_TIME = 0.5, 0.3  # offsets decay over this distance, or this time at speed [m], [s]
 ROUTE_END = 0.1  # distance from the route's end below which the heading is ignored [m]
 
 
@@ -247,6 +257,24 @@ def meets_obstacle(trail: Array, outlined: bool, obstacles: ObstacleIndex, tunin
 
 
 @leaf
+def beside_route(
+    x: float, y: float, yaw: float, v: float, s: float, candidate: Array, path: PathSamples, limits: MotionLimits,
+    tuning: PursuitTuning,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the wanted speed and yaw rate of a robot at progress s or more that steers to a line beside the route."""
+    s, k = project(x, y, s, tuning.lookahead_max + limits.speed, path.xy, path.arc)
+    px, py, k = point_at(s, k, path.xy, path.arc)
+    length = path.arc[k + 1] - path.arc[k]
+    ux, uy = (path.xy[k + 1, 0] - path.xy[k, 0]) / length, (path.xy[k + 1, 1] - path.xy[k, 1]) / length
+    aside = (x - px) * uy - (y - py) * ux + candidate[SHIFT]
+    reach = max(BESIDE_DISTANCE, BESIDE_TIME * v)
+    back = clip(0.5 * aside / reach, -STEEPEST, STEEPEST)
+    curvature = 2.0 * (back + wrapped(math.atan2(uy, ux) - yaw)) / reach
+    speed = min(candidate[SPEED], slow_for_curvature(curvature, limits.lateral_acceleration, limits.yaw_rate))
+    return speed, curvature * max(speed, abs(v))
+
+
+@leaf
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidate: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
@@ -270,6 +298,9 @@ def follow(
             continue
         if candidate[KIND] == FOLLOW_ROUTE:
             v1, w1, s, rotating, _ = advance(x, y, yaw, v, w, s, rotating, path, obstacles, capped, tuning)
+        elif candidate[KIND] == BESIDE_ROUTE:
+            speed, yaw_rate = beside_route(x, y, yaw, v, s, candidate, path, limits, tuning)
+            v1, w1 = reachable_twist(speed, yaw_rate, v, w, step, limits)
         else:
             second = now >= candidate[DURATION] - 1e-9
             speed = candidate[NEXT_SPEED] if second else candidate[SPEED]
@@ -508,7 +539,7 @@ def travel(
     """
     brake, first, second = 0.5 / limits.acceleration, candidate[SPEED], candidate[NEXT_SPEED]
     until = min(candidate[DURATION] + step, span)
-    if candidate[KIND] == FOLLOW_ROUTE:
+    if candidate[KIND] != TWO_TWISTS:
         first, second, until = min(first, limits.speed), 0.0, span
     over = max(abs(v) - abs(first), 0.0) if v * first > 0.0 else v
     slowing = over * over * brake + limits.acceleration * step * step
@@ -546,6 +577,18 @@ def limit_worths(
 
 
 @kernel
+def passes_all(trail: Array, places: Array, near: Array) -> bool:
+    """Return whether the robot comes no closer to any of the movers `near` at the end of its trail."""
+    k = trail.shape[0] - 1
+    for m in near:
+        now = math.hypot(places[k, m, 0] - trail[k, 0], places[k, m, 1] - trail[k, 1])
+        before = math.hypot(places[k - 1, m, 0] - trail[k - 1, 0], places[k - 1, m, 1] - trail[k - 1, 1])
+        if now < before:
+            return False
+    return True
+
+
+@kernel
 def choose(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidates: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
@@ -554,7 +597,8 @@ def choose(
     """Return the index of the chosen candidate (N, 6), and the time of its first contact [s], inf if never.
 
     Row 0 is the controller's motion, row 1 the last decision. Row 0 is chosen if it has the preferred clearance and no
-    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact.
+    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact. A line
+    beside the route has worth only where it leads past all movers.
 
     Obstacles only exclude candidates, and movers only lower their worth. So the search is best-first: the candidate with the
     highest bound is followed, which lowers its bound to its worth without movers. When it is first again, it is evaluated
@@ -616,7 +660,10 @@ def choose(
             if n <= 1:
                 limit[n] += weights.persistence
             continue
-        if meets_obstacle(trails[n], outlined, obstacles, tuning, weights.step):
+        beside = candidates[n, KIND] == BESIDE_ROUTE
+        if (beside and not passes_all(trails[n], places, near)) or meets_obstacle(
+            trails[n], outlined, obstacles, tuning, weights.step
+        ):
             limit[n] = -math.inf
             continue
         met = encounter(
