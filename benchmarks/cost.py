@@ -7,6 +7,7 @@ bare physics: its steps and commands alone, after each drive.
 
 - first: a world that is new to the process, read from its YAML file
 - again: the same file with the next seed, in the same process
+- mapless: the same worlds without a map, after each drive with one, by planner (`--mapless 0`: none)
 - film: ten seconds among movers, from a fixed camera, rendered and encoded
 
 The worlds are BARN's, written to a temporary folder as YAML, or all YAML files of a folder (`--worlds`).
@@ -27,11 +28,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-SMALLEST = ("--count 1 --seconds 0.1 --rounds 1",)
+SMALLEST = ("--count 1 --seconds 0.1 --rounds 1 --mapless 1",)
 HERE = Path(__file__).parent.parent
 SIZES = ((640, 480), (1280, 720))
 MOVERS = (0, 6, 24)
 PLANNER, ROBOT = "astar", "jackal"
+MAPLESS = (PLANNER, "dstar-lite")
 
 
 def write_barn(source: Path, folder: Path) -> None:
@@ -43,15 +45,16 @@ def write_barn(source: Path, folder: Path) -> None:
         save_task(task, folder / f"{name}.yaml")
 
 
-def drive(path: str, seed: int) -> dict[str, Any]:
-    """Drive a world file. Return the costs [s] and the digest of the drive."""
+def drive(path: str, seed: int, planner: str = PLANNER, map: str = "given") -> dict[str, Any]:
+    """Drive a world file. Return the costs [s], the digest of the drive and its number of replans."""
     from antdrive.sim import Scenario, run
 
     started = time.process_time()
-    done = run(Scenario.of(path, PLANNER, ROBOT, seed=seed))
+    done = run(Scenario.of(path, planner, ROBOT, seed=seed, map=map))
     cost = time.process_time() - started
     assert done.rollout is not None
     answer = {"cost": cost, "certified": done.succeeded, "digest": done.rollout.drive_digest}
+    answer["replans"], answer["simulated"] = len(done.rollout.record.replans), float(done.rollout.t[-1])
     return {**answer, "bare": bare_physics(done.rollout)}
 
 
@@ -99,7 +102,7 @@ class Checkout:
     def __init__(self, root: Path, python: str) -> None:
         path = f"{root / 'src'}{os.pathsep}{root}"
         environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
-        command = [python, str(root / "benchmarks" / "cost.py"), "--serve"]
+        command = [python, str(HERE / "benchmarks" / "cost.py"), "--serve"]
         self._process = subprocess.Popen(
             command, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
@@ -152,6 +155,33 @@ def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator
         yield f"| {kind} | {' | '.join(cells)} | {len(worlds) / sum(bare[kind]):.1f} | {ratio:.2f} |"
 
 
+def mapless_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator[str]:
+    """Yield the costs of drives without a map beside those with one, in turn."""
+    yield f"\n{len(worlds)} worlds with and without a map, {ROBOT}"
+    yield "| planner | checkout | map [ms] | mapless [ms] | mapless / map | per simulated second | certified | replans |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for planner in MAPLESS:
+        found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+        for k, world in enumerate((worlds[0], *worlds)):  # the first drives load kernels
+            for map in ("given", "none"):
+                for name in list(checkouts) if k % 2 else list(checkouts)[::-1]:
+                    answer = checkouts[name].ask("drive", str(world), 0, planner, map)
+                    if k:
+                        found.setdefault((name, map), []).append(answer)
+        for name in checkouts:
+            mapped, mapless = found[name, "given"], found[name, "none"]
+            costs = [sum(answer["cost"] for answer in answers) for answers in (mapped, mapless)]
+            times = [sum(answer["simulated"] for answer in answers) for answers in (mapped, mapless)]
+            ratio, certified = costs[1] / costs[0], sum(answer["certified"] for answer in mapless)
+            each = [1e3 * cost / len(worlds) for cost in costs]
+            yield (
+                f"| {planner} | {name} | {each[0]:.0f} | {each[1]:.0f} | {ratio:.2f} | {ratio * times[0] / times[1]:.2f} | "
+                f"{certified} of {len(worlds)} | {sum(answer['replans'] for answer in mapless)} |"
+            )
+        pairs = zip(*(found[name, "none"] for name in checkouts), strict=True)
+        assert all(len({answer["digest"] for answer in pair}) == 1 for pair in pairs), f"{planner}: the drives differ"
+
+
 def films_table(checkouts: dict[str, Checkout], seconds: float, rounds: int) -> Iterator[str]:
     """Yield frames per second among movers, and the processor time of a frame without encoding."""
     yield f"\n{seconds:g} s of film, camera oblique, rendered and encoded; median of {rounds}"
@@ -181,6 +211,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=Path, help="folder of world files; default: BARN's worlds")
     parser.add_argument("--barn", type=Path, help="folder or archive of BARN's world_*.world files")
     parser.add_argument("--count", type=int, default=50, help="number of worlds; 0: no drives")
+    parser.add_argument("--mapless", type=int, default=50, help="number of worlds with and without a map; 0: none")
     parser.add_argument("--seconds", type=float, default=10.0, help="length of each film; 0: no films [s]")
     parser.add_argument("--rounds", type=int, default=3, help="films of each kind")
     parser.add_argument("--python", default=sys.executable, help="interpreter of both checkouts")
@@ -206,6 +237,9 @@ def main() -> None:
             stack.callback(checkouts[name].close)
         if options.count:
             for line in drives_table(checkouts, worlds):
+                print(line, flush=True)
+        if options.mapless and worlds:
+            for line in mapless_table(checkouts, worlds[: options.mapless]):
                 print(line, flush=True)
         if options.seconds:
             for line in films_table(checkouts, options.seconds, options.rounds):

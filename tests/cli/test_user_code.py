@@ -166,9 +166,13 @@ def test_suites_name_it_and_go_on(folder):
 def test_a_signal_ends_a_supervised_command_as_any_other(folder, number, code):
     words = [ANTDRIVE, "run", "empty", "--planner", "mine.py:Endless", "--no-figures", "--plan-limit", "off"]
     started = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-    time.sleep(5)
-    started.send_signal(number)
-    _, said = started.communicate(timeout=20)
+    try:
+        time.sleep(5)
+        started.send_signal(number)
+        _, said = started.communicate(timeout=20)
+    finally:
+        started.kill()
+        started.communicate()
     assert started.returncode == code
     assert said.count("\n") == 1
 

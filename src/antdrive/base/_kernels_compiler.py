@@ -36,13 +36,22 @@ LOCK = "antdrive-compiling.lock"  # in each folder of machine code
 PATIENCE = 120.0  # longest wait for another process that compiles the same entry [s]
 F = TypeVar("F", bound=Callable[..., Any])
 
-# IEEE arithmetic (no fastmath), so that results repeat bit for bit.
-_SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+# IEEE arithmetic (no fastmath), so that results repeat bit for bit. `_nrt` counts references to arrays. Each kernel sets it,
+# because numba would otherwise take that of its first caller.
+_SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": True}
 
 
 def kernel(function: F) -> F:
     """Compile a function on its first call and cache it on disk."""
     return _cached(numba.njit(**_SETTINGS)(function), function)
+
+
+def leaf(function: F) -> F:
+    """Return a kernel that counts no references to its arrays, which takes most of the time of a short one.
+
+    It returns no arrays, makes none, and calls no kernel that returns one, except inlined ones.
+    """
+    return _cached(numba.njit(**{**_SETTINGS, "_nrt": False})(function), function)
 
 
 def inline(function: F) -> F:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from antdrive.worlds._kernels import Array, kernel, polygon_distance, polygon_wall_distance
+from antdrive.worlds._kernels import Array, kernel, leaf, polygon_distance, polygon_wall_distance
 
 # Distance from its origin within which a list of nearby discs stays valid [m].
 NEAR = 0.25
@@ -55,7 +55,7 @@ def footprint_clearances(poses: Array, shape: Array, corners: Array, discs: Arra
         out[i] = best
 
 
-@kernel
+@leaf
 def discs_near(x: float, y: float, slack: float, discs: Array, out: Array) -> int:
     """Write the discs at most `slack` farther from (x, y) than the closest one to `out`; return their number.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from antdrive.base._kernels_compiler import inline as inline
 from antdrive.base._kernels_compiler import kernel as kernel
+from antdrive.base._kernels_compiler import leaf as leaf
 
 Array = Any
 ONE, ALL = np.uint64(1), np.uint64(2**64 - 1)

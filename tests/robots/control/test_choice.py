@@ -13,7 +13,7 @@ from antdrive.robots.control.avoidance import _weights
 from antdrive.worlds import Disc, Route, World
 
 ROBOT, AVOIDANCE = load_robot("turtlebot"), Avoidance()
-TABLE = AVOIDANCE._candidates(ROBOT, AvoidanceState((1.0, 0.3, 0.4, 0.4, 0.3, 0.0), 0.2), 0.6, math.inf, math.inf)
+TABLE = AVOIDANCE._candidates(ROBOT, AvoidanceState((1.0, 0.3, 0.4, 0.4, 0.3, 0.0), 0.2), 0.6, math.inf, math.inf, True)
 near = st.floats(-2.5, 2.5)
 speed = st.floats(-0.9, 0.9)
 
@@ -31,7 +31,7 @@ def in_turn(situation, contact_distances, near):
     steps = len(places) - 1
     everyone = kernels.Reachable(np.tile(near, (steps, 1)), np.full(steps, len(near)))
     window = limits.speed * (weights.step * steps) + tuning.lookahead_max
-    best, best_score, best_contact = 0, -math.inf, -1.0
+    best, best_score, best_contact, unpassed = 0, -math.inf, -1.0, []
     for n, candidate in enumerate(candidates):
         trail = np.empty((steps + 1, 5))
         trail[0] = x, y, yaw, v, w
@@ -43,6 +43,10 @@ def in_turn(situation, contact_distances, near):
             if best_contact < math.inf and met.contact > best_contact + 1e-9:
                 best, best_contact = n, met.contact
             continue
+        apart = np.hypot(*np.moveaxis(places[-2:, near] - trail[-2:, None, :2], -1, 0))
+        if candidate[kernels.KIND] == kernels.BESIDE_ROUTE and (apart[1] < apart[0]).any():
+            unpassed.append(n)
+            continue
         if n == 0 and met.clearance >= weights.preferred_clearance and met.intrusion == 0:
             return 0, math.inf
         value = kernels.worth(trail[-1], s, window, path, tuning, weights)
@@ -51,6 +55,8 @@ def in_turn(situation, contact_distances, near):
         value += weights.persistence if n <= 1 else 0.0
         if best_contact < math.inf or value > best_score:
             best, best_score, best_contact = n, value, math.inf
+    if best_contact < math.inf and unpassed:
+        return unpassed[0], math.inf
     return best, best_contact
 
 
@@ -102,11 +108,11 @@ def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked):
 
 
 def test_no_candidate_is_faster_than_it_may():
-    whole = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, math.inf, math.inf)
+    whole = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, math.inf, math.inf, True)
     speeds = [kernels.SPEED, kernels.NEXT_SPEED]
     for share in (0.0, 0.3, 0.6, 1.0):
         most = share * ROBOT.max_speed
-        table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, math.inf, most)
+        table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, math.inf, most, True)
         assert np.array_equal(table[:, speeds], np.maximum(whole[:, speeds], -most))
-        table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, most, math.inf)
+        table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, most, math.inf, True)
         assert np.array_equal(table[:, speeds], np.clip(whole[:, speeds], -most, most))

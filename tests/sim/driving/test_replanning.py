@@ -234,6 +234,24 @@ def test_cells_that_a_mover_has_left_are_free_again(planner, turtlebot):
     assert [replan.solved for replan in made.log] == [True, True]
 
 
+WALKING = Keyframed(radius=0.3, keyframes=((0.0, 4.0, 1.0), (8.0, 4.0, 5.0)), loop="pingpong")
+
+
+@pytest.mark.parametrize(
+    ("mover", "trigger", "around", "quicker"),
+    [
+        (WALKING, "obstructed", 7.5, True),
+        (WALKING, "obstructed", 7.3, False),
+        (WALKING, "waited", 7.5, False),
+        (PASSING, "obstructed", 7.5, False),
+    ],
+)
+def test_waiting_for_a_walking_mover_is_quicker_than_a_long_route(mover, trigger, around, quicker, turtlebot):
+    """The robot waits for 2 s at most, in which it drives 1.4 m."""
+    made, _ = monitor_of(mover, robot=turtlebot)
+    assert made._ahead.waiting_is_quicker(0, TASK.start, trigger, 0.7, around, 6.0) is quicker
+
+
 def test_a_policy_can_ignore_movers(turtlebot):
     made, _ = monitor_of(PASSING, robot=turtlebot, around_movers=False)
     straight = made.replan(0, TASK.start, "strayed")

@@ -355,17 +355,17 @@ def test_plans_lead_round_busy_ground_and_off_movers(jackal, planner):
     movers = exploration._movers
     tracking = exploration.survey.tracking = Seen()
     movers._predictor.tracking = tracking
-    _, plan, avoided = exploration._plan_around(0, POSE)
+    _, plan, avoided = exploration._plan_around(0, POSE, "obstructed")
     assert (avoided, plan.cost) == ([], pytest.approx(14.0, abs=0.1))
     tracking.see([(3.0, 6.0, 0.0, 0.0)])
-    _, plan, avoided = exploration._plan_around(tracking.tick, POSE)
+    _, plan, avoided = exploration._plan_around(tracking.tick, POSE, "obstructed")
     assert len(avoided) > 0
     assert 14.1 < plan.cost < 16.0
     busy(movers, tracking, 1.8)
-    _, plan, _ = exploration._plan_around(60, POSE)
+    _, plan, _ = exploration._plan_around(60, POSE, "obstructed")
     assert plan.cost > 18.0
     for pose in (POSE, (5.0, 9.0, 0.0)):  # beside it, and in it: straight out
-        grid, plan, avoided = exploration._plan_around(60, pose)
+        grid, plan, avoided = exploration._plan_around(60, pose, "obstructed")
         if planner != "tangent":  # which knows no cells, and what bounds the ground alone
             assert any(not zone.blocked[tuple(plan.cells.T)].any() for zone in movers.zones(60, pose, grid))
         route, _ = exploration._route(pose, grid, plan, avoided)

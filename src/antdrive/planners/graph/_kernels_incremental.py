@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.worlds._kernels import DCOL, DROW, Array, doubled, inline, kernel
+from antdrive.worlds._kernels import DCOL, DROW, Array, doubled, inline, kernel, leaf
 from antdrive.worlds._kernels_turns import NOWHERE, MoveGraph, after_move
 
 # Costs are integers, so keys are exact. STRAIGHT is a Pell number: DIAGONAL / STRAIGHT differs from sqrt(2) by
@@ -41,13 +41,13 @@ def offsets(cols: int) -> Array:
 # use offsets without.
 
 
-@kernel
+@leaf
 def successor(u: int, k: int, graph: MoveGraph) -> Any:
     """Return the node that allowed move k leads to from u, with turns."""
     return after_move(graph, u, k)
 
 
-@kernel
+@leaf
 def cost_through(u: int, k: int, graph: MoveGraph, g: Array) -> Any:
     """Return the cost to the goal through allowed move k of u, with turns."""
     return g[after_move(graph, u, k)] + COST[k]
@@ -64,7 +64,7 @@ def before(heap: Array, i: int, first: int, second: int) -> bool:
     return bool(heap[i, 0] < first or (heap[i, 0] == first and heap[i, 1] < second))
 
 
-@kernel
+@leaf
 def rise(heap: Array, place: Array, i: int, first: int, second: int, cell: int) -> None:
     """Put an entry at the empty row i or above it."""
     while i > 0:
@@ -78,7 +78,7 @@ def rise(heap: Array, place: Array, i: int, first: int, second: int, cell: int) 
     place[cell] = i
 
 
-@kernel
+@leaf
 def sink(heap: Array, place: Array, size: int, i: int, first: int, second: int, cell: int) -> None:
     """Put an entry at the empty row i or below it."""
     while True:
@@ -96,7 +96,7 @@ def sink(heap: Array, place: Array, size: int, i: int, first: int, second: int, 
     place[cell] = i
 
 
-@kernel
+@leaf
 def put(heap: Array, place: Array, size: int, cell: int, first: int, second: int) -> int:
     """Insert a cell or update its key; returns the new size."""
     i: Any = np.int64(place[cell])
@@ -110,7 +110,7 @@ def put(heap: Array, place: Array, size: int, cell: int, first: int, second: int
     return size
 
 
-@kernel
+@leaf
 def take(heap: Array, place: Array, size: int, cell: int) -> int:
     """Remove a cell that is in the heap; returns the new size."""
     i: Any = np.int64(place[cell])

@@ -7,11 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots.control._kernels_lines import CHECKED, advance, outline_clearance
+from antdrive.robots.control._kernels_lines import CHECKED, STEEPEST, advance, outline_clearance, wrapped
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, clearance_at, nearby
-from antdrive.robots.control._kernels_path import PathSamples, point_at, project
-from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, reachable_twist
-from antdrive.worlds._kernels import Array, kernel, polygon_distance, segment_clearance
+from antdrive.robots.control._kernels_path import PathSamples, point_at, project, segment_at
+from antdrive.robots.control._kernels_pursuit import (
+    MotionLimits,
+    PursuitTuning,
+    clip,
+    reachable_twist,
+    slow_for_curvature,
+)
+from antdrive.worlds._kernels import Array, kernel, leaf, polygon_distance, segment_clearance
 
 # The columns of a table of candidates.
 KIND = 0  # FOLLOW_ROUTE or TWO_TWISTS
@@ -20,14 +26,18 @@ YAW_RATE = 2  # of the first twist [rad/s]
 DURATION = 3  # of the first twist [s]
 NEXT_SPEED, NEXT_YAW_RATE = 4, 5  # of the second twist
 
-# The kinds of candidates: pure pursuit along the route up to a speed, or one constant twist and then another.
-FOLLOW_ROUTE, TWO_TWISTS = 0.0, 1.0
+SHIFT = YAW_RATE  # of a line beside the route, to the left [m]
+
+# The kinds of candidates: pure pursuit along the route up to a speed, one constant twist and then another, or a line beside
+# the route up to a speed.
+FOLLOW_ROUTE, TWO_TWISTS, BESIDE_ROUTE = 0.0, 1.0, 2.0
 
 CONTACT_MARGIN = 0.005  # contact clearance of movers already closer than the minimum [m]
 START_TIME = 0.25  # for a robot at rest to start moving [s]
 ESCAPE_TIME = 1.2  # horizon of an escape when no candidate keeps its clearance [s]
 ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
 LEVELS = 64  # tabulated distances for progress
+BESIDE_DISTANCE, BESIDE_TIME = 0.5, 0.3  # offsets decay over this distance, or this time at speed [m], [s]
 ROUTE_END = 0.1  # distance from the route's end below which the heading is ignored [m]
 
 
@@ -107,7 +117,7 @@ class Reachable(NamedTuple):
     counts: Array
 
 
-@kernel
+@leaf
 def distance_to(dx: float, dy: float, yaw: float, weights: AvoidanceWeights) -> float:
     """Return the distance from the robot's outline to a point at (dx, dy) from its centre, plus `radius`.
 
@@ -120,7 +130,7 @@ def distance_to(dx: float, dy: float, yaw: float, weights: AvoidanceWeights) -> 
     return float(apart - weights.rounding + weights.radius)
 
 
-@kernel
+@leaf
 def outline_contact(
     start: Array, end: Array, ax: float, ay: float, ux: float, uy: float, reach: float, weights: AvoidanceWeights
 ) -> float:
@@ -138,7 +148,7 @@ def outline_contact(
     return 2.0
 
 
-@kernel
+@leaf
 def first_contact(
     start: Array, end: Array, places: Array, k: int, radii: Array, near: Array, contact_distances: Array,
     weights: AvoidanceWeights, cap: float,
@@ -174,7 +184,7 @@ def first_contact(
     return share, clearance
 
 
-@kernel
+@leaf
 def intrusion(pose: Array, places: Array, k: int, radii: Array, near: Array, weights: AvoidanceWeights) -> float:
     """Return how much closer than its `reversal_distance` a robot is to a mover at instant k, if movers reverse at instant 0."""
     most, distance = 0.0, weights.reversal_distance
@@ -187,7 +197,7 @@ def intrusion(pose: Array, places: Array, k: int, radii: Array, near: Array, wei
     return most
 
 
-@kernel
+@leaf
 def least_clearance(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
     """Return the required clearance along a trail, of the robot's centre or its outline, reduced if its start is closer [m]."""
     if not outlined:
@@ -198,6 +208,21 @@ def least_clearance(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuni
 
 
 @kernel
+def outline_between(
+    start: Array, end: Array, length: float, discs: Array, bounds: Array, tuning: PursuitTuning
+) -> float:
+    """Return the least distance from the outline to a disc or wall at poses of a step of a length, without its start."""
+    sweep = abs(end[2] - start[2]) * tuning.robot_radius
+    count = int((abs(length) + sweep) / CHECKED) + 1
+    poses = np.empty((count, 3))
+    for n in range(count):
+        share = (n + 1.0) / count
+        for j in range(3):
+            poses[n, j] = start[j] + share * (end[j] - start[j])
+    return outline_clearance(poses, discs, bounds, tuning)
+
+
+@leaf
 def passes_within(
     trail: Array,
     k: int,
@@ -218,17 +243,10 @@ def passes_within(
     distance = segment_clearance(trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1], discs, obstacles.bounds)
     if not outlined or distance >= required + tuning.robot_radius:
         return bool(distance < required)
-    sweep = abs(trail[k + 1, 2] - trail[k, 2]) * tuning.robot_radius
-    count = int((abs(length) + sweep) / CHECKED) + 1
-    poses = np.empty((count, 3))
-    for n in range(count):
-        share = (n + 1.0) / count
-        for j in range(3):
-            poses[n, j] = trail[k, j] + share * (trail[k + 1, j] - trail[k, j])
-    return bool(outline_clearance(poses, discs, obstacles.bounds, tuning) < required)
+    return bool(outline_between(trail[k], trail[k + 1], length, discs, obstacles.bounds, tuning) < required)
 
 
-@kernel
+@leaf
 def meets_obstacle(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float) -> bool:
     """Return whether a trail that was followed without obstacle checks comes too close to an obstacle."""
     required = least_clearance(trail, outlined, obstacles, tuning)
@@ -238,7 +256,25 @@ def meets_obstacle(trail: Array, outlined: bool, obstacles: ObstacleIndex, tunin
     return bool(k < steps)
 
 
-@kernel
+@leaf
+def beside_route(
+    x: float, y: float, yaw: float, v: float, s: float, candidate: Array, path: PathSamples, limits: MotionLimits,
+    tuning: PursuitTuning,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the wanted speed and yaw rate of a robot at progress s or more that steers to a line beside the route."""
+    s, k = project(x, y, s, tuning.lookahead_max + limits.speed, path.xy, path.arc)
+    px, py, k = point_at(s, k, path.xy, path.arc)
+    length = path.arc[k + 1] - path.arc[k]
+    ux, uy = (path.xy[k + 1, 0] - path.xy[k, 0]) / length, (path.xy[k + 1, 1] - path.xy[k, 1]) / length
+    aside = (x - px) * uy - (y - py) * ux + candidate[SHIFT]
+    reach = max(BESIDE_DISTANCE, BESIDE_TIME * v)
+    back = clip(0.5 * aside / reach, -STEEPEST, STEEPEST)
+    curvature = 2.0 * (back + wrapped(math.atan2(uy, ux) - yaw)) / reach
+    speed = min(candidate[SPEED], slow_for_curvature(curvature, limits.lateral_acceleration, limits.yaw_rate))
+    return speed, curvature * max(speed, abs(v))
+
+
+@leaf
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidate: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
@@ -262,6 +298,9 @@ def follow(
             continue
         if candidate[KIND] == FOLLOW_ROUTE:
             v1, w1, s, rotating, _ = advance(x, y, yaw, v, w, s, rotating, path, obstacles, capped, tuning)
+        elif candidate[KIND] == BESIDE_ROUTE:
+            speed, yaw_rate = beside_route(x, y, yaw, v, s, candidate, path, limits, tuning)
+            v1, w1 = reachable_twist(speed, yaw_rate, v, w, step, limits)
         else:
             second = now >= candidate[DURATION] - 1e-9
             speed = candidate[NEXT_SPEED] if second else candidate[SPEED]
@@ -314,7 +353,7 @@ def follow_all(
             stem = n
 
 
-@kernel
+@leaf
 def encounter(
     trail: Array, end: Trail, places: Array, radii: Array, near: Array, by_step: Reachable, contact_distances: Array,
     weights: AvoidanceWeights, cap: float,
@@ -322,10 +361,12 @@ def encounter(
     """Return the interaction of a candidate's trail with the movers `near`, step by step those of `by_step`."""
     least, risk, now = math.inf, 0.0, 0.0
     for k in range(end.steps):
-        share, clearance = first_contact(
-            trail[k], trail[k + 1], places, k, radii, by_step.near[k, : by_step.counts[k]], contact_distances, weights,
-            min(cap, least),
-        )  # fmt: skip
+        share, clearance = 2.0, math.inf
+        if by_step.counts[k] > 0:
+            share, clearance = first_contact(
+                trail[k], trail[k + 1], places, k, radii, by_step.near[k, : by_step.counts[k]], contact_distances,
+                weights, min(cap, least),
+            )  # fmt: skip
         if share <= 1.0:
             return Encounter(now + share * weights.step, least, risk)
         if weights.reversal_weight > 0.0 and now < weights.reversal_time:
@@ -375,7 +416,7 @@ def relevant_movers(
     return near[:count], contact_distances
 
 
-@kernel
+@leaf
 def is_close(x: float, y: float, yaw: float, places: Array, radii: Array, weights: AvoidanceWeights) -> bool:
     """Return whether a mover at `places` (M, 2) is closer than the minimum."""
     for m in range(radii.shape[0]):
@@ -383,6 +424,25 @@ def is_close(x: float, y: float, yaw: float, places: Array, radii: Array, weight
         within = math.hypot(dx, dy) - radii[m] < weights.min_distance
         if within and distance_to(dx, dy, yaw, weights) - radii[m] < weights.min_distance:
             return True
+    return False
+
+
+@leaf
+def must_dodge(
+    x: float, y: float, places: Array, observed: Array, predicted: Array, radii: Array, walking: float, surprise: float,
+    horizon: float, max_speed: float, radius: float,
+) -> bool:  # fmt: skip
+    """Return whether a mover that may come near within the horizon is faster than people, or not as fast as predicted.
+
+    Velocities are (M, 2) [m/s]; `walking` and `surprise` are the limits [m/s]. The robot has this radius and top speed.
+    """
+    for m in range(radii.shape[0]):
+        speed = math.hypot(observed[m, 0], observed[m, 1])
+        unlike = math.hypot(observed[m, 0] - predicted[m, 0], observed[m, 1] - predicted[m, 1]) > surprise
+        if speed > walking or unlike:
+            gap = math.hypot(places[m, 0] - x, places[m, 1] - y) - radii[m] - radius
+            if gap < horizon * (speed + max_speed):
+                return True
     return False
 
 
@@ -404,7 +464,7 @@ def reachable_by_step(
     return Reachable(rows, counts)
 
 
-@kernel
+@leaf
 def fastest(v: float, candidates: Array, limits: MotionLimits) -> float:
     """Return an upper bound of the candidates' speeds [m/s]."""
     most = max(abs(v), limits.speed)
@@ -413,7 +473,7 @@ def fastest(v: float, candidates: Array, limits: MotionLimits) -> float:
     return most
 
 
-@kernel
+@leaf
 def worth(
     end: Array, s: float, window: float, path: PathSamples, tuning: PursuitTuning, weights: AvoidanceWeights
 ) -> float:
@@ -436,14 +496,14 @@ def worth(
     return float(total)
 
 
-@kernel
+@leaf
 def among_movers(alone: float, met: Encounter, weights: AvoidanceWeights) -> float:
     """Return the worth of a candidate among movers, from its worth `alone` without movers nearby [m]."""
     value = alone - weights.reversal_weight * met.intrusion
     return value - weights.clearance_weight * max(weights.preferred_clearance - met.clearance, 0.0)
 
 
-@kernel
+@leaf
 def progress_by_distance(
     x: float, y: float, yaw: float, s: float, window: float, path: PathSamples, farthest: float, out: Array
 ) -> float:
@@ -453,9 +513,7 @@ def progress_by_distance(
     robot's heading and a segment within reach [rad].
     """
     xy, arc = path.xy, path.arc
-    k, aligned = 0, 1.0
-    while k < xy.shape[0] - 2 and arc[k + 1] < s:
-        k += 1
+    k, aligned = segment_at(s, arc), 1.0
     out[:] = s
     while k < xy.shape[0] - 1 and arc[k] <= s + window:
         length = arc[k + 1] - arc[k]
@@ -470,7 +528,7 @@ def progress_by_distance(
     return math.acos(max(aligned, -1.0))
 
 
-@kernel
+@leaf
 def travel(
     candidate: Array, v: float, w: float, span: float, step: float, off: float, limits: MotionLimits
 ) -> tuple[float, float]:
@@ -481,7 +539,7 @@ def travel(
     """
     brake, first, second = 0.5 / limits.acceleration, candidate[SPEED], candidate[NEXT_SPEED]
     until = min(candidate[DURATION] + step, span)
-    if candidate[KIND] == FOLLOW_ROUTE:
+    if candidate[KIND] != TWO_TWISTS:
         first, second, until = min(first, limits.speed), 0.0, span
     over = max(abs(v) - abs(first), 0.0) if v * first > 0.0 else v
     slowing = over * over * brake + limits.acceleration * step * step
@@ -519,6 +577,18 @@ def limit_worths(
 
 
 @kernel
+def passes_all(trail: Array, places: Array, near: Array) -> bool:
+    """Return whether the robot comes no closer to any of the movers `near` at the end of its trail."""
+    k = trail.shape[0] - 1
+    for m in near:
+        now = math.hypot(places[k, m, 0] - trail[k, 0], places[k, m, 1] - trail[k, 1])
+        before = math.hypot(places[k - 1, m, 0] - trail[k - 1, 0], places[k - 1, m, 1] - trail[k - 1, 1])
+        if now < before:
+            return False
+    return True
+
+
+@kernel
 def choose(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidates: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
@@ -527,7 +597,8 @@ def choose(
     """Return the index of the chosen candidate (N, 6), and the time of its first contact [s], inf if never.
 
     Row 0 is the controller's motion, row 1 the last decision. Row 0 is chosen if it has the preferred clearance and no
-    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact.
+    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact. A line
+    beside the route has worth only where it leads past all movers.
 
     Obstacles only exclude candidates, and movers only lower their worth. So the search is best-first: the candidate with the
     highest bound is followed, which lowers its bound to its worth without movers. When it is first again, it is evaluated
@@ -589,7 +660,10 @@ def choose(
             if n <= 1:
                 limit[n] += weights.persistence
             continue
-        if meets_obstacle(trails[n], outlined, obstacles, tuning, weights.step):
+        beside = candidates[n, KIND] == BESIDE_ROUTE
+        if (beside and not passes_all(trails[n], places, near)) or meets_obstacle(
+            trails[n], outlined, obstacles, tuning, weights.step
+        ):
             limit[n] = -math.inf
             continue
         met = encounter(

@@ -32,7 +32,7 @@ from antdrive.robots.control._kernels_pursuit import (
     speed_limit,
     unpacked,
 )
-from antdrive.worlds._kernels import Array, kernel, segment_clearance
+from antdrive.worlds._kernels import Array, inline, kernel, leaf, segment_clearance
 
 PASSED = 0.02  # smallest corner at which the robot stops and turns [rad]
 AGAIN = 0.05  # smallest heading error at a corner for a further turn [rad]
@@ -54,7 +54,7 @@ class Straight(NamedTuple):
     side: float
 
 
-@kernel
+@inline
 def advance(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, turning: bool,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
@@ -84,7 +84,7 @@ def wrapped(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-@kernel
+@leaf
 def next_stop(k: int, path: PathSamples) -> int:
     """Return the first point after segment k at which the robot stops: a corner, a reversal or the end."""
     j = k + 1

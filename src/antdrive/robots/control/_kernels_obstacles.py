@@ -10,12 +10,17 @@ import numpy as np
 from antdrive.worlds._kernels import (
     ROUNDING,
     Array,
+    inline,
     kernel,
+    leaf,
     polygon_distance,
     polygon_wall_distance,
     segment_clearance,
     wall_distance,
 )
+
+HALF_CIRCLE = 3.0  # arcs that turn by less are shorter than half a circle [rad]
+BESIDE = 1e-6  # slack for rounding of directions beside an arc, as a fraction of the squared radius
 
 
 class ObstacleIndex(NamedTuple):
@@ -69,7 +74,7 @@ def index_discs(discs: Array, bounds: Array, side: float, distance: float) -> tu
     return found, starts
 
 
-@kernel
+@inline
 def nearby(x: float, y: float, obstacles: ObstacleIndex) -> Array:
     """Return the indexed discs (N, 3) near (x, y)."""
     bounds, side = obstacles.bounds, obstacles.side
@@ -80,13 +85,13 @@ def nearby(x: float, y: float, obstacles: ObstacleIndex) -> Array:
     return obstacles.discs[obstacles.starts[r * cols + c] : obstacles.starts[r * cols + c + 1]]
 
 
-@kernel
+@leaf
 def clearance_at(x: float, y: float, obstacles: ObstacleIndex) -> float:
     """Return the distance from a point to the nearest disc surface or wall."""
     return segment_clearance(x, y, x, y, nearby(x, y, obstacles), obstacles.bounds)
 
 
-@kernel
+@leaf
 def arc_clearance(
     x: float,
     y: float,
@@ -106,11 +111,15 @@ def arc_clearance(
         return segment_clearance(x, y, ex, ey, discs, bounds)
     radius = 1.0 / abs(curvature)
     cx, cy = x - math.sin(yaw) / curvature, y + math.cos(yaw) / curvature
-    first, length = math.atan2(y - cy, x - cx), radius * abs(sweep) + ROUNDING
+    length = radius * abs(sweep) + ROUNDING
+    mx, my = x + ex - 2.0 * cx, y + ey - 2.0 * cy  # towards the middle of the arc
     best = min(wall_distance(x, y, bounds), wall_distance(ex, ey, bounds))
     for q in range(4):  # the arc's extreme points in x and y
+        ux, uy = (1.0 - q if q % 2 == 0 else 0.0), (2.0 - q if q % 2 == 1 else 0.0)
+        if is_beside_arc(ux, uy, mx, my, radius, sweep):
+            continue
         angle = q * 0.5 * math.pi
-        if on_arc(angle, first, sweep):
+        if on_arc(angle, math.atan2(y - cy, x - cx), sweep):
             best = min(best, wall_distance(cx + radius * math.cos(angle), cy + radius * math.sin(angle), bounds))
     for j in range(discs.shape[0]):
         px, py, reach = discs[j, 0], discs[j, 1], best + discs[j, 2] + length
@@ -121,13 +130,14 @@ def arc_clearance(
         # No point of the arc is farther from one of its ends than its length.
         if d - discs[j, 2] - radius * abs(sweep) > best:
             continue
-        if on_arc(math.atan2(py - cy, px - cx), first, sweep):
+        beside = is_beside_arc(px - cx, py - cy, mx, my, radius, sweep)
+        if not beside and on_arc(math.atan2(py - cy, px - cx), math.atan2(y - cy, x - cx), sweep):
             d = min(d, abs(math.hypot(px - cx, py - cy) - radius))
         best = min(best, d - discs[j, 2])
     return best
 
 
-@kernel
+@leaf
 def turn_clearance(
     x: float, y: float, yaw: float, turn: float, half_length: float, half_width: float, rounding: float, corners: Array,
     discs: Array, bounds: Array,
@@ -166,7 +176,7 @@ def turn_clearance(
     return best
 
 
-@kernel
+@leaf
 def polygon_turn_clearance(
     x: float, y: float, yaw: float, turn: float, corners: Array, discs: Array, bounds: Array
 ) -> float:
@@ -191,7 +201,20 @@ def polygon_turn_clearance(
     return best
 
 
-@kernel
+@leaf
+def is_beside_arc(ux: float, uy: float, mx: float, my: float, radius: float, sweep: float) -> bool:
+    """Return whether the direction (ux, uy) from the centre is beside the arc by more than rounding; not all such are found.
+
+    (mx, my) is the sum of the vectors from the centre to both ends. It leads to the middle of an arc of less than half a
+    circle, and its length is 2 radius cos(sweep / 2).
+    """
+    if abs(sweep) > HALF_CIRCLE:
+        return False
+    limit = mx * mx + my * my - BESIDE * radius * radius
+    return bool(2.0 * radius * (ux * mx + uy * my) < limit * math.hypot(ux, uy))
+
+
+@leaf
 def on_arc(angle: float, first: float, sweep: float) -> bool:
     """Return whether an angle lies on the arc from `first` by `sweep`."""
     turn = (angle - first) % (2.0 * math.pi)

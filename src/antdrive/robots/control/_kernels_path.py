@@ -13,6 +13,7 @@ from antdrive.worlds._kernels import (
     Array,
     inline,
     kernel,
+    leaf,
     segment_clearance,
     segment_distance2,
     wall_distance,
@@ -45,7 +46,7 @@ class PathSamples(NamedTuple):
     backwards: float = 0.0
 
 
-@kernel
+@leaf
 def point_at(s: float, k: int, xy: Array, arc: Array) -> tuple[float, float, int]:
     """Return the point at arc length s and its segment, from segment k on; the last one extends past the end."""
     n = xy.shape[0]
@@ -55,13 +56,23 @@ def point_at(s: float, k: int, xy: Array, arc: Array) -> tuple[float, float, int
     return xy[k, 0] + f * (xy[k + 1, 0] - xy[k, 0]), xy[k, 1] + f * (xy[k + 1, 1] - xy[k, 1]), k
 
 
-@kernel
+@leaf
+def segment_at(s: float, arc: Array) -> int:
+    """Return the first segment that ends at arc length s or beyond; the last one extends past the end."""
+    low, high = 0, arc.shape[0] - 2
+    while low < high:
+        middle = (low + high) // 2
+        if arc[middle + 1] < s:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@leaf
 def project(x: float, y: float, progress: float, window: float, xy: Array, arc: Array) -> tuple[float, int]:
     """Return arc length and segment of the point nearest to (x, y), between `progress` and `window` beyond it."""
-    n = xy.shape[0]
-    k = 0
-    while k < n - 2 and arc[k + 1] < progress:
-        k += 1
+    n, k = xy.shape[0], segment_at(progress, arc)
     best, best_s, best_k = math.inf, progress, k
     while k < n - 1 and arc[k] <= progress + window:
         ax, ay = xy[k, 0], xy[k, 1]
@@ -77,7 +88,7 @@ def project(x: float, y: float, progress: float, window: float, xy: Array, arc: 
     return best_s, best_k
 
 
-@kernel
+@leaf
 def carrot_at(x: float, y: float, lookahead: float, s: float, k: int, xy: Array, arc: Array) -> tuple[float, float]:
     """Return the first route point beyond arc length s at distance `lookahead` from the robot at (x, y).
 
@@ -101,7 +112,7 @@ def carrot_at(x: float, y: float, lookahead: float, s: float, k: int, xy: Array,
         k += 1
 
 
-@kernel
+@leaf
 def clearance_below(most: float, ax: float, ay: float, bx: float, by: float, discs: Array, bounds: Array) -> float:
     """Return the clearance of a segment if it is less than `most`, otherwise a value of at least `most`."""
     best = min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds))
@@ -182,7 +193,7 @@ def clear_lookaheads(
         out[i] = clear
 
 
-@kernel
+@leaf
 def brake_backwards(limit: Array, spacing: float, deceleration: float) -> None:
     """Lower each speed so that braking reaches the next: v_i^2 <= v_{i+1}^2 + 2 a ds."""
     for i in range(limit.shape[0] - 2, -1, -1):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from antdrive.worlds._kernels import Array, inline, kernel
+from antdrive.worlds._kernels import Array, inline, leaf
 
 
 @inline
@@ -16,7 +16,7 @@ def allowed_gain(v2: float, curvature: float, change: float, acceleration: float
     return min(acceleration, max(0.0, yaw_acceleration - math.copysign(1.0, curvature) * change * v2) / k)
 
 
-@kernel
+@leaf
 def limit_speed(
     curvature: Array, change: Array, max_speed: float, lateral_acceleration: float, yaw_rate: float,
     yaw_acceleration: float, half_track: float, rim_speed: float, out: Array,
@@ -32,7 +32,7 @@ def limit_speed(
         out[i] = v
 
 
-@kernel
+@leaf
 def limit_braking(
     arc: Array, curvature: Array, change: Array, deceleration: float, yaw_acceleration: float, speed: Array
 ) -> None:
@@ -46,7 +46,7 @@ def limit_braking(
         speed[i] = min(speed[i], math.sqrt(v2 + 2.0 * a * (arc[i + 1] - arc[i])))
 
 
-@kernel
+@leaf
 def limit_acceleration(
     arc: Array, curvature: Array, change: Array, acceleration: float, yaw_acceleration: float, speed: Array
 ) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, nearby, turn_clearance
 from antdrive.robots.control._kernels_path import PathSamples, carrot_at, point_at, project
-from antdrive.worlds._kernels import Array, kernel, segment_clearance
+from antdrive.worlds._kernels import Array, kernel, leaf, segment_clearance
 
 # The rules that can limit the speed, as indices into pursuit.LIMITERS.
 CRUISE, CURVATURE, ROUTE, YAW_RATE, GOAL, ROTATE, CREEP, BRAKING, DONE, CLEARANCE = range(10)
@@ -109,13 +109,13 @@ class Carrot(NamedTuple):
     clear: bool
 
 
-@kernel
+@leaf
 def clip(value: float, low: float, high: float) -> float:
     """Return the value clipped to [low, high]."""
     return min(max(value, low), high)
 
 
-@kernel
+@leaf
 def keep_wheels_within(v: float, w: float, last: float, period: float, limits: MotionLimits) -> tuple[float, float]:
     """Scale speed and yaw rate together to keep both wheels within their speed limit.
 
@@ -131,14 +131,14 @@ def keep_wheels_within(v: float, w: float, last: float, period: float, limits: M
     return v, w
 
 
-@kernel
+@leaf
 def reachable_yaw_rate(wanted: float, w: float, period: float, limits: MotionLimits) -> float:
     """Return the yaw rate closest to the wanted one that is reachable from `w` within a period."""
     change = limits.yaw_acceleration * period
     return clip(wanted, max(w - change, -limits.yaw_rate), min(w + change, limits.yaw_rate))
 
 
-@kernel
+@leaf
 def reachable_twist(
     speed: float, yaw_rate: float, v: float, w: float, period: float, limits: MotionLimits
 ) -> tuple[float, float]:
@@ -149,7 +149,7 @@ def reachable_twist(
     return keep_wheels_within(new_v, new_w, v, period, limits)
 
 
-@kernel
+@leaf
 def slow_for_curvature(curvature: float, lateral_acceleration: float, yaw_rate: float) -> float:
     """Return the highest speed in a curve for the given lateral acceleration and yaw rate.
 
@@ -161,7 +161,7 @@ def slow_for_curvature(curvature: float, lateral_acceleration: float, yaw_rate: 
     return min(math.sqrt(lateral_acceleration / k), yaw_rate / k)
 
 
-@kernel
+@leaf
 def slow_for_yaw_rate(curvature: float, yaw_rate: float, yaw_acceleration: float, time: float) -> float:
     """Return the highest speed at which a curve's yaw rate is reachable within `time` from the current one.
 
@@ -174,7 +174,7 @@ def slow_for_yaw_rate(curvature: float, yaw_rate: float, yaw_acceleration: float
     return max(turning + yaw_acceleration * time, 0.0) / k
 
 
-@kernel
+@leaf
 def slow_for_clearance(clearance: float, min_speed: float, time: float) -> float:
     """Return the speed limit near obstacles: `min_speed` plus clearance / time.
 
@@ -184,13 +184,13 @@ def slow_for_clearance(clearance: float, min_speed: float, time: float) -> float
     return min_speed + max(clearance, 0.0) / time
 
 
-@kernel
+@leaf
 def brake_for_goal(remaining: float, deceleration: float) -> float:
     """Return the speed from which the robot can stop in `remaining` metres: v^2 = 2 a d."""
     return math.sqrt(2.0 * deceleration * max(remaining, 0.0))
 
 
-@kernel
+@leaf
 def stopping_clearance(
     x: float,
     y: float,
@@ -214,10 +214,10 @@ def stopping_clearance(
     return arc_clearance(x, y, yaw, w / v, sweep, ex, ey, discs, bounds)
 
 
-@kernel
+@leaf
 def find_carrot(
     x: float, y: float, yaw: float, v: float, s: float, k: int, clearance: float, longest: float,
-    discs: Array, bounds: Array, path: PathSamples, tuning: PursuitTuning,
+    discs: Array, bounds: Array, xy: Array, arc: Array, tuning: PursuitTuning,
 ) -> Carrot:  # fmt: skip
     """Return the carrot at the longest lookahead, at most `longest`, whose arc keeps `clearance`.
 
@@ -227,7 +227,7 @@ def find_carrot(
     shortest = tuning.lookahead_min
     look = clip(max(tuning.lookahead_time * v, tuning.preferred_lookahead_min), shortest, longest)
     while True:
-        cx, cy = carrot_at(x, y, look, s, k, path.xy, path.arc)
+        cx, cy = carrot_at(x, y, look, s, k, xy, arc)
         dx, dy = cx - x, cy - y
         ahead = math.cos(yaw) * dx + math.sin(yaw) * dy
         left = math.cos(yaw) * dy - math.sin(yaw) * dx
@@ -242,7 +242,7 @@ def find_carrot(
         look = max(0.75 * look, shortest)
 
 
-@kernel
+@leaf
 def should_rotate(rotating: bool, v: float, carrot: Carrot, tuning: PursuitTuning) -> bool:
     """Return whether to rotate in place: with hysteresis, and sooner if no arc is clear or the robot is at rest."""
     limit = tuning.rotate_above if v > tuning.creep_speed else tuning.rotate_above_at_rest
@@ -253,7 +253,7 @@ def should_rotate(rotating: bool, v: float, carrot: Carrot, tuning: PursuitTunin
     return abs(carrot.bearing) > limit
 
 
-@kernel
+@leaf
 def curvature_to_drive(
     v: float, s: float, k: int, i: int, j: int, carrot: Carrot, path: PathSamples, tuning: PursuitTuning
 ) -> float:
@@ -278,7 +278,7 @@ def curvature_to_drive(
     return float(curvature)
 
 
-@kernel
+@leaf
 def speed_limit(
     w: float, curvature: float, route_speed: float, clearance: float, remaining: float, clear: bool,
     limits: MotionLimits, tuning: PursuitTuning,
@@ -304,7 +304,7 @@ def speed_limit(
     return max(target, min(tuning.creep_speed, limits.speed)), limiter
 
 
-@kernel
+@leaf
 def clear_turn(
     x: float, y: float, yaw: float, bearing: float, distance: float, discs: Array, bounds: Array, tuning: PursuitTuning
 ) -> float:
@@ -328,9 +328,9 @@ def clear_turn(
     return 0.0
 
 
-@kernel
+@leaf
 def speed_off_route(
-    route_speed: float, x: float, y: float, s: float, k: int, path: PathSamples, limits: MotionLimits,
+    route_speed: float, x: float, y: float, s: float, k: int, xy: Array, arc: Array, limits: MotionLimits,
     tuning: PursuitTuning,
 ) -> float:  # fmt: skip
     """Return the route's speed limit for a robot at (x, y) off the route, whose nearest point is at arc length s.
@@ -338,14 +338,14 @@ def speed_off_route(
     The limit holds on the route, and the robot can brake on its path there. Otherwise a robot that left the route at a sharp
     corner, where the limit is 0, would creep back. Within the shortest lookahead the robot counts as on the route.
     """
-    px, py, _ = point_at(s, k, path.xy, path.arc)
+    px, py, _ = point_at(s, k, xy, arc)
     spare = math.hypot(px - x, py - y) - tuning.lookahead_min
     if spare <= 0.0:
         return route_speed
     return math.sqrt(route_speed * route_speed + 2.0 * tuning.braking * limits.acceleration * spare)
 
 
-@kernel
+@leaf
 def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLimits, tuning: PursuitTuning) -> float:
     """Return the yaw rate for a rotation in place.
 
@@ -357,7 +357,7 @@ def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLim
     return w * new_v / v if v > 0.0 else 0.0
 
 
-@kernel
+@leaf
 def full_braking(
     x: float, y: float, yaw: float, v: float, w: float, curvature: float, required: float,
     discs: Array, bounds: Array, limits: MotionLimits, tuning: PursuitTuning,
@@ -382,7 +382,7 @@ def full_braking(
     return keep_wheels_within(new_v, steered, v, period, limits)
 
 
-@kernel
+@leaf
 def pursue(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, rotating: bool,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
@@ -400,7 +400,7 @@ def pursue(
     # Near the end a shorter lookahead makes the robot stop at the route's end, not beside it.
     near_end = max(END_LOOKAHEAD * remaining, tuning.lookahead_min)
     longest = min(min(path.lookahead[i], path.lookahead[j]), near_end)
-    carrot = find_carrot(x, y, yaw, v, s, k, clearance, longest, discs, bounds, path, tuning)
+    carrot = find_carrot(x, y, yaw, v, s, k, clearance, longest, discs, bounds, path.xy, path.arc, tuning)
 
     rotating = should_rotate(rotating, v, carrot, tuning)
     at_goal = remaining <= tuning.goal_distance
@@ -411,7 +411,8 @@ def pursue(
         target, limiter = 0.0, ROTATE
     else:
         curvature = curvature_to_drive(v, s, k, i, j, carrot, path, tuning)
-        route_speed = speed_off_route(min(path.speed[i], path.speed[j]), x, y, s, k, path, limits, tuning)
+        route_speed = min(path.speed[i], path.speed[j])
+        route_speed = speed_off_route(route_speed, x, y, s, k, path.xy, path.arc, limits, tuning)
         target, limiter = speed_limit(
             w, curvature, route_speed, distance - tuning.robot_radius, remaining, carrot.clear, limits, tuning
         )

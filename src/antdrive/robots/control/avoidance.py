@@ -25,6 +25,7 @@ H. Asama, *Inevitable collision states*, Advanced Robotics 18, 2004, also evalua
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -43,6 +44,7 @@ SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progres
 WALKING = 1.5  # movers faster than this are not people [m/s]
 SURPRISE = 0.1  # a mover has another velocity than predicted if they differ by more than this [m/s]
 CROSSING = 0.5  # a robot crosses a mover's lane if the sine of the angle between both headings exceeds this
+BESIDE = (0.2, 0.4, 0.6, 0.8, 1.0)  # distances from the route of the lines beside it that a robot may follow [m]
 PERSISTENCE = 0.05  # value of keeping the last decision, in metres of progress [m]
 
 
@@ -150,28 +152,35 @@ class Avoidance:
         tuning = tracked.tuning._replace(period=self.step)
         weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
         observed = predicted if velocities is None else velocities
-        outlined = not (spec.footprint.is_disc or len(tracked.samples.turns))
+        outlined = not spec.footprint.is_disc
         limits_of = [
             (near, slow, False), (near, slow, outlined), (near, backwards, outlined), (math.inf, backwards, outlined),
             (math.inf, math.inf, outlined),
         ]  # fmt: skip
         if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
             limits_of[:3] = [(math.inf, backwards, False)]
+        given_way = None  # a decision to slow down, unless the robot can pass beside its route by its outline
         for fastest, reverse, by_outline in dict.fromkeys(limits_of):
             weights = weights._replace(outlined=by_outline)
-            candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse)
+            candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse, by_outline)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
                 limits, tuning, weights, places, radii,
             )  # fmt: skip
             chosen, contact = kernels.choose(*situation)
-            if contact == math.inf:
+            if given_way is not None:
+                if contact < math.inf or candidates[chosen, kernels.KIND] != kernels.BESIDE_ROUTE:
+                    candidates, chosen, contact = given_way
                 break
+            if contact == math.inf:
+                if not (outlined and not by_outline and fastest < math.inf and _gives_way(candidates, chosen)):
+                    break
+                given_way = candidates, chosen, contact
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
             return wanted, False, AvoidanceState(reversed=state.reversed)
         if contact < max(abs(last.speed) / limits.acceleration, self._too_late(weights, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
-        twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
+        twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked, pose, before.arc)
         return twist, True, after._replace(reversed=state.reversed)
 
     def speed_near(
@@ -209,37 +218,39 @@ class Avoidance:
         self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, predicted: Floats, radii: Floats
     ) -> bool:
         """Return whether a mover that may come near soon is faster than people, or has another velocity than predicted."""
-        speeds = np.hypot(*observed.T)
-        unlike = (speeds > WALKING) | (np.hypot(*(observed - predicted).T) > SURPRISE)
-        if not unlike.any():
-            return False
-        gap = np.hypot(*(places - pose[:2]).T) - radii - spec.radius
-        return bool((unlike & (gap < self.horizon * (speeds + spec.max_speed))).any())
+        most = self.horizon, spec.max_speed, spec.radius
+        return kernels.must_dodge(*pose[:2], places, observed, predicted, radii, WALKING, SURPRISE, *most)
 
     def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
         return 2 * self.step if kernels.is_close(*pose, places, radii, weights) else 0.0
 
     def _candidates(
-        self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float
+        self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float, beside: bool
     ) -> Floats:
         """Return the candidates (N, 6) within speed limits [m/s].
 
         Row 0 keeps the speed limit, row 1 is the last decision.
         """
-        table = _candidate_table(spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration)
         fastest, reverse = min(fastest, spec.max_speed), min(reverse, spec.max_speed)
-        if not state.candidate and min(speed_limit, fastest, reverse) >= spec.max_speed:
+        able = spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration
+        table = _limited_table(*able, beside, fastest, reverse)
+        if not state.candidate and speed_limit >= fastest:
             return table
         table = table.copy()
         table[0, kernels.SPEED] = min(spec.max_speed, speed_limit)
         if state.candidate:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining
-        for column in (kernels.SPEED, kernels.NEXT_SPEED):
-            speeds = table[:, column]
-            np.minimum(np.maximum(speeds, -min(reverse, fastest), out=speeds), fastest, out=speeds)
+        _limit_speeds(table[:2], fastest, reverse)
         return table
+
+
+def _gives_way(candidates: Floats, chosen: int) -> bool:
+    """Return whether a candidate ends more slowly than the controller's motion may."""
+    row = candidates[chosen]
+    two = row[kernels.KIND] == kernels.TWO_TWISTS and row[kernels.DURATION] < math.inf
+    return bool(row[kernels.NEXT_SPEED if two else kernels.SPEED] < candidates[0, kernels.SPEED])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
@@ -248,7 +259,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def _execute(
-    candidate: Floats | None, wanted: Twist, last: Twist, tracked: TrackedPath
+    candidate: Floats | None, wanted: Twist, last: Twist, tracked: TrackedPath, pose: Pose, arc: float
 ) -> tuple[Twist, AvoidanceState]:
     """Return a candidate's command and state; None means that no candidate avoids a contact."""
     limits, period = tracked.limits, tracked.tuning.period
@@ -260,6 +271,11 @@ def _execute(
         speed = min(wanted.speed, max(float(candidate[kernels.SPEED]), slowest))
         yaw_rate = wanted.yaw_rate * (speed / wanted.speed if wanted.speed > 0 else 1.0)
         return Twist(speed, yaw_rate), AvoidanceState()
+    elif candidate[kernels.KIND] == kernels.BESIDE_ROUTE:
+        speed, yaw_rate = kernels.beside_route(
+            *pose, last.speed, arc, candidate, tracked.samples, limits, tracked.tuning
+        )
+        state = AvoidanceState(tuple(candidate.tolist()))
     else:
         first = candidate[kernels.DURATION] > 1e-9
         speed = float(candidate[kernels.SPEED if first else kernels.NEXT_SPEED])
@@ -285,10 +301,11 @@ _NOT_NEGATIVE = (
 
 
 @functools.cache
-def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
+def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float, beside: bool) -> Floats:
     """Return a robot's candidates (N, 6): the controller's motion at full and lower speeds, and pairs of twists.
 
-    Row 1 is a placeholder for the last decision. The second twist of a pair drives straight or stops.
+    Row 1 is a placeholder for the last decision. The second twist of a pair drives straight or stops. With `beside`, the last
+    rows follow lines beside the route.
     """
     fractions = (1.0, 1.0, 0.7, 0.45, 0.2)
     rows = [(kernels.FOLLOW_ROUTE, fraction * max_speed, 0.0, 0.0, 0.0, 0.0) for fraction in fractions]
@@ -305,7 +322,26 @@ def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration
                 rows.append((kernels.TWO_TWISTS, v, w, duration, 0.0, 0.0))
                 ahead = (v,) if v else (max_speed, -max_speed)
                 rows += [(kernels.TWO_TWISTS, v, w, duration, next_speed, 0.0) for next_speed in ahead if w]
+    for fraction, shift in itertools.product((1.0, 0.45, 0.2), BESIDE if beside else ()):
+        rows += [(kernels.BESIDE_ROUTE, fraction * max_speed, side, 0.0, 0.0, 0.0) for side in (shift, -shift)]
     return np.array(rows)
+
+
+@functools.lru_cache(maxsize=64)
+def _limited_table(
+    max_speed: float, max_yaw_rate: float, lateral_acceleration: float, beside: bool, fastest: float, reverse: float
+) -> Floats:
+    """Return a robot's candidates (N, 6) within speed limits [m/s], read-only."""
+    table = _candidate_table(max_speed, max_yaw_rate, lateral_acceleration, beside).copy()
+    _limit_speeds(table, fastest, reverse)
+    return table
+
+
+def _limit_speeds(table: Floats, fastest: float, reverse: float) -> None:
+    """Limit the speeds of candidates (N, 6) in place, forwards and backwards [m/s]."""
+    for column in (kernels.SPEED, kernels.NEXT_SPEED):
+        speeds = table[:, column]
+        np.minimum(np.maximum(speeds, -min(reverse, fastest), out=speeds), fastest, out=speeds)
 
 
 @functools.lru_cache(maxsize=64)

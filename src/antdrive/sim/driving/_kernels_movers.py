@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from antdrive.worlds._kernels import Array, kernel, polygon_distance
+from antdrive.worlds._kernels import Array, leaf, polygon_distance
 
 
-@kernel
+@leaf
 def lower_by_movers(
     poses: Array, footprint: Array, corners: Array, movers: Array, radii: Array, clearance: Array
 ) -> None:

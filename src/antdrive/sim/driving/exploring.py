@@ -183,7 +183,7 @@ class Exploration(RouteGuide):
         robot = self._robot
         return rasterise(task.world, self._routes.cell, robot.radius + margin, outline_of(robot.footprint, margin))
 
-    def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
+    def _plan_around(self, tick: int, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""
         movers = self._movers
         if movers is None:
@@ -198,6 +198,10 @@ class Exploration(RouteGuide):
         discs = movers.discs(tick, pose)
         if discs:
             grid, answer = self.plan(pose, discs)
+            if answer.solved and grid.turns:  # a long way: it has turns on the spot
+                free, speed = self.plan(pose), self._robot.max_speed
+                if movers.waiting_is_quicker(tick, pose, trigger, speed, answer.cost, free[1].cost):
+                    return (*free, [])
             if answer.solved:
                 return grid, answer, discs
         return (*self.plan(pose), [])
@@ -324,7 +328,7 @@ class Exploration(RouteGuide):
         if self._failures >= PATIENCE and trigger != SCANNED:
             self._failures = 0
             self.survey.reset(pose)
-        grid, plan, avoided = self._plan_around(tick, pose)
+        grid, plan, avoided = self._plan_around(tick, pose, trigger)
         self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0

@@ -17,7 +17,7 @@ from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.planners import PlanResult
 from antdrive.robots import RobotSpec, TrackedPath
 from antdrive.sim.driving.blockage import MIN_RADIUS, Blockage, close_route, covered_discs, points_at
-from antdrive.sim.driving.perceived_movers import PerceivedMovers, Tracked
+from antdrive.sim.driving.perceived_movers import STANDS, PerceivedMovers, Tracked
 from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED, ReplanPolicy
 from antdrive.worlds import Disc, Grid, World, rasterise
 
@@ -280,6 +280,15 @@ class MoversAhead:
         """Return the zones that movers roam, largest first: the estimated box, then the observed one."""
         assert self._traffic is not None
         return self._traffic.zones(tick, pose[:2], self._goal, grid)
+
+    def waiting_is_quicker(self, tick: int, pose: Pose, trigger: str, speed: float, around: float, free: float) -> bool:
+        """Return whether a route `around` movers [m] takes longer than to wait for them and take the `free` one [m].
+
+        Routes are driven at a speed [m/s]. A robot that has waited, or that sees only standing movers, takes any route.
+        """
+        if trigger == WAITED or around <= free + self._policy.max_wait * speed:
+            return False
+        return bool((np.hypot(*self._predictor.velocities(tick, pose[:2]).T) >= STANDS).any())
 
     def plan_around_zones(
         self, pose: Pose, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]

@@ -16,6 +16,7 @@ import dataclasses
 import functools
 import math
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.policy import LATE, MISSED, STRAYED, WAITED, ReplanPolicy
-from antdrive.worlds import Grid, Route, segment_clearance
+from antdrive.worlds import Disc, Grid, Route, segment_clearance
 
 
 class Replanning(OneRoute):
@@ -119,7 +120,8 @@ class Replanning(OneRoute):
         else:
             zones = self._ahead.zones(tick, pose, self._grid) if around_movers and self._ahead.heavy(tick, pose) else []
             around = functools.partial(self._routes.around, task, self._grid)
-            plan, discs = self._ahead.plan_around_zones(pose, zones, discs, around) or (around(discs), discs)
+            beside = self._ahead.plan_around_zones(pose, zones, discs, around)
+            plan, discs = beside or self._unless_waiting(tick, pose, trigger, discs, around)
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
             discs = self._ahead.discs(tick, pose)
             plan = self._routes.around(task, self._grid, discs)
@@ -137,6 +139,18 @@ class Replanning(OneRoute):
         self.note(now, trigger, wall_s, plan.work, plan.cost, route.xy)
         self.blockage.route_found()
         return self._prepare(route)
+
+    def _unless_waiting(
+        self, tick: int, pose: Pose, trigger: str, discs: list[Disc], around: Callable[[list[Disc]], PlanResult]
+    ) -> tuple[PlanResult, list[Disc]]:
+        """Return a plan around discs, and these; without them if waiting is quicker."""
+        plan, asked = around(discs), (tick, pose, trigger, self._routes.robot.max_speed)
+        straight = math.dist(pose[:2], self._task.goal)
+        if plan.solved and self._ahead.waiting_is_quicker(*asked, plan.cost, straight):
+            free = around([])
+            if self._ahead.waiting_is_quicker(*asked, plan.cost, free.cost):
+                return free, []
+        return plan, discs
 
     def _prepare(self, route: Route) -> TrackedPath:
         return self._routes.prepared(route, self._task.world, self._routes.margin)

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
-from antdrive.worlds._kernels import Array, kernel, polygon_distance
+from antdrive.worlds._kernels import Array, leaf, polygon_distance
 
 
-@kernel
+@leaf
 def first_meetings(
     eye: Array, first: float, spacing: float, closed: bool, reaches: Array, discs: Array, slack: float, now: float,
     met: Array,
@@ -42,7 +42,7 @@ def first_meetings(
                     met[j] = now
 
 
-@kernel
+@leaf
 def mark_seen(
     eye: Array, first: float, spacing: float, closed: bool, reaches: Array, grid: Array, seen: Array
 ) -> None:  # fmt: skip
@@ -76,7 +76,7 @@ def mark_seen(
                 seen[r, c] = True
 
 
-@kernel
+@leaf
 def nearest_approaches(poses: Array, shape: Array, corners: Array, discs: Array, rows: Array, away: Array) -> None:
     """Set rows[j] to the pose at which the footprint was nearest to the surface of disc j, and away[j] to the distance.
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.worlds._kernels import Array, inline, kernel
+from antdrive.worlds._kernels import Array, inline, kernel, leaf
 
 GRAINS = 2
 SQUARE, SHIFT = 8, 3  # cells along the side of a square, and its binary logarithm
@@ -71,7 +71,7 @@ class Fan(NamedTuple):
     closed: bool
 
 
-@kernel
+@leaf
 def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
     """Set out[i] to the distance from which beam i is needed to omit no cell [m], once all beams have had their turns.
 
@@ -84,7 +84,7 @@ def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
         out[i] = cell / (step * spacing) if number else 0.0
 
 
-@kernel
+@leaf
 def count_unseen(free: Array, unseen: Array) -> None:
     """Count the cells of each square that are not free."""
     unseen[:] = 0
@@ -93,7 +93,7 @@ def count_unseen(free: Array, unseen: Array) -> None:
             unseen[row >> SHIFT, col >> SHIFT] += 0 if free[row, col] else 1
 
 
-@kernel
+@leaf
 def insert(
     x: float, y: float, cos: float, sin: float, beams: Array, ranges: Array, closed: bool, begin: Array, turn: int,
     turns: int, left_out: Array, horizon: float, trust: float, scan: int, arrays: tuple[Array, ...], changed: Array,
@@ -164,7 +164,7 @@ def locate(fan: Fan, left_out: Array, horizon: float, m: MapArrays, found: Array
         at[i] = int(v if entered else 0.0) * cols + int(u if entered else 0.0) if entered else -1
 
 
-@kernel
+@leaf
 def occupy(row: int, col: int, scan: int, m: MapArrays) -> None:
     """Add a cell without hits to the list of occupied ones."""
     at = m.count[0]
@@ -269,7 +269,7 @@ def all_free(lane: int, first: int, last: int, flat: bool, unseen: Array) -> boo
     return bool(squares[first] | squares[(first + last) >> 1] | squares[last] == 0)
 
 
-@kernel
+@leaf
 def see_through(crossed: Array, scan: int, fan: Fan, m: MapArrays, changed: Array, count: int) -> int:
     """Lower the log-odds of the grains of occupied cells whose hits the scan has passed on both sides.
 
@@ -301,7 +301,7 @@ def see_through(crossed: Array, scan: int, fan: Fan, m: MapArrays, changed: Arra
     return count
 
 
-@kernel
+@leaf
 def seen_beyond(
     dx: float, dy: float, behind: float, beam: int, eye: Array, beams: Array, ranges: Array, closed: bool
 ) -> bool:
@@ -369,7 +369,7 @@ def see_far(
     return after
 
 
-@kernel
+@leaf
 def vacate(row: int, col: int, m: MapArrays) -> None:
     """Remove an occupied cell from the list; it becomes free ground."""
     m.occupied[row, col], m.free[row, col] = False, True
@@ -387,7 +387,7 @@ def vacate(row: int, col: int, m: MapArrays) -> None:
             m.box[gap, k, side] = m.box[last, k, side]
 
 
-@kernel
+@leaf
 def forget(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed: Array) -> int:
     """Free the occupied cells whose hits all lie within `radius` of (x, y); return the number of rows written to `changed`."""
     m = MapArrays(*arrays)
@@ -410,7 +410,7 @@ def forget(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed
     return count
 
 
-@kernel
+@leaf
 def take_as_free(
     x: float, y: float, radius: float, discs: Array, walls: Array, arrays: tuple[Array, ...], changed: Array
 ) -> int:
@@ -494,7 +494,7 @@ def meeting(low: float, high: float, begin: float, cell: float, count: int) -> t
     return first, last
 
 
-@kernel
+@leaf
 def grain_disc(box: Array, at: int, k: int) -> tuple[float, float, float]:
     """Return the disc around the hits of a grain: x, y, radius [m]."""
     x_min, y_min = np.float64(box[at, k, 0]), np.float64(box[at, k, 1])
@@ -504,7 +504,7 @@ def grain_disc(box: Array, at: int, k: int) -> tuple[float, float, float]:
     return 0.5 * (x_min + x_max), 0.5 * (y_min + y_max), radius
 
 
-@kernel
+@leaf
 def explained(points: Array, scan: int, settle: int, arrays: tuple[Array, ...], out: Array) -> None:
     """Set out[i] to whether point i lies in or beside a cell that is occupied for `settle` scans, or was never free.
 

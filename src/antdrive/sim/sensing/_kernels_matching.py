@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays
-from antdrive.worlds._kernels import Array, kernel
+from antdrive.worlds._kernels import Array, leaf
 
 ROUNDS = 4  # pairings of hits with the map
 SETTLED = 1.0  # least log-odds of a grain that is matched: two hits
 
 
-@kernel
+@leaf
 def match(
     x: float, y: float, yaw: float, beams: Array, ranges: Array, every: int, first: int, far: float, near: int,
     fewest: int, arrays: tuple[Array, ...],
@@ -56,7 +56,7 @@ def match(
     return x, y, yaw, pairs
 
 
-@kernel
+@leaf
 def partner(x: float, y: float, near: int, m: MapArrays) -> tuple[bool, float, float]:
     """Return the settled hit of the map nearest to a point, within `near` grains."""
     cell = m.frame[2]

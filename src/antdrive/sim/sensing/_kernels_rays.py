@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from antdrive.worlds._kernels import Array, inline, kernel
+from antdrive.worlds._kernels import Array, inline, kernel, leaf
 
 SURE = 0.05  # beams checked beyond a disc's angle, against rounding
 ANGLE_ERROR = 2e-5  # upper bound of the error of `angle_of` [rad]
 
 
-@kernel
+@leaf
 def scan(
     x: float, y: float, yaw: float, beams: Array, spacing: float, first: float, limits: Array, discs: Array,
     movers: Array, bounds: Array, noise: Array, out: Array,
@@ -72,7 +72,7 @@ def cast(
             low, high = low + turn, high + turn
 
 
-@kernel
+@leaf
 def look(
     x: float, y: float, cos: float, sin: float, spacing: float, first: float, most: float, discs: Array, seen: Array
 ) -> bool:
@@ -113,7 +113,7 @@ def cast_at(
             out[i] = min(out[i], max(ahead * beams[0, i] + left * beams[1, i] - math.sqrt(rest), 0.0))
 
 
-@kernel
+@leaf
 def cast_walls(x: float, y: float, cos: float, sin: float, beams: Array, bounds: Array, out: Array) -> None:
     """Lower out[i] to the distance at which beam i meets a wall; 0 for a lidar outside the walls."""
     if not (bounds[0] < x < bounds[2] and bounds[1] < y < bounds[3]):
@@ -128,7 +128,7 @@ def cast_walls(x: float, y: float, cos: float, sin: float, beams: Array, bounds:
         out[i] = wall if nearest < out[i] and wall < out[i] else out[i]
 
 
-@kernel
+@leaf
 def measure(ranges: Array, noise: Array, limits: Array) -> None:
     """Convert true distances to lidar ranges, in place; see `scan` for the `limits`.
 

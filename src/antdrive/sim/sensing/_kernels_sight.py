@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays, grain_disc
-from antdrive.worlds._kernels import Array, kernel, polygon_distance
+from antdrive.worlds._kernels import Array, kernel, leaf, polygon_distance
 
 TOUCHING = 1e-3  # distance at which the footprint meets a disc [m]
 SAMPLES = 8  # samples of the path, for its part of the map
 GIVE = 2e-3  # discs that overlap the footprint shrink to this distance from it [m]
 
 
-@kernel
+@leaf
 def clear_way(
     x0: float, y0: float, yaw: float, speed: float, yaw_rate: float, half_length: float, half_width: float,
     rounding: float, corners: Array, limit: float, arrays: tuple[Array, ...],
@@ -70,7 +70,7 @@ def clear_way(
     return best
 
 
-@kernel
+@leaf
 def within_map(
     pose: tuple[float, float, float], forward: float, bend: float, radius: float, limit: float, m: MapArrays
 ) -> float:
@@ -116,7 +116,7 @@ def on_the_way(ahead: float, left: float, forward: float, bend: float, reach: fl
     return bool(abs(math.sqrt(ahead * ahead + beside * beside) - 1.0 / abs(bend)) <= reach)
 
 
-@kernel
+@leaf
 def contact(
     ahead: float, left: float, size: float, forward: float, bend: float, shape: tuple[float, float, float], corners: Array,
     limit: float,
