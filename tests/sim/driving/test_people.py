@@ -20,12 +20,20 @@ SEES = {
 
 
 def driven(log):
-    """The driven length, and the longest way backwards that was not driven forwards again [m]."""
-    behind, longest = 0.0, 0.0
+    """The driven length [m], and at each row the way backwards that was not driven forwards again (T,) [m]."""
+    behind, ways = 0.0, []
     for speed in log.twist[:, 0]:
         behind = max(0.0, behind - speed / log.record.physics_hz)
-        longest = max(longest, behind)
-    return polyline_length(log.pose[:, :2]), longest
+        ways.append(behind)
+    return polyline_length(log.pose[:, :2]), np.array(ways)
+
+
+def backs_off_only_from_people(log, backwards, radius):
+    """Whether the robot has driven at most 0.52 m backwards, or a person would have hit it, standing there, within 2 s."""
+    row = int(np.argmax(backwards > 0.52))
+    soon = log.movers[row : row + 2 * log.record.physics_hz] - log.pose[row, :2]
+    gaps = np.hypot(soon[..., 0], soon[..., 1]) - [mover.radius for mover in log.record.world.movers]
+    return row == 0 or gaps.min() < radius
 
 
 @pytest.mark.slow
@@ -41,7 +49,7 @@ def test_a_robot_passes_people_slowly_and_without_a_long_detour(world, sees, jac
     log = done.rollout
     way, backwards = driven(log)
     assert way <= 1.5 * driven(alone.rollout)[0]
-    assert backwards <= 0.52
+    assert backs_off_only_from_people(log, backwards, jackal.radius)
     to = log.movers - log.pose[:, None, :2]
     gaps = np.hypot(to[..., 0], to[..., 1]) - [mover.radius for mover in task.world.movers] - jackal.radius
     ahead = to[..., 0] * np.cos(log.pose[:, 2:]) + to[..., 1] * np.sin(log.pose[:, 2:]) > 0
@@ -58,7 +66,7 @@ def test_a_long_robot_passes_people_by_its_outline(world, sees, jackal):
     assert done.succeeded, (done.outcome, done.reason)
     way, backwards = driven(done.rollout)
     assert way <= 1.2 * np.hypot(*np.subtract(task.goal, task.start[:2]))
-    assert backwards <= 0.52
+    assert backwards.max() <= 0.52
 
 
 @pytest.mark.slow
