@@ -40,6 +40,7 @@ def test_the_python_block_is_six_lines_that_run(home, capsys):
     assert (home / "forest.npz").exists()
 
 
+@pytest.mark.slow
 def test_the_python_block_passes_mypy_strict(tmp_path):
     """With the project's own settings, which are strict: with others mypy would check all of antdrive, and once more after it."""
     (code,) = blocks("python")

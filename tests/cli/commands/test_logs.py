@@ -14,6 +14,7 @@ def test_a_drive_becomes_tables(small_run, antdrive):
     assert (Path("new") / "drive.csv").stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_a_log_is_filmed_again_from_another_camera(antdrive, small_run, tmp_path):
     log = small_run.rollout.save(tmp_path / "run.npz")
     code, out, _ = antdrive(

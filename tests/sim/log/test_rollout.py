@@ -189,6 +189,7 @@ def packed(content, path, kind=zipfile.ZIP_DEFLATED):
                 member.write(data)
 
 
+@pytest.mark.slow
 def test_every_byte_around_the_contents_of_a_log_is_as_numpy_writes_it(saved, tmp_path):
     """Only the system that wrote the archive may differ: nobody reads it."""
     raw, path = saved.read_bytes(), tmp_path / "changed.npz"

@@ -207,6 +207,7 @@ def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths
         assert words == (set() if different else {"identical to a"})
 
 
+@pytest.mark.slow
 def test_long_names_of_planners_stay_whole_and_apart(tmp_path):
     names = [f"aco-han alpha={k} ants=10 iterations=100 cap=200" for k in range(3)]
     columns = made_up_columns({name: Skill(1.0) for name in names}, worlds=4, seeds=2)
