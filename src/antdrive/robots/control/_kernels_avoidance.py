@@ -320,6 +320,19 @@ def follow(
 
 
 @kernel
+def follow_own(
+    x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, own: Array, path: PathSamples,
+    obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning, step: float, outlined: bool, trails: Array,
+) -> Trail:  # fmt: skip
+    """Begin all `trails` (N, K + 1, 5) at the robot's state, and follow the controller's `own` motion, which is the first."""
+    for n in range(trails.shape[0]):
+        trails[n, 0, 0], trails[n, 0, 1], trails[n, 0, 2], trails[n, 0, 3], trails[n, 0, 4] = x, y, yaw, v, w
+    return follow(
+        x, y, yaw, v, w, s, rotating, own, path, obstacles, limits, tuning, step, 0, True, outlined, trails[0]
+    )
+
+
+@kernel
 def follow_all(
     s: float, rotating: bool, candidates: Array, path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits,
     tuning: PursuitTuning, step: float, outlined: bool, trails: Array, steps: Array, blocked: Array,
@@ -576,7 +589,7 @@ def limit_worths(
     return limit
 
 
-@kernel
+@leaf
 def passes_all(trail: Array, places: Array, near: Array) -> bool:
     """Return whether the robot comes no closer to any of the movers `near` at the end of its trail."""
     k = trail.shape[0] - 1
@@ -611,25 +624,8 @@ def choose(
     count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
     by_step = reachable_by_step(x, y, fastest(v, candidates, limits), weights, places, radii, near, cap)
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
-    trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
-    own = follow(
-        x,
-        y,
-        yaw,
-        v,
-        w,
-        s,
-        rotating,
-        candidates[0],
-        path,
-        obstacles,
-        limits,
-        tuning,
-        weights.step,
-        0,
-        True,
-        outlined,
-        trails[0],
+    own = follow_own(
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, outlined, trails
     )
     steps[0], blocked[0] = own.steps, own.blocked
     met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
@@ -706,25 +702,8 @@ def best_escape(
     bodies, count = radii + weights.radius, candidates.shape[0]
     by_step = reachable_by_step(x, y, math.inf, weights, soon, radii, near, math.inf)
     trails, steps, blocked = np.empty((count, soon.shape[0], 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
-    trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
-    own = follow(
-        x,
-        y,
-        yaw,
-        v,
-        w,
-        s,
-        rotating,
-        candidates[0],
-        path,
-        obstacles,
-        limits,
-        tuning,
-        weights.step,
-        0,
-        True,
-        outlined,
-        trails[0],
+    own = follow_own(
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, outlined, trails
     )
     steps[0], blocked[0] = own.steps, own.blocked
     follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, outlined, trails, steps, blocked)

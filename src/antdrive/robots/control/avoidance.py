@@ -331,7 +331,7 @@ def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration
 def _limited_table(
     max_speed: float, max_yaw_rate: float, lateral_acceleration: float, beside: bool, fastest: float, reverse: float
 ) -> Floats:
-    """Return a robot's candidates (N, 6) within speed limits [m/s], read-only."""
+    """Return a robot's candidates (N, 6) within speed limits [m/s]; callers copy them before they change them."""
     table = _candidate_table(max_speed, max_yaw_rate, lateral_acceleration, beside).copy()
     _limit_speeds(table, fastest, reverse)
     return table
