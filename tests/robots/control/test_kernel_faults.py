@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from antdrive.robots import Footprint, footprint_clearance
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs, nearby, turn_clearance
 from antdrive.robots.control._kernels_path import PathSamples
-from antdrive.robots.control._kernels_pursuit import full_braking, pursue, stopping_clearance
+from antdrive.robots.control._kernels_pursuit import full_braking, pursue, stopping_clearance, turn_in
 from antdrive.worlds import Disc, World
 from tests.robots.control.test_rules import LIMITS, TUNING
 
@@ -124,3 +124,19 @@ def test_a_braking_robot_whose_curve_leads_into_a_pillar_steers_away_from_it():
     right = np.array([[0.6, -0.3, 0.1]])
     assert full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.9, right, WIDE, LIMITS, TUNING) == pytest.approx((0.9, 0.72))
     assert full_braking(0, 0, 0, 0.1, 0.08, 0.0, 0.9, pillar, WIDE, LIMITS, TUNING) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("posts", "turns"),
+    [
+        ([], True),
+        ([(0.75, 0.5, 0.1)], False),  # on its left, where the turned stopping arc ends
+        ([(0.75, 0.0, 0.1)], True),  # ahead: it stops farther from the post if it turns
+        ([(0.75, -0.5, 0.1)], True),
+    ],
+)
+def test_a_robot_that_brakes_for_a_rotation_turns_in_where_it_then_stops_with_room(posts, turns):
+    tuning = TUNING._replace(turn_in_clearance=0.5)
+    discs = np.array(posts).reshape(-1, 3)
+    turned = turn_in(0.0, 0.0, 0.0, 0.9, 0.5, 1.5, 0.45, discs, WIDE, LIMITS, tuning)
+    assert turned == pytest.approx(1.0 / 0.9 if turns else 0.45)  # its lateral acceleration is 1 m/s^2

@@ -124,6 +124,7 @@ TUNING = PursuitTuning(
     half_width=0.0, rounding=0.2, corners=np.empty((0, 2)), lookahead_time=0.25, lookahead_min=0.1, lookahead_max=1.0,
     preferred_lookahead_min=0.3, rotate_above=1.0, rotate_above_at_rest=0.2, rotate_until=0.1, braking=0.5,
     creep_speed=0.04, goal_distance=0.02, min_speed_near_obstacles=0.5, clearance_time=0.05,
+    turn_in_clearance=math.inf,
 )  # fmt: skip
 
 

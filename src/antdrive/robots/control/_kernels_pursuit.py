@@ -66,6 +66,8 @@ class PursuitTuning(NamedTuple):
         goal_distance: remaining route length at which the robot stops [m]
         min_speed_near_obstacles: speed limit at zero clearance [m/s]
         clearance_time: clearance divided by this is added to that limit [s]
+        turn_in_clearance: clearance of the centre's stopping arc at which a robot that brakes for a rotation in place turns
+            in [m]; inf: it keeps to its curve
     """
 
     period: float
@@ -89,6 +91,7 @@ class PursuitTuning(NamedTuple):
     goal_distance: float
     min_speed_near_obstacles: float
     clearance_time: float
+    turn_in_clearance: float
 
 
 class Carrot(NamedTuple):
@@ -358,6 +361,23 @@ def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLim
 
 
 @leaf
+def turn_in(
+    x: float, y: float, yaw: float, new_v: float, w: float, bearing: float, held: float, discs: Array, bounds: Array,
+    limits: MotionLimits, tuning: PursuitTuning,
+) -> float:  # fmt: skip
+    """Return the yaw rate of a robot that brakes for a rotation in place, which is `held` on its current curve.
+
+    It turns in on the way if it then stops where it has room to rotate: `turn_in_clearance`, or as much as on its curve.
+    """
+    period, deceleration = tuning.period, limits.acceleration
+    fastest = min(math.sqrt(limits.yaw_acceleration * abs(bearing)), limits.lateral_acceleration / new_v)
+    turned = reachable_yaw_rate(math.copysign(fastest, bearing), w, period, limits)
+    kept = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, discs, bounds)
+    clear = stopping_clearance(x, y, yaw, new_v, turned, deceleration, period, discs, bounds)
+    return turned if clear >= min(max(kept, tuning.robot_radius), tuning.turn_in_clearance) else held
+
+
+@leaf
 def full_braking(
     x: float, y: float, yaw: float, v: float, w: float, curvature: float, required: float,
     discs: Array, bounds: Array, limits: MotionLimits, tuning: PursuitTuning,
@@ -421,6 +441,8 @@ def pursue(
     if rotating and not at_goal:
         bearing = clear_turn(x, y, yaw, carrot.bearing, distance, discs, bounds, tuning)
         wanted = rotation(new_v, v, w, bearing, limits, tuning)
+        if new_v >= tuning.creep_speed and tuning.turn_in_clearance < math.inf:
+            wanted = turn_in(x, y, yaw, new_v, w, carrot.bearing, wanted, discs, bounds, limits, tuning)
     else:
         wanted = curvature * new_v
     new_w = reachable_yaw_rate(wanted, w, period, limits)
@@ -445,7 +467,7 @@ def unpacked(
     """Return samples, obstacles, limits and tuning of a path in the form of `TrackedPath.packed`."""
     tuning = PursuitTuning(
         n[9], n[10], n[11], n[12], n[13], n[14], n[15], n[16], corners, n[17], n[18], n[19], n[20], n[21], n[22], n[23],
-        n[24], n[25], n[26], n[27], n[28],
+        n[24], n[25], n[26], n[27], n[28], n[29],
     )  # fmt: skip
     return (
         PathSamples(xy, arc, lookahead, speed, curvature, heading, turns, n[0]),

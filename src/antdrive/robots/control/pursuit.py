@@ -326,6 +326,7 @@ class PurePursuit:
             goal_distance=goal_distance,
             min_speed_near_obstacles=self.min_speed_near_obstacles,
             clearance_time=self.clearance_time,
+            turn_in_clearance=math.inf,
         )
 
     def _index(self, world: World, clearance: float) -> ObstacleIndex:

@@ -55,6 +55,7 @@ ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hits than to mapped obstacles [m]
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
+TURNING_IN = 0.1  # a robot that brakes for a rotation turns in if it then stops this far from hits [m]
 #: Plans for the footprint keep this margin if possible: the controller refuses turns closer to hits [m].
 TURNABLE = 0.025
 #: Scattered hits narrow a passage that is hardly wider than the robot: a last plan for the footprint comes this much closer to
@@ -263,6 +264,7 @@ class Exploration(RouteGuide):
                 stopping_clearance=tuning.stopping_clearance - give,
                 robot_radius=tuning.robot_radius + TURNING,
                 rounding=tuning.rounding + TURNING,
+                turn_in_clearance=robot.radius + TURNING_IN,
             ),
         )
 
