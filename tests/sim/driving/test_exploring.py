@@ -194,6 +194,23 @@ def test_scattered_hits_do_not_close_a_passage_and_the_record_keeps_no_margin(ja
     assert guide.footprint_margin == 0.0
 
 
+@pytest.mark.parametrize(("yaw", "margin"), [(math.pi / 2, 0.03), (0.0, 0.0)])
+def test_a_rotation_at_the_beginning_of_a_route_counts_as_length(jackal, yaw, margin, monkeypatch):
+    """The way without margin leads to the right, and the other one up."""
+    guide = compose(scenario(jackal, margin=0.03)).guide
+
+    def around(task, grid, avoided):
+        tight = grid.inflate < jackal.radius + 0.01
+        ends = np.array([[0.0, 0.0], [0.0, 30.0] if tight else [30.0, 0.0]])
+        return PlanResult(status=PlanStatus.SOLVED, cells=ends.astype(int), cost=10.0 if tight else 11.0)
+
+    monkeypatch.setattr(guide._routes, "around", around)
+    pose = (*guide._grid(guide._known(TASK.start, guide._bounds(4.0, TASK.start)), 0.03).xy(np.zeros((1, 2)))[0], yaw)
+    monkeypatch.setattr(guide, "_known", lambda pose, bounds, known=guide._known: known(TASK.start, bounds))
+    grid, _ = guide.plan(pose)
+    assert grid.inflate == pytest.approx(jackal.radius + margin)
+
+
 @pytest.mark.parametrize(
     ("pose", "led", "outlined"),
     [

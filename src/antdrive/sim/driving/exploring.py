@@ -45,7 +45,7 @@ GROWTH = (4.0, 16.0)  # extent of the planning area beyond start and goal; the s
 #: Fractions of the margin that plans for the disc keep; the second if no route exists or it is long.
 MARGINS = (1.0, 0.0)
 FAIR = 1.25  # a route longer than the straight line by more than this factor is long
-DETOUR = 1.15  # a route with less margin must be shorter by this factor
+DETOUR = 1.15  # a route with less margin must be shorter by this factor; a turn at its beginning counts as length
 CORRIDOR = 1.2  # smoothing considers obstacles within this distance of the plan, beyond the inflation [m]
 SAMPLES = 0.06  # spacing of the points of a route that get speed limits and lookaheads [m]
 SPARE = 0.25  # the controller knows obstacles this much beyond its longest arcs [m]
@@ -138,7 +138,7 @@ class Exploration(RouteGuide):
         Where no path exists otherwise, plan with less margin, in larger bounds, and for the footprint.
         """
         straight = math.dist(pose[:2], self._task.goal)
-        best: tuple[Grid, PlanResult] | None = None
+        best: tuple[float, Grid, PlanResult] | None = None
         for outlined, growth in self._searches(pose):
             for margin in self._margins(outlined):
                 task = self._known(pose, self._bounds(growth, pose))
@@ -146,15 +146,29 @@ class Exploration(RouteGuide):
                 answer = self._routes.around(task, grid, avoided)
                 if answer.status is PlanStatus.INVALID:
                     return grid, answer
-                if best is None or answer.cost < best[1].cost / DETOUR:
-                    best = grid, answer
-                if answer.solved and (outlined or answer.cost <= FAIR * straight):
+                cost = answer.cost + self._turn_cost(pose, grid, answer)
+                if best is None or cost < best[0] / DETOUR:
+                    best = cost, grid, answer
+                if answer.solved and (outlined or cost <= FAIR * straight):
                     break
             assert best is not None
-            if best[1].solved:
+            if best[2].solved:
                 break
         assert best is not None
-        return best
+        return best[1:]
+
+    def _turn_cost(self, pose: Pose, grid: Grid, answer: PlanResult) -> float:
+        """Return how far the robot could drive during the rotation in place at the beginning of a plan [m]."""
+        if not len(answer.cells):
+            return 0.0
+        controller, robot = self._routes.controller, self._robot
+        line = grid.xy(answer.line) - pose[:2]
+        far = np.hypot(*line.T) >= controller.lookahead_max
+        x, y = line[far.argmax() if far.any() else -1]
+        turn = abs(math.remainder(math.atan2(y, x) - pose[2], 2 * math.pi))
+        if turn <= controller.rotate_in_place_above:
+            return 0.0
+        return robot.max_speed * (turn / robot.max_yaw_rate + robot.max_yaw_rate / robot.max_yaw_acceleration)
 
     def _searches(self, pose: Pose) -> list[tuple[bool, float]]:
         """Return the shapes to plan for, whether the footprint, and the extents of the planning area [m], in turn.
