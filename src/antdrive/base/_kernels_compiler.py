@@ -27,6 +27,8 @@ from typing import Any, TypeVar
 import numba
 from numba.core import config, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.targetconfig import ConfigStack
+from numba.core.types.functions import BaseFunction
 
 from antdrive.base import kernel_cache
 from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
@@ -214,6 +216,37 @@ def _cached(dispatcher: Any, function: F) -> F:
             dispatcher._cache = _Cache(function)
             dispatcher._compiler = _Compiler(dispatcher, dispatcher._cache)
     return dispatcher  # type: ignore[no-any-return]  # has the function's signature
+
+
+_resolve: Any = BaseFunction.get_call_type
+_resolved: dict[Any, tuple[Any, Any]] = {}
+_PLAIN = (types.Number, types.Boolean, types.NoneType, types.SliceType, types.Array, types.NumberClass, types.DType)
+
+
+def _call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
+    """Return the signature of a call of a built-in function or operator, resolved once for each combination of types.
+
+    numba tries dozens of templates for every `+`, with an error message for each that does not fit: a seventh of all compiling.
+    """
+    if kws or not all(map(_is_plain, args)):
+        return _resolve(function, context, args, kws)
+    flags: Any = ConfigStack.top_or_none()  # implementations depend on it
+    key = function, context, tuple(args), str(flags and flags._values)
+    found = _resolved.get(key)
+    if found is None:
+        signature = _resolve(function, context, args, kws)
+        found = _resolved[key] = signature, function._impl_keys[signature.args]
+    signature, implementation = found
+    function._impl_keys[signature.args] = implementation
+    return signature
+
+
+def _is_plain(kind: Any) -> bool:
+    """Return whether a type has a fixed meaning: it is a number, an array, or a tuple of such types."""
+    return isinstance(kind, _PLAIN) or (isinstance(kind, types.BaseTuple) and all(map(_is_plain, kind.types)))
+
+
+BaseFunction.get_call_type = _call_type  # also called for each call in the functions that numba compiles for kernels
 
 
 def _choose_folder() -> None:
