@@ -32,7 +32,7 @@ def test_the_stopping_arc_is_that_of_a_period_and_of_braking(v, w):
         aside = 0.4 + w / v * s[k] + math.pi / 2
         disc = np.array([[x[k] + 0.3 * math.cos(aside), y[k] + 0.3 * math.sin(aside), 0.1]])
         expected = np.hypot(x - disc[0, 0], y - disc[0, 1]).min() - 0.1
-        found = stopping_clearance(1.0, 2.0, 0.4, v, w, deceleration, period, disc, WIDE)
+        found = stopping_clearance(1.0, 2.0, 0.4, v, w, deceleration, period, disc, WIDE, math.inf)
         assert found == pytest.approx(expected, abs=1e-4), along
 
 

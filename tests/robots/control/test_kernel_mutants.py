@@ -71,7 +71,7 @@ def test_an_arc_is_as_far_from_large_discs_as_its_points_are():
         ys = y - (np.cos(turned) - math.cos(yaw)) / curvature
         discs = rng.uniform((-6, -6, 0.05), (6, 6, 3.0), (3, 3))
         expected = min((np.hypot(xs - d[0], ys - d[1]) - d[2]).min() for d in discs)
-        found = arc_clearance(x, y, yaw, curvature, sweep, xs[-1], ys[-1], discs, WIDE)
+        found = arc_clearance(x, y, yaw, curvature, sweep, xs[-1], ys[-1], discs, WIDE, math.inf)
         assert found == pytest.approx(expected, abs=1e-5)
 
 

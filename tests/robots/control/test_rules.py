@@ -217,6 +217,6 @@ def test_an_arcs_clearance_is_that_of_its_points(yaw, curvature, angle, disc):
         (points - bounds[:2]).min(),
         (bounds[2:] - points).min(),
     )
-    exact = arc_clearance(0.0, 0.0, yaw, curvature, sweep, points[-1, 0], points[-1, 1], discs, bounds)
+    exact = arc_clearance(0.0, 0.0, yaw, curvature, sweep, points[-1, 0], points[-1, 1], discs, bounds, math.inf)
     assert exact == pytest.approx(brute, abs=5e-3)
     assert exact <= brute + 1e-9

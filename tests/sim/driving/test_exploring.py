@@ -14,7 +14,7 @@ from antdrive.planners import PlanResult, PlanStatus
 from antdrive.robots import PursuitState, Twist
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
-from antdrive.sim.driving._kernels_hits import beside, hit_within, near_polyline, point_at
+from antdrive.sim.driving._kernels_hits import beside, check, near_polyline, point_at, surrounding
 from antdrive.sim.driving.drive import Driver
 from antdrive.sim.driving.exploring import INTERVAL, SQUEEZED, TURNABLE
 from antdrive.sim.driving.parts import Step
@@ -693,13 +693,16 @@ def test_a_route_is_met_where_a_hit_is_nearer_than_it_needs(seed):
     angles = np.sort(rng.uniform(-2, 2, 40))
     beams, ranges = np.column_stack((np.cos(angles), np.sin(angles))), rng.uniform(0.5, 6, 40)
     ranges[::7], ranges[::11] = np.inf, -np.inf
-    points, needed, ahead = rng.uniform(-3, 3, (9, 2)), rng.uniform(0, 0.3, 9), np.sort(rng.uniform(0, 3, 9))
+    points, needed, arcs = rng.uniform(-3, 3, (20, 2)), rng.uniform(0, 0.3, 20), np.sort(rng.uniform(0, 3, 20))
+    first = int(rng.integers(20))
     x, y, yaw = rng.uniform(-1, 1, 3).tolist()
     turned = beams @ np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
     ends = (np.array([x, y]) + ranges[:, None] * turned)[np.isfinite(ranges)]
     room = np.hypot(*(points[:, None] - ends).transpose(2, 0, 1)).min(axis=1)
-    expected = bool((room < needed - (0.01 + 0.02 * ahead)).any())
-    assert hit_within(points, needed, ahead, 0.01, 0.02, x, y, yaw, beams, ranges) == expected
+    at = arcs[first]
+    expected = bool((room < needed - (0.01 + 0.02 * (arcs - at)))[first:].any())
+    route = points, np.arange(20.0), points, needed, arcs, surrounding(points, needed)
+    assert check(*route, at, first, 0.01, 0.02, x, y, yaw, beams, ranges)[2] == expected
 
 
 def test_a_point_of_a_route_is_interpolated():

@@ -102,18 +102,19 @@ def arc_clearance(
     ey: float,
     discs: Array,
     bounds: Array,
+    most: float,
 ) -> float:
-    """Return the distance from a circular arc to the nearest disc surface or wall.
+    """Return the distance from a circular arc to the nearest disc surface or wall, at most `most`.
 
     The arc leaves (x, y) along `yaw`, turns by `sweep` and ends at (ex, ey).
     """
     if abs(sweep) < 1e-6:
-        return segment_clearance(x, y, ex, ey, discs, bounds)
+        return min(most, segment_clearance(x, y, ex, ey, discs, bounds))
     radius = 1.0 / abs(curvature)
     cx, cy = x - math.sin(yaw) / curvature, y + math.cos(yaw) / curvature
     length = radius * abs(sweep) + ROUNDING
     mx, my = x + ex - 2.0 * cx, y + ey - 2.0 * cy  # towards the middle of the arc
-    best = min(wall_distance(x, y, bounds), wall_distance(ex, ey, bounds))
+    best = min(most, min(wall_distance(x, y, bounds), wall_distance(ex, ey, bounds)))
     for q in range(4):  # the arc's extreme points in x and y
         ux, uy = (1.0 - q if q % 2 == 0 else 0.0), (2.0 - q if q % 2 == 1 else 0.0)
         if is_beside_arc(ux, uy, mx, my, radius, sweep):

@@ -204,8 +204,9 @@ def stopping_clearance(
     period: float,
     discs: Array,
     bounds: Array,
+    most: float,
 ) -> float:
-    """Return the clearance of the stopping arc: one more period, then braking.
+    """Return the clearance of the stopping arc, at most `most`: one more period, then braking.
 
     A velocity is admissible if the robot can stop before the next obstacle on its arc (D. Fox, W. Burgard and
     S. Thrun, The dynamic window approach to collision avoidance, IEEE Robotics & Automation Magazine 4, 1997).
@@ -214,7 +215,7 @@ def stopping_clearance(
     sweep = w / v * length
     chord = length if abs(sweep) < 1e-6 else 2.0 * v / w * math.sin(0.5 * sweep)
     ex, ey = x + chord * math.cos(yaw + 0.5 * sweep), y + chord * math.sin(yaw + 0.5 * sweep)
-    return arc_clearance(x, y, yaw, w / v, sweep, ex, ey, discs, bounds)
+    return arc_clearance(x, y, yaw, w / v, sweep, ex, ey, discs, bounds, most)
 
 
 @leaf
@@ -238,7 +239,7 @@ def find_carrot(
         bearing = math.atan2(left, ahead)
         if abs(bearing) < tuning.rotate_above:
             curvature = 2.0 * left / (distance * distance)
-            if arc_clearance(x, y, yaw, curvature, 2.0 * bearing, cx, cy, discs, bounds) >= clearance:
+            if arc_clearance(x, y, yaw, curvature, 2.0 * bearing, cx, cy, discs, bounds, clearance) >= clearance:
                 return Carrot(look, left, distance, bearing, True)
         if look <= shortest:
             return Carrot(look, left, distance, bearing, False)
@@ -393,11 +394,11 @@ def full_braking(
     held = w * new_v / v if v > 0.0 else 0.0
     if new_v == 0.0:
         return new_v, held
-    clear = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, discs, bounds)
+    clear = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, discs, bounds, required)
     if clear >= required:
         return new_v, held
     steered = reachable_yaw_rate(curvature * new_v, w, period, limits)
-    if stopping_clearance(x, y, yaw, new_v, steered, deceleration, period, discs, bounds) <= clear:
+    if stopping_clearance(x, y, yaw, new_v, steered, deceleration, period, discs, bounds, required) <= clear:
         return new_v, held
     return keep_wheels_within(new_v, steered, v, period, limits)
 
@@ -452,7 +453,7 @@ def pursue(
     required = min(tuning.stopping_clearance, clearance)
     if (
         new_v > tuning.creep_speed
-        and stopping_clearance(x, y, yaw, new_v, new_w, limits.acceleration, period, discs, bounds) < required
+        and stopping_clearance(x, y, yaw, new_v, new_w, limits.acceleration, period, discs, bounds, required) < required
     ):
         limiter = BRAKING
         new_v, new_w = full_braking(x, y, yaw, v, w, curvature, required, discs, bounds, limits, tuning)

@@ -35,6 +35,7 @@ from antdrive.worlds.world import by_geometry
 
 SPACING = 0.02  # distance between the samples along a route [m]
 SQUARE = 0.5  # minimum side of a square of the obstacle index [m]
+SIDE = 1  # place of the side of an index of obstacles among the numbers of a packed path
 EVERYTHING = 1e6  # side of the single square that holds all obstacles [m]
 MAX_SQUARES = 250_000  # larger worlds have larger squares
 
@@ -138,9 +139,12 @@ class TrackedPath:
         Args:
             obstacles: index of the known obstacles
         """
-        return TrackedPath(
-            self.route, self.goal_distance, self.samples, obstacles, self.limits, self.tuning, self.backwards
-        )
+        *samples, _, _, _, corners, numbers = self.packed
+        numbers = numbers.copy()
+        *arrays, numbers[SIDE] = obstacles
+        path = object.__new__(TrackedPath)
+        vars(path).update(vars(self), obstacles=obstacles, packed=(*samples, *arrays, corners, numbers))
+        return path
 
     @property
     def ignoring_turn_clearance(self) -> TrackedPath:

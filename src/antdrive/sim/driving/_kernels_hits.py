@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from antdrive.worlds._kernels import ROUNDING, Array, inline, kernel
+from antdrive.worlds._kernels import ROUNDING, Array, inline, kernel, leaf
 
 BLOCK = 8  # points of a route that share one rectangle
 
@@ -84,35 +84,38 @@ def beside(discs: Array, points: Array, distance: float) -> Array:
     return out[:count].copy()
 
 
-@kernel
-def hit_within(
-    points: Array, needed: Array, ahead: Array, tolerance: float, blur: float, x0: float, y0: float, yaw: float,
-    beams: Array, ranges: Array,
-) -> bool:  # fmt: skip
-    """Return whether a beam from (x0, y0) ends within needed[i] of point i, less `tolerance` and `blur` * ahead[i]."""
-    distances = needed - (tolerance + blur * ahead)
-    x_min, x_max, y_min, y_max, most = math.inf, -math.inf, math.inf, -math.inf, 0.0
-    for i in range(points.shape[0]):
-        x_min, x_max = min(x_min, points[i, 0]), max(x_max, points[i, 0])
-        y_min, y_max = min(y_min, points[i, 1]), max(y_max, points[i, 1])
-        most = max(most, distances[i])
-    blocks = surrounding(points, distances)
+@leaf
+def check(
+    xy: Array, arc: Array, points: Array, needed: Array, arcs: Array, blocks: Array, at: float, first: int,
+    tolerance: float, blur: float, x0: float, y0: float, yaw: float, beams: Array, ranges: Array,
+) -> tuple[float, float, bool]:  # fmt: skip
+    """Return the point `at` an arc length of a polyline, and whether a beam from (x0, y0) ends near a route point ahead.
+
+    Such a beam ends within needed[i] of a point i >= `first`, less `tolerance` and `blur` * (arcs[i] - at). `blocks` are from
+    `surrounding`, for distances that are no shorter.
+    """
+    x_min, x_max, y_min, y_max = math.inf, -math.inf, math.inf, -math.inf
+    begin = first // BLOCK
+    for k in range(begin, blocks.shape[0]):
+        x_min, x_max = min(x_min, blocks[k, 0]), max(x_max, blocks[k, 1])
+        y_min, y_max = min(y_min, blocks[k, 2]), max(y_max, blocks[k, 3])
+    px, py = point_at(xy, arc, at)
     cos, sin = math.cos(yaw), math.sin(yaw)
     for j in range(beams.shape[0]):
         if not 0.0 <= ranges[j] < math.inf:
             continue
         x = x0 + ranges[j] * (cos * beams[j, 0] - sin * beams[j, 1])
         y = y0 + ranges[j] * (sin * beams[j, 0] + cos * beams[j, 1])
-        if x < x_min - most or x > x_max + most or y < y_min - most or y > y_max + most:
+        if x < x_min or x > x_max or y < y_min or y > y_max:
             continue
-        for k in range(blocks.shape[0]):
+        for k in range(begin, blocks.shape[0]):
             if x < blocks[k, 0] or x > blocks[k, 1] or y < blocks[k, 2] or y > blocks[k, 3]:
                 continue
-            for i in range(BLOCK * k, min(BLOCK * (k + 1), points.shape[0])):
-                dx, dy = points[i, 0] - x, points[i, 1] - y
-                if distances[i] > 0.0 and dx * dx + dy * dy < distances[i] * distances[i]:
-                    return True
-    return False
+            for i in range(max(first, BLOCK * k), min(BLOCK * (k + 1), points.shape[0])):
+                dx, dy, distance = points[i, 0] - x, points[i, 1] - y, needed[i] - (tolerance + blur * (arcs[i] - at))
+                if distance > 0.0 and dx * dx + dy * dy < distance * distance:
+                    return px, py, True
+    return px, py, False
 
 
 @kernel
@@ -128,7 +131,7 @@ def surrounding(points: Array, distances: Array) -> Array:
     return out
 
 
-@kernel
+@leaf
 def point_at(xy: Array, arc: Array, at: float) -> tuple[float, float]:
     """Return the point of a polyline at a distance from its start; `arc` holds the arc lengths of its points."""
     k = min(max(int(np.searchsorted(arc, at)), 1), arc.shape[0] - 1)

@@ -25,7 +25,7 @@ from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.parts import RouteGuide, Rows
 from antdrive.sim.driving.recovery import TRAIL, Recovery, ScanTurn
 from antdrive.sim.driving.routes import RoutePlanner, bounds_of
-from antdrive.sim.driving.survey import PATIENCE, Survey, table_logged
+from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey, table_logged
 from antdrive.sim.policy import (
     BACKED,
     DISCOVERED,
@@ -51,7 +51,6 @@ SAMPLES = 0.06  # spacing of the points of a route that get speed limits and loo
 SPARE = 0.25  # the controller knows obstacles this much beyond its longest arcs [m]
 INTERVAL = 0.15  # shortest time between two plans [s]
 COVERS = 1e-3  # hits this close to the robot or its goal count as map errors [m]
-ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hits than to mapped obstacles [m]
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
@@ -83,8 +82,7 @@ class Exploration(RouteGuide):
         self.log, self.walls = [], []
         self._routes, self._policy = planner, policy
         self._task, self._hz, self._robot = planner.task, planner.hz, planner.robot
-        self._ahead, self._needed = np.empty((0, 2)), np.empty(0)
-        self._arcs = np.empty(0)
+        self._points: RoutePoints | None = None
         self._checked = self._indexed = 0
         self._planned_at = -math.inf
         self.lost, self._failures, self._gave_up_at = False, 0, -math.inf
@@ -236,7 +234,7 @@ class Exploration(RouteGuide):
         near = dataclasses.replace(task, world=_world(bounds, discs))
         route = smooth(answer, grid, with_obstacles(near, avoided), kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
-        self._note_route(route, near.world, grid.inflate)
+        self._points = RoutePoints.of(route, near.world, grid.inflate)
         return route, tracked
 
     def _bounds(self, growth: float, pose: Pose) -> Bounds:
@@ -326,10 +324,12 @@ class Exploration(RouteGuide):
         if self._checked == self.survey.whole:
             return ""
         self._checked = self.survey.whole
-        deviation = math.dist(_kernels_hits.point_at(tracked.samples.xy, tracked.samples.arc, arc), pose[:2])
-        if deviation > self._policy.max_deviation:
+        assert self._points is not None
+        path = tracked.samples.xy, tracked.samples.arc
+        place, hit = self.survey.check(path, self._points, arc, int(arc / ROUTE_CHECK_STEP))
+        if math.dist(place, pose[:2]) > self._policy.max_deviation:
             return STRAYED
-        return DISCOVERED if self._discovered(pose, arc) else ""
+        return DISCOVERED if hit else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return a new path from a pose; None if there is none, or a scan turn comes first."""
@@ -392,21 +392,6 @@ class Exploration(RouteGuide):
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
         """Return the array `seen`: the discs behind each plan. `cells` is empty, since the log has no grid for them."""
         return {"seen": table_logged(self._seen, 4, log, per_tick), "cells": np.empty((0, 2), dtype=np.int32)}
-
-    # ---- the route ahead
-
-    def _note_route(self, route: Route, world: World, inflate: float) -> None:
-        """Note the points of a route and their required clearance, for route checks."""
-        arcs = np.arange(0.0, route.length + ROUTE_CHECK_STEP, ROUTE_CHECK_STEP)
-        self._arcs = arcs
-        self._ahead = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
-        self._needed = np.minimum(point_clearance(world, self._ahead), inflate)
-
-    def _discovered(self, pose: Pose, arc: float) -> bool:
-        """Return whether the last scan hit something on the route ahead."""
-        first = int(arc / ROUTE_CHECK_STEP)
-        ahead, needed = self._ahead[first:], self._needed[first:]
-        return len(ahead) > 0 and self.survey.hit_within(ahead, needed, self._arcs[first:] - arc)
 
 
 def _world(bounds: Bounds, discs: Floats) -> World:

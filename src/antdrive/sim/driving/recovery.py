@@ -126,11 +126,10 @@ class Recovery:
 
     def held(self, now: float, pose: Pose) -> bool:
         """Return whether a scan turn is due: held by unknown ground for long, or a narrow field of view and no turn so far."""
-        if not self._may_turn(pose):
+        first = self._turned_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW
+        if not first and now - self._held_since <= HELD_TIME:
             return False
-        if self._turned_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW:
-            return True
-        return now - self._held_since > HELD_TIME and self.held_by_unknown(pose)
+        return self._may_turn(pose) and (first or self.held_by_unknown(pose))
 
     def held_by_unknown(self, pose: Pose) -> bool:
         """Return whether the robot stands because ground ahead is unknown, rather than because of hits."""

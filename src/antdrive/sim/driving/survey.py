@@ -20,11 +20,11 @@ from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import scans_logged
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import SCANNED
-from antdrive.sim.sensing.mapping import OccupancyMap, clear_distance, clear_turn
+from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers
-from antdrive.worlds import Task, Trajectories, World
+from antdrive.worlds import Route, Task, Trajectories, World, point_clearance
 
 MAP_CELL = 0.05  # side of the map's cells [m]
 HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # range up to which hits enter the map [m]
@@ -32,6 +32,7 @@ RECENT = 1.0  # after a reset, scans up to this age enter the new map [s]
 PAD = 0.01  # distance kept from hits and from unknown ground, for rounding of ranges and cells [m]
 PATIENCE = 3  # failed plans in a row before the map is reset
 TOLERANCE = 0.008  # clearance that a route may lose without a replan [m]
+ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 BLUR = 0.02  # additional allowance per metre of distance [m/m]
 SHARPEST = 0.05  # arcs of a smaller radius are treated as turns on the spot [m]
 FAR_AMONG_MOVERS = 15.0  # matching range among movers, which hide near landmarks [m]
@@ -67,6 +68,23 @@ def table_logged(
     kept = [(tick * per_tick, lines) for tick, lines in taken if tick * per_tick < len(log.t)]
     tables = [np.column_stack((np.full(len(lines), row), lines)) for row, lines in kept]
     return np.concatenate(tables or [np.empty((0, columns))]).astype(np.float32)
+
+
+class RoutePoints(NamedTuple):
+    """Points of a route for route checks, `ROUTE_CHECK_STEP` apart."""
+
+    xy: Floats  # (N, 2) [m]
+    needed: Floats  # required clearance (N,) [m]
+    arcs: Floats  # distance along the route (N,) [m]
+    blocks: Floats  # rectangles around consecutive points with their clearances (K, 4) [m]
+
+    @classmethod
+    def of(cls, route: Route, world: World, inflate: float) -> RoutePoints:
+        """Return the points of a route, which keep `inflate` or else their clearance [m]."""
+        arcs = np.arange(0.0, route.length + ROUTE_CHECK_STEP, ROUTE_CHECK_STEP)
+        xy = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
+        needed = np.minimum(point_clearance(world, xy), inflate)
+        return cls(xy, needed, arcs, _kernels_hits.surrounding(xy, needed))
 
 
 class MoverTracking:
@@ -230,7 +248,7 @@ class Survey(Scans):
         super().__init__(sensor)
         self.lidar = sensor.scanner.lidar
         foot = robot.footprint
-        self._footprint = dataclasses.replace(foot, rounding=foot.rounding + PAD)
+        self._shape = shape_of(dataclasses.replace(foot, rounding=foot.rounding + PAD))
         self._turning_room = turning_room(robot.radius)
         self._goal = goal
         self.tracking = tracking
@@ -271,12 +289,14 @@ class Survey(Scans):
         near = np.where(standing <= FAR_AMONG_MOVERS, standing, np.inf)
         return without_sliding(estimate, corrected, self.map.endpoints(estimate, near))
 
-    def hit_within(self, points: Floats, needed: Floats, ahead: Floats) -> bool:
-        """Return whether a beam of the last scan ended clearly within the required clearance of a route point."""
+    def check(self, path: tuple[Floats, Floats], points: RoutePoints, at: float, first: int) -> tuple[Point, bool]:
+        """Return a path's point at an arc length, and whether a beam of the last scan ended clearly within the required
+        clearance of a route point from `first` on."""
         scan = self.scans[-1]
-        x, y, yaw = self.lidar.pose_on(scan.estimate)
+        eye = self.lidar.pose_on(scan.estimate)
         ranges = scan.ranges if scan.movers is None else np.where(scan.movers, np.inf, scan.ranges)
-        return bool(_kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, ranges))
+        x, y, hit = _kernels_hits.check(*path, *points, at, first, TOLERANCE, BLUR, *eye, self.map.beams, ranges)
+        return (x, y), hit
 
     def reset(self, pose: Pose) -> None:
         """Reset the map to the latest scans: older hits may be displaced by drift.
@@ -290,15 +310,13 @@ class Survey(Scans):
 
     def clear_distance(self, pose: Pose, speed: float, yaw_rate: float, longest: float) -> float:
         """Return how far the robot can drive on an arc over observed free ground [m]."""
-        return clear_distance(self.map, pose, speed, yaw_rate, self._footprint, longest)
+        return clear_way(self.map, pose, speed, yaw_rate, self._shape, longest)
 
     def clear_turn(self, pose: Pose, yaw_rate: float, farthest: float) -> float:
         """Return how far the robot can turn on the spot over observed free ground [rad]."""
-        return clear_turn(self.map, pose, yaw_rate, self._footprint, farthest)
+        return clear_way(self.map, pose, 0.0, yaw_rate, self._shape, farthest)
 
     def clear_way(self, pose: Pose, twist: Twist, farthest: float, *, freespace: bool = False) -> float:
         """Return how far a twist leads over observed free ground [m], for near turns [rad]; `freespace` opens unknown ground."""
-
-        if abs(twist.speed) <= SHARPEST * abs(twist.yaw_rate):
-            return clear_turn(self.map, pose, twist.yaw_rate, self._footprint, farthest, freespace=freespace)
-        return clear_distance(self.map, pose, *twist, self._footprint, farthest, freespace=freespace)
+        speed = 0.0 if abs(twist.speed) <= SHARPEST * abs(twist.yaw_rate) else twist.speed
+        return clear_way(self.map, pose, speed, twist.yaw_rate, self._shape, farthest, freespace=freespace)

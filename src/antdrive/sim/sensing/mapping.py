@@ -7,10 +7,9 @@ beams, so its cost is independent of the map's size.
 
 from __future__ import annotations
 
-import functools
 import math
 import mmap
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +27,7 @@ EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 _NONE = np.empty((0, 3))
 Cells = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
+Shape: TypeAlias = tuple[float, float, float, Floats]
 
 BLOCK = 64  # growth increment of the map [cells]
 OFTEN = 12.5  # rate of whole scans, if the lidar's rate allows [Hz]
@@ -135,7 +135,7 @@ class OccupancyMap:
         return self._plain
 
     def insert(self, pose: Pose, ranges: Floats, omitted: Mask | None = None) -> Cells:
-        """Enter a scan, and return the cells that became free or occupied (K, 2): row, col.
+        """Enter a scan, and return the cells that became free or occupied (K, 2): row, col; valid until the next call.
 
         Args:
             pose: the estimated pose of the robot, not of its lidar
@@ -162,7 +162,7 @@ class OccupancyMap:
                 self._plain, self._changed, count,
             )  # fmt: skip
         self._spare -= count
-        return self._changed[:count].copy()
+        return self._changed[:count]
 
     def endpoints(self, pose: Pose, ranges: Floats) -> Floats:
         """Return the ends of the beams (beams, 2) [m]; nan without a measurable hit.
@@ -378,7 +378,7 @@ def clear_distance(
     """
     if speed == 0.0:
         return 0.0 if yaw_rate else limit
-    return _clear(seen, pose, speed, yaw_rate, footprint, limit, freespace)
+    return clear_way(seen, pose, speed, yaw_rate, shape_of(footprint), limit, freespace=freespace)
 
 
 def clear_turn(
@@ -394,17 +394,28 @@ def clear_turn(
         limit: the largest angle of interest [rad]
         freespace: whether unknown ground counts as free
     """
-    return _clear(seen, pose, 0.0, yaw_rate, footprint, limit, freespace)
+    return clear_way(seen, pose, 0.0, yaw_rate, shape_of(footprint), limit, freespace=freespace)
 
 
-def _clear(
-    seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float, freespace: bool
+def clear_way(
+    seen: OccupancyMap,
+    pose: Pose,
+    speed: float,
+    yaw_rate: float,
+    shape: Shape,
+    limit: float,
+    *,
+    freespace: bool = False,
 ) -> float:
-    shape = footprint.half_length, footprint.half_width, footprint.rounding
+    """Return `clear_distance` of a robot with a speed, `clear_turn` of one without, for a footprint's `shape_of`."""
     arrays = tuple(seen.arrays._replace(free=~seen.occupied)) if freespace else seen.plain
-    return float(_kernels_sight.clear_way(*pose, speed, yaw_rate, *shape, _corners(footprint), limit, arrays))
+    length, width, rounding, corners = shape
+    clear: float = _kernels_sight.clear_way(*pose, speed, yaw_rate, length, width, rounding, corners, limit, arrays)
+    return clear
 
 
-@functools.lru_cache(maxsize=16)
-def _corners(footprint: Footprint) -> Floats:
-    return kernel_shape(footprint)[1]
+def shape_of(footprint: Footprint) -> Shape:
+    """Return a footprint for `clear_way`: half length, half width, rounding and corners (K, 2) [m]."""
+    sizes, corners = kernel_shape(footprint)
+    length, width, rounding = sizes.tolist()
+    return length, width, rounding, corners
