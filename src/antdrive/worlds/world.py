@@ -225,7 +225,7 @@ class Task:
         xmin, ymin, xmax, ymax = self.world.bounds
         if not (xmin <= x <= xmax and ymin <= y <= ymax):
             raise FieldError(key, f"({x:g}, {y:g}) is out of bounds {list(self.world.bounds)}")
-        discs = self.world.discs
+        discs = self.world._discs
         near = (np.abs(x - discs[:, 0]) <= discs[:, 2]) & (np.abs(y - discs[:, 1]) <= discs[:, 2])
         for i in np.flatnonzero(near).tolist():
             disc = self.world.obstacles[i]

@@ -16,7 +16,7 @@ import numpy as np
 
 from antdrive.worlds._kernels import Array, inline, kernel, leaf
 
-GRAINS = 2
+GRAINS, FINER = 2, 1  # grains along the side of a cell, and its binary logarithm
 SQUARE, SHIFT = 8, 3  # cells along the side of a square, and its binary logarithm
 HIT, MISS, MOST = 0.85, 0.4, 3.5  # steps of the log-odds and their upper limit (Hornung et al. 2013, section 4)
 SLACK = 1e-4  # added to the radius of discs; boxes are kept in single precision [m]
@@ -116,24 +116,25 @@ def enter_hits(fan: Fan, whole: bool, left_out: Array, horizon: float, scan: int
 
     A hit may come nearer by as much as a cell between two whole scans, which the robot must know at once.
     """
-    size = m.odds.size
+    size, cols = m.odds.size, m.occupied.shape[1]
     odds, stamp, box = m.odds.reshape(size), m.stamp.reshape(size), m.box.reshape(size, 4)
     occupied, slot = m.occupied.reshape(m.occupied.size), m.slot.reshape(m.slot.size)
-    found, at = np.empty((4, left_out.shape[0])), np.empty(left_out.shape[0], dtype=np.int64)
+    found, at = np.empty((2, left_out.shape[0]), dtype=np.float32), np.empty(left_out.shape[0], dtype=np.int32)
     locate(fan, left_out, horizon, m, found, at)
     count = 0
     for i in range(at.shape[0]):
         if at[i] < 0:
             continue
-        cell = np.uint64(at[i])  # a signed index costs a comparison each time
-        x, y, u, v = found[0, i], found[1, i], found[2, i], found[3, i]
-        row, col = int(v), int(u)
+        # A signed index costs a comparison each time.
+        grain, px, py = np.uint32(at[i]), found[0, i], found[1, i]
+        cell = grain >> np.uint32(2 * FINER)
         if not occupied[cell]:
+            row, col = cell // cols, cell % cols
             occupy(row, col, scan, m)
             changed[count, 0], changed[count, 1] = row, col
             count += 1
-        k = np.uint64(GRAINS * (GRAINS * slot[cell] + int(GRAINS * (v - row))) + int(GRAINS * (u - col)))
-        px, py, first = np.float32(x), np.float32(y), odds[k] <= 0.0
+        k = np.uint32((slot[cell] << 2 * FINER) | (at[i] & (GRAINS * GRAINS - 1)))
+        first = odds[k] <= 0.0
         if first:
             box[k, 0], box[k, 1], box[k, 2], box[k, 3] = px, py, px, py
         else:
@@ -147,7 +148,7 @@ def enter_hits(fan: Fan, whole: bool, left_out: Array, horizon: float, scan: int
 
 @inline
 def locate(fan: Fan, left_out: Array, horizon: float, m: MapArrays, found: Array, at: Array) -> None:
-    """Write the ends of the beams: x, y [m], column and row [cells] (4, B), and the number of the cell (B,), -1 for none.
+    """Write the ends of the beams (2, B) [m], and their cells' numbers with the grains' as last bits (B,), -1 for none.
 
     Branch-free for vectorisation.
     """
@@ -160,8 +161,11 @@ def locate(fan: Fan, left_out: Array, horizon: float, m: MapArrays, found: Array
         u, v = (px - left) / cell, (py - low) / cell
         entered = (not left_out[i]) & (ranges[i] > 0.0) & (ranges[i] <= horizon)
         entered &= (u >= 0.0) & (u < cols) & (v >= 0.0) & (v < rows)
-        found[0, i], found[1, i], found[2, i], found[3, i] = px, py, u, v
-        at[i] = int(v if entered else 0.0) * cols + int(u if entered else 0.0) if entered else -1
+        u, v = u if entered else 0.0, v if entered else 0.0
+        row, col = np.int32(v), np.int32(u)
+        grain = GRAINS * np.int32(GRAINS * (v - row)) + np.int32(GRAINS * (u - col))
+        found[0, i], found[1, i] = px, py
+        at[i] = GRAINS * GRAINS * (row * np.int32(cols) + col) + grain if entered else -1
 
 
 @leaf

@@ -57,6 +57,8 @@ class OccupancyMap:
         turns: whole scans enter the free paths of every `turns`-th beam
         beams: directions of the lidar's beams in its frame (beams, 2)
         layouts: number of layouts; cell indices change when the map grows
+        arrays: arrays of the map by name
+        plain: the same arrays, for kernels
 
     Args:
         lidar: the scanning lidar
@@ -107,32 +109,22 @@ class OccupancyMap:
     @property
     def origin(self) -> Point:
         """Lower left corner of cell (0, 0) [m]."""
-        return float(self._arrays.frame[0]), float(self._arrays.frame[1])
+        return float(self.arrays.frame[0]), float(self.arrays.frame[1])
 
     @property
     def occupied(self) -> Mask:
         """Cells with hits (rows, cols); rows along +y. A read-only live view."""
-        return _read_only(self._arrays.occupied)
+        return _read_only(self.arrays.occupied)
 
     @property
     def seen_free(self) -> Mask:
         """Cells that were observed as free and are not occupied (rows, cols). A read-only live view."""
-        return _read_only(self._arrays.free)
+        return _read_only(self.arrays.free)
 
     @property
     def whole(self) -> bool:
         """Whether the next scan is entered as a whole."""
         return self.scans % self.share == 0
-
-    @property
-    def arrays(self) -> kernels.MapArrays:
-        """Arrays of the map by name."""
-        return self._arrays
-
-    @property
-    def plain(self) -> tuple[Any, ...]:
-        """Arrays of the map, for kernels."""
-        return self._plain
 
     def insert(self, pose: Pose, ranges: Floats, omitted: Mask | None = None) -> Cells:
         """Enter a scan, and return the cells that became free or occupied (K, 2): row, col; valid until the next call.
@@ -154,12 +146,12 @@ class OccupancyMap:
         mask = self._none if omitted is None else np.ascontiguousarray(omitted)
         count = kernels.insert(
             x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, turn, turns, mask,
-            self.horizon, self.trust, self.scans, self._plain, self._changed,
+            self.horizon, self.trust, self.scans, self.plain, self._changed,
         )  # fmt: skip
         if self._moving and not rest:
             count = kernels.see_far(
                 x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self.trust, self.scans,
-                self._plain, self._changed, count,
+                self.plain, self._changed, count,
             )  # fmt: skip
         self._spare -= count
         return self._changed[:count]
@@ -188,7 +180,7 @@ class OccupancyMap:
             settle: scans after which a new object counts as standing
         """
         out = np.empty(len(points), dtype=np.bool_)
-        kernels.explained(np.ascontiguousarray(points), self.scans, settle, self._plain, out)
+        kernels.explained(np.ascontiguousarray(points), self.scans, settle, self.plain, out)
         return out
 
     def discs(self, within: Bounds | None = None) -> Floats:
@@ -197,7 +189,7 @@ class OccupancyMap:
         Args:
             within: omit cells outside this rectangle [m]; None: all
         """
-        discs: Floats = kernels.discs_within(*(within or EVERYWHERE), self._plain)
+        discs: Floats = kernels.discs_within(*(within or EVERYWHERE), self.plain)
         return discs
 
     def clear_hits(self, place: Point, radius: float) -> Cells:
@@ -207,7 +199,7 @@ class OccupancyMap:
             place: x, y [m]
             radius: distance around it [m]
         """
-        count = kernels.forget(*place, radius, self._plain, self._changed)
+        count = kernels.forget(*place, radius, self.plain, self._changed)
         return self._changed[:count].copy()
 
     def mark_free(self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None) -> Cells:
@@ -222,7 +214,7 @@ class OccupancyMap:
         discs, walls = (_NONE, EVERYWHERE) if world is None else (world.discs, world.bounds)
         if movers is not None:
             discs = np.concatenate((discs, movers))
-        count = kernels.take_as_free(*place, radius, discs, np.array(walls), self._plain, self._changed)
+        count = kernels.take_as_free(*place, radius, discs, np.array(walls), self.plain, self._changed)
         return self._changed[:count].copy()
 
     def reset_around(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:
@@ -249,7 +241,7 @@ class OccupancyMap:
         rows, cols = (
             side[(side >= 0) & (side < most) & (side + shift >= 0) & (side + shift < far)]
             for side, most, shift, far in zip(
-                (rows, cols), self._arrays.free.shape, (up, across), other._arrays.free.shape, strict=True
+                (rows, cols), self.arrays.free.shape, (up, across), other.arrays.free.shape, strict=True
             )
         )
         sides = zip((cols, rows), self.origin, place, strict=True)
@@ -257,20 +249,20 @@ class OccupancyMap:
             np.maximum(np.abs(low + (side + 0.5) * self.cell - at) - 0.5 * self.cell, 0) for side, low, at in sides
         )
         within = dx**2 + dy[:, None] ** 2 <= radius * radius
-        self._arrays.free[np.ix_(rows, cols)] = within & other._arrays.free[np.ix_(rows + up, cols + across)]
-        kernels.count_unseen(self._arrays.free, self._arrays.unseen)
+        self.arrays.free[np.ix_(rows, cols)] = within & other.arrays.free[np.ix_(rows + up, cols + across)]
+        kernels.count_unseen(self.arrays.free, self.arrays.unseen)
 
     def _make_room(self, x: float, y: float) -> None:
         """Grow the map if the lidar's horizon would leave it."""
         x_low, x_high, y_low, y_high = self._room
         if x_low <= x <= x_high and y_low <= y <= y_high:
             return
-        old, far, (x0, y0) = self._arrays, self.horizon, self.origin
+        old, far, (x0, y0) = self.arrays, self.horizon, self.origin
         rows, cols = old.free.shape
         need = (x0 + far - x, y0 + far - y, x + far - x0 - cols * self.cell, y + far - y0 - rows * self.cell)
         more = self._blocks(*need)
         self._lay_out(x0, y0, rows, cols, more, old)
-        new, count = self._arrays, int(old.count[0])
+        new, count = self.arrays, int(old.count[0])
         new.free[more[1] : more[1] + rows, more[0] : more[0] + cols] = old.free
         kernels.count_unseen(new.free, new.unseen)
         new.cells[:count, :2] += (more[1], more[0])
@@ -302,7 +294,7 @@ class OccupancyMap:
         kernels.count_unseen(free, unseen)
         if old is None:
             grains = kernels.GRAINS * kernels.GRAINS
-            self._arrays: kernels.MapArrays = kernels.MapArrays(
+            self.arrays = kernels.MapArrays(
                 free=free,
                 unseen=unseen,
                 occupied=occupied,
@@ -315,8 +307,8 @@ class OccupancyMap:
                 box=np.zeros((LISTED, grains, 4), dtype=np.float32),
             )
         else:
-            self._arrays = old._replace(free=free, unseen=unseen, occupied=occupied, slot=slot, frame=frame)
-        self._plain = tuple(self._arrays)
+            self.arrays = old._replace(free=free, unseen=unseen, occupied=occupied, slot=slot, frame=frame)
+        self.plain: tuple[Any, ...] = tuple(self.arrays)
         self._changed = _zeros((shape[0] * shape[1], 2), dtype=np.int32)
         (x, y), far = self.origin, self.horizon
         self._room = x + far, x + shape[1] * self.cell - far, y + far, y + shape[0] * self.cell - far
@@ -324,16 +316,16 @@ class OccupancyMap:
 
     def _lengthen_lists(self) -> None:
         """Extend the lists of occupied cells if a scan could fill them."""
-        held, room = int(self._arrays.count[0]), len(self._arrays.cells)
+        held, room = int(self.arrays.count[0]), len(self.arrays.cells)
         missing = held + self._lidar.beams - room
         if missing > 0:
             room += max(missing, room)
-            lists = {name: getattr(self._arrays, name) for name in ("cells", "odds", "stamp", "box")}
+            lists = {name: getattr(self.arrays, name) for name in ("cells", "odds", "stamp", "box")}
             longer = {name: np.zeros((room, *rows.shape[1:]), dtype=rows.dtype) for name, rows in lists.items()}
             for name, rows in lists.items():
                 longer[name][: len(rows)] = rows
-            self._arrays = self._arrays._replace(**longer)
-            self._plain = tuple(self._arrays)
+            self.arrays = self.arrays._replace(**longer)
+            self.plain = tuple(self.arrays)
         self._spare = room - held
 
 
