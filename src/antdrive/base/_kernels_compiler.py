@@ -28,7 +28,7 @@ import numba
 from numba.core import config, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.targetconfig import ConfigStack
-from numba.core.types.functions import BaseFunction
+from numba.core.types import functions
 
 from antdrive.base import kernel_cache
 from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
@@ -218,7 +218,10 @@ def _cached(dispatcher: Any, function: F) -> F:
     return dispatcher  # type: ignore[no-any-return]  # has the function's signature
 
 
-_resolve: Any = BaseFunction.get_call_type
+_function: Any = functions.BaseFunction
+_stack: Any = ConfigStack
+_tuple: Any = types.BaseTuple
+_resolve = _function.get_call_type
 _resolved: dict[Any, tuple[Any, Any]] = {}
 _PLAIN = (types.Number, types.Boolean, types.NoneType, types.SliceType, types.Array, types.NumberClass, types.DType)
 
@@ -230,7 +233,7 @@ def _call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
     """
     if kws or not all(map(_is_plain, args)):
         return _resolve(function, context, args, kws)
-    flags: Any = ConfigStack.top_or_none()  # implementations depend on it
+    flags = _stack.top_or_none()  # implementations depend on it
     key = function, context, tuple(args), str(flags and flags._values)
     found = _resolved.get(key)
     if found is None:
@@ -243,10 +246,10 @@ def _call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
 
 def _is_plain(kind: Any) -> bool:
     """Return whether a type has a fixed meaning: it is a number, an array, or a tuple of such types."""
-    return isinstance(kind, _PLAIN) or (isinstance(kind, types.BaseTuple) and all(map(_is_plain, kind.types)))
+    return isinstance(kind, _PLAIN) or (isinstance(kind, _tuple) and all(map(_is_plain, kind)))
 
 
-BaseFunction.get_call_type = _call_type  # also called for each call in the functions that numba compiles for kernels
+_function.get_call_type = _call_type  # also called for each call in the functions that numba compiles for kernels
 
 
 def _choose_folder() -> None:

@@ -370,12 +370,12 @@ def turn_in(
 
     It turns in on the way if it then stops where it has room to rotate: `turn_in_clearance`, or as much as on its curve.
     """
-    period, deceleration = tuning.period, limits.acceleration
+    period, deceleration, most = tuning.period, limits.acceleration, tuning.turn_in_clearance
     fastest = min(math.sqrt(limits.yaw_acceleration * abs(bearing)), limits.lateral_acceleration / new_v)
     turned = reachable_yaw_rate(math.copysign(fastest, bearing), w, period, limits)
-    kept = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, discs, bounds)
-    clear = stopping_clearance(x, y, yaw, new_v, turned, deceleration, period, discs, bounds)
-    return turned if clear >= min(max(kept, tuning.robot_radius), tuning.turn_in_clearance) else held
+    kept = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, discs, bounds, most)
+    clear = stopping_clearance(x, y, yaw, new_v, turned, deceleration, period, discs, bounds, most)
+    return turned if clear >= min(max(kept, tuning.robot_radius), most) else held
 
 
 @leaf
