@@ -211,6 +211,24 @@ def test_a_rotation_at_the_beginning_of_a_route_counts_as_length(jackal, yaw, ma
     assert grid.inflate == pytest.approx(jackal.radius + margin)
 
 
+def test_rotations_count_as_length_and_are_begun_on_the_way_only_without_movers(jackal):
+    guide = compose(scenario(jackal, margin=0.03)).guide
+    grid, plan = guide.first()
+    _, tracked = guide.route(grid, plan)
+    away = (*TASK.start[:2], TASK.start[2] + math.pi)
+    assert guide._turn_cost(TASK.start, grid, plan) == 0.0
+    assert guide._turn_cost(away, grid, plan) > 1.0
+    assert tracked.tuning.turn_in_clearance < 1.0
+    guide._movers = NoMovers()
+    assert guide._turn_cost(away, grid, plan) == 0.0
+    assert guide.route(grid, plan)[1].tuning.turn_in_clearance == math.inf
+
+
+class NoMovers:
+    def without_trails(self, discs, pose):
+        return discs
+
+
 @pytest.mark.parametrize(
     ("pose", "led", "outlined"),
     [

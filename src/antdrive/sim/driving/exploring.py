@@ -156,8 +156,11 @@ class Exploration(RouteGuide):
         return best[1:]
 
     def _turn_cost(self, pose: Pose, grid: Grid, answer: PlanResult) -> float:
-        """Return how far the robot could drive during the rotation in place at the beginning of a plan [m]."""
-        if not len(answer.cells):
+        """Return how far the robot could drive during the rotation in place at the beginning of a plan [m].
+
+        Among movers it is 0, and the robot does not turn in: measured, that costs certified drives (docs/notebook/movers.md).
+        """
+        if self._movers is not None or not len(answer.cells):
             return 0.0
         controller, robot = self._routes.controller, self._robot
         line = grid.xy(answer.line) - pose[:2]
@@ -276,7 +279,7 @@ class Exploration(RouteGuide):
                 stopping_clearance=tuning.stopping_clearance - give,
                 robot_radius=tuning.robot_radius + TURNING,
                 rounding=tuning.rounding + TURNING,
-                turn_in_clearance=robot.radius + TURNING_IN,
+                turn_in_clearance=robot.radius + TURNING_IN if self._movers is None else math.inf,
             ),
         )
 
