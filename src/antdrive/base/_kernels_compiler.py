@@ -229,7 +229,7 @@ _PLAIN = (types.Number, types.Boolean, types.NoneType, types.SliceType, types.Ar
 def _call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
     """Return the signature of a call of a built-in function or operator, resolved once for each combination of types.
 
-    numba tries dozens of templates for every `+`, with an error message for each that does not fit: a seventh of all compiling.
+    numba tries dozens of templates for every `+`, with an error message for each that does not fit: a fifth of a first run.
     """
     if kws or not all(map(_is_plain, args)):
         return _resolve(function, context, args, kws)
