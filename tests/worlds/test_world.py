@@ -5,7 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from antdrive.worlds import Disc, Route, World
+from antdrive.base.errors import FieldError
+from antdrive.base.records import derived
+from antdrive.worlds import Disc, Route, Task, World
 from antdrive.worlds.world import PointWorld
 
 ROOM = World("room", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 1.0), Disc(2.0, 6.0, 0.5)))
@@ -35,3 +37,13 @@ def test_it_has_the_cylinders_of_its_rows():
     assert np.array_equal(seen.discs, plain.discs)
     assert seen.obstacles == plain.obstacles
     assert dataclasses.replace(seen, name="b").obstacles == plain.obstacles
+
+
+def test_a_derived_task_has_the_other_values_unchecked_and_the_rest_of_the_first():
+    task = Task(World("a", BOUNDS), (1.0, 1.0, 0.0), (2.0, 2.0), goal_tolerance=0.1)
+    covered = World("b", BOUNDS, (Disc(1.0, 1.0, 0.3),))
+    made = derived(task, world=covered)
+    assert (made.world, made.start, made.goal, made.goal_tolerance) == (covered, task.start, task.goal, 0.1)
+    assert task.world.name == "a"
+    with pytest.raises(FieldError, match="inside obstacles"):
+        dataclasses.replace(task, world=covered)

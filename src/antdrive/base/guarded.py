@@ -98,7 +98,7 @@ class UserCode:
         who: the code's name in messages about the end of the process
         error_of: returns the exception to raise instead
         passing: classes of exceptions that pass unchanged
-        own: whether the code is antdrive's own, which needs no supervision
+        own: whether the code is antdrive's own, which needs no supervision and raises no `KeyboardInterrupt` itself
     """
 
     _outermost: UserCode | None = None
@@ -122,8 +122,8 @@ class UserCode:
         self.limit = plan_limit()
         if not self._own:
             supervision.begin(self._who, self.limit)
+            self._before = signal.getsignal(signal.SIGINT)
         UserCode._outermost = self
-        self._before = signal.getsignal(signal.SIGINT)
         if callable(self._before):
             signal.signal(signal.SIGINT, self._interrupt)
         if self.limit is not None:

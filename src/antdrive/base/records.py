@@ -9,7 +9,7 @@ import functools
 import inspect
 import re
 from collections.abc import Hashable, Mapping
-from typing import TYPE_CHECKING, Any, cast, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, cast, get_type_hints
 
 from annotated_types import Interval
 
@@ -17,6 +17,8 @@ from antdrive.base.errors import FieldError
 
 if TYPE_CHECKING:
     from pydantic import ConfigDict
+
+R = TypeVar("R")
 
 #: Rules of records and files, nested ones included: no type coercion, no unknown keys, no NaN or infinity.
 STRICT: ConfigDict = {"strict": True, "extra": "forbid", "allow_inf_nan": False, "frozen": True}
@@ -49,6 +51,13 @@ def ranges_of(kind: Hashable) -> Mapping[str, tuple[float, float]]:
 
 def _number(limit: Any) -> float:
     return float(limit)
+
+
+def derived(record: R, **changes: Any) -> R:
+    """Return a copy of a dataclass with other values, which are not checked: they are made of checked ones."""
+    made = object.__new__(type(record))
+    vars(made).update({name: getattr(record, name) for name in cast(Any, record).__dataclass_fields__} | changes)
+    return made
 
 
 def require_ranges(record: Any) -> None:

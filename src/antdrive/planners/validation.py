@@ -44,8 +44,7 @@ def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name:
         PlannerError: the planner raised another exception, or did not return a `PlanResult`.
     """
     with planner_errors(planner, name):
-        answer: Any = planner.plan(query, rng)
-    return require_result(planner, answer, name)
+        return require_result(planner, planner.plan(query, rng), name)
 
 
 def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.base import Bounds, Floats, Pose
+from antdrive.base.records import derived
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
 from antdrive.robots import TrackedPath, Twist, outline_of
 from antdrive.robots.control.pursuit import unsorted_obstacles
@@ -234,7 +235,7 @@ class Exploration(RouteGuide):
         self._seen.append((self._tick, task.world.discs))
         line = np.vstack([[pose[:2]], grid.xy(answer.line), [self._task.goal]])
         discs = _kernels_hits.near_polyline(line, task.world.discs, grid.inflate + CORRIDOR)
-        near = dataclasses.replace(task, world=_world(bounds, discs))
+        near = derived(task, world=_world(bounds, discs))
         route = smooth(answer, grid, with_obstacles(near, avoided), kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
         self._points = RoutePoints.of(route, near.world, grid.inflate)
@@ -262,7 +263,7 @@ class Exploration(RouteGuide):
             discs = self._movers.without_trails(discs, pose)
         ends = np.array((pose[:2], self._task.goal))
         discs = _kernels_hits.beside(discs, ends, COVERS)  # hits that cover one of them are map errors
-        known = dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
+        known = derived(self._task, world=_world(bounds, discs), start=pose)
         self._known_as = key, known
         return known
 

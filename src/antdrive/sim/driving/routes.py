@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import itertools
 import math
@@ -30,7 +31,7 @@ from antdrive.planners import (
     require_result,
     smooth,
 )
-from antdrive.planners.plan import Cell
+from antdrive.planners.plan import Capabilities, Cell
 from antdrive.robots import Footprint, PurePursuit, RobotSpec, TrackedPath, outline_of
 from antdrive.sim.driving.blockage import closed_cells, with_obstacles
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
@@ -108,11 +109,15 @@ class RoutePlanner:
         """Distance that plans keep between the robot's centre and every surface [m]."""
         return self.robot.radius + self.margin
 
+    @functools.cached_property
+    def can(self) -> Capabilities:
+        """The planner's capabilities."""
+        return capabilities_of(self.planner)
+
     @property
     def turns(self) -> bool:
         """Whether plans may keep the footprint clear instead of the disc."""
-        can = self.footprint != "disc" and not self.robot.footprint.is_disc
-        return can and capabilities_of(self.planner).turns
+        return self.footprint != "disc" and not self.robot.footprint.is_disc and self.can.turns
 
     @property
     def shapes(self) -> tuple[bool, ...]:
@@ -132,7 +137,7 @@ class RoutePlanner:
             return disc
         length = self._shortest(disc) if self.footprint == "auto" else math.inf
         cells = [min(self.cell, FINE)]
-        if capabilities_of(self.planner).iterative:
+        if self.can.iterative:
             cells = [self.cell, *(cells if length == math.inf else ())]
         inner = self.robot.footprint.inner_radius + self.outline_margins[-1]
         # No path of the footprint is shorter than that of the disc within it.
@@ -173,23 +178,24 @@ class RoutePlanner:
         Planners that need the world get one with additional discs. Others repair with a replanner and closed cells. Without a
         map and movers to avoid, planners without their own replanner plan from scratch.
         """
-        can, moving = capabilities_of(self.planner), bool(discs) or zone is not None
+        can, moving = self.can, bool(discs) or zone is not None
         if can.needs_world and (self.mapped or moving):
             task = with_obstacles(task, [*discs, *(zone.discs if zone is not None else ())])
             grid = rasterise(task.world, grid.cell, grid.inflate)
         query = Query.between(grid, task)
-        unreachable = PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
         if query.unreachable and not self.mapped:
-            return unreachable
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
             return self.plan(query, self.rng)
         closed = np.flatnonzero(closed_cells(query, discs, zone)) if moving else NO_CELLS
         with planner_errors(self.planner):
             # Without a map, movers change so many cells that repair is no faster than a new search.
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
-        answer = require_result(self.planner, answer)
+            answer = require_result(self.planner, answer)
         # A replanner knows cells only; it cannot tell that the first cell is unreachable for the robot.
-        return unreachable if query.unreachable else self.checked(query, answer)
+        if query.unreachable:
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+        return self.checked(query, answer)
 
     def observed(self, world: World, margin: float) -> Grid:
         """Return the grid of a map's discs for the disc, updated where they changed; valid until the next call."""
