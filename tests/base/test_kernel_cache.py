@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.base import kernel_cache
-from antdrive.base._kernels_compiler import _Entries, kernel
+from antdrive.base._kernels_compiler import _Entries, kernel, leaf
 
 MEASURE = (
     "from antdrive.worlds import Disc, World, point_clearance\n"
@@ -256,3 +256,15 @@ def test_a_call_with_a_literal_has_the_type_of_its_value():
 
     assert outer(3) == 8
     assert [str(one) for one in getattr(inner, "signatures", [])] in ([], ["(int64,)", "(bool,)"])
+
+
+def test_a_kernel_has_entries_for_python_and_kernels_only():
+    @leaf
+    def middle(low: float, high: float) -> float:
+        return 0.5 * (low + high)
+
+    assert middle(1.0, 2.0) == 1.5
+    for found in getattr(middle, "overloads", {}).values():
+        names = [function.name for function in found.library.get_defined_functions()]
+        assert found.fndesc.llvm_cpython_wrapper_name in names
+        assert found.fndesc.llvm_cfunc_wrapper_name not in names

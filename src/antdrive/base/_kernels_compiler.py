@@ -39,8 +39,8 @@ PATIENCE = 120.0  # longest wait for another process that compiles the same entr
 F = TypeVar("F", bound=Callable[..., Any])
 
 # IEEE arithmetic (no fastmath), so that results repeat bit for bit. `_nrt` counts references to arrays. Each kernel sets it,
-# because numba would otherwise take that of its first caller.
-_SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": True}
+# because numba would otherwise take that of its first caller. C does not call kernels.
+_SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": True, "no_cfunc_wrapper": True}
 
 
 def kernel(function: F) -> F:
