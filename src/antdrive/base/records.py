@@ -54,7 +54,7 @@ def _number(limit: Any) -> float:
 
 
 def derived(record: R, **changes: Any) -> R:
-    """Return a copy of a dataclass with other values, which are not checked: they are made of checked ones."""
+    """Return a copy of a dataclass with other fields or cached values, unchecked: they are made of checked ones."""
     made = object.__new__(type(record))
     vars(made).update({name: getattr(record, name) for name in cast(Any, record).__dataclass_fields__} | changes)
     return made

@@ -23,7 +23,7 @@ from annotated_types import Interval
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError
-from antdrive.base.records import meanings_of, require_ranges
+from antdrive.base.records import derived, meanings_of, require_ranges
 from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import NO_TURNS, PathSamples
@@ -142,9 +142,7 @@ class TrackedPath:
         *samples, _, _, _, corners, numbers = self.packed
         numbers = numbers.copy()
         *arrays, numbers[SIDE] = obstacles
-        path = object.__new__(TrackedPath)
-        vars(path).update(vars(self), obstacles=obstacles, packed=(*samples, *arrays, corners, numbers))
-        return path
+        return derived(self, obstacles=obstacles, packed=(*samples, *arrays, corners, numbers))
 
     @property
     def ignoring_turn_clearance(self) -> TrackedPath:
