@@ -430,18 +430,20 @@ def is_close(x: float, y: float, yaw: float, places: Array, radii: Array, weight
 
 @leaf
 def must_dodge(
-    x: float, y: float, places: Array, observed: Array, predicted: Array, radii: Array, walking: float, surprise: float,
+    x: float, y: float, places: Array, observed: Array, radii: Array, walking: float, surprise: float, step: float,
     horizon: float, max_speed: float, radius: float,
 ) -> bool:  # fmt: skip
     """Return whether a mover that may come near within the horizon is faster than people, or not as fast as predicted.
 
-    Velocities are (M, 2) [m/s]; `walking` and `surprise` are the limits [m/s]. The robot has this radius and top speed.
+    `places` are (K, M, 2) [m], a `step` [s] apart, and `observed` velocities (M, 2) [m/s]; `walking` and `surprise` are the
+    limits [m/s]. The robot has this radius and top speed.
     """
     for m in range(radii.shape[0]):
         speed = math.hypot(observed[m, 0], observed[m, 1])
-        unlike = math.hypot(observed[m, 0] - predicted[m, 0], observed[m, 1] - predicted[m, 1]) > surprise
+        vx, vy = (places[1, m, 0] - places[0, m, 0]) / step, (places[1, m, 1] - places[0, m, 1]) / step
+        unlike = math.hypot(observed[m, 0] - vx, observed[m, 1] - vy) > surprise
         if speed > walking or unlike:
-            gap = math.hypot(places[m, 0] - x, places[m, 1] - y) - radii[m] - radius
+            gap = math.hypot(places[0, m, 0] - x, places[0, m, 1] - y) - radii[m] - radius
             if gap < horizon * (speed + max_speed):
                 return True
     return False
