@@ -106,6 +106,7 @@ def adapt(
                 for i in range(top, bottom + 1):
                     for j in range(left, right + 1):
                         dirty[i, j] = True
+    before = blocked.copy()
     for i in range(dirty.shape[0]):
         for j in range(dirty.shape[1]):
             if dirty[i, j]:
@@ -116,7 +117,7 @@ def adapt(
     for i in range(dirty.shape[0]):
         for j in range(dirty.shape[1]):
             if dirty[i, j]:
-                free_tile(i, j, inside, within, blocked, closed, free)
+                free_tile(i, j, inside, within, before, blocked, closed, free)
     for n in range(len(near)):
         x, y, radius = new[near[n]]
         if grazes[n]:
@@ -155,17 +156,21 @@ def near_dirty(
 
 @kernel
 def free_tile(
-    i: int, j: int, inside: Array, within: Array, blocked: Array, closed: Array, free: Array
-) -> None:  # fmt: skip
+    i: int, j: int, inside: Array, within: Array, before: Array, blocked: Array, closed: Array, free: Array
+) -> None:
     """Fill in the free cells of a tile, without closed moves; `CHANGED` marks the cells that differ.
 
     Args:
         inside: rows clear of the walls (R,)
         within: columns clear of the walls (C,)
+        before: the bits of the blocked cells before
     """
     rows, cols = free.shape
     for r in range(TALL * i, min(rows, TALL * (i + 1))):
         bits = blocked[r, j]
+        if bits == before[r, j]:
+            closed[r, WIDE * j : WIDE * (j + 1)] = 0
+            continue
         for c in range(WIDE * j, min(cols, WIDE * (j + 1))):
             now = inside[r] & within[c] & ((bits >> np.uint64(c & 63)) & ONE == 0)
             closed[r, c] = np.uint8(now ^ free[r, c]) * np.uint8(CHANGED)

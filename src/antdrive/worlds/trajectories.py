@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -88,8 +89,8 @@ class Trajectories:
             t: times (T,) [s]
         """
         times = _times(t)
-        rows = [np.diff(motion.jumped(times)) > 0 for motion in self.motions]
-        return np.stack(rows, axis=1) if rows else np.zeros((max(0, len(times) - 1), 0), dtype=np.bool_)
+        counts = _stacked([motion.jumped(times) for motion in self.motions], (len(times), 0))
+        return np.asarray(np.diff(counts, axis=0) > 0)
 
     def jump_times(self, until: float) -> tuple[Floats, ...]:
         """Return the times of each mover's jumps, M arrays of shape (J,) [s].
@@ -104,5 +105,5 @@ def _times(t: npt.ArrayLike) -> Floats:
     return np.atleast_1d(np.asarray(t, dtype=np.float64))
 
 
-def _stacked(rows: list[Floats], empty: tuple[int, ...]) -> Floats:
+def _stacked(rows: list[npt.NDArray[Any]], empty: tuple[int, ...]) -> Floats:
     return np.stack(rows, axis=1) if rows else np.empty(empty)

@@ -158,8 +158,8 @@ JACKAL = load_robot("jackal")
 
 
 def speed_near(place, velocity, speed=2.0):
-    places, velocities = np.array([place], float), np.array([velocity], float)
-    return Avoidance().speed_near(JACKAL, (0.0, 0.0, 0.0), Twist(speed, 0.0), places, velocities, np.array([0.3]))
+    places = np.array([[place], [np.add(place, np.multiply(velocity, Avoidance().step))]], float)
+    return Avoidance().speed_near(JACKAL, (0.0, 0.0, 0.0), Twist(speed, 0.0), places, np.array([0.3]))
 
 
 @given(gap=st.floats(0.0, 8.0), mover=st.floats(-1.4, 1.4), speed=st.floats(0.0, 2.0))
@@ -191,8 +191,8 @@ def test_only_movers_that_the_robot_approaches_limit_its_speed(place, velocity, 
 
 def test_a_robot_has_a_speed_near_movers_of_its_own():
     slow = dataclasses.replace(JACKAL, near_speed=0.4)
-    places, still = np.array([(1.0, 0.0)]), np.zeros((1, 2))
-    v = Avoidance().speed_near(slow, (0.0, 0.0, 0.0), Twist(2.0, 0.0), places, still, np.array([0.3]))
+    still = np.array([[(1.0, 0.0)]] * 2)
+    v = Avoidance().speed_near(slow, (0.0, 0.0, 0.0), Twist(2.0, 0.0), still, np.array([0.3]))
     assert v == 0.4
     assert robot_to_dict(slow)["near_speed"] == 0.4
     assert "near_speed" not in robot_to_dict(JACKAL)

@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats
 from antdrive.base.errors import FieldError
-from antdrive.base.plane import polyline_length, segment_lengths
+from antdrive.base.plane import arc_lengths, polyline_length, segment_lengths
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath
 from antdrive.planners.plan import PlanResult
 from antdrive.planners.smoothing.sweeps import smooth_lines
@@ -50,6 +50,11 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
     Raises:
         ValueError: the plan has no path.
     """
+    return Route(_points_along(plan, grid, task))
+
+
+def _points_along(plan: PlanResult, grid: Grid, task: Task) -> Floats:
+    """Return the points of the plan's line (N, 2), which differ [m]."""
     if not plan.solved:
         raise FieldError("plan", "has no path to follow")
     xy = _join(grid.xy(plan.line), np.array(task.start[:2]), grid, task)
@@ -60,7 +65,7 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
         # The robot is already at the goal; a route needs two points, so it is 0.1 mm long.
         yaw = task.start[2]
         xy = np.vstack([xy[0], xy[0] + 1e-4 * np.array([math.cos(yaw), math.sin(yaw)])])
-    return Route(xy)
+    return xy
 
 
 def _join(xy: Floats, end: Floats, grid: Grid, task: Task) -> Floats:
@@ -134,20 +139,20 @@ def smooth(
         raise FieldError("bulge", f"must be greater than 0, got {bulge:g}")
     if grid.turns:
         return smooth_lines(plan, grid, task, kind)
-    line = route_along(plan, grid, task)
+    line = _points_along(plan, grid, task)
     if kind == "none":
-        return line
+        return Route(line)
     world, inflate = task.world, grid.inflate
-    spare = max(0.0, plan.cost - line.length) if math.isfinite(plan.cost) else 0.0
+    spare = max(0.0, plan.cost - arc_lengths(line).item(-1)) if math.isfinite(plan.cost) else 0.0
     extra = clearance if kind == "clearance" else 0.0
-    xy, curvature, kinds, notes = [line.xy[:1]], [np.zeros(1)], [], []
-    for run, clear in _runs(line.xy, world, inflate):
+    xy, curvature, kinds, notes = [line[:1]], [np.zeros(1)], [], []
+    for run, clear in _runs(line, world, inflate):
         piece = Piece(run, np.zeros(len(run)))
         if clear:
             piece = _smoothed(run, world, inflate, extra, stretch, spare, bulge)
             spare -= max(0.0, polyline_length(piece.xy) - polyline_length(run))
             kinds.append(piece.kind)
-        elif len(run) > 2 or not (run[0] == line.xy[0]).all():
+        elif len(run) > 2 or not (run[0] == line[0]).all():
             piece = replace(piece, note="the plan's line comes closer than the clearance and is kept there")
         if piece.note:
             notes.append(piece.note)

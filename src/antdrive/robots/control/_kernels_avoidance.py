@@ -280,12 +280,13 @@ def follow(
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
     step: float, first: int, looks: bool, outlined: bool, trail: Array,
 ) -> Trail:  # fmt: skip
-    """Follow a candidate from step `first` to the last row of `trail` (K + 1, 5).
+    """Follow a candidate from step `first`, where the robot is at (x, y, yaw, v, w), to the last row of `trail` (K + 1, 5).
 
     A row of `trail` is position [m, m], heading [rad], speed [m/s] and yaw rate [rad/s]. Row 0 is the start, which
-    determines the required clearance; row `first` is (x, y, yaw, v, w), and the rows after it are filled. Without `looks`,
-    `meets_obstacle` checks obstacles later, and the trail does not end at one.
+    determines the required clearance; the rows from `first` on are filled. Without `looks`, `meets_obstacle` checks
+    obstacles later, and the trail does not end at one.
     """
+    trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4] = x, y, yaw, v, w
     capped = MotionLimits(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
         limits.lateral_acceleration, limits.half_track, limits.rim_speed,
@@ -320,26 +321,13 @@ def follow(
 
 
 @kernel
-def follow_own(
-    x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, own: Array, path: PathSamples,
-    obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning, step: float, outlined: bool, trails: Array,
-) -> Trail:  # fmt: skip
-    """Begin all `trails` (N, K + 1, 5) at the robot's state, and follow the controller's `own` motion, which is the first."""
-    for n in range(trails.shape[0]):
-        trails[n, 0, 0], trails[n, 0, 1], trails[n, 0, 2], trails[n, 0, 3], trails[n, 0, 4] = x, y, yaw, v, w
-    return follow(
-        x, y, yaw, v, w, s, rotating, own, path, obstacles, limits, tuning, step, 0, True, outlined, trails[0]
-    )
-
-
-@kernel
 def follow_all(
     s: float, rotating: bool, candidates: Array, path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits,
     tuning: PursuitTuning, step: float, outlined: bool, trails: Array, steps: Array, blocked: Array,
 ) -> None:  # fmt: skip
     """Fill `trails` (N, K + 1, 5), `steps` and `blocked` (N,) for the candidates after the first.
 
-    Row 0 of each trail is given. Candidates with the same first twist share its trail up to their second one.
+    All begin like the first trail. Candidates with the same first twist share its trail up to their second one.
     """
     stem = -1
     for n in range(1, candidates.shape[0]):
@@ -351,12 +339,12 @@ def follow_all(
             now = 0.0
             while first < steps[stem] and now < candidate[DURATION] - 1e-9:
                 first, now = first + 1, now + step
-            for k in range(1, first + 1):
-                for j in range(5):
-                    trail[k, j] = trails[stem, k, j]
-            if first == steps[stem]:
-                steps[n], blocked[n] = steps[stem], blocked[stem]
-                continue
+        for k in range(first + 1):
+            for j in range(5):
+                trail[k, j] = trails[max(stem, 0), k, j]
+        if stem >= 0 and first == steps[stem]:
+            steps[n], blocked[n] = steps[stem], blocked[stem]
+            continue
         got = follow(
             trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4], s, rotating,
             candidate, path, obstacles, limits, tuning, step, first, True, outlined, trail,
@@ -442,18 +430,20 @@ def is_close(x: float, y: float, yaw: float, places: Array, radii: Array, weight
 
 @leaf
 def must_dodge(
-    x: float, y: float, places: Array, observed: Array, predicted: Array, radii: Array, walking: float, surprise: float,
+    x: float, y: float, places: Array, observed: Array, radii: Array, walking: float, surprise: float, step: float,
     horizon: float, max_speed: float, radius: float,
 ) -> bool:  # fmt: skip
     """Return whether a mover that may come near within the horizon is faster than people, or not as fast as predicted.
 
-    Velocities are (M, 2) [m/s]; `walking` and `surprise` are the limits [m/s]. The robot has this radius and top speed.
+    `places` are (K, M, 2) [m], a `step` [s] apart, and `observed` velocities (M, 2) [m/s]; `walking` and `surprise` are the
+    limits [m/s]. The robot has this radius and top speed.
     """
     for m in range(radii.shape[0]):
         speed = math.hypot(observed[m, 0], observed[m, 1])
-        unlike = math.hypot(observed[m, 0] - predicted[m, 0], observed[m, 1] - predicted[m, 1]) > surprise
+        vx, vy = (places[1, m, 0] - places[0, m, 0]) / step, (places[1, m, 1] - places[0, m, 1]) / step
+        unlike = math.hypot(observed[m, 0] - vx, observed[m, 1] - vy) > surprise
         if speed > walking or unlike:
-            gap = math.hypot(places[m, 0] - x, places[m, 1] - y) - radii[m] - radius
+            gap = math.hypot(places[0, m, 0] - x, places[0, m, 1] - y) - radii[m] - radius
             if gap < horizon * (speed + max_speed):
                 return True
     return False
@@ -624,9 +614,10 @@ def choose(
     count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
     by_step = reachable_by_step(x, y, fastest(v, candidates, limits), weights, places, radii, near, cap)
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
-    own = follow_own(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, outlined, trails
-    )
+    own = follow(
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True,
+        outlined, trails[0],
+    )  # fmt: skip
     steps[0], blocked[0] = own.steps, own.blocked
     met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
     if met.contact == math.inf and met.clearance >= cap and met.intrusion == 0.0:
@@ -702,9 +693,10 @@ def best_escape(
     bodies, count = radii + weights.radius, candidates.shape[0]
     by_step = reachable_by_step(x, y, math.inf, weights, soon, radii, near, math.inf)
     trails, steps, blocked = np.empty((count, soon.shape[0], 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
-    own = follow_own(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, outlined, trails
-    )
+    own = follow(
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True,
+        outlined, trails[0],
+    )  # fmt: skip
     steps[0], blocked[0] = own.steps, own.blocked
     follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, outlined, trails, steps, blocked)
     best, most = -1, -math.inf

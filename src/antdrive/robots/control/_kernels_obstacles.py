@@ -75,14 +75,21 @@ def index_discs(discs: Array, bounds: Array, side: float, distance: float) -> tu
 
 
 @inline
-def nearby(x: float, y: float, obstacles: ObstacleIndex) -> Array:
-    """Return the indexed discs (N, 3) near (x, y)."""
+def square_at(x: float, y: float, obstacles: ObstacleIndex) -> int:
+    """Return the square near (x, y)."""
     bounds, side = obstacles.bounds, obstacles.side
     cols = int((bounds[2] - bounds[0]) / side) + 1
     rows = int((bounds[3] - bounds[1]) / side) + 1
     c = min(max(int((x - bounds[0]) / side), 0), cols - 1)
     r = min(max(int((y - bounds[1]) / side), 0), rows - 1)
-    return obstacles.discs[obstacles.starts[r * cols + c] : obstacles.starts[r * cols + c + 1]]
+    return r * cols + c
+
+
+@inline
+def nearby(x: float, y: float, obstacles: ObstacleIndex) -> Array:
+    """Return the indexed discs (N, 3) near (x, y)."""
+    square = square_at(x, y, obstacles)
+    return obstacles.discs[obstacles.starts[square] : obstacles.starts[square + 1]]
 
 
 @leaf

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, nearby
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, nearby, square_at
 from antdrive.worlds._kernels import (
     ROUNDING,
     Array,
@@ -20,6 +20,7 @@ from antdrive.worlds._kernels import (
 )
 
 NO_TURNS = np.empty(0)
+STRETCH = 0.5  # length of route for which obstacles are chosen at once [m]
 
 
 class PathSamples(NamedTuple):
@@ -168,17 +169,21 @@ def clear_lookaheads(
 
     At least `low`, at most `high`. Where the route is closer to obstacles, the line may be as close as the route.
     """
-    bounds = obstacles.bounds
+    bounds, reach = obstacles.bounds, high + clearance + ROUNDING
     step = 0.5 * low
     k = 0
-    kept = np.empty((16, 3))
+    chosen, kept = np.empty((16, 3)), np.empty((16, 3))
+    around, square, begin = chosen, -1, 0.0
     for i in range(out.shape[0]):
         s = min(i * spacing, arc[-1])
         ax, ay, k = point_at(s, k, xy, arc)
-        known = nearby(ax, ay, obstacles)
-        if known.shape[0] > kept.shape[0]:
-            kept = np.empty((2 * known.shape[0], 3))
-        discs = within_reach(ax, ay, high + clearance + ROUNDING, known, kept)
+        if s > begin + STRETCH or square_at(ax, ay, obstacles) != square:
+            square, begin = square_at(ax, ay, obstacles), s
+            known = nearby(ax, ay, obstacles)
+            if known.shape[0] > kept.shape[0]:
+                chosen, kept = np.empty((2 * known.shape[0], 3)), np.empty((2 * known.shape[0], 3))
+            around = within_reach(ax, ay, reach + STRETCH + ROUNDING, known, chosen)
+        discs = within_reach(ax, ay, reach, around, kept)
         required = min(clearance, segment_clearance(ax, ay, ax, ay, discs, bounds))
         discs = beside_route(ax, ay, min(s + high, arc[-1]), k, required + ROUNDING, xy, arc, discs)
         clear, kk, length = low, k, low

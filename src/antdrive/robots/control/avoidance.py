@@ -36,7 +36,7 @@ from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
 from antdrive.robots.clearance import outline_of
 from antdrive.robots.control import _kernels_avoidance as kernels
-from antdrive.robots.control._kernels_pursuit import reachable_twist
+from antdrive.robots.control._kernels_pursuit import PursuitTuning, reachable_twist
 from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
 from antdrive.robots.spec import Footprint, RobotSpec
 
@@ -144,24 +144,22 @@ class Avoidance:
             backwards: maximum reverse speed, for a robot that cannot see behind; ignored if obeying it causes a contact [m/s]
         """
         period, limits = tracked.tuning.period, tracked.limits
-        state = state._replace(reversed=max(0.0, state.reversed - last.speed * period))
-        predicted = (places[1] - places[0]) / self.step
-        near = self.speed_near(spec, pose, last, places[0], predicted, radii)
-        left = max(self.reverse_distance - state.reversed, 0.0)
+        reversed_ = max(0.0, state.reversed - last.speed * period)
+        near = self.speed_near(spec, pose, last, places, radii)
+        left = max(self.reverse_distance - reversed_, 0.0)
         slow = min(self.reverse_speed, math.sqrt(2 * limits.acceleration * left), backwards)
-        tuning = tracked.tuning._replace(period=self.step)
-        weights = _weights(self, tracked.tuning.robot_radius, spec.footprint)
-        observed = predicted if velocities is None else velocities
+        tuning = _tuning(tracked, self.step)
+        observed = self._predicted(places) if velocities is None else velocities
         outlined = not spec.footprint.is_disc
         limits_of = [
             (near, slow, False), (near, slow, outlined), (near, backwards, outlined), (math.inf, backwards, outlined),
             (math.inf, math.inf, outlined),
         ]  # fmt: skip
-        if self._must_dodge(spec, pose, places[0], observed, predicted, radii):
+        if self._must_dodge(spec, pose, places, observed, radii):
             limits_of[:3] = [(math.inf, backwards, False)]
         given_way = None  # a decision to slow down, unless the robot can pass beside its route by its outline
         for fastest, reverse, by_outline in dict.fromkeys(limits_of):
-            weights = weights._replace(outlined=by_outline)
+            weights = _weights(self, tuning.robot_radius, spec.footprint, by_outline)
             candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse, by_outline)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
@@ -177,15 +175,13 @@ class Avoidance:
                     break
                 given_way = candidates, chosen, contact
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
-            return wanted, False, AvoidanceState(reversed=state.reversed)
+            return wanted, False, AvoidanceState(reversed=reversed_)
         if contact < max(abs(last.speed) / limits.acceleration, self._too_late(weights, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
         twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked, pose, before.arc)
-        return twist, True, after._replace(reversed=state.reversed)
+        return twist, True, after._replace(reversed=reversed_)
 
-    def speed_near(
-        self, spec: RobotSpec, pose: Pose, last: Twist, places: Floats, velocities: Floats, radii: Floats
-    ) -> float:
+    def speed_near(self, spec: RobotSpec, pose: Pose, last: Twist, places: Floats, radii: Floats) -> float:
         """Return the highest speed at which the robot can slow to its `near_speed` before it is near a mover [m/s].
 
         Movers behind the robot do not count, nor movers whose lane it crosses before them: those that come faster than
@@ -195,14 +191,14 @@ class Avoidance:
             spec: the robot
             pose: its estimated pose
             last: the command of the previous period
-            places: the movers' positions (M, 2) [m]
-            velocities: their velocities (M, 2) [m/s]
+            places: the movers' predicted positions at the `prediction_times` (K + 1, M, 2) [m]
             radii: their radii (M,) [m]
         """
         if not len(radii) or spec.near_speed >= spec.max_speed:
             return math.inf
         heading = np.array((math.cos(pose[2]), math.sin(pose[2])))
-        to, speeds = places - pose[:2], np.hypot(*velocities.T)
+        velocities = self._predicted(places)
+        to, speeds = places[0] - pose[:2], np.hypot(*velocities.T)
         away, moving = np.maximum(np.hypot(*to.T), 1e-9), np.maximum(speeds, 1e-9)
         closing = np.maximum(-(velocities * to).sum(axis=1) / away, 0.0)
         aside = np.abs(_cross(to, velocities)) / moving - radii - spec.radius - self.min_clearance
@@ -214,12 +210,14 @@ class Avoidance:
         more = np.sqrt(both**2 + 2 * spec.max_acceleration * np.maximum(gap, 0.0)) - both
         return spec.near_speed + float(more.min(initial=math.inf, where=counts))
 
-    def _must_dodge(
-        self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, predicted: Floats, radii: Floats
-    ) -> bool:
+    def _predicted(self, places: Floats) -> Floats:
+        """Return the movers' predicted velocities (M, 2) [m/s]."""
+        return np.asarray((places[1] - places[0]) / self.step)
+
+    def _must_dodge(self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, radii: Floats) -> bool:
         """Return whether a mover that may come near soon is faster than people, or has another velocity than predicted."""
         most = self.horizon, spec.max_speed, spec.radius
-        return kernels.must_dodge(*pose[:2], places, observed, predicted, radii, WALKING, SURPRISE, *most)
+        return kernels.must_dodge(*pose[:2], places, observed, radii, WALKING, SURPRISE, self.step, *most)
 
     def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
         """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
@@ -352,9 +350,17 @@ def _instants(horizon: float, step: float) -> Floats:
     return times
 
 
+@functools.lru_cache(maxsize=4)
+def _tuning(tracked: TrackedPath, step: float) -> PursuitTuning:
+    """Return the controller's settings on a path, for steps of a prediction [s]."""
+    return tracked.tuning._replace(period=step)
+
+
 @functools.lru_cache(maxsize=64)
-def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kernels.AvoidanceWeights:
-    """Return the settings for a robot whose circle counts with a given radius [m]."""
+def _weights(
+    avoidance: Avoidance, radius: float, footprint: Footprint, outlined: bool = False
+) -> kernels.AvoidanceWeights:
+    """Return the settings for a robot whose circle counts with a given radius [m]; `outlined`: or its outline."""
     outline = outline_of(footprint, 0.0)
     return kernels.AvoidanceWeights(
         step=avoidance.step,
@@ -371,5 +377,5 @@ def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kerne
         radius=footprint.radius,
         corners=outline.corners,
         rounding=outline.reach,
-        outlined=False,
+        outlined=outlined,
     )

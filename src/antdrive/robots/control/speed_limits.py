@@ -176,17 +176,16 @@ def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple
     def at(t: Floats) -> tuple[Floats, Floats, Floats]:
         """Return heading, integral and second integral at t; the heading is constant beyond the ends."""
         inside = np.clip(t, places[0], places[-1])
-        i = np.clip(np.searchsorted(places, inside, side="right") - 1, 0, len(slopes) - 1)
-        d = inside - places[i]
-        heading = headings[i] + slopes[i] * d
-        first = integral[i] + headings[i] * d + slopes[i] * d**2 / 2
-        second = second_integral[i] + integral[i] * d + headings[i] * d**2 / 2 + slopes[i] * d**3 / 6
+        i = np.minimum(np.searchsorted(places, inside, side="right"), len(slopes)) - 1
+        d, at_place, slope, so_far = inside - places[i], headings[i], slopes[i], integral[i]
+        heading = at_place + slope * d
+        first = so_far + at_place * d + slope * d**2 / 2
+        second = second_integral[i] + so_far * d + at_place * d**2 / 2 + slope * d**3 / 6
         beyond = t - inside
         return heading, first + heading * beyond, second + first * beyond + heading * beyond**2 / 2
 
     change, curvature, heading = (
-        (after - 2 * here + before) / blend**2
-        for before, here, after in (np.split(values, 3) for values in at(np.concatenate((s - blend, s, s + blend))))
+        (after - 2 * here + before) / blend**2 for before, here, after in at(np.stack((s - blend, s, s + blend)))
     )
     return heading, curvature, change
 
