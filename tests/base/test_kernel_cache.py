@@ -16,8 +16,9 @@ from antdrive.base import kernel_cache
 from antdrive.base._kernels_compiler import _SETTINGS, _Entries, kernel
 
 MEASURE = (
+    "from antdrive.base.kernel_cache import compiled\n"
     "from antdrive.worlds import Disc, World, point_clearance\n"
-    "print(point_clearance(World('w', (0, 0, 4, 4), (Disc(2, 2, 0.5),)), [[1, 2]]))"
+    "with compiled(): print(point_clearance(World('w', (0, 0, 4, 4), (Disc(2, 2, 0.5),)), [[1, 2]]))"
 )
 
 

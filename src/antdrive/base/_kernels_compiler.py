@@ -27,10 +27,12 @@ from typing import Any, TypeVar
 import numba
 from numba.core import config, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.registry import CPUDispatcher
 from numba.core.targetconfig import ConfigStack
 from numba.core.types import functions
 
 from antdrive.base import kernel_cache
+from antdrive.base._kernels_interpreter import ALLOWANCE, interpret
 from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
 
 _settings: Any = config  # its attributes are set on import
@@ -44,7 +46,7 @@ _SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": True
 
 
 def kernel(function: F) -> F:
-    """Compile a function on its first call and cache it on disk."""
+    """Compile a function once its calls have taken long in Python, and cache it on disk."""
     return _cached(numba.njit(**_SETTINGS)(function), function)
 
 
@@ -120,6 +122,12 @@ class _Cache(FunctionCache):  # type: ignore[misc]
                 self.flush()
             return None
 
+    @functools.cached_property
+    def holds_any(self) -> bool:
+        """Return whether there is machine code of these sources, for any types."""
+        entries: _Entries = self._cache_file
+        return any(name.startswith(entries._begin()) for name in _names_in(entries._cache_path))
+
     def path_of(self, sig: Any, target_context: Any) -> Path:
         """Return the file of an entry."""
         entries: _Entries = self._cache_file
@@ -131,6 +139,15 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         self._saved.add(sig)
         with contextlib.suppress(OSError):  # a full disk costs time at the next start only
             super().save_overload(sig, data)
+
+
+@functools.cache
+def _names_in(folder: str) -> list[str]:
+    """Return the names in a folder of machine code, listed once."""
+    try:
+        return os.listdir(folder)
+    except OSError:
+        return []
 
 
 class _Compiler:
@@ -210,11 +227,26 @@ def _lock_file(folder: Path) -> int:
     return os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
 
 
+class _Uncompiled(CPUDispatcher):  # type: ignore[misc]
+    """The class of a kernel until it is compiled; it then becomes numba's, whose calls cost nothing more."""
+
+    left = ALLOWANCE
+
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        if not self.overloads and not getattr(self._cache, "holds_any", False):
+            self.left, result = interpret(self.py_func, args, named, self.left)
+            if self.left > 0:
+                return result
+        self.__class__ = CPUDispatcher
+        return self(*args, **named)
+
+
 def _cached(dispatcher: Any, function: F) -> F:
     if hasattr(dispatcher, "enable_caching"):  # with NUMBA_DISABLE_JIT it is the plain function
         with contextlib.suppress(RuntimeError):  # no writable folder: every process compiles
             dispatcher._cache = _Cache(function)
             dispatcher._compiler = _Compiler(dispatcher, dispatcher._cache)
+        dispatcher.__class__ = _Uncompiled
     return dispatcher  # type: ignore[no-any-return]  # has the function's signature
 
 

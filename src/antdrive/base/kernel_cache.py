@@ -9,7 +9,7 @@ import os
 import re
 import stat
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 _ROOT = Path(__file__).parent.parent  # the package antdrive
@@ -23,6 +23,18 @@ def ignore(name: str) -> None:
 
 
 on_compile: Callable[[str], None] = ignore  # called with each kernel's name before it compiles
+blocks = 0  # open blocks of `compiled`
+
+
+@contextlib.contextmanager
+def compiled() -> Iterator[None]:
+    """Compile kernels at their first call in this block; elsewhere Python runs those that take little time."""
+    global blocks
+    blocks += 1
+    try:
+        yield
+    finally:
+        blocks -= 1
 
 
 def sources_stamp(file: Path | None = None) -> str:

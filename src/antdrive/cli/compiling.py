@@ -72,7 +72,8 @@ def _scenario() -> Scenario:
 
 def _compile(planners: Sequence[str] | None) -> None:
     """Plan with the given planners; None: drive and film."""
-    _drive_and_film() if planners is None else _plan_with(planners)
+    with kernel_cache.compiled():
+        _drive_and_film() if planners is None else _plan_with(planners)
 
 
 def _oblong() -> RobotSpec:
