@@ -82,6 +82,15 @@ def test_a_kernel_is_compiled_when_its_calls_have_taken_long(fresh, monkeypatch)
         assert bool(total.overloads) is (call > 2)  # 31 passes each: the fourth is undone
 
 
+@pytest.mark.parametrize("allowance", [30, 31, 32, 33])
+def test_a_call_is_made_once_where_the_allowance_ends(fresh, monkeypatch, allowance):
+    total = fresh(add_up)
+    monkeypatch.setattr(type(total), "left", allowance)
+    ours, theirs = np.arange(30.0), np.arange(30.0)
+    assert total(ours, 0.5) == add_up(theirs, 0.5)
+    assert ours.tobytes() == theirs.tobytes()
+
+
 def test_a_call_that_python_refuses_begins_again_in_machine_code(fresh):
     divide = fresh(divided)
     values = np.arange(3.0) + 1

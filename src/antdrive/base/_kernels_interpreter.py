@@ -62,10 +62,10 @@ def interpret(
         before = [array.copy() for array in changeable]
         try:
             twin = _twin(function)
-            _fuel[:] = bytes(allowance)
+            _fuel[:] = bytes(allowance - 1)  # so that a call that ends has something left
             with np.errstate(all="ignore", over="raise"):
                 result = twin(*args, **named)
-            return len(_fuel), _plain(result)
+            return len(_fuel) + 1, _plain(result)
         except Exception:  # such as a division by zero, which has a result in machine code
             for array, values in zip(changeable, before, strict=True):
                 array[...] = values
