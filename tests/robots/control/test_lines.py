@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -163,3 +164,11 @@ def test_equal_points_keep_the_turn_of_the_last_one():
 def test_the_backward_part_ends_exactly_at_a_point():
     route = Route([(0, 0), (-0.3, 0.1), (2, 2)], turns=np.zeros(3), backwards_until=math.hypot(0.3, 0.1) + 1e-12)
     assert route.backwards_until == route.arc[1]
+
+
+def test_kernels_are_compiled_once_for_smooth_routes_and_lines():
+    robot = ROBOTS["jackal"]
+    routes = polyline([1.0, 1.0], [1.0, 0.0]), Route([(0, 0), (1, 0), (2, 1)])
+    lines, smooth = (PurePursuit().prepare(route, OPEN, robot, 0.03, DT) for route in routes)
+    assert numba.typeof(lines.samples) == numba.typeof(smooth.samples)
+    assert numba.typeof(lines.packed) == numba.typeof(smooth.packed)

@@ -20,6 +20,7 @@ from antdrive.worlds._kernels import (
 )
 
 NO_TURNS = np.empty(0)
+NO_TURNS.setflags(write=False)  # as the turns of a route are: kernels are compiled for one type
 STRETCH = 0.5  # length of route for which obstacles are chosen at once [m]
 
 

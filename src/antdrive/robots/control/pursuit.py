@@ -26,7 +26,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.records import derived, meanings_of, require_ranges
 from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
-from antdrive.robots.control._kernels_path import NO_TURNS, PathSamples
+from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
 from antdrive.robots.control.speed_limits import limits_along, limits_along_lines, speed_profile
 from antdrive.robots.spec import RobotSpec
@@ -279,8 +279,9 @@ class PurePursuit:
         braking = self.braking * spec.max_acceleration
         if route.turns is not None:
             speed = limits_along_lines(route, world, spec, tuning.spacing, near_obstacles, braking)
+            unused = np.empty(0)
             return PathSamples(
-                route.xy, route.arc, NO_TURNS, speed, NO_TURNS, NO_TURNS, route.turns, float(route.backwards_until)
+                route.xy, route.arc, unused, speed, unused, unused, route.turns, float(route.backwards_until)
             )
         spacing = tuning.spacing
         lookahead: Floats = np.empty(int(route.arc[-1] / spacing) + 2)
