@@ -4,6 +4,7 @@ import math
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from hypothesis import strategies as st
 
 from antdrive.base._kernels_compiler import kernel
 from antdrive.base._kernels_interpreter import interpret
-from antdrive.base.kernel_cache import compiled
+from antdrive.base.kernel_cache import compiled, text_of
+from antdrive.worlds import _kernels
 
 pytestmark = pytest.mark.skipif(bool(os.environ.get("NUMBA_DISABLE_JIT")), reason="needs compiled kernels")
 finite = st.floats(-1e6, 1e6)
@@ -37,11 +39,25 @@ def divided(values, by):
 
 
 def measured(pair, x):
-    return math.hypot(pair.values[0] * pair.factor, x), len(pair.values) > 2, np.int64(3), x**2
+    return math.hypot(pair.values[0] * pair.factor, x), len(pair.values) > 2, np.int64(3), abs(x) ** 0.3
 
 
 def sorted_by(values):
     return np.argsort(values)
+
+
+def squared(x):
+    return x**2
+
+
+def interrupted(values):
+    values[0] = 7.0
+    interrupt()
+    return values[0]
+
+
+def interrupt():
+    raise KeyboardInterrupt
 
 
 def counted(count):
@@ -111,6 +127,38 @@ def test_float32_is_computed_in_machine_code(fresh):
     assert total.overloads
 
 
+def test_an_interrupted_call_changes_nothing():
+    values = np.zeros(3)
+    with pytest.raises(KeyboardInterrupt):
+        interpret(interrupted, (values,), {}, 100)
+    assert values.tolist() == [0.0, 0.0, 0.0]
+    assert interpret(add_up, (values, 1.0), {}, 100)[0] == 100 - 4
+
+
+def test_arrays_without_room_for_a_copy_change_in_machine_code():
+    class Huge(np.ndarray):
+        def copy(self, order="C"):
+            raise MemoryError
+
+    assert interpret(add_up, (np.zeros(3).view(Huge), 1.0), {}, 100) == (0, None)
+
+
+def test_sorting_counts():
+    assert interpret(sorted_by, (np.zeros(40),), {}, 1000)[0] == 1000 - 20 * 40 - 2
+    assert interpret(sorted_by, (np.zeros(60),), {}, 1000) == (0, None)
+
+
+def test_a_square_is_computed_in_machine_code():
+    """Python's `x ** 2` differs from numba's product in one of a thousand cases."""
+    assert interpret(squared, (1.5,), {}, 100) == (0, None)
+
+
+def test_python_runs_the_text_that_was_imported(monkeypatch):
+    file = Path(_kernels.__file__)
+    monkeypatch.setattr(Path, "read_bytes", lambda _: b"edited since")
+    assert b"def doubled" in text_of(file)
+
+
 def test_a_block_compiles_at_the_first_call(fresh):
     total = fresh(add_up)
     with compiled():
@@ -139,7 +187,7 @@ def test_results_have_the_bits_and_types_of_machine_code(values, factor, x):
 
 @given(st.lists(st.sampled_from([0.0, 1.0, 2.0, math.nan]), max_size=60))
 def test_equal_values_have_the_order_of_machine_code(values):
-    _, found = interpret(sorted_by, (np.array(values, dtype=float),), {}, 10)
+    _, found = interpret(sorted_by, (np.array(values, dtype=float),), {}, 10_000)
     assert found.tolist() == SORTED(np.array(values, dtype=float)).tolist()
 
 

@@ -2,10 +2,11 @@
 
 To compile a kernel takes seconds, and Python often does its work in milliseconds. Python therefore runs it until its calls
 have passed `ALLOWANCE` loops and functions. Then it is compiled: a call that passes more or fails is undone and begins again.
+An interrupted call is undone.
 
 Results have the bits of the compiled kernel: `math.hypot` is C's, `np.argsort` is numba's, and numbers leave as Python's.
-Kernels of float32 are always compiled, as numba computes with 64 bits where NumPy keeps 32; an integer that overflows is a
-failure.
+Kernels of float32 are always compiled, as numba computes with 64 bits where NumPy keeps 32, and those with powers like `x**2`,
+which numba multiplies; an integer that overflows is a failure.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from antdrive.base import kernel_cache
 
 ALLOWANCE = 250_000  # loop passes and function calls of one kernel in one process before it is compiled
 COPIED = 1000  # elements of its arrays whose copy costs as much as one of them
+SORTED = 20  # of them that sorting one element costs
 
 _fuel = bytearray()  # its length is what is left of the allowance: the fastest count that raises at its end
 _turn = threading.Lock()  # of the one thread that interprets
@@ -35,6 +37,8 @@ _quicksort = make_py_quicksort(lt=lambda a, b: a < b or (b != b and a == a), is_
 
 
 def _argsort(values: np.ndarray, kind: str = "quicksort") -> np.ndarray:
+    del _fuel[max(len(_fuel) - SORTED * len(values), 0) :]
+    _fuel.pop()
     return np.argsort(values, kind="stable") if kind == "mergesort" else np.array(_quicksort(values))
 
 
@@ -58,18 +62,21 @@ def interpret(
         return 0, None
     if not _turn.acquire(blocking=False):
         return 0, None
+    before: list[np.ndarray] = []
     try:
-        before = [array.copy() for array in changeable]
-        try:
-            twin = _twin(function)
-            _fuel[:] = bytes(allowance - 1)  # so that a call that ends has something left
-            with np.errstate(all="ignore", over="raise"):
-                result = twin(*args, **named)
-            return len(_fuel) + 1, _plain(result)
-        except Exception:  # such as a division by zero, which has a result in machine code
-            for array, values in zip(changeable, before, strict=True):
-                array[...] = values
-            return 0, None
+        before += [array.copy() for array in changeable]
+        twin = _twin(function)
+        del _fuel[allowance - 1 :]  # so that a call that ends has something left
+        _fuel.extend(bytes(allowance - 1 - len(_fuel)))
+        with np.errstate(all="ignore", over="raise"):
+            result = twin(*args, **named)
+        return len(_fuel) + 1, _plain(result)
+    except BaseException as error:  # such as a division by zero, which has a result in machine code; or an interrupt
+        for array, values in zip(changeable, before, strict=False):
+            array[...] = values
+        if not isinstance(error, Exception):
+            raise
+        return 0, None
     finally:
         _turn.release()
 
@@ -122,11 +129,19 @@ def _names(code: types.CodeType) -> Iterator[str]:
             yield from _names(const)
 
 
+def _is_product(node: ast.AST) -> bool:
+    """Return whether numba multiplies where Python calls `pow`, which rounds differently."""
+    is_power = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
+    return is_power and isinstance(node.right, ast.Constant) and isinstance(node.right.value, int)
+
+
 @functools.cache
 def _codes(file: str) -> dict[str, types.CodeType]:
     """Return the code of a file's functions, each of which counts its calls and the passes of its loops."""
-    tree = ast.parse(Path(file).read_bytes(), file)
-    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    tree = ast.parse(kernel_cache.text_of(Path(file)), file)
+    functions = [
+        node for node in tree.body if isinstance(node, ast.FunctionDef) and not any(map(_is_product, ast.walk(node)))
+    ]
     for function in functions:
         function.decorator_list = []
         for node in ast.walk(function):

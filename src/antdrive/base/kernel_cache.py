@@ -54,6 +54,11 @@ def sources_stamp(file: Path | None = None) -> str:
     return stamp if texts == [first[path] for path in paths] else _sha([*(first[path] for path in paths), *texts])
 
 
+def text_of(file: Path) -> bytes:
+    """Return the text of a kernel file as this process imported it; of another file, as it is now."""
+    return _first_state()[0].get(file) or file.read_bytes()
+
+
 @functools.cache
 def _first_state() -> tuple[dict[Path, bytes], list[tuple[int, int]], dict[Path, set[Path]]]:
     """Return the texts, `_state` and imported kernel files of all kernel files at the first call."""

@@ -1,6 +1,6 @@
 """Ahead-of-time compilation of every kernel into the cache of `antdrive.base.kernel_cache`.
 
-Other commands compile each kernel at its first call.
+Other commands compile a kernel once its calls have taken long in Python.
 """
 
 from __future__ import annotations

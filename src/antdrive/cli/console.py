@@ -21,7 +21,7 @@ LAYOUT = "\n\t"  # control characters that lines may hold
 GOOD, BAD = "✓", "✗"  # signs of success and failure
 COLOURS = {GOOD: "\033[32m{}\033[0m", BAD: "\033[31m{}\033[0m"}  # green and red
 PLAIN = {GOOD: "+", BAD: "x"}  # for streams that cannot encode the signs
-COMPILING = "compiling what this command needs, once per installation"
+COMPILING = "compiling what this command needs often, once per installation"
 LEAST_WRAPPED = 24  # least width of a wrapped column [characters]
 
 

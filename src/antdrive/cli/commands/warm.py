@@ -8,7 +8,7 @@ from antdrive.cli.console import bar, print_line
 def warm(jobs: options.Jobs = None) -> None:
     """Compile all planners ahead of time.
 
-    Optional: otherwise each command compiles what it needs at its first use.
+    Optional: otherwise each command compiles what it runs often, at its first use.
     """
     from antdrive.base.kernel_cache import cache_folder
     from antdrive.cli.compiling import is_warm

@@ -241,8 +241,8 @@ def free_arcs(discs: Array, bounds: Array) -> Rims:
                 if d2 > (r + s + EPS) * (r + s + EPS):
                     continue
                 if gap_reach < np.inf:
-                    apart = s + gap_reach
-                    if (discs[j, 0] - gap_x) ** 2 + (discs[j, 1] - gap_y) ** 2 > apart * apart:
+                    apart, gx, gy = s + gap_reach, discs[j, 0] - gap_x, discs[j, 1] - gap_y
+                    if gx * gx + gy * gy > apart * apart:
                         continue
                 d = math.sqrt(d2)
                 middle = math.atan2(dy, dx)
