@@ -169,6 +169,9 @@ class History:
         return len(self.best)
 
 
+NO_HISTORY = History()
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlanResult:
     """A plan, in cells.
@@ -201,7 +204,7 @@ class PlanResult:
     reason: str = ""
     work: int = 0
     work_unit: str = "cells expanded"
-    history: History = dataclasses.field(default_factory=History)
+    history: History = NO_HISTORY
     field: Floats | None = None
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     wall_s: float = 0.0

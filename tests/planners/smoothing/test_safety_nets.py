@@ -42,7 +42,7 @@ def test_a_line_that_comes_closer_than_the_clearance_is_refused(closer, refused)
     xy = over(3.7 - closer)
     assert ("closer than the clearance" in rejection(xy)) is refused
     assert (not _clears(xy, WORLD.discs, WORLD.bounds, INFLATE)) is (closer > 1e-9)
-    assert len(list(_runs(xy, segment_clearance(WORLD, xy[:-1], xy[1:]), INFLATE))) == (3 if closer > 2e-9 else 1)
+    assert len(list(_runs(segment_clearance(WORLD, xy[:-1], xy[1:]), INFLATE))) == (3 if closer > 2e-9 else 1)
 
 
 @pytest.mark.parametrize(
@@ -69,6 +69,6 @@ def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners():
     string = _pulled(line, WORLD.discs, INFLATE)
     drawn, _ = kernels.string_points(string, WORLD.discs, np.array(WORLD.bounds), INFLATE, bulge)
     assert length(drawn) > length(line) + 1e-6, "the usual drawing is longer"
-    piece = _smoothed(line, WORLD, INFLATE, 0.0, 0.03, 0.0, bulge)
+    piece = _smoothed(line, length(line), WORLD, INFLATE, 0.0, 0.03, 0.0, bulge)
     assert (piece.kind, piece.note) == ("taut", "")
     assert length(piece.xy) <= length(line) + 1e-9

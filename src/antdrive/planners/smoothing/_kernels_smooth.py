@@ -76,8 +76,8 @@ class Link(NamedTuple):
 @kernel
 def points_along(
     line: Array, ends: Array, cos: float, sin: float, discs: Array, bounds: Array, inflate: float
-) -> tuple[Array, Array]:
-    """Return a line (N, 2) from the exact start to the goal, the `ends`, and the clearance of each of its segments.
+) -> tuple[Array, Array, Array]:
+    """Return a line (N, 2) from the exact start to the goal, the `ends`, and clearance and length of each of its segments.
 
     The first or last point is omitted if the straight past it keeps the clearance, and so are collinear points. A line to a
     goal with less clearance ends at its last point. For a robot at its goal the line leads 0.1 mm along its heading.
@@ -123,9 +123,11 @@ def points_along(
     low, high = span(out[:size], 1)
     if max(right - left, high - low) < 1e-6:
         out[1, 0], out[1, 1], size = out[0, 0] + 1e-4 * cos, out[0, 1] + 1e-4 * sin, 2
-    room = np.empty(size - 1)
+    room, length = np.empty(size - 1), np.empty(size - 1)
     segment_clearances(out[: size - 1], out[1:size], discs, bounds, room)
-    return out[:size], room
+    for i in range(size - 1):
+        length[i] = math.hypot(out[i + 1, 0] - out[i, 0], out[i + 1, 1] - out[i, 1])
+    return out[:size], room, length
 
 
 @inline

@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats
 from antdrive.base.errors import FieldError
-from antdrive.base.plane import arc_lengths, polyline_length
+from antdrive.base.plane import polyline_length
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath
 from antdrive.planners.plan import PlanResult
 from antdrive.planners.smoothing.sweeps import smooth_lines
@@ -53,18 +53,18 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
     return Route(_points_along(plan, grid, task)[0])
 
 
-def _points_along(plan: PlanResult, grid: Grid, task: Task) -> tuple[Floats, Floats]:
-    """Return the points of the plan's line (N, 2), which differ, and the clearance of its segments (N - 1,) [m]."""
+def _points_along(plan: PlanResult, grid: Grid, task: Task) -> tuple[Floats, Floats, Floats]:
+    """Return the points of the plan's line (N, 2), which differ, and clearance and length of its segments (N - 1,) [m]."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     if not plan.solved:
         raise FieldError("plan", "has no path to follow")
     (*start, yaw), world = task.start, task.world
-    line, room = kernels.points_along(
+    line, room, lengths = kernels.points_along(
         np.ascontiguousarray(grid.xy(plan.line)), np.array((start, task.goal)), math.cos(yaw), math.sin(yaw),
         world.discs, np.array(world.bounds, dtype=np.float64), grid.inflate,
     )  # fmt: skip
-    return line, room
+    return line, room, lengths
 
 
 #: The kinds of smoothing: the plan's line, that line pulled taut, or taut with more clearance where there is room.
@@ -122,21 +122,22 @@ def smooth(
         raise FieldError("bulge", f"must be greater than 0, got {bulge:g}")
     if grid.turns:
         return smooth_lines(plan, grid, task, kind)
-    line, room = _points_along(plan, grid, task)
+    line, room, lengths = _points_along(plan, grid, task)
     if kind == "none":
         return Route(line)
     world, inflate = task.world, grid.inflate
-    spare = max(0.0, plan.cost - arc_lengths(line).item(-1)) if math.isfinite(plan.cost) else 0.0
+    spare = max(0.0, plan.cost - lengths.cumsum().item(-1)) if math.isfinite(plan.cost) else 0.0
     extra = clearance if kind == "clearance" else 0.0
     xy, curvature, kinds, notes = [line[:1]], [np.zeros(1)], [], []
-    longer: list[tuple[Floats, Floats]] = []
-    for run, clear in _runs(line, room, inflate):
+    longer: list[tuple[Floats, float]] = []
+    for first, last, clear in _runs(room, inflate):
+        run, own = line[first : last + 1], float(lengths[first:last].sum())
         piece = Piece(run, np.zeros(len(run)))
         if clear:
             for drawn, planned in longer:
-                spare -= max(0.0, polyline_length(drawn) - polyline_length(planned))
-            piece = _smoothed(run, world, inflate, extra, stretch, spare, bulge)
-            longer = [(piece.xy, run)]
+                spare -= max(0.0, polyline_length(drawn) - planned)
+            piece = _smoothed(run, own, world, inflate, extra, stretch, spare, bulge)
+            longer = [(piece.xy, own)]
             kinds.append(piece.kind)
         elif len(run) > 2 or not (run[0] == line[0]).all():
             piece = replace(piece, note="the plan's line comes closer than the clearance and is kept there")
@@ -192,15 +193,15 @@ def _path(string: String) -> TangentPath:
     return TangentPath(tuple(pieces))
 
 
-def _runs(xy: Floats, room: Floats, inflate: float) -> Iterator[tuple[Floats, bool]]:
-    """Yield the parts of a polyline that keep the clearance and those that do not, and whether each keeps it.
+def _runs(room: Floats, inflate: float) -> Iterator[tuple[int, int, bool]]:
+    """Yield first and last point of the parts of a polyline that keep the clearance or do not, and whether each keeps it.
 
     `room` is the clearance of each segment [m].
     """
     clear = room >= inflate - 1.01 * SLACK  # joined lines have exactly the clearance
     cuts = [0, *(np.flatnonzero(clear[1:] != clear[:-1]) + 1).tolist(), len(clear)]
     for first, last in itertools.pairwise(cuts):
-        yield xy[first : last + 1], bool(clear[first])
+        yield first, last, bool(clear[first])
 
 
 def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
@@ -213,13 +214,13 @@ def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
 
 
 def _smoothed(
-    line: Floats, world: World, inflate: float, extra: float, stretch: float, spare: float, bulge: float
+    line: Floats, own: float, world: World, inflate: float, extra: float, stretch: float, spare: float, bulge: float
 ) -> Piece:
-    """Smooth a clear polyline as far as the checks allow."""
+    """Smooth a clear polyline of a length `own` as far as the checks allow."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     note, xy, curvature = kernels.smoothed(
-        line, world.discs, np.array(world.bounds, dtype=np.float64), inflate, polyline_length(line), extra, stretch,
+        line, world.discs, np.array(world.bounds, dtype=np.float64), inflate, own, extra, stretch,
         spare, bulge,
     )  # fmt: skip
     kind = ("clearance" if extra else "taut") if not note else "taut" if note == kernels.CROWDED else "none"
