@@ -79,7 +79,7 @@ def checked(query: Query, answer: PlanResult) -> PlanResult:
     if not problem:
         if len(answer.cells) and answer.cells.dtype != np.int32:
             answer = dataclasses.replace(answer, cells=np.ascontiguousarray(answer.cells, dtype=np.int32))
-        reason = one_line(answer.reason)
+        reason = one_line(answer.reason) if answer.reason else ""
         return answer if reason == answer.reason else dataclasses.replace(answer, reason=reason)
     sane = isinstance(answer.wall_s, float) and 0 <= answer.wall_s < math.inf
     return PlanResult(status=PlanStatus.INVALID, reason=problem, wall_s=answer.wall_s if sane else 0.0)
