@@ -143,11 +143,11 @@ def smooth(
             piece = replace(piece, note="the plan's line comes closer than the clearance and is kept there")
         if piece.note:
             notes.append(piece.note)
-        curvature[-1] = np.append(curvature[-1][:-1], piece.curvature[0])
+        curvature[-1][-1] = piece.curvature[0]
         xy.append(piece.xy[1:])
         curvature.append(piece.curvature[1:])
     made = min(kinds, key=SMOOTHINGS.index, default="none")
-    return Route(np.vstack(xy), np.concatenate(curvature), made, "; ".join(dict.fromkeys(notes)))
+    return Route(np.concatenate(xy), np.concatenate(curvature), made, "; ".join(dict.fromkeys(notes)))
 
 
 def pull_taut(xy: npt.ArrayLike, discs: npt.ArrayLike, bounds: Bounds, inflate: float) -> TangentPath | None:

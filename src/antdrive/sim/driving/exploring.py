@@ -166,7 +166,7 @@ class Exploration(RouteGuide):
             return 0.0
         controller, robot = self._routes.controller, self._robot
         line = grid.xy(answer.line) - pose[:2]
-        far = np.hypot(*line.T) >= controller.lookahead_max
+        far = np.hypot(line[:, 0], line[:, 1]) >= controller.lookahead_max
         x, y = line[far.argmax() if far.any() else -1]
         turn = abs(math.remainder(math.atan2(y, x) - pose[2], 2 * math.pi))
         if turn <= controller.rotate_in_place_above:
@@ -233,9 +233,11 @@ class Exploration(RouteGuide):
     ) -> tuple[Route, TrackedPath]:
         bounds = bounds_of(grid)
         task = self._known(pose, bounds)
-        self._seen.append((self._tick, task.world.discs))
-        line = np.vstack([[pose[:2]], grid.xy(answer.line), [self._task.goal]])
-        discs = _kernels_hits.near_polyline(line, task.world.discs, grid.inflate + CORRIDOR)
+        seen, points = task.world.discs, grid.xy(answer.line)
+        self._seen.append((self._tick, seen))
+        line = np.empty((len(points) + 2, 2))
+        line[0], line[1:-1], line[-1] = pose[:2], points, self._task.goal
+        discs = _kernels_hits.near_polyline(line, seen, grid.inflate + CORRIDOR)
         near = derived(task, world=SEEN.among(bounds, discs))
         route = smooth(answer, grid, with_obstacles(near, avoided), kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
