@@ -222,11 +222,8 @@ class RoutePlanner:
             if not self.mapped:
                 known = raster is not None and last.grid is grid
                 replanner.change(grid, raster.changed_since(last.updates) if raster is not None and known else None)
-        for tell, cells in (
-            (replanner.clear, np.setdiff1d(before, closed)),
-            (replanner.block, np.setdiff1d(closed, before)),
-        ):
-            if len(cells):
+        for tell, some, others in ((replanner.clear, before, closed), (replanner.block, closed, before)):
+            if len(some) and len(cells := np.setdiff1d(some, others)):
                 tell(np.column_stack(np.divmod(cells, grid.shape[1])))
         replanner.move(query.start, *query.start_headings[:1])
         if kept:
