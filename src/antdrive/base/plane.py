@@ -24,8 +24,9 @@ def wrap_angle(angle: Angle) -> Angle:
 
 def segment_lengths(xy: npt.ArrayLike) -> Floats:
     """Return the length of each segment of a polyline, shape (N - 1,)."""
-    steps = np.diff(np.asarray(xy, dtype=np.float64).reshape(-1, 2), axis=0)
-    return np.asarray(np.hypot(*steps.T))
+    points = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+    steps = points[1:] - points[:-1]
+    return np.asarray(np.hypot(steps[:, 0], steps[:, 1]))
 
 
 def arc_lengths(xy: npt.ArrayLike) -> Floats:

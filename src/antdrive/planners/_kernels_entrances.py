@@ -1,4 +1,4 @@
-"""Compiled leads from a start pose to the nodes of a grid with turns."""
+"""Compiled leads between the ends of a task and the cells of a grid, or the nodes of a grid with turns."""
 
 from __future__ import annotations
 
@@ -6,10 +6,52 @@ import math
 
 import numpy as np
 
-from antdrive.worlds._kernels import Array, kernel
+from antdrive.worlds._kernels import Array, boxes_around, clearance_up_to, kernel, point_clearances
 from antdrive.worlds.headings._kernels_headings import TURN, sweep_clearance, turn_clear
 
 STEP = math.pi / 4  # between the headings of a grid [rad]
+
+
+@kernel
+def entrances(
+    free: Array, x0: float, y0: float, cell: float, inflate: float, reach: int, ends: Array, tolerance: float,
+    discs: Array, bounds: Array,
+) -> Array:  # fmt: skip
+    """Return (row, col, 1) of the nearest free cell with a clear straight line to each end, else (row, col, 0) of the end (2, 3).
+
+    Cells are up to `reach` rows and columns from an end. From an end within the inflation of a disc, the line must not come
+    closer to a disc than the end; the cell of such a goal, the second end, is also within `tolerance` of it.
+    """
+    rows, cols = free.shape
+    out, own, boxes = np.empty((2, 3), dtype=np.int64), np.empty(2), boxes_around(discs)
+    point_clearances(ends, discs, bounds, own)
+    for end in range(2):
+        x, y = ends[end, 0], ends[end, 1]
+        row = min(max(int(math.floor((y - y0) / cell + 0.5)), 0), rows - 1)
+        col = min(max(int(math.floor((x - x0) / cell + 0.5)), 0), cols - 1)
+        out[end, 0], out[end, 1], out[end, 2] = row, col, 0
+        top, left = max(0, row - reach), max(0, col - reach)
+        near = np.full((min(rows, row + reach + 1) - top, min(cols, col + reach + 1) - left), math.inf)  # distances
+        within = tolerance if end == 1 and own[1] < inflate else math.inf
+        for r in range(near.shape[0]):
+            for c in range(near.shape[1]):
+                if free[top + r, left + c]:
+                    away = math.hypot((left + c) * cell + x0 - x, (top + r) * cell + y0 - y)
+                    near[r, c] = away if away <= within else math.inf
+        while True:
+            at_row, at_col = 0, 0
+            for r in range(near.shape[0]):
+                for c in range(near.shape[1]):
+                    if near[r, c] < near[at_row, at_col]:
+                        at_row, at_col = r, c
+            if near[at_row, at_col] == math.inf:
+                break
+            near[at_row, at_col] = math.inf
+            to_x, to_y = (left + at_col) * cell + x0, (top + at_row) * cell + y0
+            if clearance_up_to(math.inf, to_x, to_y, x, y, discs, boxes, bounds) >= min(inflate, own[end]) - 1e-9:
+                out[end, 0], out[end, 1], out[end, 2] = top + at_row, left + at_col, 1
+                break
+    return out
 
 
 @kernel

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, cast, runtime_checka
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base import Floats, Point
+from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.base.guarded import value_text
 from antdrive.planners.errors import PlannerError, planner_errors
@@ -29,8 +29,6 @@ if TYPE_CHECKING:  # importing a grid loads the compiler
 Cell: TypeAlias = tuple[int, int]
 #: Cells of a grid, (N, 2): row and column of each.
 Cells: TypeAlias = npt.NDArray[np.int32]
-
-END_BATCH = 16  # candidate lines per batch, from an end to free cells, shortest first
 
 
 class PlanStatus(enum.Enum):
@@ -83,14 +81,17 @@ class Query:
         """
         if grid.turns:
             return cls._turning(grid, task)
-        from antdrive.worlds.geometry import point_clearance  # imports the compiler
+        from antdrive.planners._kernels_entrances import entrances  # imports the compiler
 
-        own, room = point_clearance(task.world, [task.start[:2], task.goal]).tolist()
-        start, can_leave = _entrance(grid, task, task.start[:2], math.inf, own)
+        world, reach = task.world, cells_beside(grid.inflate, grid.cell)
+        ends, bounds = np.array((task.start[:2], task.goal)), np.array(world.bounds, dtype=np.float64)
         # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal tolerance.
-        within = math.inf if room >= grid.inflate else _within(task)
-        goal, can_arrive = _entrance(grid, task, task.goal, within, room)
-        return cls(grid, start, goal, task, _unreachable({"the start": can_leave, "the goal": can_arrive}))
+        found = entrances(
+            grid.free, *grid.origin, grid.cell, grid.inflate, reach, ends, _within(task), world.discs, bounds
+        )
+        (*start, can_leave), (*goal, can_arrive) = found.tolist()
+        unreachable = _unreachable({"the start": can_leave, "the goal": can_arrive})
+        return cls(grid, (start[0], start[1]), (goal[0], goal[1]), task, unreachable)
 
     @classmethod
     def _turning(cls, grid: Grid, task: Task) -> Query:
@@ -148,44 +149,6 @@ def _unreachable(ends: Mapping[str, bool]) -> str:
     return "; ".join(f"no free cell near {end} can be reached from it" for end, usable in ends.items() if not usable)
 
 
-def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -> tuple[Cell, bool]:
-    """Return (cell, True) for the nearest free cell within `within` [m] with a clear straight line to the point.
-
-    Return (cell of the point, False) if there is none. `own` is the point's clearance [m].
-    """
-    from antdrive.worlds.geometry import segment_clearance
-
-    row, col = grid.cell_at(*point)
-    if grid.free[row, col]:  # the point's own cell has the nearest centre
-        centre = grid.xy([(row, col)])
-        off = np.abs(centre[0] - point)
-        if off.max() < 0.5 * grid.cell - 1e-9 and math.hypot(*off) <= within:
-            room = segment_clearance(task.world, centre, np.array([point], dtype=np.float64))
-            if room[0] >= min(grid.inflate, own) - 1e-9:
-                return (row, col), True
-    reach = cells_beside(grid.inflate, grid.cell)
-    low, left = max(0, row - reach), max(0, col - reach)
-    near = np.argwhere(grid.free[low : row + reach + 1, left : col + reach + 1]) + (low, left)
-    if not len(near):
-        return (row, col), False
-    centres = grid.xy(near)
-    distance = np.hypot(*(centres - point).T)
-    ends = np.broadcast_to(np.asarray(point, dtype=np.float64), centres.shape)
-    # If the point is within the inflation of a disc, the line must not come closer to a disc than the point.
-    needed = min(grid.inflate, own)
-    order = np.argsort(distance, kind="stable")
-    order = order[distance[order] <= within]
-    first, last = 0, 1  # the nearest cell usually works
-    while first < len(order):
-        some = order[first:last]
-        clear = segment_clearance(task.world, centres[some], ends[some]) >= needed - 1e-9
-        if clear.any():
-            at_row, at_col = near[some[clear.argmax()]].tolist()
-            return (at_row, at_col), True
-        first, last = last, last + END_BATCH
-    return (row, col), False
-
-
 @dataclass(frozen=True, eq=False)
 class History:
     """Results of each of the I iterations of an iterative planner; empty for a search. Infinite means no path.
@@ -204,6 +167,9 @@ class History:
 
     def __len__(self) -> int:
         return len(self.best)
+
+
+NO_HISTORY = History()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -238,7 +204,7 @@ class PlanResult:
     reason: str = ""
     work: int = 0
     work_unit: str = "cells expanded"
-    history: History = dataclasses.field(default_factory=History)
+    history: History = NO_HISTORY
     field: Floats | None = None
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     wall_s: float = 0.0

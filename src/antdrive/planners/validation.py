@@ -22,7 +22,6 @@ from antdrive.planners.plan import (
     PlanStatus,
     Query,
     TimedPlan,
-    path_cost,
 )
 from antdrive.worlds.route import end_reach, longest_line
 
@@ -80,7 +79,7 @@ def checked(query: Query, answer: PlanResult) -> PlanResult:
     if not problem:
         if len(answer.cells) and answer.cells.dtype != np.int32:
             answer = dataclasses.replace(answer, cells=np.ascontiguousarray(answer.cells, dtype=np.int32))
-        reason = one_line(answer.reason)
+        reason = one_line(answer.reason) if answer.reason else ""
         return answer if reason == answer.reason else dataclasses.replace(answer, reason=reason)
     sane = isinstance(answer.wall_s, float) and 0 <= answer.wall_s < math.inf
     return PlanResult(status=PlanStatus.INVALID, reason=problem, wall_s=answer.wall_s if sane else 0.0)
@@ -191,26 +190,22 @@ def _same(one: float, other: float) -> bool:
 
 def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
     """Return the first invalid cell, step or cost; `off_grid`: cells need only be neighbours."""
-    grid, cells = query.grid, result.cells.astype(np.int64)
-    outside = ((cells < 0) | (cells >= grid.shape)).any(axis=1)
-    if outside.any():
-        k = int(outside.argmax())
-        return f"cells: number {k}, {_cell(cells[k])}, is outside the grid of {grid.shape[0]} x {grid.shape[1]} cells"
-    for k, key, wanted in ((0, "start", query.start), (-1, "goal", query.goal)):
-        if tuple(cells[k].tolist()) != wanted:
-            return f"cells: the {'first' if k == 0 else 'last'} is {_cell(cells[k])}, but the {key} is {_cell(wanted)}"
-    steps = np.diff(cells, axis=0)
-    bits = _bits()[tuple(np.clip(steps, -1, 1).T + 1)]
-    bits[(np.abs(steps) > 1).any(axis=1)] = 8
-    invalid = bits == 8
-    if not off_grid and not (grid.turns and invalid.any()):
-        nodes = grid.nodes_along(query.start_node, cells)[:-1]
-        invalid |= grid.graph.mask[nodes].astype(np.int64) >> bits & 1 == 0
-    if invalid.any():
-        k = int(invalid.argmax())
-        why = "is no allowed move" if bits[k] < 8 else "does not lead to a neighbour"
+    from antdrive.planners._kernels_checks import faulty_step  # imports the compiler
+
+    grid, cells = query.grid, np.array(result.cells, dtype=np.int64, order="C")
+    outside, k, near, diagonal = faulty_step(cells, grid.shape[0], grid.graph, query.start_node, off_grid)
+    if outside >= 0:
+        where = f"outside the grid of {grid.shape[0]} x {grid.shape[1]} cells"
+        return f"cells: number {outside}, {_cell(cells[outside])}, is {where}"
+    for at, key, wanted in ((0, "start", query.start), (-1, "goal", query.goal)):
+        if tuple(cells[at].tolist()) != wanted:
+            return (
+                f"cells: the {'first' if at == 0 else 'last'} is {_cell(cells[at])}, but the {key} is {_cell(wanted)}"
+            )
+    if k >= 0:
+        why = "is no allowed move" if near else "does not lead to a neighbour"
         return f"cells: step {k} from {_cell(cells[k])} to {_cell(cells[k + 1])} {why}"
-    cost = path_cost(cells, grid.cell)
+    cost = grid.cell * (len(cells) - 1 - diagonal + math.sqrt(2.0) * diagonal)
     if not off_grid and not _same(result.cost, cost):
         return f"cost: {result.cost:.9g} m, but the cells are {cost:.9g} m long"
     return ""

@@ -129,7 +129,7 @@ def adapt(
         for j in range(dirty.shape[1]):
             if dirty[i, j]:
                 count = moves_of_tile(i, j, free, closed, moves, changed, count)
-    return np.sort(changed[:count])
+    return changed[:count].copy()
 
 
 @kernel

@@ -68,7 +68,8 @@ class Route:
         xy = np.array(self.xy, dtype=np.float64)
         if xy.ndim != 2 or xy.shape[1] != 2 or not np.isfinite(xy).all():
             raise FieldError("xy", f"must be finite numbers of shape (N, 2), got shape {xy.shape}")
-        moves_on = np.any(np.diff(xy, axis=0) != 0.0, axis=1)
+        moves_on = (xy[1:] != xy[:-1]).any(axis=1)
+        distinct = moves_on.all()
         for key in ("curvature", "turns"):
             if getattr(self, key) is None:
                 continue
@@ -76,10 +77,10 @@ class Route:
             if values.shape != xy.shape[:1] or not np.isfinite(values).all():
                 raise FieldError(key, f"must be {len(xy)} finite numbers, got shape {values.shape}")
             # The last of equal points has the next segment's curvature, and the whole turn.
-            values = values[np.append(moves_on, True)]
+            values = values if distinct else values[np.append(moves_on, True)]
             values.setflags(write=False)
             object.__setattr__(self, key, values)
-        xy = np.ascontiguousarray(xy[np.insert(moves_on, 0, True)])
+        xy = np.ascontiguousarray(xy if distinct else xy[np.insert(moves_on, 0, True)])
         if len(xy) < 2:
             raise FieldError("xy", "must have at least two different points")
         xy.setflags(write=False)

@@ -175,6 +175,13 @@ class PointWorld(World):
         world.__dict__["_discs"] = discs
         return world
 
+    def among(self, bounds: Bounds, discs: Floats) -> PointWorld:
+        """Return the world of other cylinders (N, 3) between other walls, unchecked: they are made of checked ones."""
+        made = object.__new__(PointWorld)
+        vars(made).update(vars(self) | {"bounds": bounds, "_discs": discs})
+        vars(made).pop("obstacles", None)
+        return made
+
     @functools.cached_property
     def obstacles(self) -> tuple[Disc, ...]:
         """The cylinders as records."""

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.planners.smoothing.smooth import SHRINK, _clears, _pulled, _rejection, _runs, _smoothed
-from antdrive.worlds import Disc, World
+from antdrive.planners.smoothing import _kernels_smooth as kernels
+from antdrive.planners.smoothing.smooth import NOTES, _clears, _pulled, _runs, _smoothed
+from antdrive.worlds import Disc, World, segment_clearance
 
 INFLATE = 0.2
 WORLD = World("w", (0.0, 0.0, 8.0, 6.0), (Disc(4.0, 3.0, 0.5),))
@@ -14,9 +15,10 @@ ABOVE = np.array([(1.0, 3.0), (4.0, 4.2), (7.0, 3.0)])
 BELOW = ABOVE * (1, -1) + (0, 6)
 
 
-def rejection(xy, line=ABOVE, longest=math.inf):
-    string = _pulled(line, WORLD.discs, INFLATE)
-    return _rejection(string, xy, line, WORLD, INFLATE, longest)
+def rejection(xy, line=ABOVE, longest=math.inf, string=None):
+    string = string or _pulled(line, WORLD.discs, INFLATE)
+    limits = INFLATE - kernels.SLACK, longest + kernels.SLACK
+    return NOTES[kernels.fault(string, xy, line, WORLD.discs, np.array(WORLD.bounds), *limits)]
 
 
 def length(xy):
@@ -40,7 +42,7 @@ def test_a_line_that_comes_closer_than_the_clearance_is_refused(closer, refused)
     xy = over(3.7 - closer)
     assert ("closer than the clearance" in rejection(xy)) is refused
     assert (not _clears(xy, WORLD.discs, WORLD.bounds, INFLATE)) is (closer > 1e-9)
-    assert len(list(_runs(xy, WORLD, INFLATE))) == (3 if closer > 2e-9 else 1)
+    assert len(list(_runs(segment_clearance(WORLD, xy[:-1], xy[1:]), INFLATE))) == (3 if closer > 2e-9 else 1)
 
 
 @pytest.mark.parametrize(
@@ -52,12 +54,12 @@ def test_a_line_that_is_longer_than_allowed_is_refused(spare, refused):
 
 def test_a_string_that_comes_too_close_is_refused_though_its_drawing_does_not():
     narrow = _pulled(ABOVE, WORLD.discs, INFLATE - 0.005)
-    assert "closer than the clearance" in _rejection(narrow, over(3.8), ABOVE, WORLD, INFLATE, math.inf)
+    assert "closer than the clearance" in rejection(over(3.8), string=narrow)
 
 
 def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners():
     """The shortest line around the disc, with corners closer to the arc than usual."""
-    radius = 0.7 + SHRINK
+    radius = 0.7 + kernels.SHRINK
     side = math.acos(radius / 3.0)
     angles = np.linspace(math.pi - side, side, 32)
     stand_off = radius / math.cos((angles[0] - angles[1]) / 2)
@@ -65,7 +67,8 @@ def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners():
     line = np.vstack([(1.0, 3.0), arc, (7.0, 3.0)])
     bulge = 5e-4
     string = _pulled(line, WORLD.discs, INFLATE)
-    assert length(string.drawn(WORLD, INFLATE, bulge)[0]) > length(line) + 1e-6, "the usual drawing is longer"
-    piece = _smoothed(line, WORLD, INFLATE, 0.0, 0.03, 0.0, bulge)
+    drawn, _ = kernels.string_points(string, WORLD.discs, np.array(WORLD.bounds), INFLATE, bulge)
+    assert length(drawn) > length(line) + 1e-6, "the usual drawing is longer"
+    piece = _smoothed(line, length(line), WORLD, INFLATE, 0.0, 0.03, 0.0, bulge)
     assert (piece.kind, piece.note) == ("taut", "")
     assert length(piece.xy) <= length(line) + 1e-9

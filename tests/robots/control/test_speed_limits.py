@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.robots.control.speed_limits import speed_profile, turning_time
+from antdrive.robots.control._kernels_profile import turning_time
+from antdrive.robots.control.speed_limits import speed_profile
 from antdrive.worlds import Route
 
 
@@ -80,8 +81,8 @@ def test_at_a_sharp_corner_the_robot_stops_and_rotates_in_place(turtlebot):
     leg = 1.0 / 0.7 + 0.7
     turn = (math.pi / 2) / 3.14 + 3.14 / 8.0
     assert p.duration == pytest.approx(2 * leg + turn, abs=2e-3)
-    assert turning_time(math.pi / 2, turtlebot) == pytest.approx(turn)
-    assert turning_time(-0.5, turtlebot) == pytest.approx(2 * math.sqrt(0.5 / 8.0))
+    assert turning_time(math.pi / 2, 3.14, 8.0) == pytest.approx(turn)
+    assert turning_time(-0.5, 3.14, 8.0) == pytest.approx(2 * math.sqrt(0.5 / 8.0))
     at = np.flatnonzero(p.arc == 1.0)
     assert len(at) == 2
     assert not p.speed[at].any()

@@ -26,7 +26,9 @@ from antdrive.worlds._kernels import (
     is_beyond,
     kernel,
     order_by,
+    point_clearances,
     polyline_clearance,
+    segment_clearances,
     segment_distance2,
     span,
     wall_distance,
@@ -37,7 +39,10 @@ GRAZE = 1e-9  # rad: a link turned past a disc by less than this touches it
 DEEP = 2e-10  # m: an entry into a disc by less than this is a touch
 NOT_INSIDE = 1e-3  # m: margin on centre distances beyond which a disc is certainly not within another
 STRIPS = 64  # number of strips of the plane that index segments
+SLACK = 1e-9  # m: rounding tolerance of clearances and lengths
+SHRINK = 2e-9  # m: strings are first pulled among discs smaller by this, which the plan's line certainly clears
 LOOSE = -1e-11  # rad: a contact with a smaller sweep does not bend the string
+UNPULLED, CROWDED = 4, 5  # places in `smooth.NOTES` after those of `fault`
 NONE, OFF, HIT = range(3)  # events of a turning link: it reaches its target, leaves its disc, or meets another disc
 
 
@@ -66,6 +71,63 @@ class Link(NamedTuple):
     r: float
     turn: float
     heading: float
+
+
+@kernel
+def points_along(
+    line: Array, ends: Array, cos: float, sin: float, discs: Array, bounds: Array, inflate: float
+) -> tuple[Array, Array, Array]:
+    """Return a line (N, 2) from the exact start to the goal, the `ends`, and clearance and length of each of its segments.
+
+    The first or last point is omitted if the straight past it keeps the clearance, and so are collinear points. A line to a
+    goal with less clearance ends at its last point. For a robot at its goal the line leads 0.1 mm along its heading.
+    """
+    n, least, boxes, own = line.shape[0], inflate - SLACK, boxes_around(discs), np.empty(1)
+    xy, x, y = np.empty((n + 2, 2)), ends[0, 0], ends[0, 1]
+    xy[0, 0], xy[0, 1], count = x, y, 1
+    past = n > 1 and clearance_up_to(math.inf, x, y, line[1, 0], line[1, 1], discs, boxes, bounds) >= least
+    for i in range(1 if past else 0, n):
+        xy[count, 0], xy[count, 1] = line[i, 0], line[i, 1]
+        count += 1
+    point_clearances(ends[1:], discs, bounds, own)
+    if own[0] >= least:
+        gx, gy, bx, by = ends[1, 0], ends[1, 1], xy[count - 2, 0], xy[count - 2, 1]
+        if clearance_up_to(math.inf, gx, gy, bx, by, discs, boxes, bounds) >= least:
+            count -= 1
+        xy[count, 0], xy[count, 1] = gx, gy
+        count += 1
+    kept = 1
+    for i in range(1, count):  # points that differ only by rounding define no direction
+        bx, by = xy[i, 0], xy[i, 1]
+        if i == count - 1 or math.hypot(bx - x, by - y) > 1e-6:
+            xy[kept, 0], xy[kept, 1] = bx, by
+            kept += 1
+        x, y = bx, by
+    if kept > 2 and math.hypot(x - xy[kept - 2, 0], y - xy[kept - 2, 1]) <= 1e-6:
+        kept -= 1
+        xy[kept - 1, 0], xy[kept - 1, 1] = x, y
+    out, size = np.empty((kept, 2)), 0
+    for i in range(kept):
+        if 0 < i < kept - 1:
+            ex, ey, dx, dy = (
+                xy[i + 1, 0] - xy[i, 0],
+                xy[i + 1, 1] - xy[i, 1],
+                xy[i, 0] - xy[i - 1, 0],
+                xy[i, 1] - xy[i - 1, 1],
+            )
+            if abs(ex * dy - ey * dx) < 1e-12 and ex * dx + ey * dy > 0.0:
+                continue
+        out[size, 0], out[size, 1] = xy[i, 0], xy[i, 1]
+        size += 1
+    left, right = span(out[:size], 0)
+    low, high = span(out[:size], 1)
+    if max(right - left, high - low) < 1e-6:
+        out[1, 0], out[1, 1], size = out[0, 0] + 1e-4 * cos, out[0, 1] + 1e-4 * sin, 2
+    room, length = np.empty(size - 1), np.empty(size - 1)
+    segment_clearances(out[: size - 1], out[1:size], discs, bounds, room)
+    for i in range(size - 1):
+        length[i] = math.hypot(out[i + 1, 0] - out[i, 0], out[i + 1, 1] - out[i, 1])
+    return out[:size], room, length
 
 
 @inline
@@ -619,7 +681,7 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
 
 @kernel
 def fault(string: String, xy: Array, line: Array, built: Array, bounds: Array, least: float, longest: float) -> int:
-    """Return the reason to reject a string and its polyline `xy`, as an index into `smooth.REJECTIONS`.
+    """Return the reason to reject a string and its polyline `xy`, as a place in `smooth.NOTES`.
 
     They must come no closer than `least`, be no longer than `longest`, and pass all discs on the same side as `line`.
     """
@@ -642,9 +704,7 @@ def widest(
 
     All discs (N, 3) grow by the same fraction of `extra`, each by at most its `room`; bisection finds the largest fraction.
     """
-    ends = np.empty((2, 2))
-    for k in range(2):
-        ends[0, k], ends[1, k] = line[0, k], line[-1, k]
+    ends = first_and_last(line)
     found, best, curvature = False, np.empty((0, 2)), np.empty(0)
     wider = discs.copy()
     low, high, part = 0.0, 1.0, 1.0
@@ -682,6 +742,92 @@ def near_polyline(xy: Array, discs: Array, reach: float) -> Array:
                 near[k] = True
                 break
     return near
+
+
+@kernel
+def taut(line: Array, built: Array, inflate: float) -> tuple[bool, Array, Array, Array, Array, Array]:
+    """Return whether the taut string that passes all discs on the same side as a clear polyline was found.
+
+    Also returns its contacts, its links, and the discs (N, 3) with the radii of its arcs.
+    """
+    keep, grown, count = outermost(built), np.empty_like(built), 0
+    for i in range(built.shape[0]):
+        if keep[i]:
+            grown[count, 0], grown[count, 1], grown[count, 2] = (
+                built[i, 0],
+                built[i, 1],
+                built[i, 2] + (inflate - SHRINK),
+            )
+            count += 1
+    discs, ends, links = grown[:count], first_and_last(line), np.empty((0, 4))
+    pulled, disc, turn, sweep = pull(line, discs)
+    contacts = Contacts(disc, turn, sweep)
+    for part in range(2 if pulled else 0):  # rounding may close a gap between discs of exact radius
+        discs = grown[:count].copy()
+        for i in range(count):
+            discs[i, 2] += SHRINK if part == 0 else SHRINK * 0.6
+        settled, disc, turn, sweep, links = settle(contacts, discs, ends)
+        if settled:
+            return True, disc, turn, sweep, links, discs
+    return False, disc, turn, sweep, links, discs
+
+
+@inline
+def first_and_last(xy: Array) -> Array:
+    """Return both ends of a polyline (2, 2)."""
+    ends = np.empty((2, 2))
+    for k in range(2):
+        ends[0, k], ends[1, k] = xy[0, k], xy[-1, k]
+    return ends
+
+
+@kernel
+def smoothed(
+    line: Array, built: Array, bounds: Array, inflate: float, own: float, extra: float, stretch: float, spare: float,
+    bulge: float,
+) -> tuple[int, Array, Array]:  # fmt: skip
+    """Smooth a clear polyline of a length `own` as far as the checks allow: taut, and with `extra` clearance where there is room.
+
+    Returns a place in `smooth.NOTES`, the points and their curvature.
+    """
+    found, disc, turn, sweep, links, discs = taut(line, built, inflate)
+    string, why = String(Contacts(disc, turn, sweep), links, discs), UNPULLED
+    xy, curvature = line, np.zeros(line.shape[0])
+    for part in range(2 if found else 0):  # a plan with finer arcs may be shorter
+        xy, curvature = string_points(string, built, bounds, inflate, bulge if part == 0 else bulge / 100.0)
+        why = fault(string, xy, line, built, bounds, inflate - SLACK, own + SLACK)
+        if why == 0:
+            break
+    if why > 0:
+        return why, line, np.zeros(line.shape[0])
+    if extra == 0.0:
+        return 0, xy, curvature
+    near, some, place, count = near_polyline(xy, discs, 2.0 * extra), discs.copy(), disc.copy(), 0
+    for k in range(discs.shape[0]):
+        for i in range(len(disc)):
+            if disc[i] == k:
+                place[i] = count
+        if near[k]:
+            some[count, 0], some[count, 1], some[count, 2] = discs[k, 0], discs[k, 1], discs[k, 2]
+            count += 1
+    box, room = np.empty(4), np.empty(count)
+    box[0], box[1], box[2], box[3] = bounds[0] + inflate, bounds[1] + inflate, bounds[2] - inflate, bounds[3] - inflate
+    room_to_grow(xy, some[:count], box, first_and_last(xy), extra, room)
+    longest = min(string_length(string) * (1.0 + stretch), own + spare)
+    fits, wide, bends = widest(
+        Contacts(place, turn, sweep),
+        some[:count],
+        room,
+        extra,
+        xy,
+        built,
+        bounds,
+        inflate,
+        SLACK,
+        longest + SLACK,
+        bulge,
+    )
+    return (0, wide, bends) if fits else (CROWDED, xy, curvature)
 
 
 @kernel

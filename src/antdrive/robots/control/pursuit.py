@@ -28,7 +28,7 @@ from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
-from antdrive.robots.control.speed_limits import limits_along, limits_along_lines, speed_profile
+from antdrive.robots.control.speed_limits import limits_along, limits_along_lines
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
@@ -275,9 +275,9 @@ class PurePursuit:
         self, route: Route, world: World, spec: RobotSpec, obstacles: ObstacleIndex, tuning: PursuitTuning
     ) -> PathSamples:
         """Return what the controller precomputes along a route."""
-        near_obstacles = self.min_speed_near_obstacles, self.clearance_time
-        braking = self.braking * spec.max_acceleration
         if route.turns is not None:
+            near_obstacles = self.min_speed_near_obstacles, self.clearance_time
+            braking = self.braking * spec.max_acceleration
             speed = limits_along_lines(route, world, spec, tuning.spacing, near_obstacles, braking)
             unused = np.empty(0)
             return PathSamples(
@@ -289,19 +289,10 @@ class PurePursuit:
             route.xy, route.arc, obstacles, tuning.lookahead_clearance, spacing, self.lookahead_min,
             self.lookahead_max, lookahead,
         )  # fmt: skip
-        at = spacing * np.arange(len(lookahead))
-        profile = speed_profile(
-            route,
-            spec,
-            blend=self.blend if route.curvature is not None else self.corner_blend,
-            rotate_in_place_above=self.rotate_in_place_above,
-            braking=self.braking,
-        )
-        curvature = np.interp(at, profile.arc, profile.curvature)
-        heading = np.interp(at, profile.arc, profile.heading)
+        blend = self.blend if route.curvature is not None else self.corner_blend
+        speed, curvature, heading = limits_along(route, world, spec, lookahead, tuning, blend)
         if route.curvature is None:
             curvature[:] = np.nan
-        speed = limits_along(route, world, spec.radius, profile, lookahead, tuning, near_obstacles, braking)
         return PathSamples(route.xy, route.arc, lookahead, speed, curvature, heading)
 
     def _tuning(

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from antdrive.worlds._kernels import ROUNDING, Array, inline, kernel, leaf
+from antdrive.robots.control._kernels_profile import value_at
+from antdrive.worlds._kernels import ROUNDING, Array, inline, kernel, leaf, point_clearances
 
 BLOCK = 8  # points of a route that share one rectangle
 
@@ -116,6 +117,24 @@ def check(
                 if distance > 0.0 and dx * dx + dy * dy < distance * distance:
                     return px, py, True
     return px, py, False
+
+
+@kernel
+def route_points(
+    xy: Array, arc: Array, at: Array, discs: Array, bounds: Array, inflate: float
+) -> tuple[Array, Array, Array]:
+    """Return the points of a polyline at ascending arc lengths, the clearance they keep, at most `inflate`, and `surrounding`."""
+    points, needed = np.empty((len(at), 2)), np.empty(len(at))
+    k = 0
+    for i in range(len(at)):
+        while k < len(arc) - 1 and arc[k + 1] <= at[i]:
+            k += 1
+        for axis in range(2):
+            points[i, axis] = value_at(at[i], k, arc, xy[:, axis])
+    point_clearances(points, discs, bounds, needed)
+    for i in range(len(at)):
+        needed[i] = min(needed[i], inflate)
+    return points, needed, surrounding(points, needed)
 
 
 @kernel

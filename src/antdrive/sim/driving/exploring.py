@@ -61,6 +61,7 @@ TURNABLE = 0.025
 #: Scattered hits narrow a passage that is hardly wider than the robot: a last plan for the footprint comes this much closer to
 #: them, so that the robot goes there and sees better. The controller and the stopping constraint still keep it from hits [m].
 SQUEEZED = -0.02
+SEEN = PointWorld.of("seen", (0.0, 0.0, 1.0, 1.0), np.empty((0, 3)))
 LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
 
@@ -165,7 +166,7 @@ class Exploration(RouteGuide):
             return 0.0
         controller, robot = self._routes.controller, self._robot
         line = grid.xy(answer.line) - pose[:2]
-        far = np.hypot(*line.T) >= controller.lookahead_max
+        far = np.hypot(line[:, 0], line[:, 1]) >= controller.lookahead_max
         x, y = line[far.argmax() if far.any() else -1]
         turn = abs(math.remainder(math.atan2(y, x) - pose[2], 2 * math.pi))
         if turn <= controller.rotate_in_place_above:
@@ -232,10 +233,12 @@ class Exploration(RouteGuide):
     ) -> tuple[Route, TrackedPath]:
         bounds = bounds_of(grid)
         task = self._known(pose, bounds)
-        self._seen.append((self._tick, task.world.discs))
-        line = np.vstack([[pose[:2]], grid.xy(answer.line), [self._task.goal]])
-        discs = _kernels_hits.near_polyline(line, task.world.discs, grid.inflate + CORRIDOR)
-        near = derived(task, world=_world(bounds, discs))
+        seen, points = task.world.discs, grid.xy(answer.line)
+        self._seen.append((self._tick, seen))
+        line = np.empty((len(points) + 2, 2))
+        line[0], line[1:-1], line[-1] = pose[:2], points, self._task.goal
+        discs = _kernels_hits.near_polyline(line, seen, grid.inflate + CORRIDOR)
+        near = derived(task, world=SEEN.among(bounds, discs))
         route = smooth(answer, grid, with_obstacles(near, avoided), kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
         self._points = RoutePoints.of(route, near.world, grid.inflate)
@@ -263,7 +266,7 @@ class Exploration(RouteGuide):
             discs = self._movers.without_trails(discs, pose)
         ends = np.array((pose[:2], self._task.goal))
         discs = _kernels_hits.beside(discs, ends, COVERS)  # hits that cover one of them are map errors
-        known = derived(self._task, world=_world(bounds, discs), start=pose)
+        known = derived(self._task, world=SEEN.among(bounds, discs), start=pose)
         self._known_as = key, known
         return known
 
@@ -273,7 +276,7 @@ class Exploration(RouteGuide):
         tracked = self._routes.prepared(route, world, margin, SAMPLES, indexed=False)
         foot, tuning = robot.footprint, tracked.tuning
         give = FORGIVING + CORNERED * (robot.radius - foot.inner_radius)
-        return dataclasses.replace(
+        return derived(
             tracked,
             tuning=tuning._replace(
                 lookahead_clearance=tuning.lookahead_clearance - give,
@@ -380,7 +383,7 @@ class Exploration(RouteGuide):
         route = recovery.escape(pose) if trigger == STALLED else None
         if route is None:
             return False, None
-        way = self._prepare(route, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
+        way = self._prepare(route, SEEN.among(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
     def note_command(self, tick: int, held: Twist | None, idle: bool) -> None:
@@ -396,7 +399,3 @@ class Exploration(RouteGuide):
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
         """Return the array `seen`: the discs behind each plan. `cells` is empty, since the log has no grid for them."""
         return {"seen": table_logged(self._seen, 4, log, per_tick), "cells": np.empty((0, 2), dtype=np.int32)}
-
-
-def _world(bounds: Bounds, discs: Floats) -> World:
-    return PointWorld.of("seen", bounds, discs)

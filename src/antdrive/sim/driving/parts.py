@@ -173,7 +173,7 @@ class Guide(Protocol):
         self, t: float, trigger: str, wall_s: float = 0.0, work: int = 0, cost: float = math.inf, xy: Floats = NO_ROUTE
     ) -> None:
         """Log a search for a new route (N, 2) [m] and the plan's cost [m]."""
-        points = tuple((x, y) for x, y in np.round(xy, 4).tolist())
+        points = tuple(map(tuple, np.round(xy, 4).tolist()))
         self.log.append(
             ReplanRecord(t=t, trigger=trigger, solved=len(xy) > 0, cost_m=finite_or_none(cost), work=work, route=points)
         )

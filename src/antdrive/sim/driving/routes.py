@@ -183,9 +183,8 @@ class RoutePlanner:
             task = with_obstacles(task, [*discs, *(zone.discs if zone is not None else ())])
             grid = rasterise(task.world, grid.cell, grid.inflate)
         query = Query.between(grid, task)
-        unreachable = PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
         if query.unreachable and not self.mapped:
-            return unreachable
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
             return self.plan(query, self.rng)
         closed = np.flatnonzero(closed_cells(query, discs, zone)) if moving else NO_CELLS
@@ -194,7 +193,9 @@ class RoutePlanner:
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
             answer = require_result(self.planner, answer)
         # A replanner knows cells only; it cannot tell that the first cell is unreachable for the robot.
-        return unreachable if query.unreachable else self.checked(query, answer)
+        if query.unreachable:
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+        return self.checked(query, answer)
 
     def observed(self, world: World, margin: float) -> Grid:
         """Return the grid of a map's discs for the disc, updated where they changed; valid until the next call."""
@@ -221,11 +222,8 @@ class RoutePlanner:
             if not self.mapped:
                 known = raster is not None and last.grid is grid
                 replanner.change(grid, raster.changed_since(last.updates) if raster is not None and known else None)
-        for tell, cells in (
-            (replanner.clear, np.setdiff1d(before, closed)),
-            (replanner.block, np.setdiff1d(closed, before)),
-        ):
-            if len(cells):
+        for tell, some, others in ((replanner.clear, before, closed), (replanner.block, closed, before)):
+            if len(some) and len(cells := np.setdiff1d(some, others)):
                 tell(np.column_stack(np.divmod(cells, grid.shape[1])))
         replanner.move(query.start, *query.start_headings[:1])
         if kept:

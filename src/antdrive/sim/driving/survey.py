@@ -24,7 +24,7 @@ from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers
-from antdrive.worlds import Route, Task, Trajectories, World, point_clearance
+from antdrive.worlds import Route, Task, Trajectories, World
 
 MAP_CELL = 0.05  # side of the map's cells [m]
 HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # range up to which hits enter the map [m]
@@ -82,9 +82,9 @@ class RoutePoints(NamedTuple):
     def of(cls, route: Route, world: World, inflate: float) -> RoutePoints:
         """Return the points of a route, which keep `inflate` or else their clearance [m]."""
         arcs = np.arange(0.0, route.length + ROUTE_CHECK_STEP, ROUTE_CHECK_STEP)
-        xy = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
-        needed = np.minimum(point_clearance(world, xy), inflate)
-        return cls(xy, needed, arcs, _kernels_hits.surrounding(xy, needed))
+        bounds = np.asarray(world.bounds, dtype=np.float64)
+        points, needed, blocks = _kernels_hits.route_points(route.xy, route.arc, arcs, world.discs, bounds, inflate)
+        return cls(points, needed, arcs, blocks)
 
 
 class MoverTracking:
