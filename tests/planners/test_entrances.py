@@ -5,10 +5,14 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from antdrive.base import FieldError
+from antdrive.planners._kernels_entrances import entrances
 from antdrive.planners.entrances import LEAD, MAX_BACKWARDS, ROOM, TURNING, clear_turn, ends, lead_heading
 from antdrive.worlds import DIRECTIONS, Disc, Task, World, rasterise
+from antdrive.worlds.geometry import point_clearance, segment_clearance
 from tests.worlds.headings.oracle import BAND, OUTLINES, gap, sampled
 
 SIDE = 4.0  # of the worlds [m]
@@ -165,9 +169,34 @@ def test_leads_and_turns_are_clear_where_samples_are():
             found = lead_heading(task.start, *to, outline, task.world, backwards=backwards)
             turn = clear_turn(task.start, heading, outline, task.world)
             assert math.isnan(found) or math.isclose(math.remainder(found - heading, 2 * math.pi), 0.0, abs_tol=1e-9)
-            for sure, given in ((lead, found), (turned_to(outline, *task.start, heading, around), turn)):
-                assert sure == NEAR or math.isfinite(given) == (sure == CLEAR)
+            for sure, angle in ((lead, found), (turned_to(outline, *task.start, heading, around), turn)):
+                assert sure == NEAR or math.isfinite(angle) == (sure == CLEAR)
                 seen[sure] += 1
             if math.isfinite(turn):
                 assert math.isclose(math.remainder(task.start[2] + turn - heading, 2 * math.pi), 0.0, abs_tol=1e-9)
     assert min(seen[CLEAR], seen[BLOCKED]) >= 30
+
+
+@settings(max_examples=200)
+@given(st.integers(0, 2**32 - 1), st.sampled_from((3, 30)))
+def test_the_cell_of_an_end_is_the_nearest_that_a_clear_line_reaches(seed, reach):
+    """Posts hide most cells, so dozens are tried."""
+    rng = np.random.default_rng(seed)
+    discs = np.column_stack((rng.uniform(0.0, 3.0, (40, 2)), rng.uniform(0.02, 0.1, 40)))
+    world, cell = World("posts", (-1.0, -1.0, 4.0, 4.0), tuple(Disc(*row) for row in discs)), 0.1
+    places = rng.uniform(0.5, 2.5, (60, 2))
+    ends = places[point_clearance(world, places).argsort()[-2:]]
+    free, own = rng.random((30, 30)) < 0.08, point_clearance(world, ends)
+    inflate = 0.97 * own.min()  # so that most lines come too close to a post
+    found = entrances(free, 0.0, 0.0, cell, inflate, reach, ends, 0.4, world.discs, np.array(world.bounds))
+    cells = np.argwhere(free)
+    centres = cells[:, ::-1] * cell
+    for end, (row, col, usable) in enumerate(found.tolist()):
+        away = np.hypot(*(centres - ends[end]).T)
+        clear = segment_clearance(world, centres, np.tile(ends[end], (len(cells), 1))) >= min(inflate, own[end]) - 1e-9
+        clear &= np.abs(cells - np.floor(ends[end, ::-1] / cell + 0.5)).max(axis=1) <= reach
+        if end == 1 and own[end] < inflate:
+            clear &= away <= 0.4
+        assert usable == clear.any()
+        if usable:
+            assert [row, col] == cells[clear][away[clear].argmin()].tolist()

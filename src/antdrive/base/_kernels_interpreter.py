@@ -131,8 +131,9 @@ def _names(code: types.CodeType) -> Iterator[str]:
 
 def _is_product(node: ast.AST) -> bool:
     """Return whether numba multiplies where Python calls `pow`, which rounds differently."""
-    is_power = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
-    return is_power and isinstance(node.right, ast.Constant) and isinstance(node.right.value, int)
+    if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)):
+        return False
+    return isinstance(node.right, ast.Constant) and isinstance(node.right.value, int)
 
 
 @functools.cache

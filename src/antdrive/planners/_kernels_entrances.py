@@ -10,6 +10,7 @@ from antdrive.worlds._kernels import Array, boxes_around, clearance_up_to, kerne
 from antdrive.worlds.headings._kernels_headings import TURN, sweep_clearance, turn_clear
 
 STEP = math.pi / 4  # between the headings of a grid [rad]
+FEW = 8  # nearest cells that are tried before all are sorted
 
 
 @kernel
@@ -31,25 +32,26 @@ def entrances(
         col = min(max(int(math.floor((x - x0) / cell + 0.5)), 0), cols - 1)
         out[end, 0], out[end, 1], out[end, 2] = row, col, 0
         top, left = max(0, row - reach), max(0, col - reach)
-        near = np.full((min(rows, row + reach + 1) - top, min(cols, col + reach + 1) - left), math.inf)  # distances
+        high, wide = min(rows, row + reach + 1) - top, min(cols, col + reach + 1) - left
+        near = np.full(high * wide, math.inf)  # distances of its cells
         within = tolerance if end == 1 and own[1] < inflate else math.inf
-        for r in range(near.shape[0]):
-            for c in range(near.shape[1]):
-                if free[top + r, left + c]:
-                    away = math.hypot((left + c) * cell + x0 - x, (top + r) * cell + y0 - y)
-                    near[r, c] = away if away <= within else math.inf
-        while True:
-            at_row, at_col = 0, 0
-            for r in range(near.shape[0]):
-                for c in range(near.shape[1]):
-                    if near[r, c] < near[at_row, at_col]:
-                        at_row, at_col = r, c
-            if near[at_row, at_col] == math.inf:
+        for k in range(near.shape[0]):
+            r, c = top + k // wide, left + k % wide
+            if free[r, c]:
+                away = math.hypot(c * cell + x0 - x, r * cell + y0 - y)
+                near[k] = away if away <= within else math.inf
+        order = np.empty(0, dtype=np.int64)
+        for n in range(near.shape[0]):
+            if n == FEW:
+                order = np.argsort(near, kind="mergesort")
+            at = order[n - FEW] if n >= FEW else np.argmin(near)
+            if near[at] == math.inf:
                 break
-            near[at_row, at_col] = math.inf
-            to_x, to_y = (left + at_col) * cell + x0, (top + at_row) * cell + y0
+            near[at] = math.inf
+            r, c = top + at // wide, left + at % wide
+            to_x, to_y = c * cell + x0, r * cell + y0
             if clearance_up_to(math.inf, to_x, to_y, x, y, discs, boxes, bounds) >= min(inflate, own[end]) - 1e-9:
-                out[end, 0], out[end, 1], out[end, 2] = top + at_row, left + at_col, 1
+                out[end, 0], out[end, 1], out[end, 2] = r, c, 1
                 break
     return out
 
