@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from antdrive.worlds._kernels import Array, leaf
-from antdrive.worlds._kernels_turns import MoveGraph
-from antdrive.worlds.grid import HEADINGS
+from antdrive.worlds._kernels_turns import HEADINGS, MoveGraph
 
 
 @leaf

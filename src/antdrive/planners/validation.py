@@ -239,7 +239,7 @@ def _is_cell(value: Any) -> bool:
 
 def _bits() -> Any:
     """Return the bit of `Grid.moves` by row and column step, each + 1 (3, 3); 8 where there is no step."""
-    from antdrive.worlds.grid import HEADINGS  # imports the compiler
+    from antdrive.worlds._kernels_turns import HEADINGS  # imports the compiler
 
     return HEADINGS
 

@@ -10,6 +10,9 @@ from antdrive.worlds._kernels import DCOL, DROW, Array, inline, kernel
 
 NOWHERE = -1
 
+#: The index in `DIRECTIONS` by row and column step, each + 1 (3, 3); 8 where there is no step.
+HEADINGS = np.array([(5, 6, 7), (4, 8, 0), (3, 2, 1)], dtype=np.int64)
+
 
 class MoveGraph(NamedTuple):
     """Nodes of a grid and their moves.

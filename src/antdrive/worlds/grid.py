@@ -16,16 +16,13 @@ import numpy.typing as npt
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.types import Floats, Point
 from antdrive.worlds import _kernels, _kernels_turns
-from antdrive.worlds._kernels_turns import MoveGraph
+from antdrive.worlds._kernels_turns import HEADINGS, MoveGraph
 from antdrive.worlds.headings import Outline, _kernels_headings
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import World
 
 #: The eight moves by bit of `Grid.moves`, as (row, column) steps: E, NE, N, NW, W, SW, S, SE.
 DIRECTIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
-
-#: The index in `DIRECTIONS` by row and column step, each + 1 (3, 3); 8 where there is no step.
-HEADINGS: npt.NDArray[np.int64] = np.array([(5, 6, 7), (4, 8, 0), (3, 2, 1)])
 
 
 def _none(*shape: int, dtype: npt.DTypeLike = np.int32) -> npt.NDArray[Any]:

@@ -60,6 +60,4 @@ class Raster:
     def changed_since(self, updates: int) -> npt.NDArray[np.int64]:
         """Return the flat cells that changed, themselves or their moves, after a number of updates, in order (K,)."""
         edits = self._edits[updates:]
-        return (
-            np.sort(edits[0]) if len(edits) == 1 else np.unique(np.concatenate([np.empty(0, dtype=np.int64), *edits]))
-        )
+        return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *edits]))

@@ -11,6 +11,7 @@ import numpy as np
 
 from antdrive.base.caches import Keyed, bits
 from antdrive.base.errors import FieldError, require_finite, require_positive
+from antdrive.base.records import derived
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.limits import MAX_CELLS, MAX_WALK, Coordinate, Size
 from antdrive.worlds.motions import Motion, first_cell, motion_of, path_ahead, require_few_draws
@@ -177,9 +178,8 @@ class PointWorld(World):
 
     def among(self, bounds: Bounds, discs: Floats) -> PointWorld:
         """Return the world of other cylinders (N, 3) between other walls, unchecked: they are made of checked ones."""
-        made = object.__new__(PointWorld)
-        vars(made).update(vars(self) | {"bounds": bounds, "_discs": discs})
-        vars(made).pop("obstacles", None)
+        made = derived(self, bounds=bounds, _discs=discs)
+        del vars(made)["obstacles"]
         return made
 
     @functools.cached_property

@@ -129,15 +129,12 @@ def smooth(
     spare = max(0.0, plan.cost - lengths.cumsum().item(-1)) if math.isfinite(plan.cost) else 0.0
     extra = clearance if kind == "clearance" else 0.0
     xy, curvature, kinds, notes = [line[:1]], [np.zeros(1)], [], []
-    longer: list[tuple[Floats, float]] = []
     for first, last, clear in _runs(room, inflate):
         run, own = line[first : last + 1], float(lengths[first:last].sum())
         piece = Piece(run, np.zeros(len(run)))
         if clear:
-            for drawn, planned in longer:
-                spare -= max(0.0, polyline_length(drawn) - planned)
             piece = _smoothed(run, own, world, inflate, extra, stretch, spare, bulge)
-            longer = [(piece.xy, own)]
+            spare -= max(0.0, polyline_length(piece.xy) - own)
             kinds.append(piece.kind)
         elif len(run) > 2 or not (run[0] == line[0]).all():
             piece = replace(piece, note="the plan's line comes closer than the clearance and is kept there")

@@ -24,6 +24,7 @@ from antdrive.worlds import Route, World
 
 UNKNOWN = np.empty(0)  # curvature of a route with corners
 UNKNOWN.setflags(write=False)
+STEP = 0.02  # longest distance between two samples of a profile [m]
 BACKWARDS = 0.3  # highest speed on the part of a route that is driven backwards [m/s]
 
 
@@ -65,7 +66,7 @@ def speed_profile(
     blend: float = 0.2,
     rotate_in_place_above: float = 1.0,
     braking: float = 1.0,
-    step: float = 0.02,
+    step: float = STEP,
 ) -> SpeedProfile:
     """Return the fastest speeds along a route, from rest to rest, within all limits of the robot.
 
@@ -92,7 +93,7 @@ def speed_profile(
 
 
 def _profile(
-    route: Route, spec: RobotSpec, blend: float, rotate_in_place_above: float, braking: float, step: float = 0.02
+    route: Route, spec: RobotSpec, blend: float, rotate_in_place_above: float, braking: float, step: float = STEP
 ) -> Floats:
     """Return the rows of a speed profile (6, S)."""
     from antdrive.robots.control import _kernels_profile

@@ -183,8 +183,9 @@ class RoutePlanner:
             task = with_obstacles(task, [*discs, *(zone.discs if zone is not None else ())])
             grid = rasterise(task.world, grid.cell, grid.inflate)
         query = Query.between(grid, task)
+        unreachable = PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
         if query.unreachable and not self.mapped:
-            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+            return unreachable
         if can.needs_world or not (self.mapped or moving or can.own_replanner):
             return self.plan(query, self.rng)
         closed = np.flatnonzero(closed_cells(query, discs, zone)) if moving else NO_CELLS
@@ -193,9 +194,7 @@ class RoutePlanner:
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
             answer = require_result(self.planner, answer)
         # A replanner knows cells only; it cannot tell that the first cell is unreachable for the robot.
-        if query.unreachable:
-            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
-        return self.checked(query, answer)
+        return unreachable if query.unreachable else self.checked(query, answer)
 
     def observed(self, world: World, margin: float) -> Grid:
         """Return the grid of a map's discs for the disc, updated where they changed; valid until the next call."""
