@@ -14,14 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.types import Floats
-from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE, bullet, drawn_as
+from antdrive.sim.physics.bullet import BELOW, CHASSIS, OBSTACLE, bullet, drawn_as
 from antdrive.worlds.trajectories import Trajectories
 
 SAME_VELOCITY = 1e-10  # velocities within this differ by rounding only [m/s]
 CHUNK = 480  # physics steps whose velocities are computed together
 WINDOW = 60  # physics steps between updates of the bodies; divides CHUNK
 MARGIN = 0.2  # a mover that could come this close to the robot's circumscribed circle has a body [m]
-HOLD = 0.3  # additional distance at which a body is removed [m]
+HOLD = 0.3  # additional distance at which a body is parked [m]
 
 #: A mover's index, its velocity x and y [m/s], and a position to set first [m]
 Change: TypeAlias = tuple[int, float, float, tuple[float, float] | None]
@@ -32,7 +32,7 @@ class MoverBodies:
 
     Attributes:
         bodies: PyBullet's body numbers by mover index, for the movers with a body
-        indices: mover indices by PyBullet's body number, for all bodies ever created
+        indices: mover indices by PyBullet's body number, for the same movers
     """
 
     def __init__(
@@ -48,10 +48,12 @@ class MoverBodies:
         self._trajectories, self._hz, self._client = trajectories, hz, client
         self._radius, self._speed, self._where = radius, speed, where
         self._half_heights = [max(height, 0.05) / 2 for height in trajectories.heights.tolist()]
-        self._shapes = [
-            p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=2 * half, physicsClientId=client)
-            for radius, half in zip(trajectories.radii.tolist(), self._half_heights, strict=True)
-        ]
+        self._sizes = list(zip(trajectories.radii.tolist(), self._half_heights, strict=True))
+        self._shapes = {
+            size: p.createCollisionShape(p.GEOM_CYLINDER, radius=size[0], height=2 * size[1], physicsClientId=client)
+            for size in dict.fromkeys(self._sizes)
+        }
+        self._spare: dict[tuple[float, float], list[int]] = {size: [] for size in self._shapes}  # parked bodies, by size
         self._chunk = _Chunk.of(trajectories, hz, 0)
         self._past = [self._chunk.positions]
         self._drawn = drawn_as(client)
@@ -59,9 +61,9 @@ class MoverBodies:
         self.indices: dict[int, int] = {}
 
     def park(self) -> None:
-        """Remove all bodies."""
+        """Move all bodies far below the floor."""
         for m in list(self.bodies):
-            self._remove(m)
+            self._release(m)
 
     def restart(self) -> None:
         """Place the movers at their positions at time 0."""
@@ -107,26 +109,39 @@ class MoverBodies:
         off = np.maximum(np.maximum(chunk.low[w] - robot, robot - chunk.high[w]), 0.0)
         away = np.hypot(off[:, 0], off[:, 1]) - self._trajectories.radii - self._radius - travel
         for m in [m for m in self.bodies if away[m] > MARGIN + HOLD]:
-            self._remove(m)
+            self._release(m)
         for m in np.flatnonzero(away <= MARGIN).tolist():
             if m not in self.bodies:
                 self._add(m, step)
 
     def _add(self, m: int, step: int) -> None:
-        p, (position, velocity) = self._p, self._chunk.state(m, step)
-        place = (*position, self._half_heights[m])
-        # Unlike an obstacle, a mover must be awake; with maximal coordinates it would not move.
-        body = p.createMultiBody(0, self._shapes[m], self._drawn, basePosition=place, physicsClientId=self._client)
-        p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
+        position, velocity = self._chunk.state(m, step)
+        spare = self._spare[self._sizes[m]]
+        body = spare.pop() if spare else self._create(m)
         self.bodies[m], self.indices[body] = body, m
+        self._set_position(m, *position)
         self._set_velocity(m, *velocity)
 
-    def _remove(self, m: int) -> None:
-        self._p.removeBody(self.bodies.pop(m), physicsClientId=self._client)
+    def _create(self, m: int) -> int:
+        p = self._p
+        # Unlike an obstacle, a mover must be awake; with maximal coordinates it would not move.
+        body: int = p.createMultiBody(
+            0, self._shapes[self._sizes[m]], self._drawn, basePosition=(0, 0, BELOW), physicsClientId=self._client
+        )
+        p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
+        return body
 
-    def _set_position(self, m: int, x: float, y: float) -> None:
-        position = (x, y, self._half_heights[m])
-        self._p.resetBasePositionAndOrientation(self.bodies[m], position, (0, 0, 0, 1), physicsClientId=self._client)
+    def _release(self, m: int) -> None:
+        """Park a mover's body. A removed body's number would be reused, and batches of bodies would get wrong numbers."""
+        self._set_position(m, 0.0, 0.0, BELOW)
+        self._set_velocity(m, 0.0, 0.0)
+        body = self.bodies.pop(m)
+        del self.indices[body]
+        self._spare[self._sizes[m]].append(body)
+
+    def _set_position(self, m: int, x: float, y: float, z: float | None = None) -> None:
+        place = (x, y, self._half_heights[m] if z is None else z)
+        self._p.resetBasePositionAndOrientation(self.bodies[m], place, (0, 0, 0, 1), physicsClientId=self._client)
 
     def _set_velocity(self, m: int, vx: float, vy: float) -> None:
         self._p.resetBaseVelocity(self.bodies[m], (vx, vy, 0), (0, 0, 0), physicsClientId=self._client)

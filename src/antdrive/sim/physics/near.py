@@ -13,11 +13,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from antdrive.base.types import Floats
-from antdrive.sim.physics.bullet import bullet
+from antdrive.sim.physics.bullet import BELOW, bullet
 from antdrive.worlds.world import Disc
 
 HOLD = 2.0  # travel of the robot between two updates [m]
-BELOW = -1000.0  # height of unused bodies [m]
 
 
 class NearBodies:
