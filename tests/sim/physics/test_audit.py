@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive import load_task, run
+from antdrive import Rollout, certify, load_task, run
 from antdrive.sim import Engine, Scenario
+from antdrive.sim.driving.replay import replay
 from antdrive.sim.physics.bodies import BELOW, Bodies
-from antdrive.worlds import Cruising, Disc, Keyframed, Trajectories, World
+from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE
+from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World
 
 
 def lane(cylinders, movers, seed):
@@ -123,7 +125,7 @@ def test_bodies_are_in_place_on_the_way_through_an_office_with_people(seed, spec
     task = replace(task, world=replace(task.world, movers=people))
     scenario = Scenario.of(task, "astar", robot=spec, noise=1.0, seed=seed, time_limit=20.0)
     done, swaps = a_real_drive(monkeypatch, scenario)
-    assert done.rollout is not None
+    assert done.rollout.record.physics == ""
     assert swaps > 2
 
 
@@ -261,3 +263,71 @@ def test_removed_bodies_of_movers_are_found(jackal, monkeypatch):
         for _ in range(2400):
             engine.step()
         assert engine.audit()
+
+
+OPEN = Task(World("open", (-1, -2, 4, 2), (Disc(2.0, 1.5, 0.1), Disc(2.0, -1.5, 0.1))), (0.0, 0.0, 0.0), (3.0, 0.0))
+
+
+@pytest.fixture
+def faulty(monkeypatch):
+    """Drive in a world after a fault planted after a second."""
+
+    def drive(plant):
+        command = Engine.command
+
+        def planting(engine, speed, yaw_rate):
+            command(engine, speed, yaw_rate)
+            if engine._steps == 240:
+                plant(engine, engine._bodies)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Engine, "command", planting)
+            return run(Scenario.of(OPEN, "astar"))
+
+    return drive
+
+
+def test_a_drive_with_a_misplaced_body_is_not_certified_and_the_log_says_why(faulty, tmp_path):
+    done = faulty(move(cylinder))
+    assert (done.outcome.key, done.succeeded) == ("succeeded", False)
+    assert done.rollout.record.physics.startswith("body 2 of obstacle 0 is 0.001 m off its place at t = ")
+    assert done.certificate.problems == (f"physics: its contacts are no evidence, since {done.rollout.record.physics}",)
+    done.rollout.save(tmp_path / "log.npz")
+    assert certify(Rollout.load(tmp_path / "log.npz")) == done.certificate
+
+
+def test_a_contact_with_an_unknown_body_is_no_error_and_no_certificate(faulty):
+    def plant(engine, bodies):
+        shape = engine._shape_of(Disc(1.5, 0.0, 0.2))
+        body = engine._p.createMultiBody(0, shape, basePosition=(1.5, 0.0, 0.5), physicsClientId=engine._client)
+        engine._p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=engine._client)
+
+    done = faulty(plant)
+    assert done.rollout.record.physics.startswith(
+        "physics reports a contact with body 8, which is of no obstacle at t ="
+    )
+    assert not done.certificate.certified
+
+
+def test_a_fault_is_found_at_the_swap_and_not_forgotten(faulty):
+    """A body put into its place later has missed contacts meanwhile."""
+
+    def plant(engine, bodies):
+        bodies.move(0, (2.0, 1.6, 0.5))
+        bodies.fresh.add(bodies.held[0])
+        engine.step()
+        bodies.move(0, (2.0, 1.5, 0.5))
+
+    assert faulty(plant).rollout.record.physics == "body 2 of obstacle 0 is 0.1 m off its place at t = 1.004 s"
+
+
+def test_a_drive_with_its_bodies_in_place_says_nothing_about_them():
+    done = run(Scenario.of(OPEN, "astar"))
+    assert done.succeeded
+    assert "physics" not in done.rollout.record.as_dict()
+
+
+def test_a_replay_with_a_misplaced_body_is_no_evidence(monkeypatch):
+    done = run(Scenario.of(OPEN, "astar"))
+    monkeypatch.setattr(Engine, "audit", lambda engine: "body 2 of obstacle 0 does not exist at t = 1.000 s")
+    assert "physics' contacts are no evidence, since body 2" in replay(done.rollout).problems[0]
