@@ -129,6 +129,19 @@ def test_bodies_are_in_place_on_the_way_through_an_office_with_people(seed, spec
     assert swaps > 2
 
 
+def test_a_mover_that_jumps_in_the_first_step_is_in_place(turtlebot):
+    """Its body begins the step away from the trajectory, so that it ends on it."""
+    shuttle = Keyframed(radius=0.2, keyframes=((0.0, -0.5, 0.5), (2.0, 0.5, 0.5)), loop="teleport", phase=1.999)
+    world = World("shuttle", (-3, -3, 3, 3), movers=(shuttle,))
+    with Engine(world, turtlebot, trajectories=Trajectories.of(world, (0.0, 0.0))) as engine:
+        engine.place((0.0, 0.0, 0.0))
+        assert engine.audit() == ""
+        for _ in range(3):
+            engine.step()
+            assert engine.audit() == ""
+            assert misplaced(engine) == []
+
+
 def cylinder(engine):
     return next(index for index in engine._bodies.held if index < len(engine.world.obstacles))
 

@@ -46,7 +46,7 @@ class Bodies:
         sizes = np.array([size_of(cylinder) for cylinder in cylinders]).reshape(-1, 2)
         self._halves = np.vstack([sizes[:, [0, 0, 1]] * (1.0, 1.0, 0.5), [half for half, _ in walls]])
         self._centres = self._halves * (0.0, 0.0, 1.0)
-        self._centres[: len(world.obstacles), :2] = [(disc.x, disc.y) for disc in world.obstacles] or np.empty((0, 2))
+        self._centres[: len(world.obstacles), :2] = world.discs[:, :2]
         self._centres[len(cylinders) :] = [centre for _, centre in walls]
         self._moving = slice(len(world.obstacles), len(cylinders))
         self.client = client

@@ -264,8 +264,8 @@ class Engine:
         return [Contact(index[point[2]], point[8], point[9]) for point in touching if point[2] in index]
 
     def _expected(self) -> Floats:
-        """Return the positions of the movers by their trajectories (M, 2) [m]."""
-        return self._movers.trajectory(self._steps) if self._movers else np.empty((0, 2))
+        """Return where the bodies of the movers must be (M, 2) [m]."""
+        return self._movers.expected(self._steps) if self._movers else np.empty((0, 2))
 
     def _note(self, fault: str) -> None:
         """Keep the first fault since placement, with its time."""

@@ -90,17 +90,20 @@ class MoverBodies:
 
     def positions(self, step: int) -> Floats:
         """Return the positions of all movers before a physics step (M, 2) [m]: those of bodies where they exist."""
-        places = self.trajectory(step).copy()
+        places: Floats = self._trajectories.positions(step / self._hz)[0]
         for m, body in self.held.items():
             places[m] = self._p.getBasePositionAndOrientation(body, self._client)[0][:2]
         return places
 
-    def trajectory(self, step: int) -> Floats:
-        """Return the positions of the trajectories before a physics step (M, 2) [m]."""
+    def expected(self, step: int) -> Floats:
+        """Return the positions of the bodies after the previous physics step (M, 2) [m]: where all movers have one."""
         chunk = self._chunk
-        if chunk.first <= step < chunk.end:
-            return np.asarray(chunk.positions[step - chunk.first])
-        return np.asarray(self._trajectories.positions(step / self._hz)[0])
+        if step == 0:  # The restart has carried out the jumps of the first step.
+            return np.asarray(chunk.came_from[0])
+        inside = chunk.first <= step < chunk.end
+        return np.asarray(
+            chunk.positions[step - chunk.first] if inside else self._trajectories.positions(step / self._hz)[0]
+        )
 
     def track(self, steps: int) -> Floats:
         """Return the positions of all movers before each of the first steps since the restart (steps, M, 2) [m]."""
