@@ -177,6 +177,17 @@ def test_an_engine_takes_the_client_that_another_has_left(turtlebot):
         assert second._client == number
 
 
+def test_an_engine_touches_no_other_engine_after_its_block(turtlebot):
+    with Engine(OPEN, turtlebot) as first:
+        first.place((0, 0, 0))
+    with Engine(OPEN, turtlebot) as second:
+        second.place((1, 1, 0))
+        before = second.state()
+        with pytest.raises(bullet().error):
+            first.place((0, 0, 0))
+        assert second.state() == before
+
+
 def test_a_client_of_ones_own_is_never_the_one_that_is_kept(turtlebot):
     """Calls of PyBullet without a client's number mean client 0."""
     p = bullet()

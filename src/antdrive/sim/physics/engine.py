@@ -132,6 +132,7 @@ class Engine:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        self._client = self._bodies.client = -1  # another engine may take the client
         self._open.__exit__(kind, error, traceback)
 
     def place(self, pose: Pose) -> None:

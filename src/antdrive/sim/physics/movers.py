@@ -43,7 +43,7 @@ class MoverBodies:
         bodies: Bodies,
     ) -> None:
         p, client = bullet(), bodies.client
-        self._p, self._client, self._bodies = p, client, bodies
+        self._p, self._bodies = p, bodies
         self._trajectories, self._hz = trajectories, hz
         self._radius, self._speed, self._where = radius, speed, where
         self._first = len(world.obstacles)  # contact index of the first mover
@@ -92,7 +92,7 @@ class MoverBodies:
         """Return the positions of all movers before a physics step (M, 2) [m]: those of bodies where they exist."""
         places: Floats = self._trajectories.positions(step / self._hz)[0]
         for m, body in self.held.items():
-            places[m] = self._p.getBasePositionAndOrientation(body, self._client)[0][:2]
+            places[m] = self._p.getBasePositionAndOrientation(body, self._bodies.client)[0][:2]
         return places
 
     def expected(self, step: int) -> Floats:
@@ -137,7 +137,7 @@ class MoverBodies:
         self._set_velocity(m, *velocity)
 
     def _create(self, m: int, place: Point3) -> None:
-        p, shape, client = self._p, self._shapes[m], self._client
+        p, shape, client = self._p, self._shapes[m], self._bodies.client
         # Unlike an obstacle, a mover must be awake; with maximal coordinates it would not move.
         body = p.createMultiBody(0, shape, self._drawn, basePosition=place, physicsClientId=client)
         p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=client)
@@ -152,7 +152,7 @@ class MoverBodies:
 
     def _set_velocity(self, m: int, vx: float, vy: float) -> None:
         body = self._bodies.held[self._first + m]
-        self._p.resetBaseVelocity(body, (vx, vy, 0), (0, 0, 0), physicsClientId=self._client)
+        self._p.resetBaseVelocity(body, (vx, vy, 0), (0, 0, 0), physicsClientId=self._bodies.client)
 
 
 class _Chunk(NamedTuple):
