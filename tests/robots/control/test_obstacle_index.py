@@ -18,6 +18,7 @@ from antdrive.robots.control._kernels_obstacles import (
     is_beside_arc,
     nearby,
     on_arc,
+    points_within,
 )
 from antdrive.robots.control.pursuit import obstacles_around
 from antdrive.worlds import Route, World
@@ -142,3 +143,18 @@ def distance_to_arc(x, y, yaw, curvature, sweep, ex, ey, disc):
     if not beside and on_arc(math.atan2(py - cy, px - cx), math.atan2(y - cy, x - cx), sweep):
         away = min(away, abs(math.hypot(px - cx, py - cy) - radius))
     return away - size
+
+
+def test_points_are_within_reach_of_obstacles_where_their_clearance_is_no_more():
+    rng, answers = np.random.default_rng(12), []
+    for _, obstacles in indices(rng):
+        points, reach = rng.uniform((-3.5, 1.5), (5.5, 8.5), (60, 2)), rng.uniform(0.0, 0.6, 60)
+        expected = [
+            segment_clearance(x, y, x, y, nearby(x, y, math.inf, obstacles), BOUNDS) <= most
+            for (x, y), most in zip(points.tolist(), reach, strict=True)
+        ]
+        found = np.empty(60, dtype=np.bool_)
+        points_within(points, reach, obstacles, found)
+        assert found.tolist() == expected
+        answers += expected
+    assert 0.1 < np.mean(answers) < 0.9

@@ -146,6 +146,21 @@ def clearance_at(x: float, y: float, obstacles: ObstacleIndex) -> float:
 
 
 @leaf
+def points_within(points: Array, reach: Array, obstacles: ObstacleIndex, out: Array) -> None:
+    """Fill out[i] with whether a disc or wall is within reach[i] of point i."""
+    for i in range(points.shape[0]):
+        x, y = points[i, 0], points[i, 1]
+        out[i] = wall_distance(x, y, obstacles.bounds) <= reach[i]
+        if out[i]:
+            continue
+        discs = nearby(x, y, reach[i], obstacles)
+        for j in range(discs.shape[0]):
+            if math.hypot(x - discs[j, 0], y - discs[j, 1]) - discs[j, 2] <= reach[i]:
+                out[i] = True
+                break
+
+
+@leaf
 def arc_clearance(
     x: float,
     y: float,

@@ -238,7 +238,7 @@ class PurePursuit:
         tuning = self._tuning(route, spec, margin, period, min(self.goal_distance, tolerance / 2))
         tuning = tuning._replace(spacing=spacing)
         obstacles = (
-            self._index(world, tuning.lookahead_clearance)
+            indexed_obstacles(world, self.lookahead_max + tuning.lookahead_clearance)
             if indexed
             else obstacles_around(route.xy[0], world.discs, world.bounds)
         )
@@ -325,14 +325,6 @@ class PurePursuit:
             turn_in_clearance=math.inf,
         )
 
-    def _index(self, world: World, clearance: float) -> ObstacleIndex:
-        """Index the world's obstacles by square: each square lists those within reach of the longest lookahead."""
-        bounds = np.asarray(world.bounds, dtype=np.float64)
-        side = max(SQUARE, math.sqrt(math.prod(world.size) / MAX_SQUARES))
-        distance = self.lookahead_max + clearance + side
-        discs, starts = _discs_by_square(by_geometry(world), side, distance)
-        return ObstacleIndex(discs, starts, bounds, bounds[:2], side)
-
 
 class ControllerOption(NamedTuple):
     """An option of the controller.
@@ -365,6 +357,14 @@ def controller_options() -> Mapping[str, ControllerOption]:
         acts_on = next((mark for mark in marks if isinstance(mark, ActsOn)), None)
         options[one.name] = ControllerOption(getattr(PurePursuit(), one.name), unit.removesuffix("]"), text, acts_on)
     return options
+
+
+def indexed_obstacles(world: World, reach: float, side: float = SQUARE) -> ObstacleIndex:
+    """Return an index of a world's obstacles by squares of at least a side: each lists those within reach of its points [m]."""
+    bounds = np.asarray(world.bounds, dtype=np.float64)
+    side = max(side, math.sqrt(math.prod(world.size) / MAX_SQUARES))
+    discs, starts = _discs_by_square(by_geometry(world), side, reach + side)
+    return ObstacleIndex(discs, starts, bounds, bounds[:2], side)
 
 
 def obstacles_around(centre: Floats, discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
