@@ -6,7 +6,11 @@ the limit: PyBullet has no call that returns more than one of them. The table sh
 rounds of the ratio within a round.
 
 A second table compares the loop among 24 movers that the robot avoids with the loop in the same hall without movers. Its limit
-is the loop among movers that the robot does not see. `--against PATH` then runs the benchmark of another checkout.
+is the loop among movers that the robot does not see.
+
+A third table shows what a control period, a physics step and a replan cost among 6 movers in a fenced hall of 100 cylinders, with
+more cylinders outside, and with covers of overlapping cylinders in their place, as maps have. The ratio of a round is to the
+same robot among 100 cylinders. `--against PATH` then runs the benchmark of another checkout.
 """
 
 from __future__ import annotations
@@ -17,21 +21,36 @@ import statistics
 import subprocess
 import sys
 import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
-from antdrive.sim import Perception
+from antdrive.sim import Perception, Scenario, run
+from antdrive.sim.driving import drive
 from antdrive.sim.driving.drive import OnePath, follow
+from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.perceived_movers import GroundTruth
+from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.rules import Avoid
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import CHASSIS_AND_ANY, Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
 from benchmarks.markdown import command_line
 
-SMALLEST = ("--rounds 1",)
+SMALLEST = ("--rounds 1 --most 100",)
 MOVERS = 24
+GROUND, HALL = 160.0, 20.0  # sides of the ground and of the hall in its middle [m]
+FENCE = 11  # cylinders along a side of the fence around the hall, beyond which no robot sees
+COVER, APART = 9, 0.05  # rows and columns of a cover's cylinders, and their distance [m]
+ROBOTS = {
+    "ground truth": {},
+    "lidar": {"perception": Perception(kind="lidar")},
+    "mapless": {"map": "none", "perception": Perception(kind="lidar")},
+}
 #: Runs a checkout's benchmark in processor time; older ones use wall-clock time.
 OTHER = "import runpy, time; time.perf_counter = time.process_time; runpy.run_module('benchmarks.loop', run_name='__main__')"
 
@@ -93,8 +112,100 @@ def table_of_movers(route: Route, rounds: int) -> None:
         print(f"{name:22}   {statistics.median(values):7.1f}   {ratio:11.2f}")
 
 
+def crowd(count: int, *, covers: bool = False) -> Task:
+    """Return a task of 18 m through a fenced hall of 100 cylinders and 6 movers; of `count` cylinders the others are outside.
+
+    With covers, overlapping cylinders take the place of each cylinder within the fence.
+    """
+    rng, low, around = np.random.default_rng(2), (GROUND - HALL) / 2, np.arange(FENCE)
+    inside = task_among(100 - 4 * FENCE, (HALL, HALL), 0.15).world.discs + (low, low, 0.0)
+    if covers:
+        grid = APART * (np.stack(np.meshgrid(*2 * [np.arange(COVER)]), axis=-1).reshape(-1, 2) - COVER // 2)
+        inside = np.array([(x + dx, y + dy, APART) for x, y, _ in inside.tolist() for dx, dy in grid.tolist()])
+    side = 1.0 + HALL / 2
+    fence = np.stack(
+        [side * (2 * around / FENCE - 1), np.full(FENCE, -side), np.full(FENCE, 1.1 * side / FENCE)], axis=1
+    )
+    rows = [inside]
+    for _ in range(4):
+        rows.append(fence + (GROUND / 2, GROUND / 2, 0.0))
+        fence = np.stack([-fence[:, 1], fence[:, 0], fence[:, 2]], axis=1)
+    while sum(map(len, rows)) < count:
+        more = rng.uniform((0.5, 0.5, 0.1), (GROUND - 0.5, GROUND - 0.5, 0.2), (count, 3))
+        rows.append(more[np.abs(more[:, :2] - GROUND / 2).max(axis=1) > side + 1.5])
+    rows = np.concatenate(rows)[:count].tolist()
+    middle, movers = GROUND / 2, list[Cruising]()
+    for k in range(6):  # people who walk to and fro across the route
+        x, way = low + 4.0 + 2.5 * k, 1.0 if k % 2 else -1.0
+        movers.append(Cruising(radius=0.25, position=(x, middle - 3.0 * way), velocity=(0.0, 0.6 * way)))
+    world = World("crowd", (0.0, 0.0, GROUND, GROUND), tuple(Disc(*row) for row in rows), movers=tuple(movers))
+    return Task(world, (low + 1, middle, 0), (low + 19, middle), cell=0.25)
+
+
+class Costs:
+    """Processor time of the parts of drives [s]: whole control periods, and in them physics and new routes."""
+
+    def __init__(self) -> None:
+        self.reset()
+        parts = ((drive, "_control_period"), (Bullet, "advance"), (Replanning, "replan"), (Exploration, "replan"))
+        for owner, name in parts:
+            setattr(owner, name, self._measured(getattr(owner, name), name))
+
+    def reset(self) -> None:
+        """Begin a drive."""
+        self._spent, self._calls = Counter[str](), Counter[str]()
+
+    def _measured(self, inner: Callable[..., Any], name: str) -> Callable[..., Any]:
+        def measured(*args: Any) -> Any:
+            started = time.process_time()
+            try:
+                return inner(*args)
+            finally:
+                self._spent[name] += time.process_time() - started
+                self._calls[name] += 1
+
+        return measured
+
+    def each(self) -> tuple[float, float, float]:
+        """Return the costs of a control period without the other two, of a physics step and of a replan [us]."""
+        spent, calls = self._spent, self._calls
+        period = spent["_control_period"] - spent["advance"] - spent["replan"]
+        physics, replans = spent["advance"] / (4 * calls["advance"]), spent["replan"] / max(calls["replan"], 1)
+        return 1e6 * period / calls["_control_period"], 1e6 * physics, 1e6 * replans
+
+
+def table_of_crowds(rounds: int, most: int) -> None:
+    """Print what the parts of a drive cost among movers and more and more cylinders."""
+    tasks = {f"{count:,}": crowd(count) for count in (100, 5_000, 20_000) if count <= most}
+    if most >= 5_000:
+        tasks |= {f"{count:,}, covers": crowd(count, covers=True) for count in (5_000, 20_000)}
+    meter, found = Costs(), dict[tuple[str, str], list[tuple[float, float, float]]]()
+    for turn in range(rounds + 1):
+        for robot, settings in ROBOTS.items():
+            for name, task in tasks.items():
+                meter.reset()
+                run(Scenario.of(task, "astar", "jackal", **settings))
+                if turn:
+                    found.setdefault((robot, name), []).append(meter.each())
+    print("\nrobot          cylinders        us/period   / among 100   us/step   / among 100   ms/replan")
+    for (robot, name), costs in found.items():
+        period, step, replan = (statistics.median(values) for values in zip(*costs, strict=True))
+        first = found[robot, "100"]
+        by_period, by_step = (
+            statistics.median(a[k] / b[k] for a, b in zip(costs, first, strict=True)) for k in range(2)
+        )
+        print(
+            f"{robot:12}   {name:14}   {period:9.1f}   {by_period:11.2f}   {step:7.1f}   {by_step:11.2f}   {replan / 1e3:9.1f}"
+        )
+
+
 def main() -> None:
-    options = command_line(__doc__, rounds=(9, "of each measurement"), against=("", "root of another checkout"))
+    options = command_line(
+        __doc__,
+        rounds=(9, "of each measurement"),
+        most=(20_000, "most cylinders of the third table"),
+        against=("", "root of another checkout"),
+    )
     rounds = options.rounds
     robot, controller = load_robot("turtlebot"), PurePursuit()
     p = bullet()
@@ -149,6 +260,7 @@ def main() -> None:
         )
     table_of_movers(route, rounds)
     stack.close()
+    table_of_crowds(rounds, options.most)
     if options.against:
         root = os.path.abspath(options.against)
         path = os.pathsep.join([os.path.join(root, "src"), root])

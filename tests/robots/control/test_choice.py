@@ -31,12 +31,13 @@ def in_turn(situation, contact_distances, near):
     steps = len(places) - 1
     everyone = kernels.Reachable(np.tile(near, (steps, 1)), np.full(steps, len(near)))
     window = limits.speed * (weights.step * steps) + tuning.lookahead_max
+    required = kernels.least_clearance(x, y, yaw, False, obstacles, tuning)
     best, best_score, best_contact, unpassed = 0, -math.inf, -1.0, []
     for n, candidate in enumerate(candidates):
         trail = np.empty((steps + 1, 5))
         trail[0] = x, y, yaw, v, w
         end = kernels.follow(
-            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, True, False, trail
+            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, True, required, False, trail
         )  # fmt: skip
         met = kernels.encounter(trail, end, places, radii, near, everyone, contact_distances, weights, math.inf)
         if met.contact < math.inf:
@@ -99,7 +100,9 @@ def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked):
         for n, candidate in enumerate(TABLE):
             trail = np.empty((steps + 1, 5))
             trail[0] = here
-            motion = (tracked.samples, tracked.obstacles, tracked.limits, tuning, weights.step, 0, True, False, trail)
+            required = kernels.least_clearance(*here[:3], False, tracked.obstacles, tuning)
+            path = tracked.samples, tracked.obstacles, tracked.limits, tuning
+            motion = (*path, weights.step, 0, True, required, False, trail)
             if not kernels.follow(*here, s, False, candidate, *motion).blocked:
                 worth = kernels.worth(trail[-1], s, window, tracked.samples, tuning, weights)
                 assert worth <= limit[n]

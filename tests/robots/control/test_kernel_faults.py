@@ -11,11 +11,16 @@ from antdrive.robots import Footprint, footprint_clearance
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs, nearby, turn_clearance
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import full_braking, pursue, stopping_clearance, turn_in
+from antdrive.robots.control.pursuit import obstacles_around
 from antdrive.worlds import Disc, World
 from tests.robots.control.test_rules import LIMITS, TUNING
 
 WIDE = np.array([-50.0, -50.0, 50.0, 50.0])
 NO_DISCS = np.empty((0, 3))
+
+
+def among(discs):
+    return obstacles_around(np.zeros(2), discs, WIDE)
 
 
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (1.0, 0.8), (0.6, -1.5), (2.0, 1e-9), (0.3, 3.0)])
@@ -32,7 +37,7 @@ def test_the_stopping_arc_is_that_of_a_period_and_of_braking(v, w):
         aside = 0.4 + w / v * s[k] + math.pi / 2
         disc = np.array([[x[k] + 0.3 * math.cos(aside), y[k] + 0.3 * math.sin(aside), 0.1]])
         expected = np.hypot(x - disc[0, 0], y - disc[0, 1]).min() - 0.1
-        found = stopping_clearance(1.0, 2.0, 0.4, v, w, deceleration, period, disc, WIDE, math.inf)
+        found = stopping_clearance(1.0, 2.0, 0.4, v, w, deceleration, period, among(disc), math.inf)
         assert found == pytest.approx(expected, abs=1e-4), along
 
 
@@ -67,7 +72,7 @@ def test_between_two_samples_the_shorter_lookahead_counts():
         lookahead = np.full(count, second)
         lookahead[: int(1.01 / TUNING.spacing) + 1] = first
         path = PathSamples(xy, arc, lookahead, np.full(count, 9.0), np.full(count, math.nan), np.zeros(count))
-        obstacles = ObstacleIndex(*index_discs(NO_DISCS, WIDE, 10.0, 1.0), WIDE, 10.0)
+        obstacles = ObstacleIndex(*index_discs(NO_DISCS, WIDE, 10.0, 1.0), WIDE, WIDE[:2], 10.0)
         v, w, *_ = pursue(1.01, 0.02, 0.0, 0.5, 0.0, 0.9, False, path, obstacles, LIMITS, TUNING)
         assert w / v == pytest.approx(-2 * 0.02 / 0.2**2, rel=1e-6)
 
@@ -77,9 +82,9 @@ def test_the_discs_near_a_place_are_all_those_that_come_within_the_distance():
     bounds = np.array([-3.0, 2.0, 5.0, 8.0])
     discs = rng.uniform((-3, 2, 0.01), (5, 8, 1.5), (40, 3))
     for side, distance in ((0.5, 0.3), (1.0, 1.0), (7.0, 0.0)):
-        obstacles = ObstacleIndex(*index_discs(discs, bounds, side, distance), bounds, side)
+        obstacles = ObstacleIndex(*index_discs(discs, bounds, side, distance), bounds, bounds[:2], side)
         for x, y in rng.uniform((-4, 1), (6, 9), (50, 2)):
-            here = {tuple(row) for row in nearby(x, y, obstacles).tolist()}
+            here = {tuple(row) for row in nearby(x, y, math.inf, obstacles).tolist()}
             inside = np.clip((x, y), bounds[:2], bounds[2:])
             gap = np.hypot(*(discs[:, :2] - inside).T) - discs[:, 2]
             assert {tuple(row) for row in discs[gap <= distance].tolist()} <= here
@@ -106,7 +111,7 @@ def test_a_braking_robot_leaves_its_curve_only_where_that_is_not_clear_and_only_
     v, bend, curvature, disc, required
 ):
     discs, w = np.array([disc]), bend * v
-    new_v, new_w = full_braking(0, 0, 0, v, w, curvature, required, discs, WIDE, LIMITS, TUNING)
+    new_v, new_w = full_braking(0, 0, 0, v, w, curvature, required, among(discs), LIMITS, TUNING)
     assert new_v == v - LIMITS.acceleration * TUNING.period
     held, found = (room_to_stop(new_v, yaw_rate, discs[0]) for yaw_rate in (bend * new_v, new_w))
     if held > required + 1e-4:
@@ -118,12 +123,12 @@ def test_a_braking_robot_leaves_its_curve_only_where_that_is_not_clear_and_only_
 def test_a_braking_robot_whose_curve_leads_into_a_pillar_steers_away_from_it():
     """On the bend to the left it stops 225 mm from the pillar's surface, straight ahead 314 mm."""
     pillar = np.array([[0.6, 0.4, 0.1]])
-    clear = full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.2, pillar, WIDE, LIMITS, TUNING)
+    clear = full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.2, among(pillar), LIMITS, TUNING)
     assert clear == pytest.approx((0.9, 0.72))
-    assert full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.25, pillar, WIDE, LIMITS, TUNING) == pytest.approx((0.9, 0.0))
+    assert full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.25, among(pillar), LIMITS, TUNING) == pytest.approx((0.9, 0.0))
     right = np.array([[0.6, -0.3, 0.1]])
-    assert full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.9, right, WIDE, LIMITS, TUNING) == pytest.approx((0.9, 0.72))
-    assert full_braking(0, 0, 0, 0.1, 0.08, 0.0, 0.9, pillar, WIDE, LIMITS, TUNING) == (0.0, 0.0)
+    assert full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.9, among(right), LIMITS, TUNING) == pytest.approx((0.9, 0.72))
+    assert full_braking(0, 0, 0, 0.1, 0.08, 0.0, 0.9, among(pillar), LIMITS, TUNING) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -138,5 +143,5 @@ def test_a_braking_robot_whose_curve_leads_into_a_pillar_steers_away_from_it():
 def test_a_robot_that_brakes_for_a_rotation_turns_in_where_it_then_stops_with_room(posts, turns):
     tuning = TUNING._replace(turn_in_clearance=0.5)
     discs = np.array(posts).reshape(-1, 3)
-    turned = turn_in(0.0, 0.0, 0.0, 0.9, 0.5, 1.5, 0.45, discs, WIDE, LIMITS, tuning)
+    turned = turn_in(0.0, 0.0, 0.0, 0.9, 0.5, 1.5, 0.45, among(discs), LIMITS, tuning)
     assert turned == pytest.approx(1.0 / 0.9 if turns else 0.45)  # its lateral acceleration is 1 m/s^2

@@ -37,7 +37,7 @@ def test_a_projection_never_goes_back(progress):
 def test_lookaheads_end_where_the_line_to_the_carrot_would_come_too_close():
     """Round a corner with a pillar in it; the route itself keeps 0.3 m, lines across the corner come nearer."""
     path, disc = samples(np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])), np.array([[1.5, 0.5, 0.2]])
-    obstacles = ObstacleIndex(*index_discs(disc, WIDE, 100.0, 5.0), WIDE, 100.0)
+    obstacles = ObstacleIndex(*index_discs(disc, WIDE, 100.0, 5.0), WIDE, WIDE[:2], 100.0)
     low, high, spacing, required = 0.2, 1.5, 0.1, 0.25
     found = np.empty(31)
     clear_lookaheads(path.xy, path.arc, obstacles, required, spacing, low, high, found)

@@ -142,3 +142,13 @@ def test_a_lidar_inside_a_disc_or_a_wall_measures_nothing():
     lidar = replace(EXACT, min_range=0.1)
     assert np.all(Scanner(lidar, np.array([[0.0, 0.0, 1.0]])).scan((0.2, 0, 0)) == -math.inf)
     assert np.all(Scanner(lidar, np.empty((0, 3)), bounds=(1, 1, 2, 2)).scan((0, 0, 0)) == -math.inf)
+
+
+def test_a_lidar_on_its_way_sees_discs_that_come_into_range():
+    lidar, rng = replace(EXACT, max_range=2.0), np.random.default_rng(3)
+    discs = rng.uniform((-9, -9, 0.05), (9, 9, 0.4), (60, 3))
+    discs = discs[np.abs(discs[:, 1]) > 0.6]
+    scanner = Scanner(lidar, discs)
+    for x in np.arange(-8.0, 8.0, 0.23):
+        pose = (x, 0.0, 0.2)
+        assert scanner.scan(pose) == pytest.approx(brute_force(lidar, discs, pose))

@@ -7,9 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots.control._kernels_lines import CHECKED, STEEPEST, advance, outline_clearance, wrapped
+from antdrive.robots.control._kernels_lines import (
+    CHECKED,
+    STEEPEST,
+    advance,
+    outline_clearance,
+    outline_within,
+    wrapped,
+)
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, clearance_at, nearby
-from antdrive.robots.control._kernels_path import PathSamples, point_at, project, segment_at
+from antdrive.robots.control._kernels_path import PathSamples, clearance_below, point_at, project, segment_at
 from antdrive.robots.control._kernels_pursuit import (
     MotionLimits,
     PursuitTuning,
@@ -17,7 +24,7 @@ from antdrive.robots.control._kernels_pursuit import (
     reachable_twist,
     slow_for_curvature,
 )
-from antdrive.worlds._kernels import Array, kernel, leaf, polygon_distance, segment_clearance
+from antdrive.worlds._kernels import Array, kernel, leaf, polygon_distance
 
 # The columns of a table of candidates.
 KIND = 0  # FOLLOW_ROUTE or TWO_TWISTS
@@ -35,6 +42,7 @@ FOLLOW_ROUTE, TWO_TWISTS, BESIDE_ROUTE = 0.0, 1.0, 2.0
 CONTACT_MARGIN = 0.005  # contact clearance of movers already closer than the minimum [m]
 START_TIME = 0.25  # for a robot at rest to start moving [s]
 ESCAPE_TIME = 1.2  # horizon of an escape when no candidate keeps its clearance [s]
+CLOSER = 1e-3  # a robot that is closer to obstacles than required may come closer by this [m]
 ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
 LEVELS = 64  # tabulated distances for progress
 BESIDE_DISTANCE, BESIDE_TIME = 0.5, 0.3  # offsets decay over this distance, or this time at speed [m], [s]
@@ -198,28 +206,29 @@ def intrusion(pose: Array, places: Array, k: int, radii: Array, near: Array, wei
 
 
 @leaf
-def least_clearance(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
-    """Return the required clearance along a trail, of the robot's centre or its outline, reduced if its start is closer [m]."""
-    if not outlined:
-        return min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
-    discs = nearby(trail[0, 0], trail[0, 1], obstacles)
-    here = outline_clearance(trail[:1, :3], discs, obstacles.bounds, tuning)
-    return min(max(tuning.stopping_clearance - tuning.robot_radius, 0.0), here - 1e-3)
-
-
-@kernel
-def outline_between(
-    start: Array, end: Array, length: float, discs: Array, bounds: Array, tuning: PursuitTuning
+def least_clearance(
+    x: float, y: float, yaw: float, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning
 ) -> float:
-    """Return the least distance from the outline to a disc or wall at poses of a step of a length, without its start."""
+    """Return the required clearance of trails from a pose, of the robot's centre or outline, less if the pose is closer [m]."""
+    if not outlined:
+        return min(tuning.stopping_clearance, clearance_at(x, y, obstacles) - CLOSER)
+    most = max(tuning.stopping_clearance - tuning.robot_radius, 0.0)
+    return min(most, outline_clearance(x, y, yaw, obstacles, tuning, most + CLOSER) - CLOSER)
+
+
+@leaf
+def outline_between(
+    start: Array, end: Array, length: float, required: float, discs: Array, bounds: Array, tuning: PursuitTuning
+) -> bool:
+    """Return whether the outline is closer than required to an obstacle at poses of a step of a length, without its start."""
     sweep = abs(end[2] - start[2]) * tuning.robot_radius
     count = int((abs(length) + sweep) / CHECKED) + 1
-    poses = np.empty((count, 3))
     for n in range(count):
         share = (n + 1.0) / count
-        for j in range(3):
-            poses[n, j] = start[j] + share * (end[j] - start[j])
-    return outline_clearance(poses, discs, bounds, tuning)
+        x, y = start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])
+        if outline_within(required, x, y, start[2] + share * (end[2] - start[2]), discs, bounds, tuning):
+            return True
+    return False
 
 
 @leaf
@@ -239,17 +248,20 @@ def passes_within(
     length = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step
     if abs(length) <= 1e-6 and not outlined:
         return False
-    discs = nearby(trail[k, 0], trail[k, 1], obstacles)
-    distance = segment_clearance(trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1], discs, obstacles.bounds)
-    if not outlined or distance >= required + tuning.robot_radius:
+    ax, ay, bx, by = trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1]
+    most, bounds = (required + tuning.robot_radius if outlined else required), obstacles.bounds
+    discs = nearby(ax, ay, most + math.hypot(bx - ax, by - ay), obstacles)
+    distance = clearance_below(most, ax, ay, bx, by, discs, bounds)
+    if not outlined or distance >= most:
         return bool(distance < required)
-    return bool(outline_between(trail[k], trail[k + 1], length, discs, obstacles.bounds, tuning) < required)
+    return outline_between(trail[k], trail[k + 1], length, required, discs, bounds, tuning)
 
 
 @leaf
-def meets_obstacle(trail: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float) -> bool:
-    """Return whether a trail that was followed without obstacle checks comes too close to an obstacle."""
-    required = least_clearance(trail, outlined, obstacles, tuning)
+def meets_obstacle(
+    trail: Array, required: float, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float
+) -> bool:
+    """Return whether a trail that was followed without obstacle checks comes closer to an obstacle than required."""
     k, steps = 0, trail.shape[0] - 1
     while k < steps and not passes_within(trail, k, required, outlined, obstacles, tuning, step):
         k += 1
@@ -278,20 +290,18 @@ def beside_route(
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidate: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
-    step: float, first: int, looks: bool, outlined: bool, trail: Array,
+    step: float, first: int, looks: bool, required: float, outlined: bool, trail: Array,
 ) -> Trail:  # fmt: skip
     """Follow a candidate from step `first`, where the robot is at (x, y, yaw, v, w), to the last row of `trail` (K + 1, 5).
 
-    A row of `trail` is position [m, m], heading [rad], speed [m/s] and yaw rate [rad/s]. Row 0 is the start, which
-    determines the required clearance; the rows from `first` on are filled. Without `looks`, `meets_obstacle` checks
-    obstacles later, and the trail does not end at one.
+    A row of `trail` is position [m, m], heading [rad], speed [m/s] and yaw rate [rad/s]; those from `first` on are filled.
+    Without `looks`, `meets_obstacle` checks obstacles later, and the trail does not end at one that comes closer than required.
     """
     trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4] = x, y, yaw, v, w
     capped = MotionLimits(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
         limits.lateral_acceleration, limits.half_track, limits.rim_speed,
     )  # fmt: skip
-    required = least_clearance(trail, outlined, obstacles, tuning) if looks else 0.0
     cos, sin, facing, now = 1.0, 0.0, 0.0, 0.0
     for k in range(trail.shape[0] - 1):
         if k < first:
@@ -323,7 +333,7 @@ def follow(
 @kernel
 def follow_all(
     s: float, rotating: bool, candidates: Array, path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits,
-    tuning: PursuitTuning, step: float, outlined: bool, trails: Array, steps: Array, blocked: Array,
+    tuning: PursuitTuning, step: float, required: float, outlined: bool, trails: Array, steps: Array, blocked: Array,
 ) -> None:  # fmt: skip
     """Fill `trails` (N, K + 1, 5), `steps` and `blocked` (N,) for the candidates after the first.
 
@@ -347,7 +357,7 @@ def follow_all(
             continue
         got = follow(
             trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4], s, rotating,
-            candidate, path, obstacles, limits, tuning, step, first, True, outlined, trail,
+            candidate, path, obstacles, limits, tuning, step, first, True, required, outlined, trail,
         )  # fmt: skip
         steps[n], blocked[n] = got.steps, got.blocked
         if candidate[KIND] == TWO_TWISTS and candidate[DURATION] == math.inf:
@@ -614,9 +624,10 @@ def choose(
     count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
     by_step = reachable_by_step(x, y, fastest(v, candidates, limits), weights, places, radii, near, cap)
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
+    required = least_clearance(x, y, yaw, outlined, obstacles, tuning)
     own = follow(
         x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True,
-        outlined, trails[0],
+        required, outlined, trails[0],
     )  # fmt: skip
     steps[0], blocked[0] = own.steps, own.blocked
     met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
@@ -640,7 +651,7 @@ def choose(
         if not followed[n]:
             follow(
                 x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights.step, 0, False,
-                outlined, trails[n],
+                required, outlined, trails[n],
             )  # fmt: skip
             followed[n] = True
             limit[n] = worth(trails[n, instants - 1], s, window, path, tuning, weights)
@@ -649,7 +660,7 @@ def choose(
             continue
         beside = candidates[n, KIND] == BESIDE_ROUTE
         if (beside and not passes_all(trails[n], places, near)) or meets_obstacle(
-            trails[n], outlined, obstacles, tuning, weights.step
+            trails[n], required, outlined, obstacles, tuning, weights.step
         ):
             limit[n] = -math.inf
             continue
@@ -665,7 +676,21 @@ def choose(
         limit[n] = -math.inf
     if best >= 0:
         return best, math.inf
-    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, outlined, trails, steps, blocked)
+    follow_all(
+        s,
+        rotating,
+        candidates,
+        path,
+        obstacles,
+        limits,
+        tuning,
+        weights.step,
+        required,
+        outlined,
+        trails,
+        steps,
+        blocked,
+    )
     best, latest = 0, -1.0
     for n in range(count):
         met = encounter(
@@ -693,12 +718,27 @@ def best_escape(
     bodies, count = radii + weights.radius, candidates.shape[0]
     by_step = reachable_by_step(x, y, math.inf, weights, soon, radii, near, math.inf)
     trails, steps, blocked = np.empty((count, soon.shape[0], 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
+    required = least_clearance(x, y, yaw, outlined, obstacles, tuning)
     own = follow(
         x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True,
-        outlined, trails[0],
+        required, outlined, trails[0],
     )  # fmt: skip
     steps[0], blocked[0] = own.steps, own.blocked
-    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, outlined, trails, steps, blocked)
+    follow_all(
+        s,
+        rotating,
+        candidates,
+        path,
+        obstacles,
+        limits,
+        tuning,
+        weights.step,
+        required,
+        outlined,
+        trails,
+        steps,
+        blocked,
+    )
     best, most = -1, -math.inf
     for n in range(count):
         if blocked[n]:

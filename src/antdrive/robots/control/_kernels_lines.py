@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots._kernels_footprint import footprint_clearances
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, nearby
+from antdrive.robots._kernels_footprint import comes_within, footprint_gap, outer_radius
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, clearance_at, nearby, nearest_bound
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import (
     BRAKING,
@@ -32,7 +32,7 @@ from antdrive.robots.control._kernels_pursuit import (
     speed_limit,
     unpacked,
 )
-from antdrive.worlds._kernels import Array, inline, kernel, leaf, segment_clearance
+from antdrive.worlds._kernels import Array, inline, kernel, leaf
 
 PASSED = 0.02  # smallest corner at which the robot stops and turns [rad]
 AGAIN = 0.05  # smallest heading error at a corner for a further turn [rad]
@@ -69,11 +69,11 @@ def advance(
 def follow_packed(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, turning: bool,
     xy: Array, arc: Array, lookahead: Array, speed: Array, curvature: Array, heading: Array, turns: Array,
-    discs: Array, starts: Array, bounds: Array, corners: Array, n: Array,
+    discs: Array, starts: Array, bounds: Array, corner: Array, corners: Array, n: Array,
 ) -> tuple[float, float, float, bool, int]:  # fmt: skip
     """Compute one control period along the straights of a path in the form of `TrackedPath.packed`."""
     path, obstacles, limits, tuning = unpacked(
-        xy, arc, lookahead, speed, curvature, heading, turns, discs, starts, bounds, corners, n
+        xy, arc, lookahead, speed, curvature, heading, turns, discs, starts, bounds, corner, corners, n
     )
     return follow_lines(x, y, yaw, v, w, progress, turning, path, obstacles, limits, tuning)
 
@@ -93,13 +93,32 @@ def next_stop(k: int, path: PathSamples) -> int:
     return j
 
 
-@kernel
-def outline_clearance(poses: Array, discs: Array, bounds: Array, tuning: PursuitTuning) -> float:
-    """Return the least distance from the footprint at poses (N, 3) to a disc or wall."""
-    shape = np.array((tuning.half_length, tuning.half_width, tuning.rounding))
-    found = np.empty(poses.shape[0])
-    footprint_clearances(poses, shape, tuning.corners, discs, bounds, found)
-    return float(found.min())
+@leaf
+def outline_radius(tuning: PursuitTuning) -> float:
+    """Return the circumscribed radius of the footprint [m]."""
+    return outer_radius(tuning.half_length, tuning.half_width, tuning.rounding, tuning.corners)
+
+
+@leaf
+def outline_clearance(
+    x: float, y: float, yaw: float, obstacles: ObstacleIndex, tuning: PursuitTuning, most: float
+) -> float:
+    """Return the distance from the footprint at a pose to the nearest disc or wall; exact below `most`, else at least that."""
+    radius = outline_radius(tuning)
+    discs = nearby(x, y, radius + min(most, nearest_bound(x, y, obstacles) + radius), obstacles)
+    return footprint_gap(
+        x, y, yaw, tuning.half_length, tuning.half_width, tuning.rounding, tuning.corners, discs, obstacles.bounds
+    )
+
+
+@leaf
+def outline_within(
+    required: float, x: float, y: float, yaw: float, discs: Array, bounds: Array, tuning: PursuitTuning
+) -> bool:
+    """Return whether the footprint at a pose is closer than required to a disc or wall."""
+    return comes_within(
+        required, x, y, yaw, tuning.half_length, tuning.half_width, tuning.rounding, tuning.corners, discs, bounds
+    )
 
 
 @kernel
@@ -144,7 +163,6 @@ def follow_lines(
     a turn of the middle of the corner's turn, so that an error at either end does not reverse it.
     """
     bounds, period, arc = obstacles.bounds, tuning.period, path.arc
-    discs = nearby(x, y, obstacles)
     k = 0
     while k < arc.shape[0] - 2 and arc[k + 1] <= progress:
         k += 1
@@ -158,8 +176,7 @@ def follow_lines(
     planned = path.turns[k] if progress <= arc[k] else 0.0
     turn = 0.5 * planned + wrapped(facing - yaw - 0.5 * planned)
 
-    here = np.array(((x, y, yaw),))
-    clearance = outline_clearance(here, discs, bounds, tuning)
+    clearance = outline_clearance(x, y, yaw, obstacles, tuning, math.inf)
     stop = next_stop(k, path)
     remaining, last = arc[stop] - s, stop == arc.shape[0] - 1
     halt = 0.5 * tuning.creep_speed * tuning.creep_speed / limits.acceleration + tuning.creep_speed * period
@@ -189,8 +206,7 @@ def follow_lines(
 
     new_v = clip(target, v - limits.acceleration * period, v + limits.acceleration * period)
     if turning:
-        distance = segment_clearance(x, y, x, y, discs, bounds)
-        turn = clear_turn(x, y, yaw, turn, distance, discs, bounds, tuning)
+        turn = clear_turn(x, y, yaw, turn, clearance_at(x, y, obstacles), obstacles, tuning)
         wanted = rotation(new_v, v, w, turn, limits, tuning)
     else:
         wanted = curvature * new_v
@@ -201,7 +217,12 @@ def follow_lines(
     if new_v > tuning.creep_speed:
         required = min(max(tuning.stopping_clearance - tuning.robot_radius, 0.0), clearance - START_TOLERANCE)
         poses = stopping_poses(x, y, yaw, new_v, new_w, line, limits, period)
-        if outline_clearance(poses, discs, bounds, tuning) < required:
+        stopping = new_v * period + 0.5 * new_v * new_v / limits.acceleration
+        discs = nearby(x, y, outline_radius(tuning) + required + stopping, obstacles)
+        meets = False
+        for i in range(poses.shape[0]):
+            meets = meets or outline_within(required, poses[i, 0], poses[i, 1], poses[i, 2], discs, bounds, tuning)
+        if meets:
             limiter, slowed = BRAKING, max(v - limits.acceleration * period, 0.0)
             # It steers on while it brakes: on the arc of one moment's yaw rate it would leave the straight.
             new_v, new_w = slowed, reachable_yaw_rate(curvature * slowed, w, period, limits)

@@ -13,9 +13,11 @@ from antdrive.worlds._kernels import (
     inline,
     kernel,
     leaf,
+    order_by,
     polygon_distance,
     polygon_wall_distance,
     segment_clearance,
+    segment_distance2,
     wall_distance,
 )
 
@@ -27,15 +29,17 @@ class ObstacleIndex(NamedTuple):
     """The obstacles known to the controller, indexed by the squares of a coarse grid.
 
     Attributes:
-        discs: x, y and radius of the discs near each square, square by square (K, 3) [m]
+        discs: x, y and radius of the discs near each square, square by square, nearest to its centre first (K, 3) [m]
         starts: the row of `discs` at which each square's discs start (squares + 1,)
         bounds: the walls: x_min, y_min, x_max, y_max (4,) [m]
+        corner: the lower left corner of the squares (2,) [m]
         side: side of a square [m]
     """
 
     discs: Array
     starts: Array
     bounds: Array
+    corner: Array
     side: float
 
 
@@ -71,31 +75,89 @@ def index_discs(discs: Array, bounds: Array, side: float, distance: float) -> tu
                 starts[b + 1] += starts[b]
             fill = starts.copy()
             found = np.empty((starts[-1], 3))
+    for b in range(len(starts) - 1):
+        x, y = bounds[0] + (b % cols + 0.5) * side, bounds[1] + (b // cols + 0.5) * side
+        sort_discs(x, y, found[starts[b] : starts[b + 1]])
     return found, starts
 
 
-@inline
+@kernel
+def sort_discs(x: float, y: float, discs: Array) -> None:
+    """Sort discs (N, 3) in place by the distance of their surfaces from (x, y)."""
+    before, away = discs.copy(), np.empty((discs.shape[0], 1))
+    for j in range(discs.shape[0]):
+        away[j, 0] = math.hypot(discs[j, 0] - x, discs[j, 1] - y) - discs[j, 2]
+    order = order_by(away, 0)
+    for j in range(discs.shape[0]):
+        for k in range(3):
+            discs[j, k] = before[order[j], k]
+
+
+@leaf
 def square_at(x: float, y: float, obstacles: ObstacleIndex) -> int:
     """Return the square near (x, y)."""
-    bounds, side = obstacles.bounds, obstacles.side
+    bounds, corner, side = obstacles.bounds, obstacles.corner, obstacles.side
     cols = int((bounds[2] - bounds[0]) / side) + 1
     rows = int((bounds[3] - bounds[1]) / side) + 1
-    c = min(max(int((x - bounds[0]) / side), 0), cols - 1)
-    r = min(max(int((y - bounds[1]) / side), 0), rows - 1)
+    c = min(max(int((x - corner[0]) / side), 0), cols - 1)
+    r = min(max(int((y - corner[1]) / side), 0), rows - 1)
     return r * cols + c
 
 
+@leaf
+def end_of(square: int, x: float, y: float, reach: float, obstacles: ObstacleIndex) -> int:
+    """Return the row of `discs` after those of a square whose surfaces may be within reach of (x, y)."""
+    discs, side = obstacles.discs, obstacles.side
+    cols = int((obstacles.bounds[2] - obstacles.bounds[0]) / side) + 1
+    cx, cy = obstacles.corner[0] + (square % cols + 0.5) * side, obstacles.corner[1] + (square // cols + 0.5) * side
+    farthest = reach + math.hypot(x - cx, y - cy) + ROUNDING
+    low, high = obstacles.starts[square], obstacles.starts[square + 1]
+    while low < high:
+        middle = (low + high) >> 1
+        if math.hypot(discs[middle, 0] - cx, discs[middle, 1] - cy) - discs[middle, 2] <= farthest:
+            low = middle + 1
+        else:
+            high = middle
+    return int(low)
+
+
 @inline
-def nearby(x: float, y: float, obstacles: ObstacleIndex) -> Array:
-    """Return the indexed discs (N, 3) near (x, y)."""
+def nearby(x: float, y: float, reach: float, obstacles: ObstacleIndex) -> Array:
+    """Return the indexed discs (N, 3) near (x, y), without most of those whose surfaces are not within reach."""
     square = square_at(x, y, obstacles)
-    return obstacles.discs[obstacles.starts[square] : obstacles.starts[square + 1]]
+    return obstacles.discs[obstacles.starts[square] : end_of(square, x, y, reach, obstacles)]
+
+
+@leaf
+def nearest_bound(x: float, y: float, obstacles: ObstacleIndex) -> float:
+    """Return an upper bound of the distance from a point to the nearest indexed disc surface: that of one disc."""
+    square = square_at(x, y, obstacles)
+    first = obstacles.starts[square]
+    if first == obstacles.starts[square + 1]:
+        return 0.0
+    return math.hypot(obstacles.discs[first, 0] - x, obstacles.discs[first, 1] - y) - obstacles.discs[first, 2]
 
 
 @leaf
 def clearance_at(x: float, y: float, obstacles: ObstacleIndex) -> float:
     """Return the distance from a point to the nearest disc surface or wall."""
-    return segment_clearance(x, y, x, y, nearby(x, y, obstacles), obstacles.bounds)
+    discs = nearby(x, y, nearest_bound(x, y, obstacles), obstacles)
+    return segment_clearance(x, y, x, y, discs, obstacles.bounds)
+
+
+@leaf
+def points_within(points: Array, reach: Array, obstacles: ObstacleIndex, out: Array) -> None:
+    """Fill out[i] with whether a disc or wall is within reach[i] of point i."""
+    for i in range(points.shape[0]):
+        x, y = points[i, 0], points[i, 1]
+        out[i] = wall_distance(x, y, obstacles.bounds) <= reach[i]
+        if out[i]:
+            continue
+        discs = nearby(x, y, reach[i], obstacles)
+        for j in range(discs.shape[0]):
+            if math.hypot(x - discs[j, 0], y - discs[j, 1]) - discs[j, 2] <= reach[i]:
+                out[i] = True
+                break
 
 
 @leaf
@@ -119,7 +181,8 @@ def arc_clearance(
         return min(most, segment_clearance(x, y, ex, ey, discs, bounds))
     radius = 1.0 / abs(curvature)
     cx, cy = x - math.sin(yaw) / curvature, y + math.cos(yaw) / curvature
-    length = radius * abs(sweep) + ROUNDING
+    # An arc of less than half a circle is no farther from its chord than its middle is, any arc no farther than it is long.
+    aside = radius * (1.0 - math.cos(0.5 * sweep)) if abs(sweep) <= HALF_CIRCLE else radius * abs(sweep)
     mx, my = x + ex - 2.0 * cx, y + ey - 2.0 * cy  # towards the middle of the arc
     best = min(most, min(wall_distance(x, y, bounds), wall_distance(ex, ey, bounds)))
     for q in range(4):  # the arc's extreme points in x and y
@@ -130,14 +193,10 @@ def arc_clearance(
         if on_arc(angle, math.atan2(y - cy, x - cx), sweep):
             best = min(best, wall_distance(cx + radius * math.cos(angle), cy + radius * math.sin(angle), bounds))
     for j in range(discs.shape[0]):
-        px, py, reach = discs[j, 0], discs[j, 1], best + discs[j, 2] + length
-        near = (px - x) * (px - x) + (py - y) * (py - y) <= reach * reach
-        if not near and (px - ex) * (px - ex) + (py - ey) * (py - ey) > reach * reach:
+        px, py, reach = discs[j, 0], discs[j, 1], best + discs[j, 2] + aside + ROUNDING
+        if segment_distance2(px, py, x, y, ex, ey) > reach * reach:
             continue
         d = min(math.hypot(px - x, py - y), math.hypot(px - ex, py - ey))
-        # No point of the arc is farther from one of its ends than its length.
-        if d - discs[j, 2] - radius * abs(sweep) > best:
-            continue
         beside = is_beside_arc(px - cx, py - cy, mx, my, radius, sweep)
         if not beside and on_arc(math.atan2(py - cy, px - cx), math.atan2(y - cy, x - cx), sweep):
             d = min(d, abs(math.hypot(px - cx, py - cy) - radius))

@@ -180,7 +180,7 @@ def clear_lookaheads(
         ax, ay, k = point_at(s, k, xy, arc)
         if s > begin + STRETCH or square_at(ax, ay, obstacles) != square:
             square, begin = square_at(ax, ay, obstacles), s
-            known = nearby(ax, ay, obstacles)
+            known = nearby(ax, ay, reach + STRETCH + ROUNDING, obstacles)
             if known.shape[0] > kept.shape[0]:
                 chosen, kept = np.empty((2 * known.shape[0], 3)), np.empty((2 * known.shape[0], 3))
             around = within_reach(ax, ay, reach + STRETCH + ROUNDING, known, chosen)

@@ -5,9 +5,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, nearby, turn_clearance
+from antdrive.robots.control._kernels_obstacles import (
+    ObstacleIndex,
+    arc_clearance,
+    clearance_at,
+    nearby,
+    turn_clearance,
+)
 from antdrive.robots.control._kernels_path import PathSamples, carrot_at, point_at, project
-from antdrive.worlds._kernels import Array, kernel, leaf, segment_clearance
+from antdrive.worlds._kernels import Array, kernel, leaf
 
 # The rules that can limit the speed, as indices into pursuit.LIMITERS.
 CRUISE, CURVATURE, ROUTE, YAW_RATE, GOAL, ROTATE, CREEP, BRAKING, DONE, CLEARANCE = range(10)
@@ -202,8 +208,7 @@ def stopping_clearance(
     w: float,
     deceleration: float,
     period: float,
-    discs: Array,
-    bounds: Array,
+    obstacles: ObstacleIndex,
     most: float,
 ) -> float:
     """Return the clearance of the stopping arc, at most `most`: one more period, then braking.
@@ -215,13 +220,14 @@ def stopping_clearance(
     sweep = w / v * length
     chord = length if abs(sweep) < 1e-6 else 2.0 * v / w * math.sin(0.5 * sweep)
     ex, ey = x + chord * math.cos(yaw + 0.5 * sweep), y + chord * math.sin(yaw + 0.5 * sweep)
-    return arc_clearance(x, y, yaw, w / v, sweep, ex, ey, discs, bounds, most)
+    discs = nearby(x, y, most + length, obstacles)
+    return arc_clearance(x, y, yaw, w / v, sweep, ex, ey, discs, obstacles.bounds, most)
 
 
 @leaf
 def find_carrot(
     x: float, y: float, yaw: float, v: float, s: float, k: int, clearance: float, longest: float,
-    discs: Array, bounds: Array, xy: Array, arc: Array, tuning: PursuitTuning,
+    obstacles: ObstacleIndex, xy: Array, arc: Array, tuning: PursuitTuning,
 ) -> Carrot:  # fmt: skip
     """Return the carrot at the longest lookahead, at most `longest`, whose arc keeps `clearance`.
 
@@ -239,6 +245,10 @@ def find_carrot(
         bearing = math.atan2(left, ahead)
         if abs(bearing) < tuning.rotate_above:
             curvature = 2.0 * left / (distance * distance)
+            discs, bounds = (
+                nearby(x, y, clearance + distance, obstacles),
+                obstacles.bounds,
+            )  # arcs of less than half a circle
             if arc_clearance(x, y, yaw, curvature, 2.0 * bearing, cx, cy, discs, bounds, clearance) >= clearance:
                 return Carrot(look, left, distance, bearing, True)
         if look <= shortest:
@@ -310,7 +320,7 @@ def speed_limit(
 
 @leaf
 def clear_turn(
-    x: float, y: float, yaw: float, bearing: float, distance: float, discs: Array, bounds: Array, tuning: PursuitTuning
+    x: float, y: float, yaw: float, bearing: float, distance: float, obstacles: ObstacleIndex, tuning: PursuitTuning
 ) -> float:
     """Return the angle to rotate in place towards a bearing; 0 if the footprint has contact in both directions.
 
@@ -321,6 +331,7 @@ def clear_turn(
     hx, hy, rounding, corners = tuning.half_length, tuning.half_width, tuning.rounding, tuning.corners
     if distance > tuning.robot_radius or (hx == 0.0 and hy == 0.0 and corners.shape[0] == 0):
         return bearing
+    discs, bounds = nearby(x, y, math.inf, obstacles), obstacles.bounds
     now = turn_clearance(x, y, yaw, 0.0, hx, hy, rounding, corners, discs, bounds)
     least = min(TURN_CLEARANCE, now - START_TOLERANCE)
     if turn_clearance(x, y, yaw, bearing, hx, hy, rounding, corners, discs, bounds) >= least:
@@ -363,7 +374,7 @@ def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLim
 
 @leaf
 def turn_in(
-    x: float, y: float, yaw: float, new_v: float, w: float, bearing: float, held: float, discs: Array, bounds: Array,
+    x: float, y: float, yaw: float, new_v: float, w: float, bearing: float, held: float, obstacles: ObstacleIndex,
     limits: MotionLimits, tuning: PursuitTuning,
 ) -> float:  # fmt: skip
     """Return the yaw rate of a robot that brakes for a rotation in place, which is `held` on its current curve.
@@ -373,15 +384,15 @@ def turn_in(
     period, deceleration, most = tuning.period, limits.acceleration, tuning.turn_in_clearance
     fastest = min(math.sqrt(limits.yaw_acceleration * abs(bearing)), limits.lateral_acceleration / new_v)
     turned = reachable_yaw_rate(math.copysign(fastest, bearing), w, period, limits)
-    kept = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, discs, bounds, most)
-    clear = stopping_clearance(x, y, yaw, new_v, turned, deceleration, period, discs, bounds, most)
+    kept = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, obstacles, most)
+    clear = stopping_clearance(x, y, yaw, new_v, turned, deceleration, period, obstacles, most)
     return turned if clear >= min(max(kept, tuning.robot_radius), most) else held
 
 
 @leaf
 def full_braking(
     x: float, y: float, yaw: float, v: float, w: float, curvature: float, required: float,
-    discs: Array, bounds: Array, limits: MotionLimits, tuning: PursuitTuning,
+    obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
 ) -> tuple[float, float]:  # fmt: skip
     """Return speed and yaw rate of full braking, on the current curve as long as it is clear.
 
@@ -394,11 +405,11 @@ def full_braking(
     held = w * new_v / v if v > 0.0 else 0.0
     if new_v == 0.0:
         return new_v, held
-    clear = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, discs, bounds, required)
+    clear = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, obstacles, required)
     if clear >= required:
         return new_v, held
     steered = reachable_yaw_rate(curvature * new_v, w, period, limits)
-    if stopping_clearance(x, y, yaw, new_v, steered, deceleration, period, discs, bounds, required) <= clear:
+    if stopping_clearance(x, y, yaw, new_v, steered, deceleration, period, obstacles, required) <= clear:
         return new_v, held
     return keep_wheels_within(new_v, steered, v, period, limits)
 
@@ -409,19 +420,18 @@ def pursue(
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
 ) -> tuple[float, float, float, bool, int]:  # fmt: skip
     """Compute one control period: next speed and yaw rate, progress, whether to rotate, and the limiter."""
-    bounds, period = obstacles.bounds, tuning.period
-    discs = nearby(x, y, obstacles)
+    period = tuning.period
     s, k = project(x, y, progress, tuning.lookahead_max, path.xy, path.arc)
     remaining = path.arc[-1] - s
     i = min(int(s / tuning.spacing), path.lookahead.shape[0] - 1)
     j = min(i + 1, path.lookahead.shape[0] - 1)
 
-    distance = segment_clearance(x, y, x, y, discs, bounds)
+    distance = clearance_at(x, y, obstacles)
     clearance = min(tuning.lookahead_clearance, distance - START_TOLERANCE)
     # Near the end a shorter lookahead makes the robot stop at the route's end, not beside it.
     near_end = max(END_LOOKAHEAD * remaining, tuning.lookahead_min)
     longest = min(min(path.lookahead[i], path.lookahead[j]), near_end)
-    carrot = find_carrot(x, y, yaw, v, s, k, clearance, longest, discs, bounds, path.xy, path.arc, tuning)
+    carrot = find_carrot(x, y, yaw, v, s, k, clearance, longest, obstacles, path.xy, path.arc, tuning)
 
     rotating = should_rotate(rotating, v, carrot, tuning)
     at_goal = remaining <= tuning.goal_distance
@@ -440,10 +450,10 @@ def pursue(
 
     new_v = clip(target, v - limits.acceleration * period, v + limits.acceleration * period)
     if rotating and not at_goal:
-        bearing = clear_turn(x, y, yaw, carrot.bearing, distance, discs, bounds, tuning)
+        bearing = clear_turn(x, y, yaw, carrot.bearing, distance, obstacles, tuning)
         wanted = rotation(new_v, v, w, bearing, limits, tuning)
         if new_v >= tuning.creep_speed and tuning.turn_in_clearance < math.inf:
-            wanted = turn_in(x, y, yaw, new_v, w, carrot.bearing, wanted, discs, bounds, limits, tuning)
+            wanted = turn_in(x, y, yaw, new_v, w, carrot.bearing, wanted, obstacles, limits, tuning)
     else:
         wanted = curvature * new_v
     new_w = reachable_yaw_rate(wanted, w, period, limits)
@@ -453,17 +463,17 @@ def pursue(
     required = min(tuning.stopping_clearance, clearance)
     if (
         new_v > tuning.creep_speed
-        and stopping_clearance(x, y, yaw, new_v, new_w, limits.acceleration, period, discs, bounds, required) < required
+        and stopping_clearance(x, y, yaw, new_v, new_w, limits.acceleration, period, obstacles, required) < required
     ):
         limiter = BRAKING
-        new_v, new_w = full_braking(x, y, yaw, v, w, curvature, required, discs, bounds, limits, tuning)
+        new_v, new_w = full_braking(x, y, yaw, v, w, curvature, required, obstacles, limits, tuning)
     return new_v, new_w, s, rotating, limiter
 
 
 @kernel
 def unpacked(
     xy: Array, arc: Array, lookahead: Array, speed: Array, curvature: Array, heading: Array, turns: Array,
-    discs: Array, starts: Array, bounds: Array, corners: Array, n: Array,
+    discs: Array, starts: Array, bounds: Array, corner: Array, corners: Array, n: Array,
 ) -> tuple[PathSamples, ObstacleIndex, MotionLimits, PursuitTuning]:  # fmt: skip
     """Return samples, obstacles, limits and tuning of a path in the form of `TrackedPath.packed`."""
     tuning = PursuitTuning(
@@ -472,7 +482,7 @@ def unpacked(
     )  # fmt: skip
     return (
         PathSamples(xy, arc, lookahead, speed, curvature, heading, turns, n[0]),
-        ObstacleIndex(discs, starts, bounds, n[1]),
+        ObstacleIndex(discs, starts, bounds, corner, n[1]),
         MotionLimits(n[2], n[3], n[4], n[5], n[6], n[7], n[8]),
         tuning,
     )
@@ -482,10 +492,10 @@ def unpacked(
 def pursue_packed(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, turning: bool,
     xy: Array, arc: Array, lookahead: Array, speed: Array, curvature: Array, heading: Array, turns: Array,
-    discs: Array, starts: Array, bounds: Array, corners: Array, n: Array,
+    discs: Array, starts: Array, bounds: Array, corner: Array, corners: Array, n: Array,
 ) -> tuple[float, float, float, bool, int]:  # fmt: skip
     """Compute one control period along a path in the form of `TrackedPath.packed`."""
     path, obstacles, limits, tuning = unpacked(
-        xy, arc, lookahead, speed, curvature, heading, turns, discs, starts, bounds, corners, n
+        xy, arc, lookahead, speed, curvature, heading, turns, discs, starts, bounds, corner, corners, n
     )
     return pursue(x, y, yaw, v, w, progress, turning, path, obstacles, limits, tuning)

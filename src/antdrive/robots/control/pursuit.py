@@ -139,7 +139,7 @@ class TrackedPath:
         Args:
             obstacles: index of the known obstacles
         """
-        *samples, _, _, _, corners, numbers = self.packed
+        *samples, _, _, _, _, corners, numbers = self.packed
         numbers = numbers.copy()
         *arrays, numbers[SIDE] = obstacles
         return derived(self, obstacles=obstacles, packed=(*samples, *arrays, corners, numbers))
@@ -238,7 +238,9 @@ class PurePursuit:
         tuning = self._tuning(route, spec, margin, period, min(self.goal_distance, tolerance / 2))
         tuning = tuning._replace(spacing=spacing)
         obstacles = (
-            self._index(world, tuning.lookahead_clearance) if indexed else unsorted_obstacles(world.discs, world.bounds)
+            indexed_obstacles(world, self.lookahead_max + tuning.lookahead_clearance)
+            if indexed
+            else obstacles_around(route.xy[0], world.discs, world.bounds)
         )
         samples = self._samples(route, world, spec, obstacles, tuning)
         limits = MotionLimits(
@@ -323,14 +325,6 @@ class PurePursuit:
             turn_in_clearance=math.inf,
         )
 
-    def _index(self, world: World, clearance: float) -> ObstacleIndex:
-        """Index the world's obstacles by square: each square lists those within reach of the longest lookahead."""
-        bounds = np.asarray(world.bounds, dtype=np.float64)
-        side = max(SQUARE, math.sqrt(math.prod(world.size) / MAX_SQUARES))
-        distance = self.lookahead_max + clearance + side
-        discs, starts = _discs_by_square(by_geometry(world), side, distance)
-        return ObstacleIndex(discs, starts, bounds, side)
-
 
 class ControllerOption(NamedTuple):
     """An option of the controller.
@@ -365,9 +359,19 @@ def controller_options() -> Mapping[str, ControllerOption]:
     return options
 
 
-def unsorted_obstacles(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
-    """Return an obstacle index with a single square."""
-    return ObstacleIndex(discs, np.array([0, len(discs)]), np.asarray(bounds, dtype=np.float64), EVERYTHING)
+def indexed_obstacles(world: World, reach: float, side: float = SQUARE) -> ObstacleIndex:
+    """Return an index of a world's obstacles by squares of at least a side: each lists those within reach of its points [m]."""
+    bounds = np.asarray(world.bounds, dtype=np.float64)
+    side = max(side, math.sqrt(math.prod(world.size) / MAX_SQUARES))
+    discs, starts = _discs_by_square(by_geometry(world), side, reach + side)
+    return ObstacleIndex(discs, starts, bounds, bounds[:2], side)
+
+
+def obstacles_around(centre: Floats, discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
+    """Return an obstacle index with a single square around a point (2,) [m]."""
+    away = np.hypot(discs[:, 0] - centre[0], discs[:, 1] - centre[1]) - discs[:, 2]
+    ordered, walls = discs[np.argsort(away, kind="stable")], np.asarray(bounds, dtype=np.float64)
+    return ObstacleIndex(ordered, np.array([0, len(discs)]), walls, centre - EVERYTHING / 2, EVERYTHING)
 
 
 @cached(16)

@@ -19,7 +19,7 @@ from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.records import derived
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
 from antdrive.robots import TrackedPath, Twist, outline_of
-from antdrive.robots.control.pursuit import unsorted_obstacles
+from antdrive.robots.control.pursuit import obstacles_around
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
@@ -297,7 +297,7 @@ class Exploration(RouteGuide):
         x, y, _ = pose
         near = self._routes.controller.lookahead_max + path.tuning.lookahead_clearance + SPARE
         discs = self.survey.map.discs((x - near, y - near, x + near, y + near))
-        return path.with_obstacles(unsorted_obstacles(discs, path.obstacles.bounds))
+        return path.with_obstacles(obstacles_around(np.array((x, y)), discs, path.obstacles.bounds))
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """Return a new path to a missed goal, unless a search or scan turn is under way."""

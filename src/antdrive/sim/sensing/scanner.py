@@ -40,7 +40,7 @@ class Scanner:
         self.lidar = lidar
         rows = np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 3)
         rows = rows if heights is None else rows[np.asarray(heights) >= lidar.height]
-        self._discs = np.ascontiguousarray(rows.T)
+        self._all = np.ascontiguousarray(rows.T)
         self._bounds = np.asarray(() if bounds is None else bounds, dtype=np.float64)
         self._movers = None if mover_heights is None else np.asarray(mover_heights) >= lidar.height
         angles = lidar.angles - lidar.yaw
@@ -93,7 +93,8 @@ class Scanner:
         return out
 
     def _sort(self, eye: Point) -> None:
-        """Sort discs by distance, so that rays end early."""
-
-        away = np.hypot(self._discs[0] - eye[0], self._discs[1] - eye[1]) - self._discs[2]
-        self._discs, self._sorted_at = np.take(self._discs, np.argsort(away, kind="stable"), axis=1), eye
+        """Sort the discs in range until the next sort by distance, so that rays end early."""
+        away = np.hypot(self._all[0] - eye[0], self._all[1] - eye[1]) - self._all[2]
+        order = np.argsort(away, kind="stable")
+        within = np.searchsorted(away[order], self.lidar.max_range + 2 * RESORT)
+        self._discs, self._sorted_at = np.take(self._all, order[:within], axis=1), eye

@@ -19,10 +19,12 @@ import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError, require_positive
+from antdrive.robots.control import _kernels_obstacles
+from antdrive.robots.control.pursuit import SQUARE, indexed_obstacles
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.sensing import _kernels_tracking as kernels
 from antdrive.sim.sensing.mapping import OccupancyMap
-from antdrive.worlds import World, point_clearance
+from antdrive.worlds import World
 
 SLACK = 0.02  # points this near to a known surface lie on it [m]
 SIGMAS = 3.0  # tolerance of errors in standard deviations
@@ -67,9 +69,11 @@ class KnownGround:
         self, lidar: Lidar, world: World, reach: float = math.inf, pose_xy: float = 0.0, pose_yaw: float = 0.0
     ) -> None:
         tall = tuple(disc for disc in world.obstacles if disc.height >= lidar.height)
-        self._lidar, self._world = lidar, dataclasses.replace(world, obstacles=tall, movers=())
-        self._reach = min(reach, lidar.max_range)
+        self._lidar, self._reach = lidar, min(reach, lidar.max_range)
         self._pose_xy, self._pose_yaw = pose_xy, pose_yaw
+        world = dataclasses.replace(world, obstacles=tall, movers=())
+        most = float(self._slack(np.array(self._reach)))
+        self._obstacles = indexed_obstacles(world, most, max(most, SQUARE))
 
     def hits(self, pose: Pose, ranges: Floats) -> Hits:
         """Return the hits of a scan.
@@ -79,10 +83,14 @@ class KnownGround:
             ranges: the scan (beams,) [m]
         """
         beams = np.flatnonzero(np.isfinite(ranges) & (ranges <= self._reach))
-        away, points = ranges[beams], ends(self._lidar, pose, ranges, beams)
+        points, explained = ends(self._lidar, pose, ranges, beams), np.empty(len(beams), dtype=np.bool_)
+        _kernels_obstacles.points_within(points, self._slack(ranges[beams]), self._obstacles, explained)
+        return Hits(beams, points, explained)
+
+    def _slack(self, away: Floats) -> Floats:
+        """Return how far hits at distances (N,) may lie from their obstacles (N,) [m]."""
         error = np.sqrt(self._lidar.sigma**2 + self._pose_xy**2 + (away * self._pose_yaw) ** 2)
-        slack = SLACK + self._lidar.resolution / 2 + SIGMAS * error
-        return Hits(beams, points, point_clearance(self._world, points) <= slack)
+        return np.asarray(SLACK + self._lidar.resolution / 2 + SIGMAS * error)
 
 
 class MappedGround:
