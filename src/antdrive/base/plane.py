@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TypeVar
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from antdrive.base.types import Floats, Pose
 
 Angle = TypeVar("Angle", float, Floats)
+HUGE = 1e7  # larger coordinates are printed with an exponent [m]
 
 
 def wrap_angle(angle: Angle) -> Angle:
@@ -67,13 +69,48 @@ def map_to_world(frame: Pose, points: npt.ArrayLike) -> Floats:
     return world_to_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
 
 
-def format_position(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
-    """Format a position of a world; with its map position if the world has a map frame."""
-    here = f"({x:{digits}}, {y:{digits}})"
+def format_number(value: float, decimals: int = 6) -> str:
+    """Format a number as a person writes it: rounded, without trailing zeros; with an exponent if it is huge.
+
+    Args:
+        value: the number
+        decimals: largest number of decimals
+    """
+    text = f"{round(float(value), decimals) + 0.0:.12g}"  # the sum has no negative zero
+    return f"{value:.3g}" if "e+" in text else text
+
+
+def format_numbers(values: Iterable[float]) -> str:
+    """Format bounds, a pose or a position as a list: [0.15, 0, 3.9, 2.9]."""
+    return f"[{', '.join(map(format_number, values))}]"
+
+
+def disc_text(x: float, y: float, radius: float) -> str:
+    """Return the place and size of a disc as written in a file: "at (2, 1.5) with radius 0.3"."""
+    return f"at {_pair((x, y), None)} with radius {format_number(radius)}"
+
+
+def format_position(frame: Pose, x: float, y: float, digits: int | None = 2) -> str:
+    """Format a position of a world; with its map position if the world has a map frame.
+
+    Args:
+        frame: pose of the world's frame in its map
+        x: position [m]
+        y: position [m]
+        digits: number of decimals of a computed position; None: as a person writes it
+    """
+    here = _pair((x, y), digits)
     if not any(frame):
         return here
-    there = world_to_map(frame, [(x, y)])[0].tolist()
-    return f"{here} in the world, ({there[0]:{digits}}, {there[1]:{digits}}) in its map"
+    return f"{here} in the world, {_pair(world_to_map(frame, [(x, y)])[0].tolist(), digits)} in its map"
+
+
+def _pair(point: Iterable[float], digits: int | None) -> str:
+    one, other = (
+        format_number(value) if digits is None or abs(value) > HUGE else f"{round(value, digits) + 0.0:.{digits}f}"
+        for value in point
+    )
+    return f"({one}, {other})"
 
 
 def relative_frame(inner: Floats, outer: Floats) -> Floats:
