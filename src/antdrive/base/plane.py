@@ -69,6 +69,12 @@ def map_to_world(frame: Pose, points: npt.ArrayLike) -> Floats:
     return world_to_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
 
 
+def tidy(value: float) -> float:
+    """Return a number without its rounding error: 3.9 for 3.9000000000000004; one with more than nine decimals as it is."""
+    rounded = round(value, 9) + 0.0
+    return rounded if abs(value - rounded) <= 1e-12 * max(1.0, abs(value)) else value
+
+
 def format_number(value: float, decimals: int = 6) -> str:
     """Format a number as a person writes it: rounded, without trailing zeros; with an exponent if it is huge.
 
@@ -80,37 +86,34 @@ def format_number(value: float, decimals: int = 6) -> str:
     return f"{value:.3g}" if "e+" in text else text
 
 
+def format_fixed(value: float, decimals: int) -> str:
+    """Format a measured number with this number of decimals; with an exponent if it is huge."""
+    return f"{value:.3g}" if abs(value) > HUGE else f"{round(float(value), decimals) + 0.0:.{decimals}f}"
+
+
 def format_numbers(values: Iterable[float]) -> str:
-    """Format bounds, a pose or a position as a list: [0.15, 0, 3.9, 2.9]."""
+    """Format bounds or a pose as a list: [0.15, 0, 3.9, 2.9]."""
     return f"[{', '.join(map(format_number, values))}]"
 
 
-def disc_text(x: float, y: float, radius: float) -> str:
-    """Return the place and size of a disc as written in a file: "at (2, 1.5) with radius 0.3"."""
-    return f"at {_pair((x, y), None)} with radius {format_number(radius)}"
+def format_point(point: Iterable[float], decimals: int | None = None) -> str:
+    """Format a position (2,) as a person writes it, (9.85, 5), or a measured one with this number of decimals."""
+    one, other = (format_number(v) if decimals is None else format_fixed(v, decimals) for v in point)
+    return f"({one}, {other})"
 
 
-def format_position(frame: Pose, x: float, y: float, digits: int | None = 2) -> str:
-    """Format a position of a world; with its map position if the world has a map frame.
+def format_disc(x: float, y: float, radius: float) -> str:
+    """Format place and size of a disc as a person writes them: "at (2, 1.5) with radius 0.3"."""
+    return f"at {format_point((x, y))} with radius {format_number(radius)}"
 
-    Args:
-        frame: pose of the world's frame in its map
-        x: position [m]
-        y: position [m]
-        digits: number of decimals of a computed position; None: as a person writes it
-    """
-    here = _pair((x, y), digits)
+
+def format_position(frame: Pose, x: float, y: float, decimals: int | None = 2) -> str:
+    """Format a position of a world as `format_point` does; with its map position if the world has a map frame."""
+    here = format_point((x, y), decimals)
     if not any(frame):
         return here
-    return f"{here} in the world, {_pair(world_to_map(frame, [(x, y)])[0].tolist(), digits)} in its map"
-
-
-def _pair(point: Iterable[float], digits: int | None) -> str:
-    one, other = (
-        format_number(value) if digits is None or abs(value) > HUGE else f"{round(value, digits) + 0.0:.{digits}f}"
-        for value in point
-    )
-    return f"({one}, {other})"
+    there = world_to_map(frame, [(x, y)])[0].tolist()
+    return f"{here} in the world, {format_point(there, decimals)} in its map"
 
 
 def relative_frame(inner: Floats, outer: Floats) -> Floats:

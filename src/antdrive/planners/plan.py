@@ -17,6 +17,7 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.base.guarded import value_text
+from antdrive.base.plane import format_fixed
 from antdrive.planners.errors import PlannerError, planner_errors
 from antdrive.planners.warmup import kernels_loaded
 from antdrive.worlds import MoverMotion, Task
@@ -230,7 +231,7 @@ class PlanResult:
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
     def __repr__(self) -> str:
-        path = f" of {self.line_length:.3f} m" if len(self.cells) else ""
+        path = f" of {format_fixed(self.line_length, 3)} m" if len(self.cells) else ""
         reason = f" ({self.reason:.200})" if self.reason else ""
         effort = f"{self.work:,} {self.work_unit}, {1000 * self.wall_s:.1f} ms"
         return f"<{type(self).__name__}: {self.status.value}{path}{reason}, {effort}>"
@@ -240,7 +241,7 @@ class PlanResult:
 
         picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
         facts = {
-            "length": f"{self.line_length:.3f} m",
+            "length": f"{format_fixed(self.line_length, 3)} m",
             "work": f"{self.work:,} {self.work_unit}",
             "time": f"{1000 * self.wall_s:.1f} ms",
         }

@@ -77,7 +77,7 @@ def show_world(
     **settings: Any,
 ) -> None:
     """Describe a world and check whether a robot can cross it."""
-    from antdrive.base.plane import world_to_map
+    from antdrive.base.plane import format_numbers, world_to_map
     from antdrive.planners import Query
     from antdrive.robots import list_robots, load_robot, outline_of, overlap_at
     from antdrive.robots.default_margin import LEAST
@@ -118,10 +118,10 @@ def show_world(
         "tasks": named,
     }
     facts |= {NAMES[shape]: _coverage_facts(each) for shape, each in covered.items()}
-    said = {key + UNITS.get(key, ""): "-" if value is None else str(value) for key, value in _facts(shown).items()}
+    said = {key + UNITS.get(key, ""): _said(value) for key, value in _facts(shown).items()}
     if any(shown.frame):
         for key, pose in {"start": shown.start, "goal": shown.goal}.items():
-            said[f"{key} in its map"] = str(world_to_map(shown.frame, [pose])[0].round(4).tolist())
+            said[f"{key} in its map"] = format_numbers(world_to_map(shown.frame, [pose])[0].round(4).tolist())
     by = " by its footprint" if passable and planned.turns else ""
     said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name}{by} with a margin of {margin:g} m"
     said |= {"reason": why} if why and not overlap else {}
@@ -133,6 +133,15 @@ def show_world(
     show(json, {**task_to_dict(shown), **facts}, lines)
 
 
+def _said(value: Any) -> str:
+    """Format a fact for people."""
+    from antdrive.base.plane import format_number, format_numbers
+
+    if isinstance(value, list):
+        return format_numbers(value)
+    return "-" if value is None else format_number(value) if isinstance(value, float) else str(value)
+
+
 def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
     """Return a robot's share of the floor, rooms and doors as plain values."""
     doors = [{"width": door.width, "at": list(door.at), "passed": door.passed} for door in covered.doors]
@@ -142,6 +151,8 @@ def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
 
 def _coverage_rows(covered: "Mapping[str, Coverage]") -> "Iterator[tuple[str, str]]":
     """Yield what a robot reaches by each shape, and the narrowest doors that its disc does not pass."""
+    from antdrive.base.plane import format_point
+
     for shape, each in covered.items():
         rooms = f"{len(each.rooms_reached)} of {each.room_count} rooms"
         passed = sum(door.passed for door in each.doors)
@@ -151,7 +162,7 @@ def _coverage_rows(covered: "Mapping[str, Coverage]") -> "Iterator[tuple[str, st
     last = list(covered.values())[-1].doors
     shut = [door for first, door in zip(covered["disc"].doors, last, strict=True) if not first.passed]
     for door in shut[:MOST_DOORS]:
-        place = f"{door.width:.2f} m wide at ({door.at[0]:.2f}, {door.at[1]:.2f})"
+        place = f"{door.width:.2f} m wide at {format_point(door.at, 2)}"
         yield "door by footprint" if door.passed else "door not passed", place
     if len(shut) > MOST_DOORS:
         yield "", f"and {len(shut) - MOST_DOORS} more"
