@@ -19,7 +19,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Floats, Pose
-from antdrive.robots.clearance import footprint_clearance
+from antdrive.robots.clearance import TOUCHING, footprint_clearance
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.physics import _kernels_states
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
@@ -33,7 +33,6 @@ Point3: TypeAlias = tuple[float, float, float]  # [m]
 
 MIN_HEIGHT = 0.05  # least height of obstacles: the chassis hangs 5 mm above the floor and must not pass over them [m]
 SETTLING_TIME = 0.1  # time in which a placed robot settles on its wheels [s]
-TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
 MAX_JOINT_VELOCITY = 1e6  # speed limit of wheels; Bullet's default of 100 would slow small ones [rad/s]
 RESIDUAL = 5e-7  # solver residual for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
 USUAL_RESIDUAL = 1e-7  # solver residual for other wheels, Bullet's default [(rad/s)^2]
@@ -247,7 +246,7 @@ class Engine:
         return [
             Contact(self._index(point[2]), point[8], point[9])
             for point in points
-            if point[8] <= TOUCHING_DISTANCE or point[9] > 0
+            if point[8] <= TOUCHING or point[9] > 0
         ]
 
     def _index(self, body: int) -> int:
