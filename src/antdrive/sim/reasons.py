@@ -108,20 +108,22 @@ def _remedies(s: RoutePlanner, grid: Grid, query: Query, passage: Passage | None
 
     Finer cells come first, then the footprint instead of the disc, a smaller margin, and another start or goal nearby.
     """
-    foot, same = s.robot.footprint, _same(s)
+    same = _same(s)
     if same is None:
         return
+    shapes = [same]
     if fits or s.turns:
         yield from _on_finer_cells(same)
-    if not (s.turns or foot.is_disc):
-        turning = same if s.can_turn else _astar(s)
-        yield from _on_finer_cells(turning.and_("--footprint exact", footprint="exact"))
+    if not (s.turns or s.robot.footprint.is_disc):
+        shapes.append((same if s.can_turn else _astar(s)).and_("--footprint exact", footprint="exact"))
+        yield from _on_finer_cells(shapes[-1])
     widest = math.inf if fits else passage.radius if passage else 0.0
-    least = foot.inner_radius if s.turns else s.robot.radius
-    margins = [m for m in MARGINS if m < s.margin - ROUNDING and least + m < widest - ROUNDING]
-    halves = [m for m in margins if m <= margins[0] / 2]
-    for margin in dict.fromkeys((*margins[:1], *halves[:1], *margins[-1:])):
-        yield from _on_finer_cells(same.and_(f"--margin {margin:g}", margin=margin, outline_margins=(margin,)))
+    for shape in shapes:
+        least = s.robot.footprint.inner_radius if shape.routes.turns else s.robot.radius
+        margins = [m for m in MARGINS if m < s.margin - ROUNDING and least + m < widest - ROUNDING]
+        halves = [m for m in margins if m <= margins[0] / 2]
+        for margin in dict.fromkeys((*margins[:1], *halves[:1], *margins[-1:])):
+            yield from _on_finer_cells(shape.and_(f"--margin {margin:g}", margin=margin, outline_margins=(margin,)))
     yield from _other_ends(s, same, grid, query, passage)
 
 

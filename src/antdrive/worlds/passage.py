@@ -61,9 +61,9 @@ def widest_passage(task: Task, reach: Reach = AT_THE_ENDS) -> Passage | None:
     """
     best: Passage | None = None
     for (room, start), (other, goal) in _ends(task, reach):
-        if min(room, other) > (best.radius if best else CLOSER):
-            passage = _widest(task.world, start, goal, room, other)
-            best = passage if best is None or passage.radius > best.radius else best
+        least = best.radius if best else CLOSER
+        if min(room, other) > least and not (best and _closing(task.world, start, goal, least + ROUNDING)):
+            best = _widest(task.world, start, goal, room, other)
     return best if best and best.radius > CLOSER else None
 
 
