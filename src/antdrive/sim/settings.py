@@ -106,7 +106,7 @@ class Settings:
             form="margin",
             axis=True,
             column="margin_asked",
-            usual="0.03 without noise; with noise at least that, by robot, noise and smoothing",
+            usual="at least 0.03, by robot, noise and smoothing",
         ),
     ] = None
     cell: Annotated[
