@@ -79,7 +79,7 @@ def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_n
     assert exact.endswith(narrow[narrow.index("the widest disc") :])
     beside = run(gate(robot, 0.67, cell=0.05)).reason
     assert (
-        "needs 0.66 m of the 0.67 m straight ahead; between cells, by straight moves and turns on the spot, it does not get "
+        "needs 0.66 m of the 0.67 m straight ahead; on these cells, by straight moves and turns on the spot, it does not get "
         "through; --margin 0.02 --cell 0." in beside
     )
 

@@ -99,7 +99,7 @@ def _needs(s: RoutePlanner, passage: Passage) -> str:
     fits = f"of the {gap:.3g} m straight ahead" if width <= gap else f"straight ahead, more than the {gap:.3g} m there"
     needs = f"{_shape(robot)} needs {width:.3g} m {fits}"
     if s.turns and width <= gap:
-        needs += "; between cells, by straight moves and turns on the spot, it does not get through"
+        needs += "; on these cells, by straight moves and turns on the spot, it does not get through"
     return f"{plans}{'; ' * bool(plans)}{needs}"
 
 
