@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from antdrive.base import FieldError, InputError, arc_lengths, polyline_length, wrap_angle
 from antdrive.base.errors import input_error, require_finite, require_positive
+from antdrive.base.files import format_size
 from antdrive.base.optional import optional
-from antdrive.base.plane import segment_lengths
+from antdrive.base.plane import format_disc, format_numbers, format_point, format_position, segment_lengths, tidy
 from antdrive.worlds import Disc
 
 
@@ -106,3 +107,28 @@ def test_a_single_point_has_no_length():
     assert segment_lengths([(1.0, 2.0)]).shape == (0,)
     assert arc_lengths([(1.0, 2.0)]).tolist() == [0.0]
     assert polyline_length([(1.0, 2.0)]) == 0.0
+
+
+def test_positions_print_as_a_person_writes_them():
+    assert format_point((9.85, 5.0)) == "(9.85, 5)"
+    assert format_point((300.0, -1.77636e-15)) == "(300, 0)"
+    assert format_point((10.00001, 12345.678901)) == "(10.00001, 12345.678901)"
+    assert format_point((1e300, -1e300)) == "(1e+300, -1e+300)"
+    assert format_point((-1e-9, 1e300), 2) == "(0.00, 1e+300)"
+    assert format_point((-0.001, 2.345), 2) == "(0.00, 2.35)"
+    assert format_numbers((0.15000000000000002, 0.0, 3.9000000000000004, 2.9)) == "[0.15, 0, 3.9, 2.9]"
+    assert format_disc(2.0, 0.45000000000000007, 0.1118033998749895) == "at (2, 0.45) with radius 0.111803"
+    assert format_position((10.0, 0.0, 0.0), 1.0, -1e-17, None) == "(1, 0) in the world, (11, 0) in its map"
+
+
+@given(st.floats(-1e6, 1e6))
+def test_tidy_numbers_lose_only_their_rounding_error(value):
+    assert tidy(value) == pytest.approx(value, rel=1e-12, abs=1e-12)
+    short = round(value, 3)
+    assert tidy(short + math.ulp(short)) == short + 0.0
+
+
+def test_small_sizes_are_not_zero():
+    assert [format_size(n) for n in (7, 20_000, 200_000, 1_000_000, 1 << 29, 2_100_000_000)] == [
+        "7 bytes", "20 kB", "200 kB", "1 MB", "537 MB", "2.1 GB",
+    ]  # fmt: skip

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.base import InputError
 from antdrive.cli.commands import COMMANDS, ROBOTS, WORLDS
 from antdrive.runs.failures import hunt
 from antdrive.views.film import video
@@ -141,6 +142,9 @@ def test_a_second_run_that_does_not_fit_leaves_the_first(small, tmp_path, antdri
     assert {path.name: path.read_bytes() for path in Path("r").iterdir()} == before
 
 
+SAVED = "; saved: r/result.json, r/rollout.npz\n"
+
+
 @pytest.mark.parametrize("view", ["film", "figure"])
 def test_a_finished_drive_stays_without_space_for_its_views(refused, antdrive, small, monkeypatch, view):
     def full(*_, **__):
@@ -149,15 +153,24 @@ def test_a_finished_drive_stays_without_space_for_its_views(refused, antdrive, s
     if view == "film":
         monkeypatch.setattr(video, "_write_all", full)
         said = refused("run", small, "--no-figures", "-o", "r", "--film", "r/film.mp4")
-        assert said == "antdrive: r/film.mp4: cannot be written (No space left on device)\n"
+        assert said == "antdrive: r/film.mp4: cannot be written (No space left on device)" + SAVED
     else:
         monkeypatch.setattr("matplotlib.figure.Figure.savefig", full)
         said = refused("run", small, "-o", "r")
-        assert said == "antdrive: r/overview.png: cannot be written (No space left on device)\n"
+        assert said == "antdrive: r/overview.png: cannot be written (No space left on device)" + SAVED
     assert sorted(path.name for path in Path("r").iterdir()) == ["result.json", "rollout.npz"]
     facts = json.loads(Path("r/result.json").read_text())
     assert facts["files"] == {"result": "r/result.json", "rollout": "r/rollout.npz"}
     assert antdrive("verify", "r")[0] == 0
+
+
+def test_a_log_without_space_for_its_result_is_named(refused, small, monkeypatch):
+    def full(path, value):
+        raise InputError(f"{path}: cannot be written (No space left on device)")
+
+    monkeypatch.setattr("antdrive.views.run_folder.write_json", full)
+    said = refused("run", small, "--no-figures", "-o", "r")
+    assert said == "antdrive: r/result.json: cannot be written (No space left on device); saved: r/rollout.npz\n"
 
 
 def test_an_encoder_that_dies_names_the_film(refused, small, monkeypatch):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from antdrive.robots import Lidar, Odometry, load_robot, robot_to_dict
+from antdrive.robots import Lidar, Odometry, PurePursuit, load_robot, robot_to_dict
 from antdrive.robots.robot_file import robot_schema
 from antdrive.sim.log.record import DriveRecord, canonical_hash
 
@@ -88,3 +88,22 @@ def test_the_record_of_a_drive_holds_the_lidar(small_run):
 def test_errors_of_odometry_scale():
     assert Odometry().scaled(0).gyro_bias == 0
     assert Odometry().scaled(5).gyro_bias == pytest.approx(0.025)
+
+
+@pytest.mark.parametrize("written", [6.2832, 6.28319, 6.283186, 6.284])
+def test_a_full_circle_may_be_rounded_up(tmp_path, written):
+    lidar = changed(tmp_path, field_of_view=written).lidar
+    assert lidar.full_circle
+    assert lidar.field_of_view <= 2 * math.pi + 1e-6
+
+
+@pytest.mark.parametrize("written", [3.1416, -3.1416, 3.142])
+def test_half_a_turn_may_be_rounded_up(tmp_path, written):
+    assert changed(tmp_path, yaw=written).lidar.yaw == math.copysign(math.pi, written)
+    assert Lidar(beams=3, field_of_view=1.0, min_range=0.0, max_range=1.0, rate=5.0, yaw=written).yaw == pytest.approx(
+        written, abs=1e-3
+    )
+
+
+def test_a_quarter_turn_may_be_rounded_up():
+    assert PurePursuit(rotate_in_place_above=1.5708).rotate_in_place_above < math.pi / 2

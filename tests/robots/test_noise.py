@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from antdrive.robots import Footprint, Noise, NoiseModel, Twist, footprint_clearance, load_robot, overlap_at
 from antdrive.robots.card import robot_svg
 from antdrive.robots.clearance import footprint_distances
-from antdrive.worlds import Disc, World
+from antdrive.worlds import Cruising, Disc, Keyframed, Wandering, World
 
 DT = 1 / 60
 
@@ -213,3 +213,30 @@ def test_showing_a_robot_imports_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("gap", [0.0, 4.4e-16, 1e-9, 9e-5])
+@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+def test_a_start_that_touches_by_rounding_is_refused(robot, gap):
+    """Physics reports a contact within 0.1 mm: the drive would end at once."""
+    spec = load_robot(robot)
+    _, _, xmax, ymax = spec.footprint.bounds
+    room = World("room", (0.0, 0.0, 6.0, 2.0 + ymax + gap))
+    assert overlap_at(room, spec, (3.0, 2.0, 0.0)) == "touches the upper wall"
+    ahead = World("post", (0.0, 0.0, 6.0, 4.0), (Disc(3.0 + xmax + 0.5 + gap, 2.0, 0.5),))
+    assert overlap_at(ahead, spec, (3.0, 2.0, 0.0)).startswith("touches obstacles[0]")
+    free = World("room", (0.0, 0.0, 6.0, 2.0 + ymax + 2e-4))
+    assert overlap_at(free, spec, (3.0, 2.0, 0.0)) == ""
+
+
+def test_a_start_at_a_mover_is_refused():
+    people = (
+        Cruising(radius=0.2, position=(1.0, 1.0), velocity=(0.5, 0.0)),
+        Keyframed(radius=0.3, keyframes=((0.0, 3.0, 2.4), (5.0, 3.0, 3.5))),
+        Wandering(radius=0.2, cell=0.5, period=1.0),  # its place depends on the seed
+    )
+    world = World("people", (0.0, 0.0, 6.0, 4.0), movers=people)
+    assert overlap_at(world, load_robot("turtlebot"), (3.0, 2.0, 0.0)) == (
+        "overlaps movers[1], which starts at (3, 2.4) with radius 0.3 by 0.08 m"
+    )
+    assert overlap_at(world, load_robot("turtlebot"), (3.0, 1.9, 0.0)) == ""

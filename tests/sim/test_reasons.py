@@ -10,7 +10,7 @@ import pytest
 from antdrive.planners import AStar, GridPlanner, PlanResult, PlanStatus
 from antdrive.robots import Footprint
 from antdrive.sim import Outcome, Scenario, plan, run
-from antdrive.worlds import Disc, Task, World, load_task
+from antdrive.worlds import Cruising, Disc, Task, World, load_task
 from tests.records import changed
 
 
@@ -22,27 +22,30 @@ def gate(robot, width, *, planner="astar", cell=0.1, **settings):
     return Scenario.of(task, planner, robot, **settings)
 
 
-@pytest.mark.parametrize("planner", ["astar", "ants", "tangent"])
-def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_would_do(turtlebot, planner):
+@pytest.mark.parametrize(
+    ("planner", "remedy"),
+    [
+        ("astar", "--margin 0.04 --cell 0.01"),
+        ("ants", "-p astar --margin 0.04 --cell 0.01"),  # ants may miss a path
+        ("tangent", "--margin 0.04"),  # plans between the cylinders themselves
+    ],
+)
+def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_would_do(turtlebot, planner, remedy):
     tight = gate(turtlebot, 0.45, planner=planner, margin=0.08)
     done = run(tight)
     assert done.outcome is Outcome.NO_PATH
     assert done.reason.startswith("no path for a disc of 0.26 m (radius 0.18 + margin 0.08) on cells of 0.1 m; ")
     assert done.reason.endswith(
         "; the widest disc that passes has a radius of 0.225 m, at (3.00, 2.00), between obstacles[0] at (3, 2.475) with "
-        f"radius 0.25 and obstacles[{len(tight.task.world.obstacles) // 2}] at (3, 1.525) with radius 0.25; "
-        "a margin below 0.045 m leaves a way on fine cells"
+        f"radius 0.25 and obstacles[{len(tight.task.world.obstacles) // 2}] at (3, 1.525) with radius 0.25; {remedy} finds one"
     )
-    assert run(replace(tight, margin=0.035, cell=0.0125)).succeeded, "the advice is right"
 
 
 def test_less_than_the_default_is_said_to_be_a_risk(turtlebot):
     tight = gate(turtlebot, 0.45, noise=1.0, smoothing="none")
     reason = run(tight).reason
     assert reason.startswith("no path for a disc of 0.256 m (radius 0.18 + margin 0.076)")
-    assert reason.endswith(
-        "a margin below 0.045 m leaves a way on fine cells, but noise may then cause contacts; --margin auto measures its effect"
-    )
+    assert reason.endswith("; --margin 0.04 --cell 0.01 finds one, but noise may then cause contacts")
     assert "noise" not in run(replace(tight, margin=0.06)).reason, "the user has chosen"
 
 
@@ -61,22 +64,23 @@ def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_n
         in reason
     )
     assert reason.endswith(
-        "plans use the disc of cart; its rectangle of 0.9 x 0.6 m needs 0.66 m of the 0.95 m straight ahead"
+        "plans use the disc of cart; its rectangle of 0.9 x 0.6 m needs 0.66 m of the 0.95 m straight ahead; "
+        "--footprint exact finds one"
     )
-    assert len(reason) < 350
+    assert len(reason) < 400
     assert run(gate(robot, 0.95, cell=0.05)).succeeded, "the footprint passes"
     tight = gate(robot, 0.62, cell=0.05)
     narrow = run(tight).reason
     assert run(tight, planned=plan(tight)).reason == narrow, "as whole as in `antdrive plan`"
     assert "on cells of 0.05 m, nor for its rectangle of 0.9 x 0.6 m; " in narrow
-    assert narrow.endswith("; its rectangle of 0.9 x 0.6 m needs 0.66 m straight ahead, more than the 0.62 m there")
+    assert "; its rectangle of 0.9 x 0.6 m needs 0.66 m straight ahead, more than the 0.62 m there" in narrow
     exact = run(gate(robot, 0.62, cell=0.05, footprint="exact")).reason
     assert exact.startswith("no path for its rectangle of 0.9 x 0.6 m with a margin of 0.03 m on cells of 0.05 m; ")
     assert exact.endswith(narrow[narrow.index("the widest disc") :])
     beside = run(gate(robot, 0.67, cell=0.05)).reason
-    assert beside.endswith(
-        "needs 0.66 m of the 0.67 m straight ahead; between cells, by straight moves and turns on the spot, it does not get "
-        "through"
+    assert (
+        "needs 0.66 m of the 0.67 m straight ahead; on these cells, by straight moves and turns on the spot, it does not get "
+        "through; --margin 0.02 --cell 0." in beside
     )
 
 
@@ -93,21 +97,22 @@ def test_an_office_with_a_robot_too_wide_for_its_doors_names_the_door_of_the_goa
 
 def test_a_planner_for_discs_names_one_for_footprints(jackal):
     robot = replace(jackal, footprint=Footprint.rectangle(0.9, 0.6))
-    assert run(gate(robot, 0.95, planner="tangent")).reason.endswith("; astar plans for the footprint")
+    assert run(gate(robot, 0.95, planner="tangent")).reason.endswith("; -p astar --footprint exact finds one")
 
 
-def test_a_margin_that_would_do_is_named_for_a_rectangle_too(jackal):
+def test_the_footprint_comes_before_a_smaller_margin(jackal):
     reason = run(gate(jackal, 0.7, cell=0.05, footprint="disc")).reason
-    assert reason.endswith("its rectangle of 0.508 x 0.43 m needs 0.49 m of the 0.7 m straight ahead; "
-                           "a margin below 0.0172 m leaves a way on fine cells")  # fmt: skip
+    assert reason.endswith(
+        "its rectangle of 0.508 x 0.43 m needs 0.49 m of the 0.7 m straight ahead; --footprint exact finds one"
+    )
 
 
 def test_cells_that_would_do_are_named(turtlebot):
     coarse = gate(turtlebot, 0.45, cell=0.6)
     reason = run(coarse).reason
     assert reason.startswith("no path for a disc of 0.21 m (radius 0.18 + margin 0.03) on cells of 0.6 m")
-    assert reason.endswith("; there is one on cells of 0.075 m")
-    assert run(replace(coarse, cell=float(reason.split()[-2]))).succeeded
+    assert reason.endswith("; --cell 0.025 finds one")
+    assert run(replace(coarse, cell=0.025)).succeeded
 
 
 def test_a_goal_behind_a_closed_wall_is_not_blamed_on_the_margin(turtlebot):
@@ -116,13 +121,47 @@ def test_a_goal_behind_a_closed_wall_is_not_blamed_on_the_margin(turtlebot):
     assert run(replace(closed, task=task)).reason.endswith("; not even a point gets through")
 
 
-def test_a_start_without_room_for_the_margin_is_the_narrowest_place(turtlebot):
+def test_a_goal_without_room_for_the_margin_is_the_narrowest_place(turtlebot):
     task = Task(World("corner", (0.0, 0.0, 6.0, 4.0)), (2.0, 2.0, 0.0), (5.7, 2.0), cell=0.1)
     done = run(Scenario.of(task, "astar", turtlebot, margin=0.5))
     assert done.reason.endswith(
-        "has a radius of 0.3 m, at (5.70, 2.00), the goal has no more room; a margin below 0.12 m leaves a way on fine "
-        "cells"
+        "has a radius of 0.53 m, at (5.47, 2.00), the roomiest place for the goal within its tolerance of 0.25 m; "
+        "--margin 0.3 --cell 0.05 finds one"
     )
+
+
+def shelf(robot, tolerance=0.25, goal=(9.85, 5.0), **settings):
+    """A goal closer to a wall than the robot's radius, in an empty square."""
+    task = Task(World("shelf", (0.0, 0.0, 10.0, 10.0)), (5.0, 5.0, 0.0), goal, tolerance)
+    return Scenario.of(task, "astar", robot, **settings)
+
+
+@pytest.mark.parametrize("cell", [0.5, 0.25])
+def test_a_goal_that_only_finer_cells_reach_within_its_tolerance_names_them(turtlebot, cell):
+    """The robot's centre gets to 9.79 m, 0.06 m from the goal; the nearest centre of a coarse cell is 0.27 m from it."""
+    assert run(shelf(turtlebot, cell=cell)).reason == (
+        f"no path for a disc of 0.21 m (radius 0.18 + margin 0.03) on cells of {cell} m; no free cell can be joined to the "
+        "goal within its tolerance of 0.25 m; --cell 0.1 finds one"
+    )
+    assert run(shelf(turtlebot, cell=0.1)).succeeded
+
+
+def test_a_goal_beyond_reach_names_the_nearest_that_is_not(turtlebot):
+    reason = run(shelf(turtlebot, 0.1, (9.95, 5.0))).reason
+    assert reason.endswith(
+        "the widest disc that passes has a radius of 0.13 m, at (9.87, 5.00), the roomiest place for the goal within its "
+        "tolerance of 0.1 m; this robot does not fit through; --goal 9.75,4.75 finds one"
+    )
+    assert run(shelf(turtlebot, 0.1, (9.75, 4.75))).succeeded
+
+
+def test_a_planner_that_decides_cell_by_cell_is_not_told_to_plan_for_the_footprint(jackal):
+    robot = replace(jackal, name="cart", footprint=Footprint.rectangle(0.9, 0.6))
+    among = gate(robot, 0.95)
+    mover = Cruising(radius=0.2, position=(0.5, 0.5), velocity=(0.0, 0.1))
+    task = changed(among.task, "world", movers=(mover,))
+    reason = plan(Scenario.of(task, "mmas-dstar", robot, cell=0.05))[1].reason
+    assert reason.endswith("; -p astar --footprint exact finds one")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +175,8 @@ class GivesUp(GridPlanner):
 def test_an_incomplete_planner_is_distinguished_from_a_world_without_a_path(small_scenario):
     done = run(replace(small_scenario, planner=GivesUp(), planner_name="lazy"))
     assert done.reason == (
-        "lazy found no path for a disc of 0.21 m (radius 0.18 + margin 0.03): too tired; astar finds one on these cells of 0.2 m"
+        "lazy found no path for a disc of 0.21 m (radius 0.18 + margin 0.03) on cells of 0.2 m: too tired; "
+        "-p astar finds one on these cells"
     )
 
 

@@ -73,7 +73,9 @@ def test_the_bottleneck_is_the_middle_of_the_gap():
 
 def test_worlds_without_a_bottleneck():
     room = World("room", (0.0, 0.0, 4.0, 3.0))
-    assert widest_passage(Task(room, (0.5, 1.5, 0.0), (3.7, 1.5))) == Passage(pytest.approx(0.3), (3.7, 1.5))
+    assert widest_passage(Task(room, (0.5, 1.5, 0.0), (3.7, 1.5))) == Passage(
+        pytest.approx(0.3), (3.7, 1.5), (), "goal"
+    )
     closed = World("closed", (0.0, 0.0, 4.0, 3.0), tuple(Disc(2.0, y, 0.3) for y in np.arange(0.0, 3.1, 0.5)))
     assert widest_passage(Task(closed, (0.6, 0.6, 0.0), (3.4, 0.6))) is None
 
@@ -114,3 +116,18 @@ def test_the_bottleneck_of_ten_thousand_cylinders_is_the_door_and_not_a_corridor
     assert passage.radius == pytest.approx((high.min() - low.max() - 0.1) / 2)
     assert passage.at == pytest.approx((35.0, (high.min() + low.max()) / 2))
     assert {opening[k] for k in passage.between} == {(35.0, low.max()), (35.0, high.min())}
+
+
+def test_an_end_with_little_room_counts_by_the_roomiest_place_within_reach():
+    """In a corner the roomiest place is away from both walls; behind a row of cylinders no straight line leads to one."""
+    room = World("room", (0.0, 0.0, 4.0, 3.0))
+    task = Task(room, (0.1, 0.1, 0.0), (3.9, 2.9))
+    reach = 0.4 / math.sqrt(2) + 0.1
+    assert widest_passage(task).radius == pytest.approx(0.1)
+    corner = widest_passage(task, (0.4, 0.4))
+    assert (corner.radius, corner.end) == (pytest.approx(reach, abs=1e-4), "start")
+    assert feasible(task, reach - 1e-3, (0.4, 0.4))
+    assert not feasible(task, reach + 1e-3, (0.4, 0.4))
+    row = tuple(Disc(x, 2.6, 0.05) for x in np.arange(0.0, 4.1, 0.1).tolist())
+    behind = Task(World("row", room.bounds, row), (0.6, 0.6, 0.0), (2.0, 2.8))
+    assert widest_passage(behind, (0.4, 0.4)) is None

@@ -7,7 +7,7 @@ import pytest
 
 from antdrive.base.errors import FieldError
 from antdrive.base.records import derived
-from antdrive.worlds import Disc, Route, Task, World
+from antdrive.worlds import Cruising, Disc, Route, Task, World
 from antdrive.worlds.world import PointWorld
 
 ROOM = World("room", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 1.0), Disc(2.0, 6.0, 0.5)))
@@ -47,3 +47,13 @@ def test_a_derived_task_has_the_other_values_unchecked_and_the_rest_of_the_first
     assert task.world.name == "a"
     with pytest.raises(FieldError, match="inside obstacles"):
         dataclasses.replace(task, world=covered)
+
+
+def test_positions_at_the_bounds_may_be_rounded():
+    world = World("rounded", (0.15000000000000002, 0.0, 2.9000000000000004, 3.0))
+    assert Task(world, (1.0, 1.0, 0.0), (0.15, 2.0)).goal == (0.15, 2.0)
+    with pytest.raises(FieldError, match=r"goal: \(0\.14, 2\) is out of bounds \[0\.15, 0, 2\.9, 3\]"):
+        Task(world, (1.0, 1.0, 0.0), (0.14, 2.0))
+    mover = Cruising(radius=0.2, position=(0.35, 1.0), velocity=(0.0, 0.5))
+    assert world.bounds[0] + mover.radius > 0.35
+    assert dataclasses.replace(world, movers=(mover,)).movers == (mover,)

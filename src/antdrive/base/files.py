@@ -111,7 +111,13 @@ def read_bytes(path: str | os.PathLike[str], max_bytes: int, kind: str = "a file
 
 
 def _too_large(path: str | os.PathLike[str], max_bytes: int) -> InputError:
-    return input_error(os.fspath(path), f"is too large; the limit is {max_bytes // 1_000_000} MB")
+    return input_error(os.fspath(path), f"is too large; the limit is {format_size(max_bytes)}")
+
+
+def format_size(size: int) -> str:
+    """Format a number of bytes as a person writes it: 20 kB, 1.35 MB."""
+    unit, name = next(((u, n) for u, n in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")) if size >= u), (1.0, "bytes"))
+    return f"{size / unit:.3g} {name}"
 
 
 def unreadable(path: str | os.PathLike[str], error: OSError | ValueError) -> InputError:

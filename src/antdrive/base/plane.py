@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TypeVar
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from antdrive.base.types import Floats, Pose
 
 Angle = TypeVar("Angle", float, Floats)
+HUGE = 1e7  # larger coordinates are printed with an exponent [m]
 
 
 def wrap_angle(angle: Angle) -> Angle:
@@ -67,13 +69,51 @@ def map_to_world(frame: Pose, points: npt.ArrayLike) -> Floats:
     return world_to_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
 
 
-def format_position(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
-    """Format a position of a world; with its map position if the world has a map frame."""
-    here = f"({x:{digits}}, {y:{digits}})"
+def tidy(value: float) -> float:
+    """Return a number without its rounding error: 3.9 for 3.9000000000000004; one with more than nine decimals as it is."""
+    rounded = round(value, 9) + 0.0
+    return rounded if abs(value - rounded) <= 1e-12 * max(1.0, abs(value)) else value
+
+
+def format_number(value: float, decimals: int = 6) -> str:
+    """Format a number as a person writes it: rounded, without trailing zeros; with an exponent if it is huge.
+
+    Args:
+        value: the number
+        decimals: largest number of decimals
+    """
+    text = f"{round(float(value), decimals) + 0.0:.12g}"  # the sum has no negative zero
+    return f"{value:.3g}" if "e+" in text else text
+
+
+def format_fixed(value: float, decimals: int) -> str:
+    """Format a measured number with this number of decimals; with an exponent if it is huge."""
+    return f"{value:.3g}" if abs(value) > HUGE else f"{round(float(value), decimals) + 0.0:.{decimals}f}"
+
+
+def format_numbers(values: Iterable[float]) -> str:
+    """Format bounds or a pose as a list: [0.15, 0, 3.9, 2.9]."""
+    return f"[{', '.join(map(format_number, values))}]"
+
+
+def format_point(point: Iterable[float], decimals: int | None = None) -> str:
+    """Format a position (2,) as a person writes it, (9.85, 5), or a measured one with this number of decimals."""
+    one, other = (format_number(v) if decimals is None else format_fixed(v, decimals) for v in point)
+    return f"({one}, {other})"
+
+
+def format_disc(x: float, y: float, radius: float) -> str:
+    """Format place and size of a disc as a person writes them: "at (2, 1.5) with radius 0.3"."""
+    return f"at {format_point((x, y))} with radius {format_number(radius)}"
+
+
+def format_position(frame: Pose, x: float, y: float, decimals: int | None = 2) -> str:
+    """Format a position of a world as `format_point` does; with its map position if the world has a map frame."""
+    here = format_point((x, y), decimals)
     if not any(frame):
         return here
     there = world_to_map(frame, [(x, y)])[0].tolist()
-    return f"{here} in the world, ({there[0]:{digits}}, {there[1]:{digits}}) in its map"
+    return f"{here} in the world, {format_point(there, decimals)} in its map"
 
 
 def relative_frame(inner: Floats, outer: Floats) -> Floats:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 import re
 from collections.abc import Hashable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_type_hints
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from pydantic import ConfigDict
 
 R = TypeVar("R")
+ANGLE_ROUNDING = 1e-3  # people round pi to 3.142 and 2 pi to 6.284 [rad]
 
 #: Rules of records and files, nested ones included: no type coercion, no unknown keys, no NaN or infinity.
 STRICT: ConfigDict = {"strict": True, "extra": "forbid", "allow_inf_nan": False, "frozen": True}
@@ -58,6 +60,19 @@ def derived(record: R, **changes: Any) -> R:
     made = object.__new__(type(record))
     vars(made).update({name: getattr(record, name) for name in cast(Any, record).__dataclass_fields__} | changes)
     return made
+
+
+def clamp_angle(record: Any, key: str, most: float) -> None:
+    """Set an angle that was rounded beyond its limit, such as 3.142 for pi, to the limit [rad].
+
+    Args:
+        record: the record, before its check
+        key: the field
+        most: its largest magnitude [rad]
+    """
+    value = getattr(record, key)
+    if most < abs(value) <= most + ANGLE_ROUNDING:
+        object.__setattr__(record, key, math.copysign(most, value))
 
 
 def require_ranges(record: Any) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from antdrive.base.errors import InputError
+from antdrive.base.files import format_size
 from antdrive.cli.console import file_lines, show, table
 from antdrive.cli.options import option
 
@@ -142,5 +143,5 @@ def report_campaigns(
     show(
         json,
         facts,
-        [f"{size / 1e6:.2f} MB", *file_lines({**names, **({} if figures is None else {"figures": figures})})],
+        [format_size(size), *file_lines({**names, **({} if figures is None else {"figures": figures})})],
     )

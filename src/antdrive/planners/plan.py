@@ -17,6 +17,7 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.base.guarded import value_text
+from antdrive.base.plane import format_fixed
 from antdrive.planners.errors import PlannerError, planner_errors
 from antdrive.planners.warmup import kernels_loaded
 from antdrive.worlds import MoverMotion, Task
@@ -87,10 +88,10 @@ class Query:
         ends, bounds = np.array((task.start[:2], task.goal)), np.array(world.bounds, dtype=np.float64)
         # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal tolerance.
         found = entrances(
-            grid.free, *grid.origin, grid.cell, grid.inflate, reach, ends, _within(task), world.discs, bounds
+            grid.free, *grid.origin, grid.cell, grid.inflate, reach, ends, within_goal(task), world.discs, bounds
         )
         (*start, can_leave), (*goal, can_arrive) = found.tolist()
-        unreachable = _unreachable({"the start": can_leave, "the goal": can_arrive})
+        unreachable = _unreachable({"the start": can_leave, goal_of(task): can_arrive})
         return cls(grid, (start[0], start[1]), (goal[0], goal[1]), task, unreachable)
 
     @classmethod
@@ -98,11 +99,11 @@ class Query:
         """Build the query for a task on a grid with turns: the goal becomes a reachable cell within its tolerance."""
         from antdrive.planners.entrances import ends
 
-        node, goal = ends(grid, task, _within(task))
+        node, goal = ends(grid, task, within_goal(task))
         cols = grid.shape[1]
         start = divmod(int(grid.turns.cell[node]), cols) if node >= 0 else grid.cell_at(*task.start[:2])
         to = divmod(goal, cols) if goal >= 0 else grid.cell_at(*task.goal)
-        unreachable = _unreachable({"the start": node >= 0, "the goal": goal >= 0})
+        unreachable = _unreachable({"the start": node >= 0, goal_of(task): goal >= 0})
         return cls(grid, start, to, task, unreachable, start_label=node)
 
     @property
@@ -136,7 +137,7 @@ class Query:
         return None
 
 
-def _within(task: Task) -> float:
+def within_goal(task: Task) -> float:
     """Return the farthest centre of a cell from the goal at which a robot may stop [m].
 
     The allowance covers the distance between the stopping point and the cell's centre.
@@ -144,9 +145,14 @@ def _within(task: Task) -> float:
     return task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
 
 
+def goal_of(task: Task) -> str:
+    """Return the name of a task's goal in messages."""
+    return f"the goal within its tolerance of {task.goal_tolerance:g} m"
+
+
 def _unreachable(ends: Mapping[str, bool]) -> str:
     """Return why ends are unusable; empty if all are usable."""
-    return "; ".join(f"no free cell near {end} can be reached from it" for end, usable in ends.items() if not usable)
+    return "; ".join(f"no free cell can be joined to {end}" for end, usable in ends.items() if not usable)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +231,7 @@ class PlanResult:
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
     def __repr__(self) -> str:
-        path = f" of {self.line_length:.3f} m" if len(self.cells) else ""
+        path = f" of {format_fixed(self.line_length, 3)} m" if len(self.cells) else ""
         reason = f" ({self.reason:.200})" if self.reason else ""
         effort = f"{self.work:,} {self.work_unit}, {1000 * self.wall_s:.1f} ms"
         return f"<{type(self).__name__}: {self.status.value}{path}{reason}, {effort}>"
@@ -235,7 +241,7 @@ class PlanResult:
 
         picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
         facts = {
-            "length": f"{self.line_length:.3f} m",
+            "length": f"{format_fixed(self.line_length, 3)} m",
             "work": f"{self.work:,} {self.work_unit}",
             "time": f"{1000 * self.wall_s:.1f} ms",
         }

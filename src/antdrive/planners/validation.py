@@ -12,7 +12,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.guarded import one_line, value_text
-from antdrive.base.plane import polyline_length, segment_lengths, wrap_angle
+from antdrive.base.plane import format_point, polyline_length, segment_lengths, wrap_angle
 from antdrive.planners.errors import PlannerError, place_of, planner_errors
 from antdrive.planners.plan import (
     Cell,
@@ -259,9 +259,9 @@ def _waypoints(query: Query, result: PlanResult, xy: Floats) -> str:
         close = _too_close(query, xy)
         if close.any():
             k = int(close.argmax())
-            (ax, ay), (bx, by) = xy[k], xy[k + 1]
+            begin, end = (format_point(xy[i].tolist(), 3) for i in (k, k + 1))
             keeps = f"{query.grid.inflate:g} m from obstacles" if query.task is not None else "to free cells"
-            return f"waypoints: step {k} from ({ax:.3f}, {ay:.3f}) to ({bx:.3f}, {by:.3f}) does not keep {keeps}"
+            return f"waypoints: step {k} from {begin} to {end} does not keep {keeps}"
     drawn = polyline_length(xy)
     slack = RELATIVE * drawn + NEAR
     if not drawn - _rounded_off(xy) - slack <= length <= drawn + slack:

@@ -8,12 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
+from antdrive.base.plane import format_disc
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds import Disc, World
+from antdrive.worlds.motions import first_place
 
 if TYPE_CHECKING:
     from antdrive.worlds.headings import Outline
 
+TOUCHING = 1e-4  # surfaces closer than this touch [m]
 WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
 
 
@@ -98,23 +101,31 @@ def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
         return WALLS[index - count]
     disc, known = world.obstacles[index], count - unseen
     key = f"obstacles[{index}]" if index < known else f"unseen[{index - known}]"
-    return f"{key} at ({disc.x:g}, {disc.y:g}) with radius {disc.radius:g}"
+    return f"{key} {format_disc(disc.x, disc.y, disc.radius)}"
 
 
 def overlap_at(world: World, spec: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
-    """Describe the footprint's deepest overlap at a pose; empty if there is none.
+    """Describe the footprint's deepest overlap at a pose at a run's start; empty if there is none.
+
+    Surfaces closer than `TOUCHING` touch. Movers count, except wanderers whose place depends on the seed.
 
     Args:
-        world: the obstacles and walls; movers do not count
+        world: the obstacles, walls and movers
         spec: the robot
         pose: x, y and yaw of its centre [m, rad]
         unseen: further obstacles, placed after planning
     """
-    full = World(world.name, world.bounds, world.obstacles + unseen)
+    starts = {i: first_place(mover, world.bounds, world.discs) for i, mover in enumerate(world.movers)}
+    movers = {i: Disc(*place, world.movers[i].radius) for i, place in starts.items() if place is not None}
+    full = World(world.name, world.bounds, (*movers.values(), *world.obstacles, *unseen))
     gap = footprint_distances(full, spec, [pose])[0]
     worst = int(gap.argmin())
-    if gap[worst] > 0:
+    if gap[worst] > TOUCHING:
         return ""
     depth = -float(gap[worst])
     touches = f"overlaps {{}} by {depth:.3g} m" if depth > 1e-9 else "touches {}"
-    return touches.format(obstacle_name(full, worst, len(unseen)))
+    if worst < len(movers):
+        mover = movers[index := list(movers)[worst]]
+        return touches.format(f"movers[{index}], which starts {format_disc(mover.x, mover.y, mover.radius)}")
+    known = World(world.name, world.bounds, (*world.obstacles, *unseen))
+    return touches.format(obstacle_name(known, worst - len(movers), len(unseen)))

@@ -11,9 +11,10 @@ import numpy as np
 from annotated_types import Interval
 
 from antdrive.base.errors import FieldError
-from antdrive.base.records import require_ranges
+from antdrive.base.records import clamp_angle, require_ranges
 from antdrive.base.types import Floats, Pose
 
+MOST_SEEN = 2 * math.pi + 1e-6  # largest field of view; larger rounded values become this one [rad]
 FULL_CIRCLE = 2 * math.pi - 1e-4  # minimum field of view that counts as a full circle [rad]
 
 
@@ -43,7 +44,7 @@ class Lidar:
     """
 
     beams: Annotated[int, Interval(ge=3, le=10_000)]
-    field_of_view: Annotated[float, Interval(ge=0.01, le=2 * math.pi + 1e-6)]  # 2 pi, rounded up in some files
+    field_of_view: Annotated[float, Interval(ge=0.01, le=6.284)]
     min_range: Annotated[float, Interval(ge=0.0, le=10.0)]
     max_range: Annotated[float, Interval(ge=0.1, le=300.0)]
     rate: Annotated[float, Interval(ge=1.0, le=1000.0)]
@@ -51,10 +52,12 @@ class Lidar:
     sigma: Annotated[float, Interval(ge=0.0, le=0.5)] = 0.0
     x: Annotated[float, Interval(ge=-20.0, le=20.0)] = 0.0
     y: Annotated[float, Interval(ge=-20.0, le=20.0)] = 0.0
-    yaw: Annotated[float, Interval(ge=-math.pi, le=math.pi)] = 0.0
+    yaw: Annotated[float, Interval(ge=-3.142, le=3.142)] = 0.0
     height: Annotated[float, Interval(ge=0.01, le=10.0)] = 0.2
 
     def __post_init__(self) -> None:
+        clamp_angle(self, "field_of_view", MOST_SEEN)
+        clamp_angle(self, "yaw", math.pi)
         require_ranges(self)
         if not self.min_range < self.max_range:
             raise FieldError("min_range", f"must be below max_range, {self.max_range:g}, got {self.min_range:g}")

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from antdrive.base.errors import FieldError
+from antdrive.base.plane import format_point
 from antdrive.base.types import Bounds, Point
 
 MAX_CORNERS = 32  # of a polygon
@@ -203,7 +204,7 @@ class Footprint:
             return
         for k, (x, y) in enumerate(corners):
             if not _cross(corners[k - 1], (x, y), corners[k + 1 - len(corners)]) > 0:
-                raise FieldError("corners", f"must be a convex polygon; it turns inwards at ({x:g}, {y:g})")
+                raise FieldError("corners", f"must be a convex polygon; it turns inwards at {format_point((x, y))}")
         for a, b in _around(corners):
             if any(not _cross(a, b, c) > 0 for c in corners if c not in (a, b)):
                 raise FieldError("corners", "must go once around a convex polygon; its edges cross")

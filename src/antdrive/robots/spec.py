@@ -10,6 +10,7 @@ from typing import Annotated
 from annotated_types import Interval
 
 from antdrive.base.errors import FieldError
+from antdrive.base.plane import format_point
 from antdrive.base.records import require_ranges
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint as Footprint
@@ -194,8 +195,8 @@ class RobotSpec:
         if self.footprint.depth(x, y) < 0:
             raise FieldError(
                 "footprint",
-                f"wheels of {r:g} m, {self.track:g} m apart, protrude from it at ({x:g}, {y:g}); its origin is the axle's "
-                "centre",
+                f"wheels of {r:g} m, {self.track:g} m apart, protrude from it at {format_point((x, y))}; its origin is the "
+                "axle's centre",
             )
 
     @property
@@ -253,7 +254,7 @@ def require_on_robot(lidar: Lidar, foot: Footprint) -> None:
         key = "x" if abs(lidar.x) >= abs(lidar.y) else "y"
         raise FieldError(
             f"lidar.{key}",
-            f"the lidar at ({lidar.x:g}, {lidar.y:g}) is {outside:.3g} m outside the footprint; it must be on the robot",
+            f"the lidar at {format_point((lidar.x, lidar.y))} is {outside:.3g} m outside the footprint; it must be on the robot",
         )
 
 

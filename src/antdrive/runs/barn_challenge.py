@@ -21,7 +21,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from antdrive.base.errors import InputError, input_error
-from antdrive.base.files import open_regular
+from antdrive.base.files import format_size, open_regular
 from antdrive.base.plane import polyline_length
 from antdrive.base.types import Point
 from antdrive.sim.log.metrics import BARN_SPEED
@@ -189,7 +189,7 @@ class _Bounded:
 
 
 def _too_large(source: Path) -> InputError:
-    limits = f"{MAX_MEMBERS} files and {MAX_BYTES // 1_000_000} MB when unpacked"
+    limits = f"{MAX_MEMBERS} files and {format_size(MAX_BYTES)} when unpacked"
     return input_error(str(source), f"larger than an archive of the challenge's worlds; the limits are {limits}")
 
 

@@ -116,11 +116,12 @@ def route_planner(s: Scenario) -> RoutePlanner:
         usual_margin=s.usual_margin,
         cell=s.planning_cell,
         smoothing=s.driven_smoothing,
-        footprint=s.footprint if s.plans_footprints else "disc",
+        footprint=s.footprint,
         hz=s.control_hz,
         seed=s.seed,
         motions=s.trajectories.motions if s.timed else (),
         mapped=s.map == "given",
+        whole=not s.cell_by_cell,
     )
 
 

@@ -1,92 +1,203 @@
-"""Reasons for missing paths, with the decisive sizes and remedies."""
+"""Reasons for missing paths, with the decisive sizes and a remedy that planning has confirmed."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import dataclasses
+import math
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from antdrive.base.plane import format_position
-from antdrive.planners import Query, capabilities_of
+import numpy as np
+
+from antdrive.base.errors import FieldError
+from antdrive.base.plane import format_number, format_position
+from antdrive.planners import AStar, Query
 from antdrive.planners.graph.search import reachable
+from antdrive.planners.plan import within_goal
 from antdrive.robots.clearance import obstacle_name
 from antdrive.robots.default_margin import LEAST
-from antdrive.worlds import Grid, Task, rasterise
-from antdrive.worlds.passage import feasible, widest_passage
+from antdrive.worlds import Grid
+from antdrive.worlds.passage import Passage, feasible, widest_passage
+from antdrive.worlds.route import end_reach
 
 if TYPE_CHECKING:
     from antdrive.robots import RobotSpec
     from antdrive.sim.driving.routes import RoutePlanner
 
-FINER = (2, 4, 8)  # cells are tried this many times smaller
-MOST_CELLS = 2_000_000  # largest grid built only to test for a path
+CELLS = (0.5, 0.25, 0.1, 0.05, 0.025, 0.01)  # sides of finer cells to try [m]
+MARGINS = (0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01)  # smaller margins to try [m]
+MOST_CELLS, MOST_OUTLINED = 2_000_000, 500_000  # largest grids to try: for the disc, and for a footprint
+MOST_TRIES = 20  # plans to try for a remedy
+NEAR = 1.0  # longest move of a start or a goal as a remedy [m]
+ROUNDING = 1e-6  # [m]
+
+#: Whether a route planner finds a first path that its robot can follow.
+FindsPath = Callable[["RoutePlanner"], bool]
 
 
-def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
-    """Explain why a planner found no path: its reason, the disc that does not fit, and a remedy."""
-    robot = s.robot
+class Remedy(NamedTuple):
+    """Options that change a run, and the route planner of the changed run."""
+
+    options: str
+    routes: RoutePlanner
+
+    def and_(self, option: str, **changes: Any) -> Remedy:
+        """Return the remedy with a further option and its changes."""
+        return Remedy(f"{self.options} {option}".strip(), dataclasses.replace(self.routes, **changes))
+
+
+def no_path_reason(s: RoutePlanner, grid: Grid, said: str, finds_path: FindsPath) -> str:
+    """Explain why a planner found no path: its reason, the disc that does not fit, and a remedy that works."""
+    robot, query = s.robot, Query.between(grid, s.task)
     disc = f"a disc of {s.inflate:.3g} m (radius {robot.radius:.3g} + margin {s.margin:.3g})"
     if grid.turns:
         disc = f"{_shape(robot)} with a margin of {grid.turns.outline.reach - robot.footprint.rounding:.3g} m"
-    if reachable(Query.between(grid, s.task)):
-        says = f": {said}" if said else ""
-        finds = "" if s.motions else f"; astar finds one on these cells of {grid.cell:g} m"  # astar ignores motions
-        return f"{s.planner_label} found no path for {disc}{says}{finds}"
-    start = f"no path for {disc} on cells of {grid.cell:g} m"
+    head = f"no path for {disc} on cells of {grid.cell:g} m"
+    if query.blocked_end is None and reachable(query):
+        same = _astar(s)
+        works = not s.motions and finds_path(same.routes)  # astar ignores motions
+        finds = f"; {same.options} finds one on these cells" if works else ""
+        return f"{s.planner_label} found {head}{f': {said}' if said else ''}{finds}"
     if s.turns and not grid.turns:
-        start += f", nor for {_shape(robot)}"
-    if feasible(s.task, s.inflate):
-        if grid.turns:
-            return start
-        finer = next((grid.cell / k for k in FINER if _has_path(s.task, grid.cell / k, s.inflate)), None)
-        return f"{start}; there is one on {f'cells of {finer:g} m' if finer else 'finer cells'}"
-    return f"{start}; {_narrowest_place(s)}"
+        fine = f" on cells of {s.outlined_cell:g} m" if s.outlined_cell < grid.cell else ""
+        head += f", nor for {_shape(robot)}{fine}"
+    reach = end_reach(s.inflate, grid.cell), within_goal(s.task)
+    fits = feasible(s.task, s.inflate, reach)
+    passage = None if fits else widest_passage(s.task, reach)
+    says = [head, query.unreachable if fits else _narrowest_place(s, passage)]
+    found = _first_that_works(_remedies(s, grid, query, passage, fits=fits), finds_path)
+    if found is not None:
+        risk = found.routes.margin < s.margin and LEAST < s.usual_margin <= s.margin
+        says += [f"{found.options} finds one{', but noise may then cause contacts' if risk else ''}"]
+    return "; ".join(filter(None, says))
 
 
-def _narrowest_place(s: RoutePlanner) -> str:
-    """Describe the widest passable disc, its bottleneck, and whether a smaller margin would help."""
-    task = s.task
-    passage = widest_passage(task)
+def _narrowest_place(s: RoutePlanner, passage: Passage | None) -> str:
+    """Describe the widest passable disc, its bottleneck, and the room that the robot needs there."""
     if passage is None:
         return "not even a point gets through"
+    task = s.task
+    where = "between " + " and ".join(obstacle_name(task.world, k) for k in passage.between)
+    if not passage.between:
+        tolerance = f" within its tolerance of {task.goal_tolerance:g} m" if passage.end == "goal" else ""
+        where = f"the roomiest place for the {passage.end}{tolerance}"
     at = format_position(task.frame, *passage.at)
-    ends = ((task.start[:2], "the start has no more room"), (task.goal, "the goal has no more room"))
-    where = " and ".join(obstacle_name(task.world, k) for k in passage.between)
-    where = f"between {where}" if where else next(says for end, says in ends if end == passage.at)
-    return (
-        f"the widest disc that passes has a radius of {passage.radius:.3g} m, at {at}, {where}; "
-        f"{_what_it_takes(s, passage.radius)}"
-    )
+    needs = _needs(s, passage)
+    return f"the widest disc that passes has a radius of {passage.radius:.3g} m, at {at}, {where}{'; ' * bool(needs)}{needs}"
 
 
-def _what_it_takes(s: RoutePlanner, passes: float) -> str:
-    """Describe the room that the robot needs where only discs of radius `passes` [m] fit, and a remedy."""
+def _needs(s: RoutePlanner, passage: Passage) -> str:
+    """Describe the room that the robot needs at a bottleneck; empty if a smaller margin could do."""
     robot, foot = s.robot, s.robot.footprint
-    spare = passes - robot.radius
-    helps = f"a margin below {spare:.3g} m leaves a way on fine cells" if spare > 0 else ""
-    if helps and LEAST < s.usual_margin <= s.margin:
-        helps += ", but noise may then cause contacts; --margin auto measures its effect"
     if foot.is_disc:
-        return helps or "this robot does not fit through"
+        return "" if passage.radius > robot.radius + ROUNDING else "this robot does not fit through"
+    plans = "" if s.turns else f"plans use the disc of {robot.name}"
+    if not passage.between:
+        return plans
     _, ymin, _, ymax = foot.bounds
-    width, gap = ymax - ymin + 2 * s.margin, 2 * passes
+    width, gap = ymax - ymin + 2 * s.margin, 2 * passage.radius
     fits = f"of the {gap:.3g} m straight ahead" if width <= gap else f"straight ahead, more than the {gap:.3g} m there"
     needs = f"{_shape(robot)} needs {width:.3g} m {fits}"
     if s.turns and width <= gap:
-        needs += "; between cells, by straight moves and turns on the spot, it does not get through"
-    if not s.turns:
-        able = capabilities_of(s.planner).turns
-        others = "" if able or width > gap else "; astar plans for the footprint"
-        needs = f"plans use the disc of {robot.name}; {needs}{others}"
-    return f"{needs}{'; ' * bool(helps)}{helps}"
+        needs += "; on these cells, by straight moves and turns on the spot, it does not get through"
+    return f"{plans}{'; ' * bool(plans)}{needs}"
+
+
+def _remedies(s: RoutePlanner, grid: Grid, query: Query, passage: Passage | None, *, fits: bool) -> Iterator[Remedy]:
+    """Yield changes that could lead to a path, the smallest first.
+
+    Finer cells come first, then the footprint instead of the disc, a smaller margin, and another start or goal nearby.
+    """
+    same = _same(s)
+    if same is None:
+        return
+    shapes = [same]
+    if fits or s.turns:
+        yield from _on_finer_cells(same)
+    if not (s.turns or s.robot.footprint.is_disc):
+        shapes.append((same if s.can_turn else _astar(s)).and_("--footprint exact", footprint="exact"))
+        yield from _on_finer_cells(shapes[-1])
+    widest = math.inf if fits else passage.radius if passage else 0.0
+    for shape in shapes:
+        least = s.robot.footprint.inner_radius if shape.routes.turns else s.robot.radius
+        margins = [m for m in MARGINS if m < s.margin - ROUNDING and least + m < widest - ROUNDING]
+        halves = [m for m in margins if m <= margins[0] / 2]
+        for margin in dict.fromkeys((*margins[:1], *halves[:1], *margins[-1:])):
+            yield from _on_finer_cells(shape.and_(f"--margin {margin:g}", margin=margin, outline_margins=(margin,)))
+    yield from _other_ends(s, same, grid, query, passage)
+
+
+def _on_finer_cells(remedy: Remedy) -> Iterator[Remedy]:
+    """Yield a remedy on the run's cells, if it changes anything, and on finer ones."""
+    s = remedy.routes
+    if remedy.options:
+        yield remedy
+    for cell in CELLS:
+        # Plans for the footprint alone use no larger cells anyway.
+        if cell < (s.outlined_cell if s.turns and s.footprint == "exact" else s.cell) - ROUNDING:
+            yield remedy.and_(f"--cell {cell:g}", cell=cell)
+
+
+def _other_ends(s: RoutePlanner, same: Remedy, grid: Grid, query: Query, passage: Passage | None) -> Iterator[Remedy]:
+    """Yield the nearest goal that moves reach, if the goal has too little room; for a disc, also the nearest start."""
+    from antdrive.worlds import _kernels_turns
+
+    end = passage.end if passage else ""
+    free = {"goal": query.start_node, "start": -1 if grid.turns else query.goal_cell}.get(end, -1)
+    if free < 0 or not grid.graph.mask[free]:
+        return
+    *start, yaw = s.task.start
+    exact = start if end == "start" else s.task.goal
+    cells = grid.cells_of(_kernels_turns.led_to(grid.graph, free))
+    centres = grid.xy(np.column_stack(np.divmod(cells, grid.shape[1])))
+    away = np.hypot(*(centres - exact).T)
+    if away.min() > NEAR:
+        return
+    place = centres[away.argmin()].tolist()
+    text = ",".join(map(format_number, place if end == "goal" else (*place, yaw)))
+    moved: dict[str, Any] = {end: tuple(map(float, text.split(",")))}
+    try:
+        task = dataclasses.replace(s.task, **moved)
+    except FieldError:  # such as a goal at the start
+        return
+    yield same.and_(f"--{end} {text}", task=task)
+
+
+def _first_that_works(remedies: Iterator[Remedy], finds_path: FindsPath) -> Remedy | None:
+    """Return the first remedy whose plan is a path, of a bounded number and size."""
+    tries = 0
+    for remedy in remedies:
+        if tries == MOST_TRIES:
+            return None
+        if _is_small(remedy.routes):
+            tries += 1
+            if finds_path(remedy.routes):
+                return remedy
+    return None
+
+
+def _is_small(s: RoutePlanner) -> bool:
+    """Return whether the grids of a plan are small enough to try it."""
+    width, height = s.task.world.size
+    outlined = not s.turns or width * height <= MOST_OUTLINED * s.outlined_cell**2
+    few = MOST_OUTLINED if s.motions else MOST_CELLS
+    return outlined and width * height <= few * s.cell**2
+
+
+def _same(s: RoutePlanner) -> Remedy | None:
+    """Return the run's own planner if it is antdrive's and its answer is certain, else A*; None among known motions."""
+    own = type(s.planner).__module__.split(".")[0] == __name__.split(".")[0]
+    if own and s.can.complete and s.can.deterministic:
+        return Remedy("", s)
+    return None if s.motions else _astar(s)
+
+
+def _astar(s: RoutePlanner) -> Remedy:
+    """Return A* as a remedy."""
+    return Remedy("-p astar", dataclasses.replace(s, planner=AStar(), planner_label="astar", whole=True, motions=()))
 
 
 def _shape(robot: RobotSpec) -> str:
     """Return the name and size of a robot's footprint."""
     xmin, ymin, xmax, ymax = robot.footprint.bounds
     return f"its {'rectangle' if robot.footprint.box else 'outline'} of {xmax - xmin:.3g} x {ymax - ymin:.3g} m"
-
-
-def _has_path(task: Task, cell: float, inflate: float) -> bool:
-    width, height = task.world.size
-    return width * height <= MOST_CELLS * cell**2 and reachable(
-        Query.between(rasterise(task.world, cell, inflate), task)
-    )

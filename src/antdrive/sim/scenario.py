@@ -100,7 +100,7 @@ class Scenario(Settings):
             raise FieldError("control_hz", problem)
         overlap = overlap_at(self.task.world, self.robot, self.task.start, self.unseen)
         if overlap:
-            at = format_position(self.task.frame, *self.task.start[:2], "g")
+            at = format_position(self.task.frame, *self.task.start[:2], None)
             raise FieldError("start", f"{self.robot.name} at {at} {overlap}; move the start away from it")
 
     def _check_kinds(self) -> None:

@@ -106,7 +106,7 @@ class Settings:
             form="margin",
             axis=True,
             column="margin_asked",
-            usual="0.03; with noise more, by robot, noise and smoothing",
+            usual="at least 0.03, by robot, noise and smoothing",
         ),
     ] = None
     cell: Annotated[

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,16 +67,29 @@ def write_run(run: Run, folder: Path, command: str, *, vector: bool = False, fig
 
     Each is kept if the next cannot be written. The files of an earlier run in that folder are removed.
     """
-    files = {"result": str(folder / "result.json")}
+    files, saved = {"result": str(folder / "result.json")}, list[str]()
     if run.rollout is not None:
         files["rollout"] = str(run.rollout.save(folder / "rollout.npz"))
+        saved.append(files["rollout"])
     for name in RUN_FILES:
         if name != "rollout.npz" or run.rollout is None:
             (folder / name).unlink(missing_ok=True)
-    result = write_result(run, files, command)
+    with naming_saved(saved):
+        result = write_result(run, files, command)
     if not figures:
         return result
-    return write_result(run, files | _write_figures(run, folder, suffixes(vector)), command)
+    with naming_saved(files.values()):
+        return write_result(run, files | _write_figures(run, folder, suffixes(vector)), command)
+
+
+@contextmanager
+def naming_saved(files: Iterable[str]) -> Iterator[None]:
+    """Add the files that stay to the error of writing the next one."""
+    try:
+        yield
+    except InputError as error:
+        saved = ", ".join(files)
+        raise InputError(f"{error}; saved: {saved}" if saved else str(error)) from None
 
 
 def _write_figures(run: Run, folder: Path, kinds: Sequence[str]) -> dict[str, str]:

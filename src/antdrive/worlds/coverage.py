@@ -94,10 +94,20 @@ def share_of(reached: Cells, floor: Cells) -> float:
     return int(np.count_nonzero(reached & floor)) / max(1, int(np.count_nonzero(floor)))
 
 
-def coverage(world: World, grids: Sequence[Grid], start: Point) -> tuple[Coverage, ...]:
-    """Return what a robot reaches on each of its grids from a start [m], on the cells of the finest."""
+def coverage(
+    world: World, grids: Sequence[Grid], start: Point, entries: Sequence[Point] | None = None
+) -> tuple[Coverage, ...]:
+    """Return what a robot reaches on each of its grids, on the cells of the finest.
+
+    Args:
+        world: the world
+        grids: the robot's grids
+        start: the robot's start [m]
+        entries: where the robot enters each grid [m]; None: at the start
+    """
+    entries = entries or [start] * len(grids)
     bare = rasterise(world, min(grid.cell for grid in grids))
-    floor = reached_cells(bare, [start])
+    floor = reached_cells(bare, [start, *entries])
     clearance = np.zeros(bare.shape)
     clearance[floor] = point_clearance(world, bare.xy(np.argwhere(floor)))
     order = np.flatnonzero(floor)
@@ -105,7 +115,7 @@ def coverage(world: World, grids: Sequence[Grid], start: Point) -> tuple[Coverag
     rooms = np.full(bare.shape, -1)
     _kernels_coverage.rooms(bare.moves, clearance, order, NARROW, LEAST_ROOM / bare.cell**2, rooms)
     rooms[floor] = np.unique(rooms[floor], return_inverse=True)[1]
-    masks = [_on_cells_of(bare, grid, reached_cells(grid, [start])) for grid in grids]
+    masks = [_on_cells_of(bare, grid, reached_cells(grid, [at])) for grid, at in zip(grids, entries, strict=True)]
     doors: list[list[Door]] = [[] for _ in grids]
     for border in _borders(bare, rooms):
         room = clearance[tuple(border.T)]

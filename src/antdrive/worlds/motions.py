@@ -16,11 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
+from antdrive.base.plane import format_numbers, format_point
 from antdrive.base.types import Bounds, Floats, Point
 from antdrive.worlds.limits import MAX_DRAWS
 from antdrive.worlds.movers import Cruising, Keyframed, Mover, Wandering
 
 CLEAR_OF_ROBOT = 1.0  # minimum distance from a wanderer's surface in its random first cell to the robot's start [m]
+ROUNDING = 1e-9  # positions beyond the bounds by no more are within them [m]
 TRIES = 10_000  # draws of a wanderer's first cell
 PATH_POINTS = 120  # points of a drawn path
 _NEIGHBOURS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.float64)  # x, y
@@ -91,6 +93,14 @@ def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, start: Po
         return _CruisingMotion(mover, bounds)
     key = [seed, zlib.crc32(b"mover"), index] if mover.seed is None else [mover.seed]
     return _WanderingMotion(mover, bounds, discs, start, np.random.default_rng(key))
+
+
+def first_place(mover: Mover, bounds: Bounds, discs: Floats) -> Point | None:
+    """Return a mover's centre at a run's start [m]; None for a wanderer whose place depends on the seed."""
+    if isinstance(mover, Wandering):
+        return first_cell(mover, bounds, discs) if mover.start is not None and not mover.phase else None
+    x, y = motion_of(mover, 0, bounds, discs, (math.inf, math.inf), 0).at(np.zeros(1))[0].tolist()
+    return x, y
 
 
 def path_ahead(motion: Motion, seconds: float) -> Floats:
@@ -275,19 +285,25 @@ class _WanderingMotion(Motion):
         )
 
 
+def is_within(bounds: Bounds, x: float, y: float, radius: float = 0.0) -> bool:
+    """Return whether a disc is within bounds, up to rounding."""
+    xmin, ymin, xmax, ymax = bounds
+    inset = radius - ROUNDING
+    return xmin + inset <= x <= xmax - inset and ymin + inset <= y <= ymax - inset
+
+
 def first_cell(mover: Wandering, bounds: Bounds, discs: Floats) -> Point:
     """Return the centre of the cell that contains a wanderer's given start."""
     assert mover.start is not None
-    (x, y), (xmin, ymin, xmax, ymax), cell = mover.start, bounds, mover.cell
-    if not (xmin <= x <= xmax and ymin <= y <= ymax):
-        raise FieldError("walk.start", f"({x:g}, {y:g}) is out of bounds {list(bounds)}")
+    (x, y), (xmin, ymin), cell = mover.start, bounds[:2], mover.cell
+    if not is_within(bounds, x, y):
+        raise FieldError("walk.start", f"{format_point((x, y))} is out of bounds {format_numbers(bounds)}")
     cols, rows = _cells_across(bounds, cell)
-    col, row = min(math.floor((x - xmin) / cell), cols - 1), min(math.floor((y - ymin) / cell), rows - 1)
+    col = min(max(math.floor((x - xmin) / cell), 0), cols - 1)
+    row = min(max(math.floor((y - ymin) / cell), 0), rows - 1)
     centre = (float(xmin + cell / 2 + col * cell), float(ymin + cell / 2 + row * cell))
     if not _free_steps(discs, bounds, centre, np.array([centre]), mover.radius)[0]:
-        raise FieldError(
-            "walk.start", f"radius {mover.radius:g} has no room in the cell around ({centre[0]:g}, {centre[1]:g})"
-        )
+        raise FieldError("walk.start", f"radius {mover.radius:g} has no room in the cell around {format_point(centre)}")
     return centre
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args
 
 from antdrive.base.errors import FieldError, require_positive
+from antdrive.base.plane import format_numbers
 from antdrive.worlds.limits import MAX_PHASE, MAX_SPEED, MIN_PERIOD
 
 Loop = Literal["pingpong", "teleport", "once"]
@@ -142,7 +143,7 @@ class Wandering(_Body):
         if math.sqrt(2) * self.cell > MAX_SPEED * self.period:
             raise FieldError("walk.period", f"a diagonal in {self.period:g} s is faster than {MAX_SPEED:g} m/s")
         if self.start is not None and not (len(self.start) == 2 and all(map(math.isfinite, self.start))):
-            raise FieldError("walk.start", f"must be 2 finite numbers, got {list(self.start)}")
+            raise FieldError("walk.start", f"must be 2 finite numbers, got {format_numbers(self.start)}")
         if self.seed is not None and not (isinstance(self.seed, int) and self.seed >= 0):
             raise FieldError("walk.seed", f"must be a whole number of at least 0, got {self.seed}")
 

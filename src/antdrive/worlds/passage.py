@@ -6,18 +6,28 @@ a loop around the start or the goal. Union-find with the parity of crossings det
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from antdrive.base.types import Floats, Point
 from antdrive.worlds import _kernels_passage
-from antdrive.worlds.geometry import point_clearance
-from antdrive.worlds.world import Task, World
+from antdrive.worlds.geometry import point_clearance, segment_clearance
+from antdrive.worlds.world import PointWorld, Task, World
 
 CLOSER = 1e-7  # the widest disc is wider than this, or not even a point passes [m]
 ROUNDING = 5e-10  # an end may lack this much clearance; a gap wider than the disc by no more is closed [m]
 FIRST = 1 / 16  # gaps are listed up to this fraction of the ends' room first
+RINGS, RAYS = 8, 180  # of positions around an end
+AROUND = np.array([(math.cos(ray), math.sin(ray)) for ray in np.arange(RAYS) * (2 * math.pi / RAYS)])
+PLACES = 4  # largest number of positions kept in place of an end
+HALVINGS = 30  # of the step towards the roomiest position
+
+#: How far the ends of a path may be from start and goal [m].
+Reach = tuple[float, float]
+AT_THE_ENDS: Reach = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -29,28 +39,103 @@ class Passage:
     # indices of the two obstacles that form it: the world's obstacles, then its left, lower, right and upper wall;
     # empty if the bottleneck is an end
     between: tuple[int, ...] = ()
+    end: str = ""  # "start" or "goal" if the bottleneck is the roomiest position for that end
 
 
-def feasible(task: Task, clearance: float) -> bool:
-    """Return whether a path from start to goal keeps a clearance [m]; contact closes a gap."""
-    ends = task.start[:2], task.goal
-    room = float(point_clearance(task.world, ends).min())
-    return room >= clearance - ROUNDING and _closing(task.world, *ends, clearance + ROUNDING) is None
+def feasible(task: Task, clearance: float, reach: Reach = AT_THE_ENDS) -> bool:
+    """Return whether a path from start to goal keeps a clearance [m]; contact closes a gap.
+
+    Within `reach` of an end with less clearance, the path may begin or end where a straight line joins the end. That line
+    keeps the end's clearance.
+    """
+    return any(
+        min(room, other) >= clearance - ROUNDING and _closing(task.world, start, goal, clearance + ROUNDING) is None
+        for (room, start), (other, goal) in _ends(task, reach)
+    )
 
 
-def widest_passage(task: Task) -> Passage | None:
+def widest_passage(task: Task, reach: Reach = AT_THE_ENDS) -> Passage | None:
     """Return the bottleneck on the path of the widest disc from the task's start to its goal.
 
-    None if not even a point passes.
+    None if not even a point passes. `reach` is that of `feasible`.
     """
-    ends = task.start[:2], task.goal
-    rooms = point_clearance(task.world, ends)
-    most, fraction = float(rooms.min()), FIRST
-    passage = Passage(most, ends[int(rooms.argmin())])
+    best: Passage | None = None
+    for (room, start), (other, goal) in _ends(task, reach):
+        least = best.radius if best else CLOSER
+        if min(room, other) > least and not (best and _closing(task.world, start, goal, least + ROUNDING)):
+            best = _widest(task.world, start, goal, room, other)
+    return best if best and best.radius > CLOSER else None
+
+
+def _widest(world: World, start: Point, goal: Point, room: float, other: float) -> Passage:
+    """Return the bottleneck between two positions with their clearances [m]."""
+    most, fraction = min(room, other), FIRST
+    passage = Passage(most, start, (), "start") if room <= other else Passage(most, goal, (), "goal")
     while most > CLOSER and fraction <= 1 and not passage.between:
-        passage = _closing(task.world, *ends, fraction * most) or passage
+        passage = _closing(world, start, goal, fraction * most) or passage
         fraction *= 2
-    return passage if passage.radius > CLOSER else None
+    return passage
+
+
+def _ends(task: Task, reach: Reach) -> itertools.product[tuple[tuple[float, Point], ...]]:
+    """Return all pairs of positions in place of start and goal, each with its clearance, the roomiest first."""
+    return itertools.product(_places(task.world, task.start[:2], reach[0]), _places(task.world, task.goal, reach[1]))
+
+
+def _places(world: World, end: Point, reach: float) -> list[tuple[float, Point]]:
+    """Return the roomiest positions joined to an end within a distance, and the end, each with its clearance [m].
+
+    Positions that a wide line joins count once.
+    """
+    own = float(point_clearance(world, [end])[0])
+    discs = world.discs
+    near = np.hypot(discs[:, 0] - end[0], discs[:, 1] - end[1]) - discs[:, 2] <= max(own, 0.0) + 2 * reach
+    around = _Around(PointWorld.of("around", world.bounds, discs[near]), end, own, reach)
+    points = np.reshape(end + reach / RINGS * np.arange(1, RINGS + 1)[:, None, None] * AROUND, (-1, 2))
+    rooms = around.rooms(points)
+    places: list[tuple[float, Point]] = []
+    for k in np.argsort(-rooms, kind="stable").tolist() if reach > 0 else ():
+        x, y = points[k].tolist()
+        if rooms[k] <= own + CLOSER or len(places) == PLACES:
+            break
+        if not any(around.line((x, y), at) >= rooms[k] - CLOSER for _, at in places):
+            places.append(around.roomiest((x, y), float(rooms[k])))
+    return sorted([*places, (own, end)], reverse=True)
+
+
+@dataclass(frozen=True)
+class _Around:
+    """The surroundings of an end, with its clearance [m] and how far a path may end from it [m]."""
+
+    world: World
+    end: Point
+    own: float
+    reach: float
+
+    def rooms(self, points: Floats) -> Floats:
+        """Return the clearance of positions (N,) [m]; minus infinity for those that no line joins to the end."""
+        lines = segment_clearance(self.world, points, np.broadcast_to(self.end, points.shape))
+        usable = (lines >= self.own - CLOSER) & (np.hypot(*(points - self.end).T) <= self.reach)
+        return np.where(usable, point_clearance(self.world, points), -math.inf)
+
+    def line(self, one: Point, other: Point) -> float:
+        """Return the clearance of a straight line [m]."""
+        return float(segment_clearance(self.world, [one], [other])[0])
+
+    def roomiest(self, at: Point, room: float) -> tuple[float, Point]:
+        """Climb from a position to the roomiest around it; return the clearance and the position [m]."""
+        step = self.reach / RINGS
+        for _ in range(HALVINGS):
+            away = at + step * AROUND - self.end
+            far = np.hypot(*away.T)[:, None]
+            points = self.end + away * np.minimum(1.0, (self.reach - CLOSER) / np.maximum(far, CLOSER))
+            rooms = self.rooms(points)
+            k = int(rooms.argmax())
+            if rooms[k] > room:
+                at, room = (float(points[k, 0]), float(points[k, 1])), float(rooms[k])
+            else:
+                step /= 2
+        return room, at
 
 
 def _closing(world: World, start: Point, goal: Point, most: float) -> Passage | None:

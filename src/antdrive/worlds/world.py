@@ -11,10 +11,11 @@ import numpy as np
 
 from antdrive.base.caches import Keyed, bits
 from antdrive.base.errors import FieldError, require_finite, require_positive
+from antdrive.base.plane import format_disc, format_number, format_numbers, format_point
 from antdrive.base.records import derived
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.limits import MAX_CELLS, MAX_WALK, Coordinate, Size
-from antdrive.worlds.motions import Motion, first_cell, motion_of, path_ahead, require_few_draws
+from antdrive.worlds.motions import Motion, first_cell, is_within, motion_of, path_ahead, require_few_draws
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
 from antdrive.worlds.svg import card, world_svg
 
@@ -81,7 +82,9 @@ class World:
             require_finite("bounds", value)
         xmin, ymin, xmax, ymax = self.bounds
         if not (xmin < xmax and ymin < ymax):
-            raise FieldError("bounds", f"must be [xmin, ymin, xmax, ymax] with min < max, got {list(self.bounds)}")
+            raise FieldError(
+                "bounds", f"must be [xmin, ymin, xmax, ymax] with min < max, got {format_numbers(self.bounds)}"
+            )
         for i, mover in enumerate(self.movers):
             try:
                 self._require_room(mover)
@@ -99,12 +102,10 @@ class World:
 
     def _require_room(self, mover: Mover) -> None:
         if isinstance(mover, Cruising):
-            xmin, ymin, xmax, ymax = self.bounds
             (x, y), r = mover.position, mover.radius
-            if not (2 * r < min(self.size) and xmin + r <= x <= xmax - r and ymin + r <= y <= ymax - r):
-                raise FieldError(
-                    "position", f"({x:g}, {y:g}) leaves no room for radius {r:g} within bounds {list(self.bounds)}"
-                )
+            if not (2 * r < min(self.size) and is_within(self.bounds, x, y, r)):
+                room = f"radius {format_number(r)} within bounds {format_numbers(self.bounds)}"
+                raise FieldError("position", f"{format_point((x, y))} leaves no room for {room}")
         if isinstance(mover, Wandering):
             columns, rows = (side / mover.cell for side in self.size)
             if columns * rows > MAX_CELLS:
@@ -229,18 +230,15 @@ class Task:
         self._require_start_clear_of_movers()
 
     def _require_free(self, key: str, x: float, y: float) -> None:
-        xmin, ymin, xmax, ymax = self.world.bounds
-        if not (xmin <= x <= xmax and ymin <= y <= ymax):
-            raise FieldError(key, f"({x:g}, {y:g}) is out of bounds {list(self.world.bounds)}")
+        if not is_within(self.world.bounds, x, y):
+            raise FieldError(key, f"{format_point((x, y))} is out of bounds {format_numbers(self.world.bounds)}")
         discs = self.world._discs
         near = (np.abs(x - discs[:, 0]) <= discs[:, 2]) & (np.abs(y - discs[:, 1]) <= discs[:, 2])
         for i in np.flatnonzero(near).tolist():
             disc = self.world.obstacles[i]
             if math.hypot(x - disc.x, y - disc.y) <= disc.radius:
-                raise FieldError(
-                    key,
-                    f"({x:g}, {y:g}) is inside obstacles[{i}] at ({disc.x:g}, {disc.y:g}) with radius {disc.radius:g}",
-                )
+                where = f"obstacles[{i}] {format_disc(disc.x, disc.y, disc.radius)}"
+                raise FieldError(key, f"{format_point((x, y))} is inside {where}")
 
     def _require_start_clear_of_movers(self) -> None:
         """Raise FieldError for a start inside a mover, or a wanderer without a free first cell."""
@@ -254,13 +252,10 @@ class Task:
                 require_few_draws(motions)
             except FieldError as error:
                 raise error.under(f"movers[{i}]") from None
-            mx, my = motion.at(np.zeros(1))[0]
+            mx, my = motion.at(np.zeros(1))[0].tolist()
             if math.hypot(x - mx, y - my) <= motion.radius:
-                raise FieldError(
-                    "start",
-                    f"({x:g}, {y:g}) is inside movers[{i}], which starts at ({mx:g}, {my:g}) "
-                    f"with radius {motion.radius:g}",
-                )
+                where = f"movers[{i}], which starts {format_disc(mx, my, motion.radius)}"
+                raise FieldError("start", f"{format_point((x, y))} is inside {where}")
 
     def _repr_html_(self) -> str:
         world = self.world

@@ -160,3 +160,14 @@ def test_a_plan_is_drawn_and_printed_without_a_drive(antdrive, tmp_path):
     assert facts["status"] == "solved"
     assert len(facts["cells"]) > 10
     assert Path(facts["files"]["plan"]).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("goal", "options"), [((9.85, 5.0), "--cell 0.1"), ((9.95, 5.0), "--goal 9.75,4.75")])
+def test_options_that_a_reason_names_work_as_typed(antdrive, tmp_path, goal, options):
+    task = Task(World("shelf", (0.0, 0.0, 10.0, 10.0)), (5.0, 5.0, 0.0), goal, 0.25 if goal[0] < 9.9 else 0.1)
+    save_task(task, tmp_path / "shelf.yaml")
+    code, out, _ = antdrive("plan", "shelf.yaml", "-p", "astar")
+    assert code == 1
+    assert f"; {options} finds one)" in out
+    assert f"; {options} finds one\n" in antdrive("worlds", "show", "shelf.yaml")[1]
+    assert antdrive("plan", "shelf.yaml", "-p", "astar", *options.split())[0] == 0

@@ -173,7 +173,7 @@ def test_a_rotated_map_becomes_an_upright_world_with_a_frame(tmp_path):
     )
     with pytest.raises(
         InputError,
-        match=r"goal: \(20, 30\) is not on the map, which spans x 0\.442327 to 5\.68424 and y -3 to 2\.24192",
+        match=r"goal: \(20, 30\) is not on the map, which spans x 0\.442327 to 5\.684244 and y -3 to 2\.241917",
     ):
         import_map_server(tmp_path / "turned.yaml", start=(start.real, start.imag, 0.5), goal=(20.0, 30.0))
     assert turned.world.bounds == upright.world.bounds
@@ -195,3 +195,11 @@ def test_an_export_replaces_files_only_on_request(tmp_path, there):
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(there, "mine")]
     export_map_server(load_task("empty"), tmp_path / "w.yaml", replace=True)
     assert import_map_server(tmp_path / "w.yaml").goal == load_task("empty").goal
+
+
+def test_an_imported_world_has_no_rounding_errors(tmp_path):
+    """Three tenths of a metre are 0.30000000000000004 in steps of 0.1."""
+    text = GOOD.replace("0.5", "0.1").replace("[-1.0, 2.0, 0.0]", "[0.0, 0.0, 0.0]")
+    task = import_map_server(written(tmp_path, text), start=(0.05, 0.05, 0.0), goal=(0.25, 0.05))
+    assert task.world.bounds == (0.0, 0.0, 0.3, 0.2)
+    assert [(disc.x, disc.y) for disc in task.world.obstacles] == [(0.15, 0.15), (0.25, 0.15)]

@@ -21,17 +21,18 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
     "Used at most" is the maximum that a cause used anywhere in the drive. "At the tightest place" splits the loss at the
     smallest remaining clearance by cause: positive towards the obstacle, negative away from it.
     """
+    from antdrive.base.plane import format_point
     from antdrive.sim.log.margin import budget, has_default
     from antdrive.sim.log.rollout import Rollout
 
     log = Rollout.load(log_at(rollout))
     spent, prediction = budget(log), _prediction(log)
-    place = f"({spent.x:.2f}, {spent.y:.2f}), t = {spent.t:.2f} s"
+    place = f"{format_point((spent.x, spent.y), 2)}, t = {spent.t:.2f} s"
     rows = (
         (
             share.cause,
             f"{share.metres:.4f}",
-            f"({share.x:.2f}, {share.y:.2f}), {share.t:.2f} s" if share.metres else "-",
+            f"{format_point((share.x, share.y), 2)}, {share.t:.2f} s" if share.metres else "-",
             f"{share.at_tightest:+.4f}",
         )
         for share in spent.contributions

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from antdrive.base.errors import InputError
+from antdrive.base.files import format_size
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, is_campaign, refuse_campaign_options, report_campaigns
 from antdrive.cli.console import file_lines, show
@@ -54,7 +55,7 @@ def report(
     if out is not None:
         count = write_report(folders, out, title=title, embed_films=embed_films)
         facts = {"file": str(out), "runs": count, "bytes": out.stat().st_size}
-        lines = [f"{count} runs, {out.stat().st_size / 1e6:.2f} MB", *file_lines({"report": out})]
+        lines = [f"{count} runs, {format_size(out.stat().st_size)}", *file_lines({"report": out})]
     if figures is not None:
         facts["figures"] = [str(path) for path in write_run_figures(folders, figures)]
         lines += file_lines({"figures": figures})

@@ -11,7 +11,7 @@ from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, print_idle_settings, run_lines
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.sim.settings import SETTINGS
-from antdrive.views.run_folder import check_film, check_folder, default_folder, write_result, write_run
+from antdrive.views.run_folder import check_film, check_folder, default_folder, naming_saved, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -54,8 +54,9 @@ def run(
         with stage("writing log and figures"):
             report = write_run(result, folder, this_command(), vector=vector, figures=figures)
         if film is not None and result.rollout is not None:
-            filmed = film_drives([result.rollout], film, prelude=prelude)["file"]
-            report = write_result(result, {**report["files"], "film": filmed}, this_command())
+            with naming_saved(report["files"].values()):
+                filmed = film_drives([result.rollout], film, prelude=prelude)["file"]
+                report = write_result(result, {**report["files"], "film": filmed}, this_command())
     show(json, report, run_lines(result, report["files"]))
     if gui and result.rollout is not None:
         from antdrive.views.window import show as show_window

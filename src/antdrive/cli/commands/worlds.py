@@ -77,10 +77,11 @@ def show_world(
     **settings: Any,
 ) -> None:
     """Describe a world and check whether a robot can cross it."""
-    from antdrive.base.plane import world_to_map
-    from antdrive.planners import Query, load_planner, reachable
+    from antdrive.base.plane import format_numbers, world_to_map
+    from antdrive.planners import Query
     from antdrive.robots import list_robots, load_robot, outline_of, overlap_at
     from antdrive.robots.default_margin import LEAST
+    from antdrive.sim import Scenario, plan
     from antdrive.sim.driving.routes import FINE
     from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
     from antdrive.worlds.coverage import coverage
@@ -96,34 +97,49 @@ def show_world(
     if not spec.footprint.is_disc:
         outline = outline_of(spec.footprint, margin)
         grids["footprint"] = rasterise(shown.world, min(shown.cell, FINE), spec.radius + margin, outline)
-    queries = {shape: Query.between(grid, shown) for shape, grid in grids.items()}
-    passing = [shape for shape, query in queries.items() if query.blocked_end is None and reachable(query)]
-    passable = not starts[spec.name] and bool(passing)
-    covered = dict(zip(grids, coverage(shown.world, list(grids.values()), shown.start[:2]), strict=True))
+    overlap = starts[spec.name]
+    planned, answer = (grids["disc"], None) if overlap else plan(Scenario.of(shown, "astar", spec, margin=margin))
+    passable, why = answer is not None and answer.solved, overlap if answer is None else answer.reason
+    entries = [tuple(grid.xy([Query.between(grid, shown).start])[0].tolist()) for grid in grids.values()]
+    covered = dict(zip(grids, coverage(shown.world, [*grids.values()], shown.start[:2], entries), strict=True))
     if out is not None:
-        import numpy as np
-
+        from antdrive.planners import PlanResult, PlanStatus
         from antdrive.views.figures.plan_figures import plan_figure
 
-        query = queries[passing[0] if passing else "disc"]
-        plan = load_planner("astar").plan(query, np.random.default_rng(0))
-        plan_figure(shown, query.grid, plan, spec, out, covered=list(covered.values()))
+        drawn = answer or PlanResult(status=PlanStatus.NO_PATH, reason=f"start: {spec.name} {overlap}")
+        plan_figure(shown, planned, drawn, spec, out, covered=list(covered.values()))
     named = list(load_tasks(world))
-    facts = {"passable": passable, "robot": spec.name, "margin": margin, "starts": starts, "tasks": named}
+    facts = {
+        "passable": passable,
+        "reason": why,
+        "robot": spec.name,
+        "margin": margin,
+        "starts": starts,
+        "tasks": named,
+    }
     facts |= {NAMES[shape]: _coverage_facts(each) for shape, each in covered.items()}
-    said = {key + UNITS.get(key, ""): "-" if value is None else str(value) for key, value in _facts(shown).items()}
+    said = {key + UNITS.get(key, ""): _said(value) for key, value in _facts(shown).items()}
     if any(shown.frame):
         for key, pose in {"start": shown.start, "goal": shown.goal}.items():
-            said[f"{key} in its map"] = str(world_to_map(shown.frame, [pose])[0].round(4).tolist())
-    reason = "" if passable else "; antdrive plan says why"
-    by = "" if passing[:1] != ["footprint"] else " by its footprint"
-    said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name}{by} with a margin of {margin:g} m{reason}"
+            said[f"{key} in its map"] = format_numbers(world_to_map(shown.frame, [pose])[0].round(4).tolist())
+    by = " by its footprint" if passable and planned.turns else ""
+    said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name}{by} with a margin of {margin:g} m"
+    said |= {"reason": why} if why and not overlap else {}
     said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
     rows = [*said.items(), *_coverage_rows(covered)]
     rows += [(f"start for {name}", overlap) for name, overlap in starts.items() if overlap]
     rows += [("tasks", ", ".join(named))] if named else []
     lines = [*table(rows[0], rows[1:]), *([] if out is None else file_lines({"figure": out}))]
     show(json, {**task_to_dict(shown), **facts}, lines)
+
+
+def _said(value: Any) -> str:
+    """Format a fact for people."""
+    from antdrive.base.plane import format_number, format_numbers
+
+    if isinstance(value, list):
+        return format_numbers(value)
+    return "-" if value is None else format_number(value) if isinstance(value, float) else str(value)
 
 
 def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
@@ -135,6 +151,8 @@ def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
 
 def _coverage_rows(covered: "Mapping[str, Coverage]") -> "Iterator[tuple[str, str]]":
     """Yield what a robot reaches by each shape, and the narrowest doors that its disc does not pass."""
+    from antdrive.base.plane import format_point
+
     for shape, each in covered.items():
         rooms = f"{len(each.rooms_reached)} of {each.room_count} rooms"
         passed = sum(door.passed for door in each.doors)
@@ -144,7 +162,7 @@ def _coverage_rows(covered: "Mapping[str, Coverage]") -> "Iterator[tuple[str, st
     last = list(covered.values())[-1].doors
     shut = [door for first, door in zip(covered["disc"].doors, last, strict=True) if not first.passed]
     for door in shut[:MOST_DOORS]:
-        place = f"{door.width:.2f} m wide at ({door.at[0]:.2f}, {door.at[1]:.2f})"
+        place = f"{door.width:.2f} m wide at {format_point(door.at, 2)}"
         yield "door by footprint" if door.passed else "door not passed", place
     if len(shut) > MOST_DOORS:
         yield "", f"and {len(shut) - MOST_DOORS} more"

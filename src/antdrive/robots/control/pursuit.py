@@ -23,7 +23,7 @@ from annotated_types import Interval
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError
-from antdrive.base.records import derived, meanings_of, require_ranges
+from antdrive.base.records import clamp_angle, derived, meanings_of, require_ranges
 from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
@@ -201,6 +201,7 @@ class PurePursuit:
     goal_distance: Annotated[float, POSITIVE] = 0.01
 
     def __post_init__(self) -> None:
+        clamp_angle(self, "rotate_in_place_above", math.nextafter(math.pi / 2, 0.0))
         require_ranges(self)
         if self.lookahead_max < self.lookahead_min:
             raise FieldError("lookahead_max", f"must be at least lookahead_min ({self.lookahead_min:g})")

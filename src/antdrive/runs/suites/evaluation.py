@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antdrive.base.plane import format_point
 from antdrive.base.types import Floats, Point
 from antdrive.runs.suites.baseline import Baseline, configuration_hashes
 from antdrive.runs.suites.demands import END, Bound, Demands
@@ -40,13 +41,11 @@ class Divergence:
     @property
     def sentence(self) -> str:
         """The divergence in words."""
-        (x, y), (x0, y0) = self.now, self.then
         rule = f"{_rule(self.limiter)} limits the speed there"
         if self.limiter != self.limiter_then:
             rule += f", in the baseline {_rule(self.limiter_then)} did"
-        return (
-            f"the drives diverge at t = {self.t:.1f} s, at ({x:.2f}, {y:.2f}) instead of ({x0:.2f}, {y0:.2f}); {rule}"
-        )
+        now, then = format_point(self.now, 2), format_point(self.then, 2)
+        return f"the drives diverge at t = {self.t:.1f} s, at {now} instead of {then}; {rule}"
 
 
 def _rule(name: str) -> str:
@@ -328,9 +327,9 @@ def _line_faults(rollout: Rollout, baseline: Baseline, demands: Demands) -> Iter
     """Yield the faults of the drive's end and line."""
     ends, tolerance = end_distance(baseline, rollout), demands.tolerance(END)
     if tolerance is not None and ends > tolerance.allowed(0.0) + 1e-3:
-        (x, y), (x0, y0) = rollout.pose[-1, :2].tolist(), baseline.xy[-1].tolist()
+        now, then = (format_point(xy.tolist(), 2) for xy in (rollout.pose[-1, :2], baseline.xy[-1]))
         yield (
-            f"{END}: the drive ends at ({x:.2f}, {y:.2f}), in the baseline at ({x0:.2f}, {y0:.2f}): {ends:.3g} m apart, "
+            f"{END}: the drive ends at {now}, in the baseline at {then}: {ends:.3g} m apart, "
             f"tolerance {tolerance.allowed(0.0):.3g} m"
         )
     if demands.trajectory == "exact":

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antdrive.base.plane import format_number, format_point
 from antdrive.base.records import STRICT
 from antdrive.robots.clearance import footprint_distances, obstacle_name
 from antdrive.runs.suites.demands import CYLINDER, MOVER, UNSEEN, WALL
@@ -34,7 +35,7 @@ class ClosestApproach:
     @property
     def place(self) -> str:
         """Place and time, in words."""
-        return f"the robot was at ({self.x:.2f}, {self.y:.2f}) at t = {self.t:.2f} s"
+        return f"the robot was at {format_point((self.x, self.y), 2)} at t = {self.t:.2f} s"
 
 
 def nearest_of(rollout: Rollout) -> ClosestApproach:
@@ -74,8 +75,8 @@ def _mover_gaps(rollout: Rollout, row: int) -> np.ndarray[tuple[int, ...], np.dt
 
 
 def _mover(rollout: Rollout, index: int, row: int) -> str:
-    x, y = rollout.movers[row, index].tolist()
-    return f"movers[{index}] at ({x:.2f}, {y:.2f}) with radius {rollout.record.world.movers[index].radius:g}"
+    at, radius = rollout.movers[row, index].tolist(), rollout.record.world.movers[index].radius
+    return f"movers[{index}] at {format_point(at, 2)} with radius {format_number(radius)}"
 
 
 def _encounter(rollout: Rollout, row: int, thing: str) -> ClosestApproach:

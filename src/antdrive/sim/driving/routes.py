@@ -92,6 +92,7 @@ class RoutePlanner:
     seed: int  # the seed of the drive's random numbers
     motions: tuple[MoverMotion, ...] = ()  # motions of the movers, for space-time planners
     mapped: bool = True  # whether all plans use the grid of the given map
+    whole: bool = True  # whether the planner plans whole routes, rather than cell by cell
 
     def __post_init__(self) -> None:
         self.plan_error = ""
@@ -109,6 +110,11 @@ class RoutePlanner:
         """Distance that plans keep between the robot's centre and every surface [m]."""
         return self.robot.radius + self.margin
 
+    @property
+    def outlined_cell(self) -> float:
+        """Side of the cells of plans for the footprint [m]; iterative planners try larger ones first."""
+        return min(self.cell, FINE)
+
     @functools.cached_property
     def can(self) -> Capabilities:
         """The planner's capabilities."""
@@ -117,7 +123,12 @@ class RoutePlanner:
     @property
     def turns(self) -> bool:
         """Whether plans may keep the footprint clear instead of the disc."""
-        return self.footprint != "disc" and not self.robot.footprint.is_disc and self.can.turns
+        return self.footprint != "disc" and not self.robot.footprint.is_disc and self.can_turn
+
+    @property
+    def can_turn(self) -> bool:
+        """Whether the planner plans for footprints; one that decides cell by cell knows no headings."""
+        return self.can.turns and self.whole
 
     @property
     def shapes(self) -> tuple[bool, ...]:
@@ -136,7 +147,7 @@ class RoutePlanner:
         if not self.turns:
             return disc
         length = self._shortest(disc) if self.footprint == "auto" else math.inf
-        cells = [min(self.cell, FINE)]
+        cells = [self.outlined_cell]
         if self.can.iterative:
             cells = [self.cell, *(cells if length == math.inf else ())]
         inner = self.robot.footprint.inner_radius + self.outline_margins[-1]
@@ -254,12 +265,16 @@ class OneRoute(RouteGuide):
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start; report no path if the start is too narrow to follow it."""
+        grid, plan = self._planned()
+        if plan.status is PlanStatus.NO_PATH:
+            return grid, dataclasses.replace(plan, reason=no_path_reason(self._routes, grid, plan.reason, _finds_path))
+        return grid, self._drivable(grid, plan)
+
+    def _planned(self) -> tuple[Grid, PlanResult]:
         routes = self._routes
         grid = routes.chosen_grid()
-        plan = routes.plan(routes.query(grid, routes.task), random_stream(routes.seed, "planner"), routes.planner_label)
-        if plan.status is PlanStatus.NO_PATH:
-            return grid, dataclasses.replace(plan, reason=no_path_reason(routes, grid, plan.reason))
-        return grid, self._drivable(grid, plan)
+        query, rng = routes.query(grid, routes.task), random_stream(routes.seed, "planner")
+        return grid, routes.plan(query, rng, routes.planner_label)
 
     def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
         """Check an external plan on the grid of `first`."""
@@ -304,6 +319,12 @@ class OneRoute(RouteGuide):
             options=plan.options,
             wall_s=plan.wall_s,
         )
+
+
+def _finds_path(routes: RoutePlanner) -> bool:
+    """Return whether the first plan is a path that the robot can follow from its start."""
+    guide = OneRoute(routes)
+    return guide._drivable(*guide._planned()).solved
 
 
 @cached(4)

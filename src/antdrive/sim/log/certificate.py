@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
-from antdrive.base.plane import segment_lengths, wrap_angle
+from antdrive.base.plane import format_numbers, segment_lengths, wrap_angle
 from antdrive.base.types import Bounds, Floats, Point
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.consistency import GRIP, inconsistencies, windowed
@@ -331,7 +331,7 @@ def _check_start(rollout: Rollout) -> Iterator[str]:
         yield "pose: headings must be from -pi to pi"
     pose, start = rollout.pose[0], rollout.record.task.start
     if np.hypot(*(pose[:2] - start[:2])) > START_SLACK or abs(wrap_angle(pose[2] - start[2])) > START_TURN_SLACK:
-        yield f"pose: the first row is not the task's start {list(start)}"
+        yield f"pose: the first row is not the task's start {format_numbers(start)}"
 
 
 def _check_motion(rollout: Rollout) -> Iterator[str]:

@@ -27,7 +27,7 @@ import numpy.typing as npt
 
 from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.files import open_regular
+from antdrive.base.files import format_size, open_regular
 from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord, Proof
@@ -117,7 +117,7 @@ def _check_members(archive: Archive) -> None:
     if len({info.filename for info in members}) < len(members):
         raise ValueError("two members have the same name")
     if sum(info.file_size for info in members) > MAX_BYTES:
-        raise ValueError(f"larger than {MAX_BYTES >> 20} MB when unpacked")
+        raise ValueError(f"larger than {format_size(MAX_BYTES)} when unpacked")
     known = [f"{name}.npy" for name in ("record", *ARRAYS, *SENSED)]
     names = [info.filename for info in members]
     for name in names:

@@ -19,7 +19,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Floats, Pose
-from antdrive.robots.clearance import footprint_clearance
+from antdrive.robots.clearance import TOUCHING, footprint_clearance
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.physics import _kernels_states
 from antdrive.sim.physics.bodies import Bodies, Point3, size_of
@@ -31,7 +31,6 @@ from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc, World
 
 SETTLING_TIME = 0.1  # time in which a placed robot settles on its wheels [s]
-TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
 MAX_JOINT_VELOCITY = 1e6  # speed limit of wheels; Bullet's default of 100 would slow small ones [rad/s]
 RESIDUAL = 5e-7  # solver residual for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
 USUAL_RESIDUAL = 1e-7  # solver residual for other wheels, Bullet's default [(rad/s)^2]
@@ -258,7 +257,7 @@ class Engine:
 
     def _touching(self, points: Sequence[Any]) -> list[Contact]:
         # Bullet also lists points some millimetres apart. A pressing contact may be listed 0.05 mm apart, but has a force.
-        touching = [point for point in points if point[8] <= TOUCHING_DISTANCE or point[9] > 0]
+        touching = [point for point in points if point[8] <= TOUCHING or point[9] > 0]
         index = self._bodies.index
         for body in {point[2] for point in touching} - index.keys():
             self._note(f"physics reports a contact with body {body}, which is of no obstacle")

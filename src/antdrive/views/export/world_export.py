@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.base.plane import world_to_map
+from antdrive.base.plane import format_point, world_to_map
 from antdrive.planners import Query, load_planner
 from antdrive.worlds import (
     Grid,
@@ -38,7 +38,9 @@ def write_world(
         if any(facts["corner_in_map"]):
             x, y, yaw = facts["corner_in_map"]
             turned = f", turned by {yaw:.6g} rad" if yaw else ""
-            lost.append(f"its pose: .map has no coordinates; its lower left corner is at ({x:.6g}, {y:.6g}){turned}")
+            lost.append(
+                f"its pose: .map has no coordinates; its lower left corner is at {format_point((x, y))}{turned}"
+            )
     else:
         image = export_map_server(task, out, resolution=resolution, tasks=tasks, replace=True)  # checked by the caller
         return {"files": {"map": str(out), "image": str(image)}}, lost

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import InputError
+from antdrive.base.files import format_size
 from antdrive.views.film.camera import CAMERAS, Picture
 from antdrive.views.film.planes import Planes
 
@@ -108,7 +109,7 @@ class FilmInfo:
         link = f'<a href="{escape(quote(os.path.relpath(self.path)))}">{escape(str(self.path))}</a>'
         data = self.path.read_bytes() if self.path.is_file() else b""
         if not 0 < len(data) <= MOST_EMBEDDED:
-            return f"<p>{link}: {about}, {len(data) / 1e6:.1f} MB{'' if data else ', the file is gone'}</p>"
+            return f"<p>{link}: {about}, {format_size(len(data))}{'' if data else ', the file is gone'}</p>"
         kind = self.path.suffix.lower()[1:]
         source = (
             f'style="max-width: 100%" width="{width}" src="data:{"video" if kind == "mp4" else "image"}/{kind};base64,'

@@ -20,6 +20,7 @@ from antdrive.base.caches import cached
 from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of, suggest, yaml_number
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
+from antdrive.base.files import format_size
 from antdrive.base.records import STRICT
 from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD, Coordinate, Size
 from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
@@ -211,7 +212,7 @@ def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingP
         raise input_error(
             os.fspath(path),
             f"not written: {len(task.world.obstacles)} obstacles and {len(task.world.movers)} movers make "
-            f"{size / 1e6:.1f} MB and {values} values; the limits are {MAX_BYTES / 1e6:g} MB and {MAX_VALUES} values; "
+            f"{format_size(size)} and {values} values; the limits are {format_size(MAX_BYTES)} and {MAX_VALUES} values; "
             f"use fewer, larger cylinders (for maps, a larger overhang)",
         )
     write_text(path, text)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.plane import world_to_map
+from antdrive.base.plane import format_number, format_point, tidy, world_to_map
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import Disc, Task, World
@@ -226,7 +226,9 @@ def map_task(
         "beyond blocked cells" + ("" if joined else "; start and goal are not joined")
     )
     try:
-        world = World(name, used.bounds, tuple(Disc(*map(float, disc)) for disc in covered.discs), source)
+        xmin, ymin, xmax, ymax = map(tidy, used.bounds)
+        discs = tuple(Disc(tidy(x), tidy(y), radius) for x, y, radius in covered.discs.tolist())
+        world = World(name, (xmin, ymin, xmax, ymax), discs, source)
         return Task(world, start, goal, goal_tolerance, cells.resolution if cell is None else cell)
     except FieldError as error:
         hint = f"; it is within {covered.overhang:.4g} m of a blocked cell" if "inside" in error.problem else ""
@@ -303,13 +305,12 @@ def _reachable(cells: CellMap, start: Pose, goal: Point) -> tuple[CellMap, bool]
 
 def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
     spot = cells.cell_at(x, y)
-    there_x, there_y = world_to_map(cells.frame, [(x, y)])[0].tolist()
+    there = world_to_map(cells.frame, [(x, y)])[0].tolist()
     if spot is None:
-        raise input_error(key, f"({there_x:g}, {there_y:g}) is not on the map, which spans {_span(cells)}")
+        raise input_error(key, f"{format_point(there)} is not on the map, which spans {_span(cells)}")
     if not cells.free[spot]:
-        raise input_error(
-            key, f"({there_x:g}, {there_y:g}) is on a blocked cell: row {spot[0]} from below, column {spot[1]}"
-        )
+        at = f"row {spot[0]} from below, column {spot[1]}"
+        raise input_error(key, f"{format_point(there)} is on a blocked cell: {at}")
     return spot
 
 
@@ -318,7 +319,8 @@ def _span(cells: CellMap) -> str:
     x0, y0, x1, y1 = cells.bounds
     corners = world_to_map(cells.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-    return f"x {xmin:g} to {xmax:g} and y {ymin:g} to {ymax:g} m"
+    xs, ys = (" to ".join(map(format_number, ends)) for ends in ((xmin, xmax), (ymin, ymax)))
+    return f"x {xs} and y {ys} m"
 
 
 def _cropped(cells: CellMap) -> CellMap:
