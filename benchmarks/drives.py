@@ -5,6 +5,7 @@ Tables:
 - barn: the BARN Challenge worlds, by planner, smoothing and noise; needs their folder or archive (`--barn`)
 - forests: random worlds; every failure is listed with its seed
 - smooth: excess length of taut routes over the exact optimum
+- straight: heavy robots on an open straight, by yaw acceleration and top speed
 """
 
 from __future__ import annotations
@@ -24,15 +25,16 @@ import numpy as np
 from antdrive.planners import Query, load_planner, pull_taut
 from antdrive.planners.anyangle.tangent import shortest
 from antdrive.planners.smoothing._kernels_smooth import encloses
-from antdrive.robots import RobotSpec, load_robot
+from antdrive.robots import Footprint, Noise, RobotSpec, load_robot
 from antdrive.runs.pool import call_all
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import measure, tracking_error
-from antdrive.worlds import Task, generate, import_barn, rasterise
+from antdrive.worlds import Task, World, generate, import_barn, rasterise
 from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import BARN
 
 SMALLEST = ("--worlds 2 --jobs 1",)
+CROSSED = 0.005  # a crossing leads from this far on one side of a line to this far on the other [m]
 
 
 class Result(NamedTuple):
@@ -187,6 +189,38 @@ def smooth(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
     )
 
 
+def straight(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
+    """Drive heavy robots along 19 m of open ground at noise 1, with three seeds each."""
+    lane = Task(World("lane", (0.0, 0.0, 22.0, 3.0)), (1.5, 1.5, 0.0), (20.8, 1.5), cell=0.25, goal_tolerance=0.05)
+    levels = Noise(pose_xy=0.01, pose_yaw=0.01, encoder=0.02, slip=0.02, delay=0.1)
+    rows = []
+    for yaw_acceleration, speed in itertools.product((0.25, 0.5, 1.0, 2.0, 4.0), (1.0, 2.0)):
+        robot = RobotSpec(
+            name="heavy", footprint=Footprint.rectangle(0.8, 0.6), height=0.5, mass=150.0, wheel_radius=0.1, track=0.5,
+            max_speed=speed, max_yaw_rate=1.5, max_acceleration=0.5, max_yaw_acceleration=yaw_acceleration,
+            max_lateral_acceleration=0.6, max_wheel_speed=40.0, wheel_torque=40.0, noise=levels,
+        )  # fmt: skip
+        seeds = range(min(worlds, 3))
+        calls = (partial(along, Scenario.of(lane, "astar", robot, noise=1.0, seed=k)) for k in seeds)
+        off, crossings, duration, certified = zip(*call_all(calls, jobs), strict=True)
+        rows.append(
+            [f"{yaw_acceleration:g}", f"{speed:g}", f"{sum(certified)} of {len(seeds)}"]
+            + [f"{1000 * max(off):.0f} mm", str(max(crossings)), f"{statistics.mean(duration):.1f} s"]
+        )
+    heads = "yaw acceleration rad/s², top speed m/s, certified, largest distance, crossings, mean time"
+    yield from table(heads.split(", "), rows)
+
+
+def along(scenario: Scenario) -> tuple[float, int, float, bool]:
+    """Return the largest distance from a line along x [m], how often it is crossed, the duration [s], whether certified."""
+    done = run(scenario)
+    log = done.rollout
+    assert log is not None
+    off = log.pose[:, 1] - scenario.task.goal[1]
+    sides = np.sign(off[np.abs(off) > CROSSED])
+    return float(np.abs(off).max()), int((np.diff(sides) != 0).sum()), float(log.t[-1]), done.succeeded
+
+
 def main() -> None:
     given = command_line(
         __doc__,
@@ -195,7 +229,9 @@ def main() -> None:
         jobs=(int, "processes; by default one per core"),
         barn=(BARN, "folder or archive of BARN's world_*.world files"),
     )
-    print_tables(given.tables, {f.__name__: f for f in (barn, forests, smooth)}, given.jobs, given.barn, given.worlds)
+    print_tables(
+        given.tables, {f.__name__: f for f in (barn, forests, smooth, straight)}, given.jobs, given.barn, given.worlds
+    )
 
 
 if __name__ == "__main__":

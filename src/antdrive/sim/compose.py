@@ -119,6 +119,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
         footprint=s.footprint,
         hz=s.control_hz,
         seed=s.seed,
+        noise=s.noise,
         motions=s.trajectories.motions if s.timed else (),
         mapped=s.map == "given",
         whole=not s.cell_by_cell,

@@ -8,13 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.robots import Noise, PurePursuit, list_robots, load_robot
 from antdrive.robots.control._kernels_profile import turning_time
 from antdrive.robots.control.speed_limits import speed_profile
-from antdrive.worlds import Route
+from antdrive.worlds import Route, World
 
 
 def straight(length):
     return Route([[0.0, 0.0], [length, 0.0]])
+
+
+def prepared(robot, noise):
+    open_ground = World("open", (-5.0, -5.0, 35.0, 5.0))
+    route = Route([[0.0, 0.0], [30.0, 0.0]], np.zeros(2))
+    return PurePursuit().prepare(route, open_ground, robot, 0.03, 1 / 60, noise=noise)
 
 
 def around(radius, sweep, bulge=5e-4):
@@ -73,6 +80,29 @@ def test_acceleration_on_an_arc_respects_the_yaw_acceleration(jackal):
     a = np.diff(tighter.speed**2) / 2 / np.diff(tighter.arc)
     middle = (tighter.arc[1:] > 0.3) & (tighter.arc[1:] < 0.6)
     np.testing.assert_allclose(a[middle], 1.0, rtol=2e-3)
+
+
+@pytest.mark.parametrize(("noise", "error"), [(0.5, 0.04), (1.0, 0.08), (2.0, 0.08)])
+def test_noise_and_little_yaw_acceleration_lengthen_the_lookahead_and_lower_the_speed(noise, error, jackal):
+    """An error is undone in 2 sqrt(error / a), over which the robot drifts by half of the error."""
+    heavy = dataclasses.replace(jackal, max_yaw_acceleration=0.25)
+    path = prepared(heavy, noise)
+    assert path.tuning.lookahead_time == pytest.approx(math.sqrt(2 * error / 0.25))
+    assert path.limits.speed * error / 2 * 2 * math.sqrt(error / 0.25) == pytest.approx(0.025)
+    assert path.samples.speed.max() == path.limits.speed
+
+
+def test_a_robot_without_noise_keeps_its_speed_and_lookahead(jackal):
+    heavy = dataclasses.replace(jackal, max_yaw_acceleration=0.25)
+    for path in (prepared(heavy, 0.0), prepared(dataclasses.replace(heavy, noise=Noise()), 1.0)):
+        assert (path.limits.speed, path.tuning.lookahead_time) == (2.0, 0.25)
+
+
+@pytest.mark.parametrize("name", list_robots())
+def test_robots_of_the_catalogue_keep_their_speed_and_lookahead_at_any_noise(name):
+    robot = load_robot(name)
+    path = prepared(robot, 2.0)
+    assert (path.limits.speed, path.tuning.lookahead_time) == (robot.max_speed, PurePursuit().lookahead_time)
 
 
 def test_at_a_sharp_corner_the_robot_stops_and_rotates_in_place(turtlebot):

@@ -28,7 +28,7 @@ from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
-from antdrive.robots.control.speed_limits import limits_along, limits_along_lines
+from antdrive.robots.control.speed_limits import heading_error, limits_along, limits_along_lines, steady, steering_time
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
@@ -223,6 +223,7 @@ class PurePursuit:
         tolerance: float = math.inf,
         spacing: float = SPACING,
         indexed: bool = True,
+        noise: float = 1.0,
     ) -> TrackedPath:
         """Prepare a route for tracking.
 
@@ -235,9 +236,13 @@ class PurePursuit:
             tolerance: goal tolerance [m]; a small one makes the robot stop closer to the route's end
             spacing: distance between the samples of lookaheads and speed limits [m]
             indexed: whether to index the obstacles by position, which pays off on long drives
+            noise: factor on the documented noise, for which robots of low yaw acceleration look farther ahead and drive slower
         """
+        error = heading_error(spec, noise)
+        spec = steady(spec, error)
         tuning = self._tuning(route, spec, margin, period, min(self.goal_distance, tolerance / 2))
-        tuning = tuning._replace(spacing=spacing)
+        time = max(tuning.lookahead_time, steering_time(spec, error))
+        tuning = tuning._replace(spacing=spacing, lookahead_time=time)
         obstacles = (
             indexed_obstacles(world, self.lookahead_max + tuning.lookahead_clearance)
             if indexed

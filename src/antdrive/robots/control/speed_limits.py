@@ -10,7 +10,7 @@ length of a step. `limits_along` adds the limits near obstacles; `_kernels_pursu
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,8 @@ UNKNOWN = np.empty(0)  # curvature of a route with corners
 UNKNOWN.setflags(write=False)
 STEP = 0.02  # longest distance between two samples of a profile [m]
 BACKWARDS = 0.3  # highest speed on the part of a route that is driven backwards [m/s]
+#: Heading error at noise 1 that the yaw acceleration must undo, and the largest drift to the side meanwhile [rad], [m].
+HEADING_ERROR, DRIFT = 0.08, 0.025
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +107,42 @@ def _profile(
         braking * spec.max_acceleration,
     )  # fmt: skip
     return rows
+
+
+def heading_error(spec: RobotSpec, noise: float) -> float:
+    """Return the heading error by noise and slip that the yaw acceleration must undo [rad].
+
+    Args:
+        spec: the robot
+        noise: factor on its documented noise; above 1 the error no longer grows
+    """
+    return HEADING_ERROR * min(noise, 1.0) if spec.noise.nonzero else 0.0
+
+
+def steering_time(spec: RobotSpec, error: float) -> float:
+    """Return the shortest lookahead time T whose steering the yaw acceleration can follow [s].
+
+    Pure pursuit returns to a straight with the natural frequency sqrt(2) / T. An oscillation of the heading by `error` then
+    needs the yaw acceleration 2 `error` / T^2. A robot that cannot reach it lags behind its commands and weaves.
+
+    Args:
+        spec: the robot
+        error: the heading error [rad]
+    """
+    return math.sqrt(2 * error / spec.max_yaw_acceleration)
+
+
+def steady(spec: RobotSpec, error: float) -> RobotSpec:
+    """Return the robot, no faster than it can hold a line: it drifts at most `DRIFT` while it undoes a heading error.
+
+    From rest to rest that takes 2 sqrt(error / a) with the yaw acceleration a; on average half of the error is left.
+
+    Args:
+        spec: the robot
+        error: the heading error [rad]
+    """
+    drift = error * math.sqrt(error / spec.max_yaw_acceleration)  # per speed [s]
+    return replace(spec, max_speed=DRIFT / drift) if spec.max_speed * drift > DRIFT else spec
 
 
 def limits_along(

@@ -160,7 +160,7 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     answer = PLANNERS["astar"].plan(Query.between(grid, task), random_stream(seed, "planner"))
     route = smooth(answer, grid, task, kind=c.smoothing)
     period, limit = 1 / c.control_hz, 30.0 + 10.0 * route.length / robot.max_speed
-    path = c.controller.prepare(route, task.world, robot, margin, period, task.goal_tolerance)
+    path = c.controller.prepare(route, task.world, robot, margin, period, task.goal_tolerance, noise=c.noise)
     localiser = localiser_of("fixes", robot, c.noise, 1.0, period, task.start, seed)
     with Engine(task.world, robot, physics_hz=c.physics_hz) as engine:
         log = follow(engine, c.controller, path, task, limit=limit, control_hz=c.control_hz, localiser=localiser)

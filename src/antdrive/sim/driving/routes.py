@@ -90,6 +90,7 @@ class RoutePlanner:
     footprint: str  # the shape that plans keep clear: disc, exact, or auto
     hz: int  # control periods per second
     seed: int  # the seed of the drive's random numbers
+    noise: float  # factor on the robot's documented noise
     motions: tuple[MoverMotion, ...] = ()  # motions of the movers, for space-time planners
     mapped: bool = True  # whether all plans use the grid of the given map
     whole: bool = True  # whether the planner plans whole routes, rather than cell by cell
@@ -243,6 +244,7 @@ class RoutePlanner:
     def prepared(self, route: Route, world: World, margin: float, *options: Any, **settings: Any) -> TrackedPath:
         """Prepare a route for the controller, among the obstacles of a world."""
         period, tolerance = 1 / self.hz, self.task.goal_tolerance
+        settings["noise"] = self.noise
         return self.controller.prepare(route, world, self.robot, margin, period, tolerance, *options, **settings)
 
 
@@ -294,7 +296,7 @@ class OneRoute(RouteGuide):
 
     def _prepared(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         routes = self._routes
-        numbers = bits(plan.cost, routes.margin, 1 / routes.hz)
+        numbers = bits(plan.cost, routes.margin, 1 / routes.hz, routes.noise)
         line = plan.waypoints.tobytes() if plan.waypoints is not None else b""
         setting = type(routes.controller), repr((routes.robot, routes.controller))
         contents = by_contents(grid, routes.task)
