@@ -1,9 +1,9 @@
 """Refused genuine drives and accepted forgeries by kind of drive: `python -m benchmarks.genuine [--count N] [--seed S]`.
 
 Kinds are those of `benchmarks.kinds`. Each drive is certified, and its folder verified, also with its world and robot. Then
-values of its log or its `result.json` are forged, one at a time, and the digest renewed. Plain `verify`, or `--world --robot`, must refuse it, as
-declared. A drive that is refused, and a forgery that is accepted, is printed with the command that repeats it. Contacts are no
-refusals.
+values of its log or its `result.json` are forged, one at a time, and the digest renewed. Plain `verify`, or
+`--world --robot`, must refuse each, as declared. A drive that is refused, and a forgery that is accepted, is printed with the
+command that repeats it. Contacts are no refusals.
 """
 
 from __future__ import annotations

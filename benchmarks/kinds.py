@@ -60,15 +60,15 @@ def axes(settings: Mapping[str, DeclaredSetting] = SETTINGS) -> dict[str, tuple[
     """
     found = {name: one.setting.choices or VALUES[name] for name, one in settings.items()}
     return {
-        name: values if name in VALUES else (settings[name].default, *(set(values) - {settings[name].default}))
+        name: values if name in VALUES else (settings[name].default, *(one for one in values if one != settings[name].default))
         for name, values in found.items()
     }
 
 
 def crossed() -> list[DriveKind]:
     """Return every combination of the settings in `CROSSED`."""
-    all_axes = {name: sorted(map(str, values)) if name == "footprint" else values for name, values in axes().items()}
-    return [dict(zip(CROSSED, one, strict=True)) for one in itertools.product(*(all_axes[name] for name in CROSSED))]
+    choices = axes()
+    return [dict(zip(CROSSED, one, strict=True)) for one in itertools.product(*(choices[name] for name in CROSSED))]
 
 
 def scenario(kind: DriveKind, rng: np.random.Generator) -> Scenario:
