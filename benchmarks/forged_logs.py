@@ -749,7 +749,7 @@ def _(log: Log) -> None:
 
 @forgery("an optimum longer than the plan", "verify")
 def _(log: Log) -> None:
-    log.record["plan"]["grid_optimum_m"] = 2 * log.record["plan"]["cost_m"]
+    log.record["plan"]["grid_optimum_m"] = 2 * log.record["plan"]["length_m"]
 
 
 @forgery("other rules that limited the speed", "replay")

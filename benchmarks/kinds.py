@@ -60,7 +60,9 @@ def axes(settings: Mapping[str, DeclaredSetting] = SETTINGS) -> dict[str, tuple[
     """
     found = {name: one.setting.choices or VALUES[name] for name, one in settings.items()}
     return {
-        name: values if name in VALUES else (settings[name].default, *(one for one in values if one != settings[name].default))
+        name: values
+        if name in VALUES
+        else (settings[name].default, *(one for one in values if one != settings[name].default))
         for name, values in found.items()
     }
 
