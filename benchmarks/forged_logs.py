@@ -332,6 +332,10 @@ for _name, _level, _when, _path, _to in (
     ("settings nested 150 deep", "load", "", ("planner", "settings",), {"deep": _DEEP}),
     ("a higher noise level", "replay", "noisy", ("noise",), 1.1),
     ("an optimum shorter than the straight line", "verify", "", ("plan", "euclidean_optimum_m",), 1.0),
+    ("an optimum of 60 m", "verify", "", ("plan", "euclidean_optimum_m",), 60.0),
+    ("an optimum of 60 m on the grid", "verify", "", ("plan", "grid_optimum_m",), 60.0),
+    ("no optimum", "verify", "", ("plan", "euclidean_optimum_m",), None),
+    ("no optimum on the grid", "verify", "", ("plan", "grid_optimum_m",), None),
     ("another planner's name", "replay", "", ("planner", "name",), "ants"),
     ("less work", "replay", "", ("plan", "work",), 1),
     ("other versions", "none", "", ("versions",), {"antdrive": "9.9"}),
@@ -745,7 +749,7 @@ def _(log: Log) -> None:
 
 @forgery("an optimum longer than the plan", "verify")
 def _(log: Log) -> None:
-    log.record["plan"]["grid_optimum_m"] = 2 * log.record["plan"]["cost_m"]
+    log.record["plan"]["grid_optimum_m"] = 2 * log.record["plan"]["length_m"]
 
 
 @forgery("other rules that limited the speed", "replay")

@@ -18,10 +18,11 @@ from __future__ import annotations
 import collections
 import dataclasses
 import hashlib
+import itertools
 import json
 import tempfile
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,7 +30,7 @@ import numpy as np
 
 from antdrive.base.errors import InputError
 from antdrive.planners import PlannerError, load_planner
-from antdrive.robots import Footprint, RobotSpec, load_robot
+from antdrive.robots import Footprint, load_robot
 from antdrive.runs.margins.choice import with_chosen_margin
 from antdrive.sim import Perception, Rollout, Scenario, certify, run
 from antdrive.sim.driving.replay import replay
@@ -40,6 +41,7 @@ from antdrive.sim.verifying import wrong_optima
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
 from benchmarks.forged_fields import ENTRIES, LEVEL_OF, POOL
 from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
+from benchmarks.kinds import DriveKind, crossed, scenario
 from benchmarks.markdown import command_line, print_table
 
 CRASHED = "crash"  # in place of a level: the check raised an exception
@@ -80,71 +82,39 @@ def genuine_drives() -> dict[str, Rollout]:
     return drives
 
 
-def more_drives(only: Collection[str] = ()) -> dict[str, Rollout]:
-    """Drives of every kind: planners, robots, footprints, routes, perceptions, localisations, margins and ends.
+def more_drives(kinds: Sequence[DriveKind], seed: int = 0) -> dict[str, Rollout]:
+    """Random drives of some kinds of `benchmarks.kinds`, each the first that has a log."""
+    found = {}
+    for number, kind in enumerate(kinds):
+        logs = (
+            run(scenario(kind, np.random.default_rng([seed, number, again]))).rollout for again in itertools.count()
+        )
+        log = next(log for log in logs if log is not None)
+        found[f"{number}: {', '.join(map(str, kind.values()))}, {log.record.robot.name}, {log.record.planner.name}"] = (
+            log
+        )
+    return found
 
-    Args:
-        only: names of drives; empty for all of them
-    """
+
+def special_drives() -> dict[str, Rollout]:
+    """Drives with what no setting asks for: a chosen margin, a polygon off the axle, a range of sight, a closed corridor."""
     posts = (Disc(2.0, 1.5, 0.3), Disc(3.4, 2.6, 0.25), Disc(3.6, 0.8, 0.35))
     task = Task(World("posts", (0.0, 0.0, 6.0, 3.5), posts), (0.6, 1.4, 0.0), (5.3, 1.9), cell=0.1)
-    movers = (
-        Cruising(radius=0.2, position=(3.0, 3.0), velocity=(0.1, -0.3)),
-        Keyframed(radius=0.2, keyframes=((0.0, 4.5, 0.5), (6.0, 4.5, 3.0))),
-    )
-    moving = dataclasses.replace(task, world=dataclasses.replace(task.world, name="moving", movers=movers))
+    walker = Keyframed(radius=0.2, keyframes=((0.0, 4.5, 0.5), (6.0, 4.5, 3.0)))
+    moving = dataclasses.replace(task, world=dataclasses.replace(task.world, name="moving", movers=(walker,)))
+    corners = ((0.25, 0.12), (-0.1, 0.15), (-0.12, -0.15), (0.2, -0.14))
     off_axle = dataclasses.replace(
-        load_robot("turtlebot"),
-        name="off-axle",
-        footprint=Footprint(0.0, 0.0, 0.0, ((0.25, 0.12), (-0.1, 0.15), (-0.12, -0.15), (0.2, -0.14))),
+        load_robot("turtlebot"), name="off-axle", footprint=Footprint(0.0, 0.0, 0.0, corners)
     )
     guard = Keyframed(radius=0.35, keyframes=((0.0, 3.0, 0.6), (1.0, 3.0, 0.6)))
     corridor = Task(World("corridor", (0.0, 0.0, 6.0, 1.2), movers=(guard,)), (0.8, 0.6, 0.0), (5.3, 0.6), cell=0.1)
-    mapless = {"map": "none", "cell": 0.05}
-
-    def of(
-        where: Task = task, planner: str = "astar", robot: str | RobotSpec = "turtlebot", **given: object
-    ) -> Scenario:
-        options = given.pop("options", None)
-        return Scenario.of(where, planner, robot, options=options, **given)  # type: ignore[arg-type]
-
     scenarios = {
-        "tangent, taut": of(planner="tangent", smoothing="taut"),
-        "ants, noise": of(planner="aco-han", noise=1.0, seed=7, options={"iterations": 5}),
-        "genetic, raw": of(planner="ga-han", smoothing="none", seed=2),
-        "footprint kept clear": of(robot="jackal", footprint="exact", noise=1.0),
-        "polygon off the axle": of(robot=off_axle, noise=1.0),
-        "taut, noise": of(smoothing="taut", noise=1.0, seed=9),
-        "husky": of(robot="husky", noise=1.0, margin=0.05),
-        "burger, own margin": of(robot="turtlebot3-burger", margin=0.12, noise=0.5),
-        "positions within 2 m": of(moving, "dstar-lite", perception=Perception(kind="positions", range=2.0)),
-        "motions": of(moving, "dstar-lite", perception=Perception(kind="motions"), seed=3),
-        "space and time": of(moving, "sipp", perception=Perception(kind="motions")),
-        "lidar, map": of(moving, "dstar-lite", perception=Perception(kind="lidar"), noise=1.0),
-        "no avoidance": of(moving, avoidance=None, replanning=None, seed=4),
-        "mapless, fixes": of(planner="dstar-lite", noise=1.0, **mapless),
-        "mapless, true": of(planner="dstar-lite", localisation="true", **mapless),
-        "mapless, odometry": of(planner="dstar-lite", localisation="odometry", noise=1.0, **mapless),
-        "mapless, matching": of(planner="dstar-lite", localisation="matching", noise=1.0, robot="jackal", **mapless),
-        "mapless, matching, lidar": of(
-            moving,
-            "dstar-lite",
-            "jackal",
-            localisation="matching",
-            noise=1.0,
-            perception=Perception(kind="lidar"),
-            **mapless,
-        ),
-        "unseen beside the way": of(unseen=(Disc(5.0, 3.0, 0.15),)),
-        "timed out": of(time_limit=2.5, noise=1.0),
-        "timed out, mapless": of(time_limit=3.0, planner="dstar-lite", **mapless),
-        "blocked": of(corridor),
-        "another cell and rates": of(cell=0.15, control_hz=30, physics_hz=120, noise=1.0),
+        "chosen margin": with_chosen_margin(Scenario.of(task, "astar", noise=1.0)),
+        "polygon off the axle": Scenario.of(task, "astar", off_axle, noise=1.0),
+        "positions within 2 m": Scenario.of(moving, "dstar-lite", perception=Perception(kind="positions", range=2.0)),
+        "blocked": Scenario.of(corridor, "astar"),
     }
-    if not only:
-        scenarios["chosen margin"] = with_chosen_margin(of(noise=1.0))
-    some = {name: s for name, s in scenarios.items() if name in (only or scenarios)}
-    return {name: log for name, s in some.items() if (log := run(s).rollout) is not None}
+    return {name: log for name, s in scenarios.items() if (log := run(s).rollout) is not None}
 
 
 @dataclass(frozen=True)
@@ -324,7 +294,7 @@ def main() -> None:
         **counted,
     )
     begun = time.monotonic()
-    drives = genuine_drives() | ({} if chosen.few else more_drives())
+    drives = genuine_drives() | ({} if chosen.few else more_drives(crossed()) | special_drives())
     POOL.extend(log.record.as_dict() for log in drives.values())
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "forged.npz"

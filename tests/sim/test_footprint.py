@@ -1,5 +1,6 @@
 """Drives through a door that only the robot's footprint passes."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from antdrive.robots import load_robot
 from antdrive.sim import Rollout, Scenario, certify, run
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.rerun import replayed
-from antdrive.worlds import Disc, Keyframed, Task, World
+from antdrive.sim.verifying import false_claims
+from antdrive.worlds import Disc, Keyframed, Task, World, generate
 
 #: Width of a door that the footprint passes and the disc around the robot does not [m].
 DOORS = {"jackal": 0.62, "warehouse": 0.84}
@@ -92,6 +94,22 @@ def test_a_saved_drive_of_a_footprint_is_driven_again_bit_for_bit(driven, noise,
     check = replayed(loaded)
     assert (check.exact, check.problems) == (True, ())
     assert certify(loaded).certified
+
+
+def test_a_result_names_the_cell_that_the_footprint_was_planned_on(driven):
+    made = driven("jackal", 0.0)
+    log, result = made.rollout, made.as_dict()
+    assert (made.scenario.planning_cell, log.record.cell, result["cell_m"]) == (0.1, 0.05, 0.05)
+    assert list(false_claims(result, log, made.certificate, made.metrics, log.digest)) == []
+
+
+def test_a_route_that_ends_short_of_a_goal_with_room_for_the_disc_is_genuine():
+    """The straight from the last cell to the goal is not clear for the footprint."""
+    task = generate("forest", np.random.default_rng(24), {}, name="forest", note="")
+    made = run(Scenario.of(task, "astar", "husky", footprint="exact", noise=1.0))
+    short = math.dist(made.rollout.route[-1], task.goal)
+    assert 1.5 * made.rollout.record.cell < short < task.goal_tolerance
+    assert made.succeeded, made.certificate.problems
 
 
 def test_an_exact_footprint_is_recorded(driven):

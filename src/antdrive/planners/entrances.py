@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.plane import wrap_angle
+from antdrive.worlds.route import LEAD
 
 if TYPE_CHECKING:
     from antdrive.base import Floats, Point, Pose
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from antdrive.worlds.headings import Outline
 
 MAX_BACKWARDS = 0.5  # longest way that a robot backs out of a place where it cannot turn [m]
-LEAD = 0.75  # farthest entrance from a start [m]
 ROOM = 1e-4  # a start closer to obstacles than the margin leaves with this much less room than it has [m]
 TURNING = 0.1  # a turn to an entrance counts as this much of a way [m/rad]
 

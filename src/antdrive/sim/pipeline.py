@@ -101,6 +101,7 @@ class Run:
         return {
             **self.scenario.as_dict(),
             **({"options": dict(options)} if options else {}),
+            "cell_m": self.grid.cell,
             "outcome": self.outcome.key,
             "sentence": self.outcome.value,
             "reason": self.reason,

@@ -21,6 +21,7 @@ from antdrive.sim.log.record import (
     SmoothingRecord,
     TimesRecord,
     finite_or_none,
+    free_radius,
     settings_of,
 )
 from antdrive.sim.log.rollout import Rollout
@@ -112,12 +113,11 @@ def optima_of(
         margin: clearance of plans on top of the robot's radius [m]
         footprint_margin: clearance of plans that keep the footprint clear [m]; None for those of the disc
     """
-    world, foot = by_geometry(task.world), robot.footprint
-    if footprint_margin is None:
-        grid = by_contents(grid_of(world, cell, robot.radius + margin), task)
-        return _on_grid(grid), _among_discs(grid)
-    inner = by_contents(grid_of(world, cell, foot.inner_radius + footprint_margin), task)
-    return _on_grid(by_contents(outlined_grid_of(world, cell, foot, footprint_margin), task)), _among_discs(inner)
+    world = by_geometry(task.world)
+    free = grid = by_contents(grid_of(world, cell, free_radius(robot, margin, footprint_margin)), task)
+    if footprint_margin is not None:
+        grid = by_contents(outlined_grid_of(world, cell, robot.footprint, footprint_margin), task)
+    return _on_grid(grid), _among_discs(free)
 
 
 @cached(64)

@@ -13,7 +13,7 @@ from antdrive.base.files import as_json, parse_json, read_bytes
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import measure, succeeded
-from antdrive.sim.log.record import DriveRecord, differences, hashes_of, plain_value
+from antdrive.sim.log.record import DriveRecord, SensingRecord, differences, hashes_of, plain_value, settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Task
 
@@ -47,12 +47,15 @@ def false_claims(
     for key, logged in facts.items():
         if key in result and not _agree(result[key], logged):
             yield f"result.json: {key}: differs from the log, which says {_short(logged)}"
-    claimed = result.get("metrics")
-    if not isinstance(claimed, Mapping):
-        return
-    for key, logged in json.loads(as_json(metrics)).items():
-        if key in claimed and not _agree(claimed[key], logged):
-            yield f"result.json: metrics.{key}: differs from the log, which says {_short(logged)}"
+    for name, inner in (("metrics", metrics), ("settings", _logged_changes(rollout.record))):
+        claimed = result.get(name)
+        if not isinstance(claimed, Mapping):
+            continue
+        for key, logged in json.loads(as_json(inner)).items():
+            if isinstance(logged, Mapping) and isinstance(claimed.get(key), Mapping):
+                logged = {one: logged.get(one) for one in claimed[key]}  # options at their defaults are omitted
+            if key in claimed and not _agree(claimed[key], logged):
+                yield f"result.json: {name}.{key}: differs from the log, which says {_short(logged)}"
 
 
 def logged_settings(rollout: Rollout) -> dict[str, Any]:
@@ -75,6 +78,16 @@ def logged_settings(rollout: Rollout) -> dict[str, Any]:
         "control_hz": record.control_hz,
         **({"frame": list(task.frame)} if any(task.frame) else {}),
         "task": plain_value({"start": task.start, "goal": task.goal, "goal_tolerance_m": task.goal_tolerance}),
+    }
+
+
+def _logged_changes(record: DriveRecord) -> dict[str, Any]:
+    """Return the keys of `settings` in `result.json` that the log repeats; what was asked of movers' rules, it does not."""
+    sensed = record.sensing or SensingRecord(map="given", localisation="fixes", odometry=1.0)
+    return {
+        "controller": record.controller.settings,
+        **settings_of(sensed),
+        "unseen": [[disc.x, disc.y, disc.radius] for disc in record.unseen],
     }
 
 

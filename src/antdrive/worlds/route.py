@@ -1,9 +1,10 @@
 """Routes, and the rule that joins a task's start and goal to the grid.
 
 Planning and all checks share the rule. A start or a goal need not lie at the centre of a free cell. A straight lead, at
-most `end_reach` long, joins it to a free cell nearby. If the start has less clearance than paths keep, only its lead may be
-as close to obstacles as the start. If the goal has less clearance, the path ends within the goal tolerance. The line of an
-any-angle planner is at most `DETOUR` longer than its path of cells.
+most `end_reach` long, or `LEAD` for a footprint, joins it to a free cell nearby. If the start has less clearance than paths
+keep, only its lead may be as close to obstacles as the start. If the goal has less clearance, or plans keep a footprint clear,
+the path may end anywhere within the goal tolerance. The line of an any-angle planner is at most `DETOUR` longer than its path of
+cells.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from antdrive.base.types import Floats
 
 ROUNDING = 1e-9  # tolerance of an arc length [m]
 DETOUR = 3.0  # largest excess of an any-angle planner's line over its path of cells [cells]
+LEAD = 0.75  # farthest entrance of a footprint from its start [m]
+NEAR = 1.5  # largest distance of a route's end from a start or goal that it reaches [cells]
 
 
 def cells_beside(inflate: float, cell: float) -> int:
@@ -33,6 +36,11 @@ def cells_beside(inflate: float, cell: float) -> int:
 def end_reach(inflate: float, cell: float) -> float:
     """Return the largest distance from an end to the centre of its grid cell [m]."""
     return math.sqrt(2.0) * (cells_beside(inflate, cell) + 0.5) * cell
+
+
+def short_of_goal(tolerance: float, cell: float) -> float:
+    """Return how far from a goal without room a route may end [m]."""
+    return max(tolerance, NEAR * cell)
 
 
 def longest_line(cost: float, leads: float, cell: float) -> float:

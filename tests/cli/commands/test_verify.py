@@ -146,11 +146,11 @@ def test_a_planner_without_a_replay_or_a_registered_one_is_refused(antdrive, ref
 
 
 def test_a_forged_optimum_needs_the_world_or_the_replay(antdrive, small_run, small, tmp_path):
-    forged = replace(small_run.rollout, record=changed(small_run.rollout.record, "plan", euclidean_optimum_m=3.3))
+    forged = replace(small_run.rollout, record=changed(small_run.rollout.record, "plan", euclidean_optimum_m=3.05))
     path = forged.save(tmp_path / "forged.npz")
     assert antdrive("verify", path)[0] == 0
-    assert "  record.plan.euclidean_optimum_m: 3.3 m in the log, " in antdrive("verify", path, "--world", small)[1]
-    assert "  replay: record.plan.euclidean_optimum_m: 3.3 in the log, " in antdrive("verify", path, "--replay")[1]
+    assert "  record.plan.euclidean_optimum_m: 3.05 m in the log, " in antdrive("verify", path, "--world", small)[1]
+    assert "  replay: record.plan.euclidean_optimum_m: 3.05 in the log, " in antdrive("verify", path, "--replay")[1]
 
 
 def test_results_that_the_log_contradicts_are_named(antdrive, small_run, tmp_path):
@@ -167,6 +167,9 @@ def test_results_that_the_log_contradicts_are_named(antdrive, small_run, tmp_pat
     }.items():
         path.write_text(json.dumps({**result, key: value}))
         assert f"result.json: {key}: differs from the log" in antdrive("verify", tmp_path)[1]
+    for key, value in {"map": "none", "controller": {"blend": 9.0}, "unseen": [[1.0, 1.0, 0.1]]}.items():
+        path.write_text(json.dumps({**result, "settings": {key: value}}))
+        assert f"result.json: settings.{key}: differs from the log" in antdrive("verify", tmp_path)[1]
     path.write_text(json.dumps({**result, "metrics": {**result["metrics"], "spl": 0.5}}))
     assert "result.json: metrics.spl: differs from the log" in antdrive("verify", tmp_path)[1]
     rounded = {**result["metrics"], "duration_s": result["metrics"]["duration_s"] * (1 + 1e-12)}

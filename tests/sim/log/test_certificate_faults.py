@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 
 from antdrive import Scenario, run
+from antdrive.base.plane import polyline_length
 from antdrive.robots import load_robot
 from antdrive.robots.spec import Footprint
 from antdrive.sim import Outcome, Rollout, certify
 from antdrive.sim.log.certificate import Certificate, closed_form_clearance
+from antdrive.sim.log.metrics import driven_length_m
 from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord, SensingRecord
+from antdrive.sim.recording import optima_of
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, World
 from antdrive.worlds.route import end_reach
 from tests.records import changed, made_up_log, made_up_record
@@ -492,6 +495,34 @@ def test_routes_stay_in_the_world(corner):
     assert says(replace(drive(), route=np.array([(1.0, 1.0)])), "two points or more, found 1")
 
 
+def test_a_route_for_a_footprint_may_end_anywhere_within_the_goals_tolerance():
+    def ends(metres, **record):
+        return with_record(replace(drive(), route=np.array([(1.0, 1.0), (5.0, 1.0 - metres)])), cell=0.05, **record)
+
+    only_beyond(1.5 * 0.05, ends, "route: ends")
+    only_beyond(0.25, lambda metres: ends(metres, footprint_margin=0.03), "route: ends")
+
+
+def test_the_first_cell_of_a_footprint_is_as_far_from_the_start_as_its_lead():
+    def begins(metres, **record):
+        log = with_task(replace(drive(), cells=np.array([(19, 19)], np.int32)), start=(0.975 + metres, 0.975, 0.0))
+        return with_record(log, cell=0.05, inflate=0.23, **record)
+
+    only_beyond(end_reach(0.23, 0.05), begins, "cells: begin")
+    only_beyond(0.75, lambda metres: begins(metres, footprint_margin=0.03), "cells: begin")
+
+
+def test_the_lead_of_a_footprint_keeps_the_room_of_the_start_pose():
+    """At the start a cylinder is 16 mm before the robot; beside its lead another is as close, and is too close later."""
+    before = Disc(1.0, 1.37, 0.1)
+    jackal = load_robot("jackal")
+    for x, fits in ((1.5, True), (2.5, False)):
+        world = World("made-up", (0.0, 0.0, 6.0, 4.0), (before, Disc(x, 1.335, 0.1)))
+        task = Task(world, (1.0, 1.0, math.pi / 2), (5.0, 1.0))
+        log = with_record(drive(), task=task, robot=jackal, inflate=jackal.radius + 0.05, footprint_margin=0.05)
+        assert says(log, "past an obstacle") is not fits
+
+
 def test_a_route_of_decisions_need_not_reach_the_goal():
     short = replace(drive(), route=np.array([(1.0, 1.0), (1.25, 1.0)]))
     step = ReplanRecord(t=1.0, trigger="cell", solved=True, cost_m=1.0, work=1, route=((1.0, 1.0), (5.0, 1.0)))
@@ -514,31 +545,61 @@ def test_cells_are_neighbours():
         assert says(replace(drive(), cells=cells), "must be neighbours") is not fits
 
 
-def test_no_path_among_discs_is_longer_than_the_plan():
+def test_no_shortest_path_is_longer_than_the_paths_in_the_log():
+    """Nothing is searched up to the shortest of cells with leads, route, and a success's drive with the goal's tolerance."""
     leads = math.dist((1.0, 1.0), (1.125, 1.125)) + math.dist((5.0, 1.0), (5.125, 1.125))
+    long_way = np.array([(1.0, 1.0), (3.0, 1.2), (5.0, 1.0)])
 
-    def optimum(metres):
-        return changed(drive(), "record.plan", euclidean_optimum_m=metres)
+    def optimum(metres, key="euclidean_optimum_m", **arrays):
+        return changed(replace(drive(), **arrays), "record.plan", **{key: metres})
 
-    only_beyond(4.0 + leads, optimum, "euclidean_optimum_m", share=1e-5)
-    assert says(optimum(60.0), "record.plan.euclidean_optimum_m: 60 m is longer than the plan's 4.35355 m")
-    by_cells = ReplanRecord(t=1.0, trigger=DECISION, solved=False, cost_m=None, work=1, route=())
-    assert not says(with_record(optimum(60.0), replans=(by_cells,)), "is longer than the plan's")
-    assert not says(changed(optimum(60.0), "record.plan", cost_m=None), "is longer than the plan's")
+    searched = "m is longer than the shortest path in its world; that has 4 m"
+    only_beyond(4.0, optimum, searched, share=1e-5)
+    only_beyond(polyline_length(long_way), lambda metres: optimum(metres, route=long_way), searched, share=1e-5)
+    far = np.array([(1.0, 1.0), (1.0, 3.0), (5.0, 3.0), (5.0, 1.0)])
+    only_beyond(4.0 + leads, lambda metres: optimum(metres, route=far), searched, share=1e-5)
+    only_beyond(4.0, lambda metres: optimum(metres, key="grid_optimum_m"), searched, share=1e-5)
+
+
+def test_a_search_decides_where_the_log_has_no_path():
+    """A mapless robot squeezes through a gap too narrow for the margin, so the shortest path is longer than its drive."""
+    wall = tuple(Disc(3.0, y, 0.2) for y in (0.2, 0.6, 1.4, 1.8, 2.2))
+    record = drive(0.8).record
+    task = replace(record.task, world=replace(record.task.world, obstacles=wall))
+    mapless = SensingRecord(map="none", localisation="true", odometry=1.0)
+    log = with_record(drive(0.8), task=task, sensing=mapless, outcome=Outcome.SUCCEEDED)
+    grid, free = optima_of(task, record.cell, record.robot, record.margin)
+    assert free > driven_length_m(log) + task.goal_tolerance
+
+    def optima(euclidean, on_grid):
+        return changed(log, "record.plan", euclidean_optimum_m=euclidean, grid_optimum_m=on_grid)
+
+    assert not says(optima(free, grid), "optimum_m")
+    for euclidean, on_grid, key, what in (
+        (60.0, grid, "euclidean_optimum_m", "60 m is longer"),
+        (free, 60.0, "grid_optimum_m", "60 m is longer"),
+        (None, grid, "euclidean_optimum_m", "must not be null"),
+        (free, None, "grid_optimum_m", "must not be null"),
+    ):
+        assert says(optima(euclidean, on_grid), f"record.plan.{key}: {what}")
 
 
 def test_no_path_is_shorter_than_the_straight_line_between_the_ends():
-    """Either end may lie 1.5 cells away; where the cells end elsewhere, as far as a grid's end may."""
+    """A path ends off a goal without room by at most its tolerance, and the grid's path at the cells, where the log has them."""
     by_cells = ReplanRecord(t=1.0, trigger=DECISION, solved=False, cost_m=None, work=1, route=())
-    for key in ("euclidean_optimum_m", "grid_optimum_m"):
+    text = "start and goal are farther apart"
 
-        def shorter(metres, key=key):
-            return changed(drive(), "record.plan", **{key: 4.0 - metres})
+    def shorter(metres, key="euclidean_optimum_m", **record):
+        return changed(with_record(drive(), **record), "record.plan", **{key: 4.0 - metres})
 
-        text = f"record.plan.{key}: "
-        only_beyond(2 * 1.5 * 0.25, shorter, text)
-        reach = 2 * end_reach(ROBOT.radius + 0.05, 0.25)
-        only_beyond(reach, lambda metres, shorter=shorter: with_record(shorter(metres), replans=(by_cells,)), text)
+    only_beyond(4e-6, shorter, text)
+    close = replace(drive().record.task.world, obstacles=(Disc(5.0, 1.3, 0.1),))
+    near = replace(drive().record.task, world=close)
+    only_beyond(near.goal_tolerance, lambda metres: shorter(metres, task=near), text)
+    leads = math.dist((1.0, 1.0), (1.125, 1.125)) + math.dist((5.0, 1.0), (5.125, 1.125))
+    only_beyond(leads, lambda metres: shorter(metres, "grid_optimum_m"), text)
+    reach = 2 * end_reach(ROBOT.radius + 0.05, 0.25)
+    only_beyond(reach, lambda metres: shorter(metres, "grid_optimum_m", replans=(by_cells,)), text)
 
 
 def test_the_plan_is_as_long_as_its_cells():

@@ -12,6 +12,7 @@ from antdrive.sim.log.rollout import FORMS
 from benchmarks.forged_fields import ENTRIES, POOL
 from benchmarks.forged_logs import KINDS, LEVELS, Log, digest
 from benchmarks.forgeries import Finding, accepted, all_findings, drawn, forged, found, genuine_drives, more_drives
+from benchmarks.kinds import CROSSED, STILL
 from tests.records import changed
 
 #: What is said of a forgery, for the checks that nothing else covers: the drive, and words of the sentence.
@@ -26,7 +27,7 @@ SENTENCES = {
     "a plan along the wall": ("turtlebot", "the robot is"),
     "a plan that costs half": ("jackal", "cost_m: "),
     "a route with 5 m more": ("jackal", "length_m: "),
-    "an optimum longer than the plan": ("jackal", "is longer than the plan's"),
+    "an optimum longer than the plan": ("jackal", "is longer than the shortest path in its world"),
     "an optimum shorter than the straight line": ("jackal", "start and goal are farther apart"),
     "nothing perceived among movers": ("turtlebot, movers", "must not be null among movers"),
     "movers perceived where there are none": ("turtlebot", "must be null without movers"),
@@ -49,6 +50,14 @@ NOISE = {
 }
 
 
+#: Kinds of drives that have the arrays and keys that the eight by hand lack.
+KINDS_OF_DRIVES = (
+    ("disc", "none", "lidar", 1.0, "astar"),
+    ("exact", "given", STILL, 1.0, "dijkstra"),
+    ("auto", "given", STILL, 0.0, "sipp"),
+)
+
+
 @pytest.fixture(scope="module")
 def drives():
     return genuine_drives()
@@ -61,7 +70,7 @@ def all_drives(drives):
     chosen = changed(drives["jackal, noise"], "record", margin_choice=choice)
     found = {
         **drives,
-        **more_drives(["mapless, matching, lidar", "ants, noise", "footprint kept clear"]),
+        **more_drives([{**dict(zip(CROSSED, kind, strict=True)), "planner": one} for *kind, one in KINDS_OF_DRIVES]),
         "chosen margin": chosen,
     }
     POOL[:] = [log.record.as_dict() for log in found.values()]

@@ -8,7 +8,7 @@ count up to the contact.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -17,11 +17,11 @@ from antdrive.base.types import Floats
 from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
 from antdrive.sim.log.ending import false_endings
-from antdrive.sim.log.record import DECISION
+from antdrive.sim.log.metrics import driven_length_m, succeeded
+from antdrive.sim.log.record import DECISION, free_radius
 from antdrive.sim.log.rollout import Rollout, estimates_of
-from antdrive.worlds.route import end_reach, longest_line
+from antdrive.worlds.route import NEAR, longest_line, short_of_goal
 
-NEAR = 1.5  # largest distance from a route's end to a point with room [cells]
 JUST_ROOM = 1e-6  # a goal with at most this much more room than the inflation may count as too narrow [m]
 ROUTE_SLACK = 0.012  # smoothed routes keep the inflation; logged replans are rounded to 0.1 mm [m]
 SAME_LENGTH = 1e-6  # relative tolerance of lengths that are computed twice
@@ -31,17 +31,15 @@ POINT_SPACING = 0.05  # spacing of the route points whose clearance is checked [
 
 def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
     """Yield every contradiction of the plan with the world, itself or the rows."""
+    if not rollout.record.exploring:  # else plans refer to the occupancy map, in the frame of its odometry
+        yield from _check_routes(rollout)
+        yield from _check_cells(rollout)
+        yield from _check_cost(rollout)
+        yield from _check_followed(rollout, end)
+    yield from _check_length(rollout)
     yield from _check_optima(rollout)
-    if rollout.record.exploring:  # its plans refer to the occupancy map, in the frame of its odometry
-        yield from _check_movers_known(rollout)
-        yield from _check_replans(rollout)
-        return
-    yield from _check_routes(rollout)
-    yield from _check_cells(rollout)
-    yield from _check_lengths(rollout)
     yield from _check_movers_known(rollout)
     yield from _check_replans(rollout)
-    yield from _check_followed(rollout, end)
 
 
 def _by_cells(rollout: Rollout) -> bool:
@@ -68,10 +66,20 @@ def _check_routes(rollout: Rollout) -> Iterator[str]:
 
 
 def _short_of_goal(rollout: Rollout) -> float:
-    """Return how far from the goal the route may end [m]; routes end short of goals in narrow places."""
-    task, near = rollout.record.task, NEAR * rollout.record.cell
-    room = float(_room(rollout, np.array([task.goal]))[0])
-    return max(near, task.goal_tolerance) if room < rollout.record.inflate + JUST_ROOM else near
+    """Return how far from the goal the route may end [m].
+
+    It ends short of a goal without room for the disc. For a footprint it ends at its last cell where the straight from there to
+    the goal, or the turn to it, is not clear.
+    """
+    record = rollout.record
+    if record.footprint_margin is None and _has_room(rollout, record.inflate):
+        return NEAR * record.cell
+    return short_of_goal(record.task.goal_tolerance, record.cell)
+
+
+def _has_room(rollout: Rollout, radius: float) -> bool:
+    """Return whether a disc of a radius [m] surely fits at the goal."""
+    return float(_room(rollout, np.array([rollout.record.task.goal]))[0]) >= radius + JUST_ROOM
 
 
 def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
@@ -81,12 +89,14 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
     """
     record = rollout.record
     points = _spaced(route)
-    keeps, what, room = record.inflate, "inflation", _room
-    if record.footprint_margin is not None:
-        keeps, what, room = record.footprint_margin, "margin", _room_of_footprint
-    rooms = room(rollout, points)
-    own = min(keeps, float(rooms[0])) if name == "route" else -math.inf
-    leaving = np.hypot(*(points - route[0]).T) <= end_reach(record.inflate, record.cell)
+    if record.footprint_margin is None:
+        keeps, what, rooms = record.inflate, "inflation", _room(rollout, points)
+        begin = rooms[0]
+    else:
+        keeps, what, rooms = record.footprint_margin, "margin", _room_of_footprint(rollout, points)
+        begin = footprint_clearance(record.task.world, record.robot.footprint, record.task.start)[0]
+    own = min(keeps, float(begin)) if name == "route" else -math.inf
+    leaving = np.hypot(*(points - route[0]).T) <= record.reach[0]
     needed = np.where(leaving, own, keeps)
     worst = int((rooms - needed).argmin())
     if not rooms[worst] >= needed[worst] - ROUTE_SLACK:
@@ -124,7 +134,7 @@ def _room_of_footprint(rollout: Rollout, points: Floats) -> Floats:
     steps = np.diff(points, axis=0)
     ahead = np.arctan2(steps[:, 1], steps[:, 0])
     before, after = np.append(ahead[:1], ahead), np.append(ahead, ahead[-1:])
-    behind = np.hypot(*(points - points[0]).T) <= end_reach(record.inflate, record.cell)
+    behind = np.hypot(*(points - points[0]).T) <= record.reach[0]
     rooms = [
         footprint_clearance(record.task.world, record.robot.footprint, np.column_stack([points, yaw]))
         for yaw in (
@@ -147,71 +157,93 @@ def _check_cells(rollout: Rollout) -> Iterator[str]:
         return
     if (np.abs(np.diff(cells, axis=0)) > 1).any():
         yield "cells: must be neighbours on the grid"
-    reach = end_reach(record.inflate, record.cell) + SAME_LENGTH
-    for lead, does, end in zip(_leads(rollout), ("begin", "end"), ("start", "goal"), strict=True):
-        if lead > reach:
+    ends = zip(_leads(rollout), record.reach, ("begin", "end"), ("start", "goal"), strict=True)
+    for lead, reach, does, end in ends:
+        if lead > reach + SAME_LENGTH:
             yield f"cells: {does} {lead:.3g} m from the task's {end}"
 
 
 def _leads(rollout: Rollout) -> tuple[float, float]:
-    """Return the distances of the first cell from the start and of the last from the goal [m]; 0 without cells."""
+    """Return the distances of the first cell from the start and of the last from the goal [m]; the largest without cells."""
     if not len(rollout.cells):
-        return 0.0, 0.0
-    task, (first, last) = rollout.record.task, _centres(rollout)[[0, -1]]
+        return rollout.record.reach
+    task, cells = rollout.record.task, rollout.cells[[0, -1], ::-1]
+    first, last = (cells + 0.5) * rollout.record.cell + rollout.record.world.bounds[:2]
     return math.dist(first, task.start[:2]), math.dist(last, task.goal)
 
 
-def _centres(rollout: Rollout) -> Floats:
-    """Return the centres of the planned cells (P, 2) [m]."""
-    return np.asarray((rollout.cells[:, ::-1] + 0.5) * rollout.record.cell + rollout.record.world.bounds[:2])
-
-
-def _check_lengths(rollout: Rollout) -> Iterator[str]:
-    """Check that the plan's length is that of its cells, and not below the optimum."""
-    plan, cell = rollout.record.plan, rollout.record.cell
-    length = polyline_length(rollout.cells) * cell
-    slack = SAME_LENGTH * max(1.0, length)
+def _check_cost(rollout: Rollout) -> Iterator[str]:
+    """Check that the plan's cost is the length of its cells."""
+    plan, length = rollout.record.plan, polyline_length(rollout.cells) * rollout.record.cell
     if plan.cost_m is None:
         if plan.grid_optimum_m is not None:
             yield f"record.plan.cost_m: must not be null, since the grid has a path of {plan.grid_optimum_m:.6g} m"
-    elif abs(plan.cost_m - length) > slack:
+    elif abs(plan.cost_m - length) > SAME_LENGTH * max(1.0, length):
         yield f"record.plan.cost_m: {plan.cost_m:.6g} m, but the cells are {length:.6g} m long"
-    elif plan.grid_optimum_m is not None and plan.grid_optimum_m > plan.cost_m + slack:
-        yield f"record.plan.grid_optimum_m: {plan.grid_optimum_m:.6g} m is longer than the plan's {plan.cost_m:.6g} m"
-    leads = sum(_leads(rollout))
-    if not _by_cells(rollout) and plan.length_m < _straight(rollout, leads):
+
+
+def _check_length(rollout: Rollout) -> Iterator[str]:
+    """Check that the plan's line leads from start to goal, and is no longer than its cells allow."""
+    record, plan, leads = rollout.record, rollout.record.plan, sum(_leads(rollout))
+    if not _by_cells(rollout) and plan.length_m < _straight(rollout) - max(leads, 2 * NEAR * record.cell):
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but start and goal are farther apart"
-    free = plan.euclidean_optimum_m
-    if plan.cost_m is not None and free is not None and free > plan.cost_m + leads + slack and _is_clear(rollout):
-        yield f"record.plan.euclidean_optimum_m: {free:.6g} m is longer than the plan's {plan.cost_m + leads:.6g} m"
-    if plan.cost_m is not None and plan.length_m > longest_line(plan.cost_m, leads, cell) + slack:
+    if plan.cost_m is None:
+        return
+    if plan.length_m > longest_line(plan.cost_m, leads, record.cell) + SAME_LENGTH * max(1.0, plan.cost_m):
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
 
 
-def _straight(rollout: Rollout, leads: float) -> float:
-    """Return a lower bound of every path's length [m]; ends may lead away by `leads` [m]."""
-    task = rollout.record.task
-    return math.dist(task.start[:2], task.goal) - max(leads, 2 * NEAR * rollout.record.cell)
-
-
-def _is_clear(rollout: Rollout) -> bool:
-    """Return whether the cells lead from start to goal with more room than the inflation; contact closes a free path."""
-    record = rollout.record
-    if _by_cells(rollout):
-        return False
-    between = POINT_SPACING**2 / (8 * record.inflate) + JUST_ROOM  # the largest room lost between two points
-    return bool(_room(rollout, _spaced(_centres(rollout))).min() > record.inflate + between)
+def _straight(rollout: Rollout) -> float:
+    """Return the distance of the goal from the start [m]."""
+    return math.dist(rollout.record.task.start[:2], rollout.record.task.goal)
 
 
 def _check_optima(rollout: Rollout) -> Iterator[str]:
-    """Check that the shortest paths are no shorter than the straight line. `verify --world` computes them."""
-    record = rollout.record
-    elsewhere = record.exploring or _by_cells(rollout)  # the cells end elsewhere
-    leads = 2 * end_reach(record.inflate, record.cell) if elsewhere else sum(_leads(rollout))
-    for key in ("euclidean_optimum_m", "grid_optimum_m"):
-        value = getattr(record.plan, key)
-        if value is not None and value < _straight(rollout, leads):
+    """Check that the shortest paths are no shorter than the straight line and no longer than the paths in the log.
+
+    A path in the log may pass where those of the optimum do not: a plan on the occupancy map with less margin, a robot that left
+    its route. A search in the record's world then decides, as it does without a path in the log, or if the optimum is null.
+    """
+    record, plan, straight = rollout.record, rollout.record.plan, _straight(rollout)
+    leads = sum(record.reach if _by_cells(rollout) else _leads(rollout))
+    narrow = not _has_room(rollout, free_radius(record.robot, record.margin, record.footprint_margin))
+    paths = [driven_length_m(rollout) + record.task.goal_tolerance] if succeeded(rollout) else []
+    cells = plan.length_m if plan.cost_m is None else plan.cost_m
+    if not record.exploring:
+        route = polyline_length(rollout.route) + math.dist(rollout.route[-1], record.task.goal)
+        paths += [cells + leads, route]
+    doubted = {}
+    for key, short, longest in (
+        ("grid_optimum_m", leads, paths if record.exploring else [cells]),
+        ("euclidean_optimum_m", record.task.goal_tolerance * narrow, paths),
+    ):
+        value, slack = getattr(plan, key), SAME_LENGTH * max(1.0, straight)
+        if value is not None and value < straight - short - slack:
             yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
+        elif value is None or value > min(longest, default=0.0) + slack:
+            doubted[key] = value
+    if doubted:
+        yield from _longer_than_shortest(rollout, doubted)
+
+
+def _longer_than_shortest(rollout: Rollout, doubted: Mapping[str, float | None]) -> Iterator[str]:
+    """Yield the optima by key [m] that are longer than the shortest paths in the record's world, or null where it has one."""
+    from antdrive.sim.recording import optima_of  # imports the compiler
+
+    record = rollout.record
+    try:
+        found = optima_of(record.task, record.cell, record.robot, record.margin, record.footprint_margin)
+    except ValueError as error:  # the grid has too many cells
+        yield f"record.{error}"
+        return
+    for key, shortest in zip(("grid_optimum_m", "euclidean_optimum_m"), found, strict=True):
+        if key not in doubted or (value := doubted[key]) == shortest:
+            continue
+        if value is None:
+            yield f"record.plan.{key}: must not be null; the shortest path in its world has {shortest:.6g} m"
+        elif shortest is None or value > shortest * (1 + SAME_LENGTH):
+            longest = "there is none" if shortest is None else f"that has {shortest:.6g} m"
+            yield f"record.plan.{key}: {value:.6g} m is longer than the shortest path in its world; {longest}"
 
 
 def _check_movers_known(rollout: Rollout) -> Iterator[str]:

@@ -18,6 +18,7 @@ from antdrive.base.plane import arc_lengths
 from antdrive.base.types import Floats, Point
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout, estimates_of
+from antdrive.worlds.route import short_of_goal
 
 Rows: TypeAlias = npt.NDArray[np.int64]
 
@@ -30,7 +31,6 @@ ROUNDING = 1e-9  # estimates are logged as errors of the poses [m]
 AT_ROUTE_END = 0.05  # a robot with at most this much of its route left is at its end [m]
 BESIDE_END = 1.0  # avoidance may take a robot at most this far off the end of its route [m]
 STAYED = 0.1  # a stuck robot gets at most this much farther in `STUCK_TIME`, straight or along its route [m]
-NEAR_GOAL = 1.5  # a route that ends farther from the goal leads elsewhere, unless within the tolerance [cells]
 AVOID, ROTATE = "avoid", "rotate"  # names of rules in `record.limiters`
 TURNS = (ROTATE, "braking", "done", "sight")  # those that may limit a robot that turns on the spot, or brakes for it
 BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good moves less [m]
@@ -193,7 +193,7 @@ def _at_route_end(rollout: Rollout) -> bool:
     task, cell, places = rollout.record.task, rollout.record.cell, estimates_of(rollout)[:, :2]
     rows, route = rollout.legs()[-1]
     near = places[rows][np.hypot(*(places[rows] - route[-1]).T) <= BESIDE_END]
-    if math.dist(route[-1], task.goal) > max(task.goal_tolerance, NEAR_GOAL * cell) or not len(near):
+    if math.dist(route[-1], task.goal) > short_of_goal(task.goal_tolerance, cell) or not len(near):
         return False
     got = float(_arcs(route, near).max())
     return math.dist(places[-1], route[-1]) <= BESIDE_END and got >= float(arc_lengths(route)[-1]) - AT_ROUTE_END

@@ -32,6 +32,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
 from antdrive.worlds.limits import MAX_COORDINATE
+from antdrive.worlds.route import LEAD, end_reach
 from antdrive.worlds.world import Disc, Task, World
 
 if TYPE_CHECKING:
@@ -364,6 +365,14 @@ class DriveRecord:
         """Clearance that plans keep from the footprint if any did, else from the disc [m]."""
         return self.margin if self.footprint_margin is None else self.footprint_margin
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Largest distances of the first planned cell from the start, and of the last from the goal [m]."""
+        near = end_reach(self.inflate, self.cell)
+        if self.footprint_margin is None:
+            return near, near
+        return max(near, LEAD), max(near, self.task.goal_tolerance)
+
     @classmethod
     def held(cls, setting: str) -> bool:
         """Return whether a key of the record holds a setting."""
@@ -618,6 +627,19 @@ def hashes_of_configuration(fields: Mapping[str, Any]) -> dict[str, str]:
 def canonical_hash(value: Task | RobotSpec) -> str:
     """Return the SHA-256 of a world with start and goal, or of a robot, as `hashes_of` computes it for logs."""
     return _sha256(_meaning(value))
+
+
+def free_radius(robot: RobotSpec, margin: float, footprint_margin: float | None) -> float:
+    """Return the radius of the largest disc around the axle that plans keep clear [m].
+
+    Args:
+        robot: the robot
+        margin: clearance of plans on top of the robot's radius [m]
+        footprint_margin: clearance of plans that keep the footprint clear [m]; None for those of the disc
+    """
+    if footprint_margin is None:
+        return robot.radius + margin
+    return robot.footprint.inner_radius + footprint_margin
 
 
 def differences(record: DriveRecord, *, task: Task | None = None, robot: RobotSpec | None = None) -> Iterator[str]:
