@@ -48,7 +48,24 @@ class EndlessLater(Right):
 
 class ExitsLater(Right):
     def before(self): self.count > 1 and os._exit(0)
+
+class Threads(Right):
+    def before(self):
+        import threading
+        threading.Thread(target=time.sleep, args=(99,), daemon=False).start()
 """
+#: What a planner may do to the process; the run goes on and keeps its results.
+CHANGES = {
+    "streams": "import sys; sys.stdout.close(); sys.stderr.close(); sys.stdin.close()",
+    "replaced": "import sys; sys.stdout = sys.stderr = sys.stdin = None",
+    "files": "os.closerange(0, 3)",
+    "folder": "os.chdir('/')",
+    "depth": "import sys, inspect; sys.setrecursionlimit(len(inspect.stack(0)) + 40)",
+    "warnings": "import warnings; warnings.simplefilter('error')",
+    "floats": "import numpy; numpy.seterr(all='raise')",
+    "variables": "os.environ.clear()",
+    "umask": "os.umask(0o777)",
+}
 OVER = "took longer than the limit of 0.3 s"
 EXITS = "(mine.py:7) ended the process with exit code 0"
 #: What the error says of each class of the file, after its name.
@@ -175,6 +192,23 @@ def test_a_signal_ends_a_supervised_command_as_any_other(folder, number, code):
         started.communicate()
     assert started.returncode == code
     assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_what_a_planner_changes_in_the_process_costs_no_result(folder, antdrive, monkeypatch, name):
+    monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
+    after = f"answer = load_planner('astar').plan(query, rng); {CHANGES[name]}; return answer"
+    (folder / "mine.py").write_text(PLANNERS.replace('return load_planner("astar").plan(query, rng)', after))
+    code, out, err = antdrive("run", "moving.yaml", "-p", "mine.py:Right", "--no-figures", "-o", "out")
+    assert (code, err) == (0, ""), out
+    assert "certified collision-free" in out
+    assert (folder / "out" / "result.json").stat().st_mode & 0o777 == 0o644
+
+
+def test_a_thread_that_a_planner_leaves_running_does_not_keep_the_command(folder):
+    done = process("run", "empty", "-p", "mine.py:Threads", "--no-figures", "-o", "out", limit="off")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "certified collision-free" in done.stdout
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "soon"])
