@@ -131,6 +131,22 @@ def test_a_file_that_never_ends_or_exits_on_import_is_named(folder, code, words)
     assert said_in_one_line(process("plan", "empty", "--planner", "import.py:Mine"), "import.py", words)
 
 
+def test_a_sweep_and_a_comparison_count_each_error_and_end_as_a_run_does(folder, antdrive, monkeypatch):
+    monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
+    raising = "class Raises:\n    def plan(self, query, rng): raise ValueError('lost')\n"
+    (folder / "mine.py").write_text(PLANNERS + raising)
+    planners = "-p", "mine.py:Raises", "-p", "astar"
+    counted = "antdrive: planner Raises raised ValueError: lost (mine.py:44) (2 runs)\n"
+    code, out, err = antdrive("sweep", "-w", "empty", *planners, "--seeds", "2", "-o", "camp", "--jobs", "1", "--json")
+    assert code == 3
+    assert err.endswith(counted)
+    assert json.loads(out)["faults"] == {"planner Raises raised ValueError: lost (mine.py:44)": 2}
+    code, _, err = antdrive("compare", "empty", *planners, "--seeds", "2", "--no-figures", "-o", "out")
+    assert code == 3
+    assert err.count("Raises") == 1
+    assert counted in err
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "names", ["Exits Right", pytest.param("Endless Compiled Crashes Right", marks=pytest.mark.slow)]
@@ -139,13 +155,15 @@ def test_a_sweep_records_each_of_them_and_goes_on(folder, antdrive, monkeypatch,
     monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
     planners = ", ".join(f"mine.py:{name}" for name in names.split())
     (folder / "camp.yaml").write_text(f"schema: 1\nworlds: [empty]\nseeds: 1\nplanners: [{planners}]\n")
-    assert antdrive("sweep", "camp.yaml", "-o", "camp", "--jobs", "1", "--plan-limit", "3")[0] == 0
+    code, _, err = antdrive("sweep", "camp.yaml", "-o", "camp", "--jobs", "1", "--plan-limit", "3")
+    assert code == 3
     rows = pyarrow.parquet.read_table(folder / "camp" / "runs.parquet").to_pylist()
     found = {row["planner"].removeprefix("mine.py:"): (row["outcome"], row["reason"]) for row in rows}
     assert found.pop("Right")[0] == "succeeded"
     for name, (outcome, reason) in found.items():
         assert outcome == "planner_fault"
         assert reason == f"planner {name} {ENDS[name].replace('0.3', '3')}"
+        assert f"antdrive: {reason} (1 run)\n" in err
 
 
 def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypatch):
@@ -153,7 +171,7 @@ def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypat
     planners = "-p", "a=mine.py:Endless", "-p", "b=mine.py:Right"
     code, out, err = antdrive("compare", "empty", *planners, "--no-figures", "--json", "-o", "out", "--plan-limit", "3")
     assert code == 3
-    assert err.startswith(f"antdrive: planner Endless {ENDS['Endless'].replace('0.3', '3')}")
+    assert err.startswith(f"antdrive: planner Endless {ENDS['Endless'].replace('0.3', '3')} (1 run)\n")
     runs = json.loads(out)["runs"]
     assert runs["a"]["outcome"] == "planner_fault"
     assert "limit of 3 s" in runs["a"]["reason"]

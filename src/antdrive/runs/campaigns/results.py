@@ -13,7 +13,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.optional import parquet_library
-from antdrive.runs.campaigns.rows import NOT_CANONICAL
+from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, PLANNER_FAULT
 from antdrive.runs.campaigns.store import GRID_FILE, TABLE, joined, read_manifest
 from antdrive.runs.statistics.run_table import FOLDER, RunTable, column_named, matching, merged
 
@@ -63,6 +63,13 @@ class SweepResults:
     def outcomes(self) -> dict[str, int]:
         """The number of runs by outcome, the most frequent first."""
         return dict(Counter(self.table["outcome"].to_pylist()).most_common())
+
+    @property
+    def faults(self) -> dict[str, int]:
+        """The number of runs by error of a planner or of antdrive, the most frequent first."""
+        prefix = {PLANNER_FAULT: "", CRASHED: "internal error: "}
+        rows = zip(self.table["outcome"].to_pylist(), self.table["reason"].to_pylist(), strict=True)
+        return dict(Counter(prefix[outcome] + reason for outcome, reason in rows if outcome in prefix).most_common())
 
     def medians(self) -> Iterator[tuple[str, ...]]:
         """Yield a table row for each planner: its successes, and the median and extremes of `MEDIANS` over them."""
