@@ -137,8 +137,8 @@ def _causes(run: Run, baseline: Baseline, elsewhere: Callable[[], str | None]) -
     s, hashes = run.scenario, configuration_hashes(run)
     same_drive = baseline.drive_digest == ("" if run.rollout is None else run.rollout.drive_digest)
     changed = _changed(hashes, baseline)
-    suspected = not same_drive and {*changed} <= {PLANNER_FILE}
-    if suspected and is_unsteady(s, fingerprint_of(s, run.plan, run.rollout), elsewhere):
+    suspected, first = not same_drive and {*changed} <= {PLANNER_FILE}, fingerprint_of(s, run.plan, run.rollout)
+    if suspected and (is_unsteady(s, first) if changed else is_unsteady(s, first, elsewhere)):
         yield UNSTEADY
     elif not changed and "settings" in baseline.hashes:
         same, code = _same_parts(s, baseline)
