@@ -50,7 +50,7 @@ def barn(
     Prints the results table beside published scores.
 
     Repeat the command to resume it. Exit code 0: all runs are done, or the log has 10 trials of each of the 50 public worlds,
-    whatever their outcomes; 3: a planner or antdrive raised an error in a run.
+    whatever their outcomes; 3: as `sweep`.
     """
     if score:
         if with_map or films:

@@ -79,8 +79,8 @@ def sweep(
     """Run a campaign: every combination of its settings.
 
     The output folder holds one row per run as Parquet. Repeat the command to resume, or to add runs after a change. Options
-    override the keys of the campaign file. Exit code 0: all runs are done, whatever their outcomes; 3: a
-    planner or antdrive raised an error in one, and the table has it as planner_fault or crashed.
+    override the keys of the campaign file. Exit code 0: all runs are done, whatever their outcomes; 3:
+    an error of a planner or of antdrive.
     """
     from antdrive.runs.campaigns.expanding import expand
     from antdrive.runs.campaigns.sweeping import differences, missing_runs
