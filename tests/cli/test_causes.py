@@ -11,6 +11,7 @@ import pybullet  # noqa: F401
 import pytest
 
 from antdrive import list_robots
+from antdrive.base import kernel_cache
 from antdrive.cli.testing import evaluation
 from antdrive.planners import user_code
 from antdrive.sim.driving.rules import Pursuit
@@ -126,6 +127,7 @@ def folder(antdrive, pytester, monkeypatch):
     monkeypatch.chdir(pytester.path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(pytester.path / "cache"))
     monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "0.2")
+    monkeypatch.setattr(kernel_cache, "on_compile", kernel_cache.ignore)  # the plugin sets its own
     monkeypatch.setattr(evaluation, "in_new_process", lambda call: None)
     monkeypatch.setattr(evaluation, "write_artefacts", lambda *given, **named: {})
     files = {"s.drive.yaml": SUITE, "w.yaml": WORLD, "mine.py": PLANNER, "beside.py": "BITS = 0\n"}
