@@ -48,7 +48,24 @@ class EndlessLater(Right):
 
 class ExitsLater(Right):
     def before(self): self.count > 1 and os._exit(0)
+
+class Threads(Right):
+    def before(self):
+        import threading
+        threading.Thread(target=time.sleep, args=(99,), daemon=False).start()
 """
+#: What a planner may do to the process; the run goes on and keeps its results.
+CHANGES = {
+    "streams": "import sys; sys.stdout.close(); sys.stderr.close(); sys.stdin.close()",
+    "replaced": "import sys; sys.stdout = sys.stderr = sys.stdin = None",
+    "files": "os.closerange(0, 3)",
+    "folder": "os.chdir('/')",
+    "depth": "import sys, inspect; sys.setrecursionlimit(len(inspect.stack(0)) + 40)",
+    "warnings": "import warnings; warnings.simplefilter('error')",
+    "floats": "import numpy; numpy.seterr(all='raise')",
+    "variables": "os.environ.clear()",
+    "umask": "os.umask(0o777)",
+}
 OVER = "took longer than the limit of 0.3 s"
 EXITS = "(mine.py:7) ended the process with exit code 0"
 #: What the error says of each class of the file, after its name.
@@ -114,6 +131,22 @@ def test_a_file_that_never_ends_or_exits_on_import_is_named(folder, code, words)
     assert said_in_one_line(process("plan", "empty", "--planner", "import.py:Mine"), "import.py", words)
 
 
+def test_a_sweep_and_a_comparison_count_each_error_and_end_as_a_run_does(folder, antdrive, monkeypatch):
+    monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
+    raising = "class Raises:\n    def plan(self, query, rng): raise ValueError('lost')\n"
+    (folder / "mine.py").write_text(PLANNERS + raising)
+    planners = "-p", "mine.py:Raises", "-p", "astar"
+    counted = "antdrive: planner Raises raised ValueError: lost (mine.py:44) (2 runs)\n"
+    code, out, err = antdrive("sweep", "-w", "empty", *planners, "--seeds", "2", "-o", "camp", "--jobs", "1", "--json")
+    assert code == 3
+    assert err.endswith(counted)
+    assert json.loads(out)["faults"] == {"planner Raises raised ValueError: lost (mine.py:44)": 2}
+    code, _, err = antdrive("compare", "empty", *planners, "--seeds", "2", "--no-figures", "-o", "out")
+    assert code == 3
+    assert err.count("Raises") == 1
+    assert counted in err
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "names", ["Exits Right", pytest.param("Endless Compiled Crashes Right", marks=pytest.mark.slow)]
@@ -122,13 +155,15 @@ def test_a_sweep_records_each_of_them_and_goes_on(folder, antdrive, monkeypatch,
     monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
     planners = ", ".join(f"mine.py:{name}" for name in names.split())
     (folder / "camp.yaml").write_text(f"schema: 1\nworlds: [empty]\nseeds: 1\nplanners: [{planners}]\n")
-    assert antdrive("sweep", "camp.yaml", "-o", "camp", "--jobs", "1", "--plan-limit", "3")[0] == 0
+    code, _, err = antdrive("sweep", "camp.yaml", "-o", "camp", "--jobs", "1", "--plan-limit", "3")
+    assert code == 3
     rows = pyarrow.parquet.read_table(folder / "camp" / "runs.parquet").to_pylist()
     found = {row["planner"].removeprefix("mine.py:"): (row["outcome"], row["reason"]) for row in rows}
     assert found.pop("Right")[0] == "succeeded"
     for name, (outcome, reason) in found.items():
         assert outcome == "planner_fault"
         assert reason == f"planner {name} {ENDS[name].replace('0.3', '3')}"
+        assert f"antdrive: {reason} (1 run)\n" in err
 
 
 def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypatch):
@@ -136,7 +171,7 @@ def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypat
     planners = "-p", "a=mine.py:Endless", "-p", "b=mine.py:Right"
     code, out, err = antdrive("compare", "empty", *planners, "--no-figures", "--json", "-o", "out", "--plan-limit", "3")
     assert code == 3
-    assert err.startswith(f"antdrive: planner Endless {ENDS['Endless'].replace('0.3', '3')}")
+    assert err.startswith(f"antdrive: planner Endless {ENDS['Endless'].replace('0.3', '3')} (1 run)\n")
     runs = json.loads(out)["runs"]
     assert runs["a"]["outcome"] == "planner_fault"
     assert "limit of 3 s" in runs["a"]["reason"]
@@ -175,6 +210,23 @@ def test_a_signal_ends_a_supervised_command_as_any_other(folder, number, code):
         started.communicate()
     assert started.returncode == code
     assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_what_a_planner_changes_in_the_process_costs_no_result(folder, antdrive, monkeypatch, name):
+    monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
+    after = f"answer = load_planner('astar').plan(query, rng); {CHANGES[name]}; return answer"
+    (folder / "mine.py").write_text(PLANNERS.replace('return load_planner("astar").plan(query, rng)', after))
+    code, out, err = antdrive("run", "moving.yaml", "-p", "mine.py:Right", "--no-figures", "-o", "out")
+    assert (code, err) == (0, ""), out
+    assert "certified collision-free" in out
+    assert (folder / "out" / "result.json").stat().st_mode & 0o777 == 0o644
+
+
+def test_a_thread_that_a_planner_leaves_running_does_not_keep_the_command(folder):
+    done = process("run", "empty", "-p", "mine.py:Threads", "--no-figures", "-o", "out", limit="off")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "certified collision-free" in done.stdout
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "soon"])

@@ -33,6 +33,7 @@ from numba.core.types import functions
 
 from antdrive.base import kernel_cache
 from antdrive.base._kernels_interpreter import ALLOWANCE, interpret
+from antdrive.base.files import MAX_BYTES, read_bytes
 from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
 
 _settings: Any = config  # its attributes are set on import
@@ -76,10 +77,10 @@ class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
                     other.unlink()
 
     def load(self, key: Any) -> Any:
-        try:
-            found = pickle.loads(self._path(key).read_bytes())  # noqa: S301 - no less safe than the code in it
-        except FileNotFoundError:
+        path = self._path(key)
+        if not path.exists():
             return None
+        found = pickle.loads(read_bytes(path, MAX_BYTES))  # noqa: S301 - no less safe than the code in it
         *is_for, data = found
         return data if is_for == [self._version, self._source_stamp, key] else None
 

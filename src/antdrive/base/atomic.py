@@ -7,6 +7,7 @@ import os
 import platform
 import re
 import shutil
+import stat
 import tempfile
 import zlib
 from collections.abc import Callable, Iterator
@@ -124,7 +125,10 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
         try:
             made.enter_context(made_folder(path.parent))
             while True:
-                handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+                handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0), 0o666)
+                if not stat.S_ISREG(os.fstat(handle).st_mode):
+                    os.close(handle)
+                    raise InputError(f"{path}: is not a file; remove it")
                 try:
                     fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:

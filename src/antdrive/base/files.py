@@ -91,7 +91,7 @@ def open_regular(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES, kind:
             raise input_error(os.fspath(path), problem)
         if found.st_size > max_bytes:
             raise _too_large(path, max_bytes)
-        return open(path, "rb", opener=_without_waiting)
+        return open(path, "rb", opener=without_waiting)
     except InputError:
         raise
     except (OSError, ValueError) as error:
@@ -130,8 +130,8 @@ def unreadable(path: str | os.PathLike[str], error: OSError | ValueError) -> Inp
 _SPECIAL = {stat.S_IFDIR: "a directory", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 
 
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file without waiting for the writer of a pipe."""
+def without_waiting(path: str, flags: int) -> int:
+    """Open a file without waiting for the other end of a pipe; an opener for `open`."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from antdrive.base import supervision
 from antdrive.base.errors import InputError, Terminated, input_error
+from antdrive.base.process_state import ProcessState
 
 LIMIT = "ANTDRIVE_PLAN_LIMIT"  # variable of the environment with the limit on planning time, seconds or "off"
 USUAL_LIMIT = "600"  # of the command line
@@ -92,7 +93,7 @@ class UserCode:
 
     `InputError`, errors of the caller's choice, Ctrl-C and SIGTERM pass unchanged. A `KeyboardInterrupt` that user
     code raises without Ctrl-C is an error like any other, and so is `OverLimit`, which an alarm raises after the limit on
-    planning time. Blocks within a block of the main thread belong to it.
+    planning time. The block restores the `ProcessState`. Blocks within a block of the main thread belong to it.
 
     Args:
         who: the code's name in messages about the end of the process
@@ -122,6 +123,7 @@ class UserCode:
         self.limit = plan_limit()
         if not self._own:
             supervision.begin(self._who, self.limit)
+            self._state = ProcessState()
             self._before = signal.getsignal(signal.SIGINT)
         UserCode._outermost = self
         if callable(self._before):
@@ -135,6 +137,8 @@ class UserCode:
     ) -> None:
         outermost = UserCode._outermost is self
         if outermost:
+            if not self._own:
+                self._state.restore_depth()
             self._leave()
         if error is None or issubclass(type(error), self._passing):
             return
@@ -156,6 +160,7 @@ class UserCode:
         if callable(self._before) and signal.getsignal(signal.SIGINT) == self._interrupt:
             signal.signal(signal.SIGINT, self._before)
         if not self._own:
+            self._state.restore()
             supervision.end()
 
     def _interrupt(self, *signalled: Any) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
+import threading
 from typing import NoReturn, TextIO
 
 from antdrive.base import supervision
@@ -24,7 +26,12 @@ ENDS = {signal.SIGTERM: TERMINATED, signal.SIGHUP: HUNG_UP}  # exit codes of the
 def main() -> None:
     """Run the command line and exit with its code. User code runs in a supervised child of this process."""
     supervision.arm(_blame)
-    run_command()
+    try:
+        run_command()
+    except SystemExit as ended:
+        if any(not one.daemon for one in threading.enumerate() if one is not threading.main_thread()):
+            _leave_threads(int(ended.code or 0))
+        raise
 
 
 def run_command() -> None:
@@ -55,6 +62,12 @@ def run_command() -> None:
             _settle(stream)
     supervision.finish()
     sys.exit(code)
+
+
+def _leave_threads(code: int) -> NoReturn:
+    """Exit without waiting for threads that user code has left running."""
+    atexit._run_exitfuncs()  # what a usual exit does after its threads have ended
+    os._exit(code)
 
 
 def _blame(fault: str) -> NoReturn:

@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
 from antdrive.base.errors import visible
+from antdrive.cli.commands import DEBUG
 
 LAYOUT = "\n\t"  # control characters that lines may hold
 GOOD, BAD = "✓", "✗"  # signs of success and failure
@@ -148,6 +149,15 @@ def print_error(message: str) -> None:
     """Print one line on stderr; a stderr that cannot take it costs no results."""
     with suppress(OSError):
         _write(sys.stderr, f"antdrive: {visible(message, LAYOUT)}")
+
+
+def print_traceback(error: Exception) -> bool:
+    """Print an error's traceback on stderr if `--debug` is given; return whether it is."""
+    if debug := DEBUG in sys.argv[1:]:
+        import traceback
+
+        traceback.print_exception(error)
+    return debug
 
 
 def print_line(text: str = "") -> None:

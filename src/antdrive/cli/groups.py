@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib
 import shlex
-import sys
-import traceback
 from collections import Counter, UserDict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
@@ -16,7 +14,7 @@ import typer.main
 
 from antdrive.base.errors import FieldError, InputError, Terminated, input_error
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
-from antdrive.cli.console import print_error, print_line, report_compiling
+from antdrive.cli.console import print_error, print_line, print_traceback, report_compiling
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INTERRUPTED, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.listings import version_line
 from antdrive.cli.options import with_plan_limit
@@ -209,9 +207,7 @@ def print_exception(error: Exception) -> None:
     """Print one line about a planner error or internal error, after the traceback if `--debug` is given."""
     from antdrive.planners import PlannerError
 
-    debug = DEBUG in sys.argv[1:]
-    if debug:
-        traceback.print_exception(error)
+    debug = print_traceback(error)
     if isinstance(error, PlannerError):
         message = str(error)
     else:

@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.cli.console import bar, file_lines, marked, print_error, this_command
+from antdrive.cli.exits import INTERNAL_ERROR, SUCCEEDED
 from antdrive.runs.results_folder import free_folder, opened
 from antdrive.views.run_folder import check_folder
+
+MOST_FAULTS = 10  # printed errors
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
@@ -46,6 +49,15 @@ def print_idle_settings(scenarios: Sequence[Scenario], given: Collection[str] = 
 
     for note in idle_notes(scenarios, given):
         print_error(note)
+
+
+def print_faults(faults: Mapping[str, int]) -> int:
+    """Print errors of planners or antdrive with their numbers of runs on stderr. Return the exit code: success if none."""
+    for message, runs in list(faults.items())[:MOST_FAULTS]:
+        print_error(f"{message} ({runs} run{'s' if runs > 1 else ''})")
+    if len(faults) > MOST_FAULTS:
+        print_error(f"{len(faults) - MOST_FAULTS} more errors in {sum(list(faults.values())[MOST_FAULTS:])} runs")
+    return INTERNAL_ERROR if faults else SUCCEEDED
 
 
 def run_lines(run: Run, files: Mapping[str, str]) -> Iterator[str]:

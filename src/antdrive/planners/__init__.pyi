@@ -14,6 +14,7 @@ from .colonies.mmas_dstar import MaxMinDStar as MaxMinDStar
 from .colonies.mmas_dstar import PheromoneAgent as PheromoneAgent
 from .colonies.pfaco import PotentialFieldAnts as PotentialFieldAnts
 from .errors import PlannerError as PlannerError
+from .errors import is_built_in as is_built_in
 from .errors import planner_errors as planner_errors
 from .graph.apf import PotentialField as PotentialField
 from .graph.incremental import DStar as DStar

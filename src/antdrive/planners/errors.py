@@ -45,9 +45,14 @@ def planner_errors(planner: Planner, name: str = "") -> contextlib.AbstractConte
         raised = "" if issubclass(type(error), OverLimit) else "raised "
         return PlannerError(called, f"{raised}{error_text(error)} ({place_of(planner, error)})")
 
-    own = type(planner).__module__.startswith("antdrive.")
+    own = is_built_in(planner)
     who = f"planner {called}" if own else f"planner {called} ({place_of(planner)})"
     return UserCode(who, error_of, (PlannerError,), own)
+
+
+def is_built_in(planner: Planner) -> bool:
+    """Return whether a planner's class is antdrive's."""
+    return type(planner).__module__.startswith("antdrive.")
 
 
 def place_of(planner: Planner, error: BaseException | None = None) -> str:

@@ -141,8 +141,13 @@ def user_code_version(name: str) -> str:
 
 def module_hash(name: str) -> str:
     """Return the beginning of the hash of a module's file; empty without a file."""
-    file = getattr(sys.modules.get(name), "__file__", None)
-    return _hash(Path(file).read_bytes()) if file is not None and Path(file).is_file() else ""
+    file = module_file(name)
+    return _hash(_content(file)) if file.is_file() else ""
+
+
+def module_file(name: str) -> Path:
+    """Return the file of an imported module; one without a file, its name."""
+    return Path(getattr(sys.modules.get(name), "__file__", None) or name)
 
 
 def _hash(content: bytes) -> str:

@@ -82,7 +82,9 @@ def checked(query: Query, answer: PlanResult) -> PlanResult:
         reason = one_line(answer.reason) if answer.reason else ""
         return answer if reason == answer.reason else dataclasses.replace(answer, reason=reason)
     sane = isinstance(answer.wall_s, float) and 0 <= answer.wall_s < math.inf
-    return PlanResult(status=PlanStatus.INVALID, reason=problem, wall_s=answer.wall_s if sane else 0.0)
+    options = answer.options if type(answer.options) is dict else {}
+    wall = answer.wall_s if sane else 0.0
+    return PlanResult(status=PlanStatus.INVALID, reason=problem, wall_s=wall, options=options)
 
 
 def check_plan(query: Query, result: PlanResult) -> str:

@@ -1,15 +1,17 @@
 """Rerun: the scenario of a log driven again, and compared with the log value by value.
 
 The open loop of `antdrive.sim.driving.replay` needs no planner; the rerun plans, perceives and decides again. It compares
-every array, and every key of the record that does not declare itself a claim.
+every array, and every key of the record that does not declare itself a claim. A custom planner that does not repeat its own
+plan is named before anything else is blamed.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,16 +20,18 @@ import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
-from antdrive.planners import Planner, PlannerError
+from antdrive.planners import Planner, PlannerError, PlanResult, TimedPlan, is_built_in
 from antdrive.sim.driving.replay import ROUNDING, ReplayCheck, offsets, replay
 from antdrive.sim.log.record import PROOFS, Proof, plain_value
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS, Rollout
-from antdrive.sim.pipeline import driven
+from antdrive.sim.pipeline import driven, plan
 from antdrive.sim.rebuild import rebuilt
 from antdrive.sim.recording import versions
+from antdrive.sim.scenario import Scenario
 
 LONGER = 1.0  # a rerun may outlast its log by this time [s]
 LONGEST = 60  # characters of a value in a message
+UNSTEADY = "the planner gives another plan for the same seed; draw random numbers from rng only"
 
 
 @dataclass(frozen=True)
@@ -40,25 +44,72 @@ class Mismatch:
     rounded: bool = False  # whether the difference is within `ROUNDING`
 
 
-def replayed(rollout: Rollout, planner: Planner | str | None = None) -> ReplayCheck:
+def fingerprint(s: Scenario) -> str:
+    """Return a hash of a scenario's plan, and of its drive if the robot replans; of the message if the planner raises."""
+    try:
+        if s.moving or s.map == "none":
+            _, answer, rollout = driven(s)
+            return fingerprint_of(s, answer, rollout)
+        return fingerprint_of(s, plan(s)[1], None)
+    except PlannerError as error:
+        return str(error)
+
+
+def fingerprint_of(s: Scenario, answer: PlanResult, rollout: Rollout | None) -> str:
+    """Return the `fingerprint` of a scenario that was run.
+
+    Args:
+        s: the scenario
+        answer: its plan
+        rollout: the log of its drive; None without one
+    """
+    times = (answer.arrive, answer.leave) if isinstance(answer, TimedPlan) else ()
+    sha = hashlib.sha256(answer.status.name.encode())
+    for array in (answer.line, *times):
+        sha.update(array.tobytes())
+    if rollout is not None and (s.moving or s.map == "none"):
+        sha.update(rollout.drive_digest.encode())
+    return sha.hexdigest()
+
+
+def is_unsteady(s: Scenario, first: str, elsewhere: Callable[[], str | None] = lambda: None) -> bool:
+    """Return whether a custom planner gives another plan for the same seed, here or in a new process.
+
+    Args:
+        s: the scenario
+        first: `fingerprint_of` its run
+        elsewhere: returns `fingerprint(s)` of a new process; None if that is unknown
+    """
+    return not is_built_in(s.planner) and (fingerprint(s) != first or elsewhere() not in (None, first))
+
+
+def replayed(
+    rollout: Rollout, planner: Planner | str | None = None, elsewhere: Callable[[], str | None] = lambda: None
+) -> ReplayCheck:
     """Replay a log's commands, then drive its scenario again, and compare both with the log.
 
     Args:
         rollout: the log
         planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the registered
             planner of the record's name
+        elsewhere: returns `rerun_fingerprint(rollout, planner)` of a new process; None if that is unknown
 
     Raises:
         FieldError: the record's rates of physics and control do not fit.
     """
     check = replay(rollout)
     try:
-        again = rerun(rollout, planner)
+        s = rerun_scenario(rollout, planner)
+        answer, again = _driven(s, rollout)
     except (PlannerError, ValueError) as error:
         return dataclasses.replace(check, exact=False, problems=(*check.problems, f"replay: {error}"))
     found = sorted(mismatches(rollout, again), key=lambda one: one.row)
     wrong = [one for one in found if not one.rounded]
     problems = [*check.problems, *_sentences(wrong)]
+    if wrong and is_unsteady(s, fingerprint_of(s, answer, again), elsewhere):
+        problems.append(f"replay: {UNSTEADY}")
+    elif any(one.name == "cells" for one in wrong):  # `run` does not record that it was given a plan
+        problems.append("replay: another planner, or another version of it, made the log's plan")
     other = {name: version for name, version in versions().items() if rollout.record.versions.get(name) != version}
     if problems and other:
         logged = ", ".join(f"{name} {rollout.record.versions.get(name, 'of no version')}" for name in other)
@@ -69,6 +120,16 @@ def replayed(rollout: Rollout, planner: Planner | str | None = None) -> ReplayCh
         check = dataclasses.replace(check, position=most[0], turn=most[1], twist=most[2])
     rounded = tuple(one.name for one in found if one.rounded)
     return dataclasses.replace(check, exact=check.exact and not found, rounded=rounded, problems=tuple(problems))
+
+
+def rerun_fingerprint(rollout: Rollout, planner: Planner | str | None = None) -> str:
+    """Return the `fingerprint` of a log's scenario.
+
+    Args:
+        rollout: the log
+        planner: as in `rebuilt`
+    """
+    return fingerprint(rerun_scenario(rollout, planner))
 
 
 def rerun(rollout: Rollout, planner: Planner | str | None = None) -> Rollout:
@@ -83,16 +144,30 @@ def rerun(rollout: Rollout, planner: Planner | str | None = None) -> Rollout:
         FieldError: the record is no scenario, or its plan fails.
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
     """
+    return _driven(rerun_scenario(rollout, planner), rollout)[1]
+
+
+def rerun_scenario(rollout: Rollout, planner: Planner | str | None = None) -> Scenario:
+    """Return the scenario of a log for a drive that lasts little longer than the log.
+
+    Args:
+        rollout: the log
+        planner: as in `rebuilt`
+    """
     record = rollout.record
-    s = rebuilt(record, planner)
     limit = min(record.time_limit, float(rollout.t[-1]) + LONGER)
-    s = dataclasses.replace(s, planner_name=record.planner.name, time_limit=limit)
+    return dataclasses.replace(rebuilt(record, planner), planner_name=record.planner.name, time_limit=limit)
+
+
+def _driven(s: Scenario, rollout: Rollout) -> tuple[PlanResult, Rollout]:
+    """Return the plan and the drive of a log's scenario."""
+    record = rollout.record
     _, answer, again = driven(s)
     if again is None:
         raise FieldError("cells", f"planning again ends with {answer.status.name.lower()}: {answer.reason}")
     # The digest covers claims as well, and the shorter time limit is not the record's.
     kept = dataclasses.replace(again.record, digest=record.digest, time_limit=record.time_limit)
-    return dataclasses.replace(again, record=kept)
+    return answer, dataclasses.replace(again, record=kept)
 
 
 def mismatches(rollout: Rollout, again: Rollout) -> Iterator[Mismatch]:
@@ -131,8 +206,8 @@ def _of_array(name: str, rollout: Rollout, again: Rollout) -> Iterator[Mismatch]
     first = int(wrong.argmax()) if wrong.any() else both
     if first == len(logged) == len(computed):
         yield Mismatch(name, "", rounded=True)
-    elif name == "cells":  # `run` does not record that it was given a plan
-        yield Mismatch(name, f", from cell {first + 1}; a plan of your own cannot be replayed")
+    elif name == "cells":
+        yield Mismatch(name, f", from cell {first + 1}")
     elif name == "route":
         yield Mismatch(name, f", from point {first + 1}")
     else:

@@ -30,7 +30,7 @@ PANELS = ("World", "Planner", "Robot", "Sensing", "Movers", "Output")
 MAPS = ("given", "none")
 LOCALISATIONS = ("fixes", "odometry", "matching", "true")
 SMOOTHINGS = ("none", "taut", "clearance")
-#: Default smoothing of planners under comparison: others turn different plans into one route.
+#: Default smoothing of compared planners, and of custom ones under test: others turn different plans into one route.
 COMPARED_SMOOTHING = "none"
 FOOTPRINTS = ("auto", "disc", "exact")
 PHYSICS_HZ = (60, 10_000)  # slower physics makes the robot jerk

@@ -1,6 +1,7 @@
 """`antdrive check` and `antdrive accept`: what they print, write and return."""
 
 import json
+import os
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -83,6 +84,16 @@ def test_the_command_in_a_message_repeats_the_drive(antdrive, suite):
     code, out, _ = antdrive(*words[1:], "--no-figures", "--json", "--out", "again")
     again = json.loads(out)
     assert (code, again["outcome"], again["metrics"]["duration_s"]) == (1, "collided", test["metrics"]["duration_s"])
+
+
+@pytest.mark.parametrize("command", ["accept", "check"])
+def test_a_baseline_that_is_a_pipe_is_refused(antdrive, suite, command):
+    folder = suite.parent / "baselines" / "a"
+    folder.mkdir(parents=True)
+    os.mkfifo(folder / "closed-0.json")
+    code, out, _ = antdrive(command, "a.drive.yaml::closed", "--jobs", "1", "--film", "never")
+    assert code == 2
+    assert "closed-0.json: is a pipe; give a baseline" in out
 
 
 BROKEN = """

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import os
 import re
 import tempfile
 from pathlib import Path
@@ -643,6 +644,22 @@ def test_what_xacro_cannot_expand_is_refused_in_one_line(tmp_path, inside, says)
     assert message.isprintable()
     assert message.count(says) == 1
     assert "\\n" not in message
+
+
+def test_a_pipe_that_a_xacro_file_includes_is_refused(tmp_path, monkeypatch):
+    pytest.importorskip("xacrodoc")
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "robot.xacro"
+    head = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x">'
+    for inside in (
+        '<xacro:include filename="part"/>',
+        "<xacro:property name='a' value=\"${xacro.load_yaml('part')}\"/>${a}",
+    ):
+        path.write_text(f"{head}{inside}</robot>")
+        (tmp_path / "part").unlink(missing_ok=True)
+        os.mkfifo(tmp_path / "part")
+        with pytest.raises(InputError, match="part: is a pipe; give a xacro file"):
+            import_urdf(path)
 
 
 def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path):

@@ -101,7 +101,7 @@ def test_results_are_read_while_another_process_merges_them(tmp_path, monkeypatc
     for job in JOBS:
         kept.add(failed_row(job.key, "succeeded", ""))
         kept.flush()
-    listed, read = store.parts_in(tmp_path), store._read
+    listed, read = store.parts_in(tmp_path), store.read_table
     merging = iter([kept.merge])
 
     def read_and_merge(path):
@@ -110,7 +110,7 @@ def test_results_are_read_while_another_process_merges_them(tmp_path, monkeypatc
             next(merging, lambda: None)()
         return table
 
-    monkeypatch.setattr(store, "_read", read_and_merge)
+    monkeypatch.setattr(store, "read_table", read_and_merge)
     assert outcomes(tmp_path) == dict.fromkeys(range(6), "succeeded")
     assert next(merging, None) is None, "parts were merged between two reads"
 

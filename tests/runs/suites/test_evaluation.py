@@ -254,10 +254,10 @@ def test_messages_name_what_changed_since_the_baseline(small_run, baseline):
         return "\n".join(explain(small_run, dataclasses.replace(baseline, **changes)))
 
     assert "what changed" not in text(), "it is the baseline's drive, so the demands are what changed"
-    assert "so the code has changed" in text(drive_digest="0")
+    assert "so antdrive's code or the baseline's file has changed" in text(drive_digest="0")
     older = text(versions={**baseline.versions, "numpy": "1.0"}, drive_digest="0")
     assert "settings equal the baseline's\n" in older
-    assert "so the code" not in older
+    assert "code" not in older
     assert "changed since the baseline: robot" in text(hashes={**baseline.hashes, "robot": "0"})
     assert "versions since the baseline: numpy 1.0 -> " in text(versions={**baseline.versions, "numpy": "1.0"})
 

@@ -199,14 +199,15 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path, monkeypat
             assert type(made.planner).__name__ == "Mine"
             assert made.planner_label == name
             source = path.name if in_a_file else path.stem
-            assert run_command(case) == f"antdrive run empty --planner {source}:{name} --robot turtlebot --seed 0"
+            rest = "--robot turtlebot --seed 0 --smoothing none"
+            assert run_command(case) == f"antdrive run empty --planner {source}:{name} {rest}"
             elsewhere = run_command(case, anywhere=True)
-            assert elsewhere == f"antdrive run empty --planner {path}:{name} --robot turtlebot --seed 0"
+            assert elsewhere == f"antdrive run empty --planner {path}:{name} {rest}"
     installed = only(tmp_path, "world: empty, planner: {module: antdrive.planners, name: AStar}")
-    assert run_command(installed) == "antdrive run empty --planner antdrive.planners:AStar --robot turtlebot --seed 0"
+    assert run_command(installed) == f"antdrive run empty --planner antdrive.planners:AStar {rest}"
     (tmp_path / "pack").mkdir()
     inside = only(tmp_path, "world: empty, planner: 'pack.mine:Mine'")
-    assert run_command(inside) == "antdrive run empty --planner pack.mine:Mine --robot turtlebot --seed 0"
+    assert run_command(inside) == f"antdrive run empty --planner pack.mine:Mine {rest}"
     assert run_command(inside, anywhere=True) is None, "antdrive check runs it"
     path.write_text(text.replace("pass", "old = 1"))
     os.utime(path, (1, 1))
@@ -216,6 +217,16 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path, monkeypat
     os.utime(path, (1, 1))
     again = scenario_of(only(tmp_path, f"world: empty, planner: {path.name}:Mine"))
     assert (made.planner.old, again.planner.old) == (1, 2), "by its content, not by its time"
+
+
+def test_custom_planners_drive_their_own_plans_unless_the_suite_sets_the_smoothing(tmp_path):
+    (tmp_path / "mine.py").write_text("from antdrive.planners import AStar\nclass Mine(AStar): pass\n")
+    for planner, given, smoothing in (
+        ("mine.py:Mine", "", "none"),
+        ("mine.py:Mine", ", smoothing: taut", "taut"),
+        ("astar", "", "clearance"),
+    ):
+        assert scenario_of(only(tmp_path, f"world: empty, planner: '{planner}'{given}")).smoothing == smoothing
 
 
 #: What is wrong in a scenario; and beside a world that is right.

@@ -12,6 +12,7 @@ from antdrive.cli import options
 from antdrive.cli.campaign_options import OPTIONS
 from antdrive.cli.console import bar, campaign_bar, print_error, show, table
 from antdrive.cli.options import argument, flag, option
+from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -43,13 +44,13 @@ def barn(
     ] = None,
     json: options.Json = False,
     **given: Any,
-) -> bool:
+) -> bool | int:
     """Drive the BARN Challenge worlds, or score a log.
 
     Prints the results table beside published scores.
 
     Repeat the command to resume it. Exit code 0: all runs are done, or the log has 10 trials of each of the 50 public worlds,
-    whatever their outcomes.
+    whatever their outcomes; 3: as `sweep`.
     """
     if score:
         if with_map or films:
@@ -97,7 +98,7 @@ def barn(
     }
     failed = (row for row in runs[map].to_pylist() if not row["succeeded"])
     show(json, facts, (_failure_line(row, filmed) for row in failed))
-    return results.complete
+    return print_faults(results.faults) or results.complete
 
 
 def _score(source: Path, log: Path, json: bool) -> bool:

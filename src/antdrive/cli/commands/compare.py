@@ -1,5 +1,6 @@
 """`antdrive compare`."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,11 +11,11 @@ from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
-from antdrive.cli.console import file_lines, marked, planning, print_error, show, table
+from antdrive.cli.console import file_lines, marked, planning, print_error, print_traceback, show, table
 from antdrive.cli.entrants import check_worlds, entrants_of, repeat_command
-from antdrive.cli.exits import FAILED, INTERNAL_ERROR, SUCCEEDED
+from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.options import argument, option
-from antdrive.cli.output import film_drives, print_idle_settings, results_folder
+from antdrive.cli.output import film_drives, print_faults, print_idle_settings, results_folder
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.runs.comparing import (
     COMPARED,
@@ -76,7 +77,6 @@ def compare(
     show the first pair. Exit code 0: every run succeeded.
     Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
-    from antdrive.cli.groups import print_exception
     from antdrive.planners import PlannerError, capabilities_of
     from antdrive.sim.pipeline import run
 
@@ -121,7 +121,7 @@ def compare(
                     result = error
             write_json(folder / MARKER, facts)  # early, so that an interrupted comparison owns its results
             if isinstance(result, PlannerError):
-                print_exception(result)
+                print_traceback(result)
                 return result, None
             command = repeat_command(scenario, of[label], words[case[0]], robot, ends.words)
             write_run(result, part, command, figures=figures and case == cases[0])
@@ -136,12 +136,12 @@ def compare(
         files |= _views(compared.logs, folder, film, figures, speed=speed, prelude=prelude)
     results = {"runs": {run.label: run.facts for run in first}, **compared.as_dict(), "files": files}
     show(json, results, _lines(compared, files))
+    errors = Counter(run.facts["reason"] for run in compared.runs if run.facts["outcome"] == PLANNER_FAULT)
+    code = print_faults(dict(errors.most_common()))
     if len(compared.logs) < 2:
         planned = "only one planner" if compared.logs else "no planner"
         print_error(f"{planned} found a path: no comparison figure or film")
-    if any(run.facts["outcome"] == PLANNER_FAULT for run in compared.runs):
-        return INTERNAL_ERROR
-    return SUCCEEDED if all(run.facts["succeeded"] for run in compared.runs) else FAILED
+    return code or (SUCCEEDED if all(run.facts["succeeded"] for run in compared.runs) else FAILED)
 
 
 def _views(

@@ -9,7 +9,9 @@ from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.campaign_options import campaign_from
 from antdrive.cli.console import campaign_bar, print_error, show, table
+from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.options import argument, flag, option
+from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -73,11 +75,12 @@ def sweep(
     ] = None,
     json: options.Json = False,
     **given: Any,
-) -> None:
+) -> int:
     """Run a campaign: every combination of its settings.
 
     The output folder holds one row per run as Parquet. Repeat the command to resume, or to add runs after a change. Options
-    override the keys of the campaign file. Exit code 0: all runs are done, whatever their outcomes.
+    override the keys of the campaign file. Exit code 0: all runs are done, whatever their outcomes; 3:
+    an error of a planner or of antdrive.
     """
     from antdrive.runs.campaigns.expanding import expand
     from antdrive.runs.campaigns.sweeping import differences, missing_runs
@@ -100,7 +103,7 @@ def sweep(
         missing = size if out is None else len(missing_runs(expansion.jobs, out, **rest).jobs)
         counts = {"duplicates": expansion.duplicates, "counts": expansion.counts}
         show(json, {"runs": size, "missing": missing, **counts}, _size_lines(expansion, missing))
-        return
+        return SUCCEEDED
     with campaign_bar("driving") as progress:
         rest |= {"jobs": jobs, "dask": dask, "keep": cast("Keep | None", keep)}
         results = make_runs(requested, out, expansion=expansion, progress=progress, notify=print_error, **rest)
@@ -116,9 +119,11 @@ def sweep(
         "made": results.made,
         "succeeded": results.succeeded,
         "outcomes": results.outcomes,
+        "faults": results.faults,
         **({"report": files[0]} if files else {}),
     }
     show(json, facts, _lines(results, files))
+    return print_faults(results.faults)
 
 
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:

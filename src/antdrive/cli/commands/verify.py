@@ -27,6 +27,7 @@ def verify(
     Exit code 2: a log cannot be read; the others are still certified.
     """
     from antdrive.robots.robot_file import load_robot
+    from antdrive.runs.pool import in_new_process
     from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 
@@ -41,7 +42,9 @@ def verify(
         try:
             path = str(log_at(given))
             result = given / "result.json" if given.is_dir() else None
-            report = checked[path] = verify_log(Path(path), task, spec, result, replay=replay, planner=planner)
+            report = checked[path] = verify_log(
+                Path(path), task, spec, result, replay=replay, planner=planner, elsewhere=in_new_process
+            )
         except InputError as error:
             print_error(str(error))
             checked[path] = {"certified": False, "problems": [str(error)], "readable": False}

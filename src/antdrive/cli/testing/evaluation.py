@@ -9,7 +9,7 @@ import os
 import shlex
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any, Literal, TypeAlias
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PlannerError
-from antdrive.runs.pool import Pool, WorkerDied
+from antdrive.runs.pool import Pool, WorkerDied, in_new_process
 from antdrive.runs.suites.baseline import Baseline, fixed_hashes
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.evaluation import RAISED, Evaluation, changes, evaluate, explain, unmet_demands
@@ -25,6 +25,7 @@ from antdrive.runs.suites.scenarios import run_command, scenario_of
 from antdrive.runs.suites.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
+from antdrive.sim.rerun import UNSTEADY, fingerprint, fingerprint_of, is_unsteady
 from antdrive.sim.scenario import Scenario
 from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, write_artefacts, write_traceback
 
@@ -32,6 +33,7 @@ from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, writ
 Update: TypeAlias = Literal["", "new", "all"]
 #: Outcomes of a test that could not be evaluated: invalid input or internal error.
 INVALID_INPUT, INTERNAL_ERROR = "wrong_input", "internal_error"
+_REPEATED: dict[type, bool] = {}  # whether a new process repeats a planner's plans, by its class
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,6 +104,7 @@ class Check:
     update: Update = ""  # baselines to write
     folder: Path | None = None  # for the test's logs, figures and films; None: write nothing
     results: Results | None = None  # selection of what to write; None: nothing
+    again: Callable[[], str] | None = None  # returns `fingerprint` of the test's scenario in any process
 
     def evaluate(self, run: Run) -> CheckResult:
         """Evaluate a run."""
@@ -111,7 +114,9 @@ class Check:
             evaluation, accepted = self._without_baseline(run, path)
         else:
             evaluation = evaluate(run, self.demands, baseline)
-        details = [] if evaluation.passed else [*explain(run, baseline)]
+        if accepted in ("written", "renewed") and self._is_unsteady(run):
+            evaluation = dataclasses.replace(evaluation, notes=(*evaluation.notes, UNSTEADY))
+        details = [] if evaluation.passed else [*explain(run, baseline, self._elsewhere)]
         files, unfilmed = dict[str, str](), False
         try:
             files, unfilmed = self._written(run, evaluation, baseline)
@@ -140,12 +145,28 @@ class Check:
             wall_s=wall + (rollout.record.times.drive_wall_s if rollout else 0.0) + time.perf_counter() - started,
         )
 
+    def _elsewhere(self) -> str | None:
+        """Return the scenario's fingerprint of a new process; None if that is unknown."""
+        return None if self.again is None else in_new_process(self.again)
+
+    def _is_unsteady(self, run: Run) -> bool:
+        """Return whether the planner of an accepted drive does not repeat its plan."""
+        s, first = run.scenario, fingerprint_of(run.scenario, run.plan, run.rollout)
+        kind = type(s.planner)
+
+        def elsewhere() -> str:
+            if kind not in _REPEATED:  # a new process takes seconds: one for each planner
+                _REPEATED[kind] = self._elsewhere() in (None, first)
+            return first if _REPEATED[kind] else ""
+
+        return is_unsteady(s, first, elsewhere)
+
     def raised(self, s: Scenario, error: PlannerError) -> CheckResult:
         """Return the result of a test whose planner raised an error, with what has changed since the baseline."""
         details: tuple[str, ...] = ()
         with suppress(InputError):
             if self.baseline is not None and (earlier := Baseline.own(self.baseline, self.name)) is not None:
-                details = tuple(changes(s, fixed_hashes(s), earlier, ""))
+                details = tuple(changes(s, fixed_hashes(s), earlier))
         return self.failed_early(RAISED, str(error), error, details)
 
     def failed_early(
@@ -214,6 +235,7 @@ def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check
         update=update,
         folder=results.of(case.suite, case.id) if results else None,
         results=results,
+        again=functools.partial(_fingerprint_by_name, str(case.suite), case.id),
     )
 
 
@@ -291,6 +313,11 @@ def _check_in_turn(
                 yield _check_of(case, update, results).failed_early(INVALID_INPUT, done.value, InputError(done.value))
             else:
                 yield done.value
+
+
+def _fingerprint_by_name(suite: str, test: str) -> str:
+    """Return the fingerprint of a test's scenario."""
+    return fingerprint(next(scenario_of(case) for case in load_suite(suite) if case.id == test))
 
 
 def _check_by_name(folder: str, update: Update, results: Results | None, name: tuple[str, str]) -> CheckResult | str:

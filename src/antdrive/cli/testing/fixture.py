@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 from antdrive.base.errors import FieldError
 from antdrive.cli.testing.evaluation import Check, CheckResult, Update
-from antdrive.planners import Planner, PlannerError
+from antdrive.planners import PLANNERS, Planner, PlannerError, is_built_in
 from antdrive.robots import RobotSpec, list_robots
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.nearest import first_contact, nearest_of
@@ -19,7 +20,9 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive_scenario
+from antdrive.sim.rerun import fingerprint
 from antdrive.sim.scenario import Scenario
+from antdrive.sim.settings import COMPARED_SMOOTHING
 from antdrive.views.artefacts import Results, file_name
 from antdrive.worlds import Task, list_worlds
 
@@ -98,7 +101,7 @@ class DriveFixture:
             tolerance: allowed degradation of metrics from the baseline
             trajectory: allowed distance from the baseline's trajectory [m], or "exact"
             baseline: whether to compare with a baseline
-            settings: further settings of `Scenario.of`, such as seed, noise and margin
+            settings: further settings of `Scenario.of`, such as seed, noise and margin; smoothing is none for a custom planner
 
         Raises:
             DriveFailure: the drive misses a demand or is worse than its baseline, or the planner raised an error.
@@ -126,6 +129,7 @@ class DriveFixture:
             update=self._update,
             folder=self._results.of(self._file, whole) if self._results else None,
             results=self._results,
+            again=functools.partial(fingerprint, scenario),
         )
         try:
             run = drive_scenario(scenario)
@@ -153,7 +157,7 @@ class DriveFixture:
                 the test's file
             planner: a planner's name, or a planner; by default ants
             robot: a robot, a robot of the catalogue, or a robot file relative to the test's file; by default turtlebot
-            settings: further settings of `Scenario.of`, such as seed, noise and margin
+            settings: further settings of `Scenario.of`, such as seed, noise and margin; smoothing is none for a custom planner
 
         Raises:
             InputError: the world, the planner or the robot is invalid.
@@ -177,10 +181,12 @@ class DriveFixture:
                 raise FieldError(given[0], "is part of the scenario; change it with dataclasses.replace")
             return world
         planner = "ants" if planner is None else planner
+        built_in = planner in PLANNERS if isinstance(planner, str) else is_built_in(planner)
         robot = "turtlebot" if robot is None else robot
         place = world if isinstance(world, Task) else self._beside(world, list_worlds())
         body = robot if isinstance(robot, RobotSpec) else self._beside(robot, list_robots())
-        return Scenario.of(place, planner, body, **settings)
+        usual = {} if built_in else {"smoothing": COMPARED_SMOOTHING}
+        return Scenario.of(place, planner, body, **{**usual, **settings})
 
     def baseline_path(self, name: str) -> Path:
         """Return the baseline file of a drive.

@@ -260,11 +260,13 @@ def _add_extras(report: Any, results: list[CheckResult]) -> None:
         return
     import base64
 
+    from antdrive.base.files import MAX_BYTES, read_bytes
+
     attached = list(getattr(report, "extras", []))
     for result in results:
         for name, path in result.files.items():
             if path.endswith(".png"):
-                attached.append(extras.png(base64.b64encode(Path(path).read_bytes()).decode(), name=name))
+                attached.append(extras.png(base64.b64encode(read_bytes(path, MAX_BYTES)).decode(), name=name))
             else:
                 attached.append(extras.url(Path(path).as_uri(), name=name))
     report.extras = attached

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError, input_error
+from antdrive.base.files import MAX_BYTES, read_bytes
 from antdrive.cli.testing.evaluation import INVALID_INPUT, CheckResult, Update
 from antdrive.runs.suites.suite import SUFFIX
 
@@ -92,7 +93,7 @@ class _Drives:
         if collection_path.name.endswith(SUFFIX):
             return True
         module = collection_path.suffix == ".py" and collection_path.name != "conftest.py" and collection_path.is_file()
-        return True if module and b"drive" not in collection_path.read_bytes() else None
+        return True if module and b"drive" not in read_bytes(collection_path, MAX_BYTES) else None
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         """Leave out tests without the fixture, and those that the pattern does not match."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.atomic import atomic_write
+from antdrive.base.files import without_waiting
 from antdrive.cli.testing.evaluation import CheckResult
 
 #: Metrics in test reports.
@@ -133,7 +134,7 @@ def add_to_page(drives: Iterable[Mapping[str, str]], unused: Sequence[str], say:
     """Append the summary to the file named by GITHUB_STEP_SUMMARY, if any. `say` reports write errors."""
     if page := os.environ.get("GITHUB_STEP_SUMMARY"):
         try:
-            with open(page, "a", encoding="utf-8") as file:
+            with open(page, "a", encoding="utf-8", opener=without_waiting) as file:
                 file.write(markdown(list(drives), unused))
         except (OSError, ValueError) as error:
             say(f"GITHUB_STEP_SUMMARY: {page}: cannot be written ({getattr(error, 'strerror', None) or error})")

@@ -5,9 +5,13 @@ xacro files are expanded without ROS. Packages not given are searched for beside
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import io
 import math
+import os
 import re
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -20,7 +24,7 @@ import numpy as np
 
 from antdrive.base.checks import suggest
 from antdrive.base.errors import InputError, input_error
-from antdrive.base.files import read_bytes
+from antdrive.base.files import open_regular, read_bytes
 from antdrive.base.optional import optional
 from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
@@ -47,8 +51,11 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
         xacrodoc.packages.update_package_cache(known)
         asked = _Arguments(arguments)
         try:
-            document = xacrodoc.XacroDoc.from_file(str(path), subargs=asked, resolve_packages=False)
+            with _refusing_pipes():
+                document = xacrodoc.XacroDoc.from_file(str(path), subargs=asked, resolve_packages=False)
             text = str(document.to_urdf_string())
+        except InputError:
+            raise
         except Exception as error:  # xacro's expressions can raise any exception
             missing = _missing_package(error)
             folder = None if missing is None or missing in known else package_folder(path, missing, known)
@@ -62,6 +69,25 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
             raise InputError(f"--arg {unknown}: {path.name} has no such argument; {advice}")
         return text
     raise input_error(str(path), f"refers to more than {MAX_PACKAGES} packages")
+
+
+@contextlib.contextmanager
+def _refusing_pipes() -> Iterator[None]:
+    """Replace `open` in xacro's modules by a function that opens regular files alone."""
+
+    def open_text(path: str, mode: str = "r") -> io.TextIOBase:
+        if not os.path.exists(path):
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)  # which xacro explains
+        return io.TextIOWrapper(open_regular(path, MAX_BYTES, "a xacro file"), encoding="utf-8")
+
+    modules = [sys.modules[name] for name in ("xacro", "xacrodoc.xacrodoc", "xacrodoc.packages")]
+    for module in modules:
+        vars(module)["open"] = open_text
+    try:
+        yield
+    finally:
+        for module in modules:
+            del vars(module)["open"]
 
 
 class _Arguments(dict[str, str]):

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import open_regular
 from antdrive.base.optional import parquet_library
-from antdrive.runs.campaigns.rows import NOT_CANONICAL
-from antdrive.runs.campaigns.store import GRID_FILE, TABLE, joined, read_manifest
+from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, PLANNER_FAULT
+from antdrive.runs.campaigns.store import GRID_FILE, TABLE, joined, read_manifest, read_table
 from antdrive.runs.statistics.run_table import FOLDER, RunTable, column_named, matching, merged
 
 if TYPE_CHECKING:
@@ -64,6 +65,13 @@ class SweepResults:
         """The number of runs by outcome, the most frequent first."""
         return dict(Counter(self.table["outcome"].to_pylist()).most_common())
 
+    @property
+    def faults(self) -> dict[str, int]:
+        """The number of runs by error of a planner or of antdrive, the most frequent first."""
+        prefix = {PLANNER_FAULT: "", CRASHED: "internal error: "}
+        rows = zip(self.table["outcome"].to_pylist(), self.table["reason"].to_pylist(), strict=True)
+        return dict(Counter(prefix[outcome] + reason for outcome, reason in rows if outcome in prefix).most_common())
+
     def medians(self) -> Iterator[tuple[str, ...]]:
         """Yield a table row for each planner: its successes, and the median and extremes of `MEDIANS` over them."""
         rows = [row for row in self.table.select(["planner", "succeeded", *MEDIANS]).to_pylist() if row["succeeded"]]
@@ -92,7 +100,8 @@ def read_results(folder: str | Path) -> SweepResults:
     path = Path(folder)
     read_manifest(path)
     table = joined(path)  # a command killed at its start leaves the manifest of another grid: the grid decides the size
-    return SweepResults(path, table, parquet_library().parquet.read_metadata(path / GRID_FILE).num_rows)
+    with open_regular(path / GRID_FILE) as stream:
+        return SweepResults(path, table, parquet_library().parquet.read_metadata(stream).num_rows)
 
 
 def canonical_table(folder: str | Path) -> pyarrow.Table:
@@ -158,10 +167,9 @@ def _names(folders: Sequence[Path]) -> list[str]:
 
 def _of_one(folder: Path, base: Path) -> tuple[dict[str, list[Any]], dict[str, list[Any]]]:
     """Return the columns of a campaign's finished runs, and the grid columns of its other runs."""
-    arrow = parquet_library()
     columns = read_results(folder).table.to_pydict()
     done = set(columns["key"])
-    grid = arrow.parquet.read_table(folder / GRID_FILE).to_pydict()
+    grid = read_table(folder / GRID_FILE).to_pydict()
     left = [k for k, key in enumerate(grid["key"]) if key not in done]
     prefix = os.path.relpath(folder.resolve(), base)
     if prefix != "." and "rollout" in columns:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from antdrive.base.errors import InputError
+from antdrive.base.files import MAX_BYTES, read_bytes
 from antdrive.planners import PlannerError
 from antdrive.runs.campaigns.job import Job
 from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, failed_row, run_row, too_slow_row
@@ -79,7 +80,7 @@ def log_path(key: str) -> str:
 
 def _bytes_of(log: Rollout) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        return log.save(Path(folder) / "log.npz").read_bytes()
+        return read_bytes(log.save(Path(folder) / "log.npz"), MAX_BYTES)
 
 
 def finished_of(done: Done[Job, Finished], limit: float | None) -> Finished:

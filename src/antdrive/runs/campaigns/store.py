@@ -139,7 +139,7 @@ def results_in(folder: Path, column: str) -> dict[str, Any]:
 
 def former_grid(folder: Path) -> pyarrow.Table | None:
     """Return the grid of the folder's previous campaign; None if there is none."""
-    return _read(folder / GRID_FILE) if (folder / GRID_FILE).exists() else None
+    return read_table(folder / GRID_FILE) if (folder / GRID_FILE).exists() else None
 
 
 def read_manifest(folder: str | Path) -> dict[str, Any]:
@@ -159,7 +159,7 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
 
 def joined(folder: Path) -> pyarrow.Table:
     """Return a row for each finished run of the campaign, in the campaign's order."""
-    grid, results = _read(folder / GRID_FILE), _results(folder)
+    grid, results = read_table(folder / GRID_FILE), _results(folder)
     places = {key: i for i, key in enumerate(results["key"].to_pylist())}
     keys = grid["key"].to_pylist()
     rows = [i for i, key in enumerate(keys) if key in places]
@@ -215,7 +215,7 @@ def _tables(folder: Path) -> list[pyarrow.Table]:
         tables = []
         for path in parts_in(folder):
             try:
-                tables.append(_cast(_read(path), result_schema()))
+                tables.append(_cast(read_table(path), result_schema()))
             except InputError:
                 if path.exists():
                     raise
@@ -251,7 +251,8 @@ def _cast(table: pyarrow.Table, schema: pyarrow.Schema) -> pyarrow.Table:
     return arrow.table(columns, schema=schema)
 
 
-def _read(path: Path) -> pyarrow.Table:
+def read_table(path: Path) -> pyarrow.Table:
+    """Read a Parquet file; raise InputError if it is damaged or too large."""
     arrow = parquet_library()
     if not path.exists():
         raise input_error(str(path), "no such file; antdrive sweep writes it")

@@ -20,6 +20,8 @@ from antdrive.base.files import parse_json, read_bytes
 from antdrive.base.plane import wrap_angle
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
+from antdrive.planners import is_built_in
+from antdrive.planners.user_code import module_hash
 from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
 from antdrive.runs.suites.suite import shown_path
 from antdrive.sim.compose import compose
@@ -35,6 +37,7 @@ SCHEMA = 1
 MAX_BYTES = 20_000  # of a baseline
 LINE_HZ = 10.0  # rate of the driven line, halved until the file is small enough [Hz]
 LEAST_HZ = 1e-3
+PLANNER_FILE = "planner file"  # hash of the file of a custom planner
 
 
 def _to_outcome(value: Any) -> Outcome:
@@ -55,7 +58,7 @@ class Baseline:
         bound_m: the clearance proved by the certificate [m]; None without one
         metrics: every metric except wall-clock times; empty if the robot did not drive
         nearest: the closest approach; None if the robot did not drive
-        hashes: of the world, the unseen obstacles, the robot and the settings
+        hashes: of the world, the unseen obstacles, the robot, the settings and the file of a custom planner
         versions: of antdrive, Python and the packages that computed the drive
         drive_digest: `Rollout.drive_digest`; empty if the robot did not drive
         limiters: names of the rules that can limit the robot's speed
@@ -160,7 +163,7 @@ class Baseline:
             InputError: the file cannot be written.
         """
         existed = path.exists()
-        if existed and path.read_bytes() == self.to_text().encode():
+        if existed and read_bytes(path, 10 * MAX_BYTES, "a baseline") == self.to_text().encode():
             return "unchanged"
         self.save(path)
         return "renewed" if existed else "written"
@@ -240,9 +243,13 @@ def configuration_hashes(run: Run) -> dict[str, str]:
 
     The time limit counts only if it was given: the default follows from the robot and the route.
     """
-    s = run.scenario
+    s, plan = run.scenario, run.plan
+    planner: Any = s.planner
+    if not (plan.solved or plan.options) and dataclasses.is_dataclass(planner):  # it was never asked
+        options = {field.name: getattr(planner, field.name) for field in dataclasses.fields(planner)}
+        plan = dataclasses.replace(plan, options=options)
     fields = {
-        **configuration_of(s, compose(s), run.grid, run.plan),
+        **configuration_of(s, compose(s), run.grid, plan),
         "time_limit": s.time_limit or s.task.time_limit or 1.0,
         "smoothing": s.smoothing,
     }
@@ -250,12 +257,13 @@ def configuration_hashes(run: Run) -> dict[str, str]:
 
 
 def fixed_hashes(s: Scenario) -> dict[str, str]:
-    """Return the hashes of a scenario's world, robot and unseen obstacles, which are known without a plan."""
+    """Return the hashes of a scenario's parts that are known without a plan: world, robot, unseen obstacles, planner's file."""
     unseen = json.dumps([dataclasses.asdict(disc) for disc in s.unseen], sort_keys=True)
     return {
         "world": canonical_hash(s.task),
         "robot": canonical_hash(s.robot),
         "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest(),
+        **({} if is_built_in(s.planner) else {PLANNER_FILE: module_hash(type(s.planner).__module__)}),
     }
 
 

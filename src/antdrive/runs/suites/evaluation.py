@@ -6,26 +6,30 @@ a fault; one better by more than that is a gain. The driven line counts only if 
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from antdrive.base.plane import format_point
 from antdrive.base.types import Floats, Point
-from antdrive.runs.suites.baseline import Baseline, configuration_hashes
+from antdrive.planners import is_built_in
+from antdrive.planners.user_code import module_file
+from antdrive.runs.suites.baseline import PLANNER_FILE, Baseline, configuration_hashes
 from antdrive.runs.suites.demands import END, Bound, Demands
 from antdrive.runs.suites.nearest import cause_of_contact, first_contact, first_contact_kind, nearest_of
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.rerun import UNSTEADY, fingerprint_of, is_unsteady
 from antdrive.sim.scenario import Scenario
+from antdrive.sim.settings import SMOOTHINGS
 
 #: Distance at the same time beyond which two drives diverge [m].
 APART = 0.01
-SAME = "world, robot and settings equal the baseline's"
 
 
 @dataclass(frozen=True)
@@ -94,8 +98,14 @@ def divergence(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Di
     )
 
 
-def explain(run: Run, baseline: Baseline | None) -> Iterator[str]:
-    """Yield explanations of a test's faults, a sentence each."""
+def explain(run: Run, baseline: Baseline | None, elsewhere: Callable[[], str | None] = lambda: None) -> Iterator[str]:
+    """Yield explanations of a test's faults, a sentence each.
+
+    Args:
+        run: the run
+        baseline: the earlier drive; None without one
+        elsewhere: returns `fingerprint(run.scenario)` of a new process; None if that is unknown
+    """
     if run.rollout is not None:
         touched = first_contact(run.rollout)
         if touched is not None:
@@ -106,48 +116,99 @@ def explain(run: Run, baseline: Baseline | None) -> Iterator[str]:
     if baseline is not None:
         if run.rollout is not None and baseline.line:
             yield from _divergence(run, baseline)
-        digest = "" if run.rollout is None else run.rollout.drive_digest
-        yield from changes(run.scenario, configuration_hashes(run), baseline, digest)
+        yield from _causes(run, baseline, elsewhere)
 
 
 def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
     assert run.rollout is not None
     first = divergence(baseline, run.rollout)
     most = float(distances(baseline, run.rollout).max(initial=0.0))
-    if first is not None:
-        yield f"{first.sentence}; at most {most:.3g} m apart at the same time"
-    elif run.rollout.drive_digest == baseline.drive_digest:
+    if run.rollout.drive_digest == baseline.drive_digest:
         yield "the drive equals the baseline's bit for bit"
+    elif first is not None:
+        yield f"{first.sentence}; at most {most:.3g} m apart at the same time"
     else:
         yield f"the drive follows the baseline's line within {max(most, 0.001):.3f} m"
 
 
-def changes(s: Scenario, hashes: Mapping[str, str], baseline: Baseline, digest: str) -> Iterator[str]:
+def _causes(run: Run, baseline: Baseline, elsewhere: Callable[[], str | None]) -> Iterator[str]:
+    """Yield the causes of a difference from the baseline, a line each."""
+    s, hashes = run.scenario, configuration_hashes(run)
+    same_drive = baseline.drive_digest == ("" if run.rollout is None else run.rollout.drive_digest)
+    changed = _changed(hashes, baseline)
+    suspected, first = not same_drive and {*changed} <= {PLANNER_FILE}, fingerprint_of(s, run.plan, run.rollout)
+    if suspected and (is_unsteady(s, first) if changed else is_unsteady(s, first, elsewhere)):
+        yield UNSTEADY
+    elif not changed and "settings" in baseline.hashes:
+        same, code = _same_parts(s, baseline)
+        if _newer(baseline):
+            yield f"{same} equal the baseline's"
+        elif not same_drive:
+            yield f"{same} equal the baseline's; so {code} or the baseline's file has changed"
+        elif edited := _edited(run, baseline):
+            yield f"the baseline's file was edited: the same drive has another {', '.join(edited)}; accept the drive again"
+    yield from changes(s, hashes, baseline, _smoothing_of(run, baseline) if "settings" in changed else "")
+
+
+def changes(s: Scenario, hashes: Mapping[str, str], baseline: Baseline, smoothing: str = "") -> Iterator[str]:
     """Yield the differences in setup between a scenario and its baseline, a line each.
 
     Args:
         s: the scenario
         hashes: of its configuration; those that the baseline lacks are not compared
         baseline: the earlier drive
-        digest: `Rollout.drive_digest`; empty if the robot did not drive
+        smoothing: that of the baseline if no other setting differs; empty if unknown
     """
-    others = [
+    if changed := _changed(hashes, baseline):
+        words = {PLANNER_FILE: f"{PLANNER_FILE} ({module_file(type(s.planner).__module__).name})"}
+        if smoothing:
+            words["settings"] = f"settings (smoothing {smoothing} -> {s.smoothing})"
+        yield f"changed since the baseline: {', '.join(words.get(name, name) for name in changed)}"
+    chosen = s.chosen
+    if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
+        yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
+    if others := _newer(baseline):
+        yield f"versions since the baseline: {', '.join(others)}"
+
+
+def _changed(hashes: Mapping[str, str], baseline: Baseline) -> list[str]:
+    """Return the parts of the configuration that differ from the baseline's."""
+    return [name for name in hashes if name in baseline.hashes and hashes[name] != baseline.hashes[name]]
+
+
+def _newer(baseline: Baseline) -> list[str]:
+    """Return the versions that differ from the baseline's, in words."""
+    return [
         f"{name} {baseline.versions.get(name, 'none')} -> {version}"
         for name, version in versions().items()
         if baseline.versions.get(name) != version
     ]
-    shared = [name for name in hashes if name in baseline.hashes]
-    if changed := [name for name in shared if hashes[name] != baseline.hashes[name]]:
-        yield f"changed since the baseline: {', '.join(changed)}"
-    elif "settings" in shared and others:
-        yield SAME
-    elif "settings" in shared and digest != baseline.drive_digest:  # else the demands changed
-        yield f"{SAME}; so the code has changed"
-    chosen = s.chosen
-    if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
-        yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
-    if others:
-        yield f"versions since the baseline: {', '.join(others)}"
+
+
+def _same_parts(s: Scenario, baseline: Baseline) -> tuple[str, str]:
+    """Return the compared parts of a setup, and the code that the comparison leaves out."""
+    if is_built_in(s.planner):
+        return "world, robot and settings", "antdrive's code"
+    if PLANNER_FILE not in baseline.hashes:
+        return "world, robot and settings", "the code of the planner, antdrive's code"
+    return "world, robot, settings and planner file", "a module that the planner imports, antdrive's code"
+
+
+def _smoothing_of(run: Run, baseline: Baseline) -> str:
+    """Return the smoothing with which the settings would equal the baseline's; empty without one."""
+    for kind in SMOOTHINGS:
+        other = dataclasses.replace(run, scenario=dataclasses.replace(run.scenario, smoothing=kind))
+        if configuration_hashes(other)["settings"] == baseline.hashes["settings"]:
+            return kind
+    return ""
+
+
+def _edited(run: Run, baseline: Baseline) -> list[str]:
+    """Return the values that a baseline has otherwise, though it is of this very drive."""
+    mine = Baseline.of(run, baseline.case)
+    names = [name for name, value in mine.metrics.items() if baseline.metrics.get(name, value) != value]
+    parts = ("outcome", "certified", "bound_m", "nearest", "line_hz", "line")
+    return names + [name for name in parts if getattr(mine, name) != getattr(baseline, name)]
 
 
 #: Words for a worse metric.

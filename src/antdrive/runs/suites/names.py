@@ -10,10 +10,11 @@ from typing import Any
 from antdrive.base.checks import resolve, show, suggest
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.planners.plan import Planner
-from antdrive.planners.registry import load_planner, make_planner
+from antdrive.planners.registry import PLANNERS, load_planner, make_planner
 from antdrive.planners.user_code import UserCodeError, is_user_code, load_object, record_name
 from antdrive.robots.robot_file import list_robots
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
+from antdrive.sim.settings import COMPARED_SMOOTHING
 from antdrive.worlds.files.world_file import list_worlds
 
 #: Keys of a planner entry that give its source; other keys are options.
@@ -69,6 +70,17 @@ def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
     name = planner if isinstance(planner, str) else planner.get("name")
     sources = () if isinstance(planner, str) else (key for key in SOURCES if key in planner)
     return any(sources) or (isinstance(name, str) and is_user_code(name))
+
+
+def settings_of(case: SuiteCase) -> dict[str, Any]:
+    """Return the settings of a test by key: those given, and the smoothing of custom planners, which drive their own plans."""
+    planner = case.entry.planner
+    name = planner if isinstance(planner, str) else planner.get("name")
+    return (
+        case.given
+        if name in PLANNERS and not is_own_entry(planner)
+        else {"smoothing": COMPARED_SMOOTHING, **case.given}
+    )
 
 
 def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:

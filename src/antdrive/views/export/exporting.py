@@ -14,7 +14,7 @@ import numpy as np
 
 from antdrive.base.atomic import atomic_folder, atomic_write
 from antdrive.base.errors import FieldError, input_error
-from antdrive.base.files import require_new
+from antdrive.base.files import MAX_BYTES, read_bytes, require_new
 from antdrive.base.plane import world_to_map
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.driving.odometry import odometry_of
@@ -69,13 +69,13 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
     """Return a bag's attachments: media type and content by name."""
     with tempfile.TemporaryDirectory() as folder:
         save_task(rollout.record.task, Path(folder) / "world.yaml")
-        world = (Path(folder) / "world.yaml").read_bytes()
+        world = read_bytes(Path(folder) / "world.yaml", MAX_BYTES)
     certificate = json.dumps(certify(rollout).as_dict(), indent=2, default=str)
     return {
         "world.yaml": ("application/yaml", world),
         "certificate.json": ("application/json", certificate.encode()),
         "digest.txt": ("text/plain", f"{rollout.record.digest}\n".encode()),
-        "rollout.npz": ("application/octet-stream", log.read_bytes()),
+        "rollout.npz": ("application/octet-stream", read_bytes(log, MAX_BYTES)),
     }
 
 

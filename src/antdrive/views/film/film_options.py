@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import InputError
-from antdrive.base.files import format_size
+from antdrive.base.files import MAX_BYTES, format_size, read_bytes
 from antdrive.views.film.camera import CAMERAS, Picture
 from antdrive.views.film.planes import Planes
 
@@ -107,7 +107,7 @@ class FilmInfo:
         width, height = self.size
         about = f"{self.duration_s:.1f} s, {width} x {height} px"
         link = f'<a href="{escape(quote(os.path.relpath(self.path)))}">{escape(str(self.path))}</a>'
-        data = self.path.read_bytes() if self.path.is_file() else b""
+        data = read_bytes(self.path, MAX_BYTES) if self.path.is_file() else b""
         if not 0 < len(data) <= MOST_EMBEDDED:
             return f"<p>{link}: {about}, {format_size(len(data))}{'' if data else ', the file is gone'}</p>"
         kind = self.path.suffix.lower()[1:]

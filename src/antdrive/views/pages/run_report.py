@@ -18,7 +18,7 @@ from typing import Any
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import InputError
-from antdrive.base.files import file_name, known_suffix, open_regular
+from antdrive.base.files import MAX_BYTES, file_name, known_suffix, open_regular, read_bytes
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 from antdrive.views.pages.rendering import json_column, link_to, page_data, rendered, shown
@@ -217,7 +217,7 @@ def _filmed(run: Run) -> list[Attachment]:
         return []
     with tempfile.TemporaryDirectory() as folder:
         path = film(run.rollout, Path(folder) / "film.mp4", size=FILM_SIZE).path
-        return [Attachment(path.name, _data_uri("video/mp4", path.read_bytes()), is_video=True)]
+        return [Attachment(path.name, _data_uri("video/mp4", read_bytes(path, MAX_BYTES, "a film")), is_video=True)]
 
 
 def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
@@ -230,7 +230,7 @@ def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
         if age := _older(path, run.folder):
             run.links.append(Attachment(path.name + age, link_to(path, base)))
             continue
-        source = _data_uri(kind, path.read_bytes()) if embed_films else link_to(path, base)
+        source = _data_uri(kind, read_bytes(path, MAX_BYTES, "a film")) if embed_films else link_to(path, base)
         run.films.append(Attachment(path.name, source, is_video=kind.startswith("video/")))
     for names, attached in ((("rollout.npz", "result.json"), run.links), (("overview.png", "plan.png"), run.pictures)):
         for path in (run.folder / name for name in names):
