@@ -325,7 +325,9 @@ SPEED_JUMPS, YAW_JUMPS, TOO_FAST = "the forward speed changes", "the yaw rate ch
 
 def driving_limits(noise):
     more = 8 * 0.02 * noise
-    return 0.7 * (1.03 + more) + 0.02, (3.14 + more * 0.7 * 2 / 0.23) * (1.03 + more) + 0.02, 25 * (1.03 + more) + 0.02
+    late = 1.0 / 60 / 0.036  # braking while it turns: the speed lags by a control period
+    yaw_rate = 3.14 + more * 0.7 * 2 / 0.23
+    return tuple(limit * (1.03 + more) + 0.02 for limit in (0.7, yaw_rate, 25 + late))
 
 
 CONSISTENCY: dict[str, tuple[float, Callable[[float], Rollout], str]] = {

@@ -350,10 +350,12 @@ def _check_speeds(rollout: Rollout, end: int) -> Iterator[str]:
     record, robot, twist = rollout.record, rollout.record.robot, rollout.twist[:end]
     more = SIGMAS * robot.noise.slip * record.noise
     wheels = wheel_speeds(twist, robot.track)
+    # Where the robot brakes and turns at once, the forward speed lags its command by up to a control period.
+    late = robot.max_acceleration / record.control_hz / robot.wheel_radius
     limits = (
         ("forward speed", "m/s", np.abs(twist[:, 0]), robot.max_speed),
         ("yaw rate", "rad/s", np.abs(twist[:, 1]), robot.max_yaw_rate + more * robot.max_speed * 2 / robot.track),
-        ("wheel speed", "rad/s", np.abs(wheels).max(axis=1) / robot.wheel_radius, robot.max_wheel_speed),
+        ("wheel speed", "rad/s", np.abs(wheels).max(axis=1) / robot.wheel_radius, robot.max_wheel_speed + late),
     )
     for what, unit, values, limit in limits:
         if not values.max() <= limit * (1 + OVERSHOOT + more) + STILL:
