@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import math
 import multiprocessing
-import operator
 import os
 import signal
 import time
@@ -343,13 +342,18 @@ class Pool:
 def call_all(calls: Iterable[Callable[[], Result]], jobs: int | None = None) -> list[Result]:
     """Return the results of calls without arguments, run in processes (None: one per core)."""
     with Pool(processes_for(jobs)) as pool:
-        return list(pool.results(operator.call, calls))
+        return list(pool.results(call_now, calls))
+
+
+def call_now(call: Callable[[], Result]) -> Result:
+    """Return the result of a call; `operator.call` needs Python 3.11."""
+    return call()
 
 
 def in_new_process(call: Callable[[], Result]) -> Result | None:
     """Return a call's result from a new process, where sets of texts have another order; None if it fails there."""
     with contextlib.suppress(Exception), Pool(1) as pool:
-        return next(pool.results(operator.call, [call]))
+        return next(pool.results(call_now, [call]))
     return None
 
 

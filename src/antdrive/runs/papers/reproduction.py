@@ -11,7 +11,6 @@ import functools
 import hashlib
 import json
 import math
-import operator
 import re
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -45,7 +44,7 @@ from antdrive.runs.papers.claims import (
 )
 from antdrive.runs.papers.experiments import PAPERS, Experiment
 from antdrive.runs.papers.paper_runs import PaperRun, drive_among, solve
-from antdrive.runs.pool import Pool, processes_for
+from antdrive.runs.pool import Pool, call_now, processes_for
 from antdrive.runs.statistics.intervals import medians_by_world
 
 HISTORY = ("best", "iteration_best", "iteration_mean", "arrived")
@@ -245,7 +244,7 @@ def _all_runs(
             runs = load_runs(path, key)
             if runs is None:
                 runs = []
-                for run in pool.results(operator.call, _planned(experiment, seeds)):
+                for run in pool.results(call_now, _planned(experiment, seeds)):
                     runs.append(dataclasses.replace(run, world=experiment.world(run.seed)))
                     if progress is not None:
                         progress((done + len(runs)) / total)
