@@ -56,14 +56,11 @@ def test_what_ran_before_changes_nothing(order, fresh):
 def one_by_one(self, indices, shape, centres):
     """Obstacles as they were built before: a call for each, drawn by Bullet as it likes."""
     p, client = bullet(), self._client
-    bodies = []
     for index, centre in zip(indices, centres, strict=True):
         body = p.createMultiBody(0, shape, basePosition=centre, useMaximalCoordinates=1, physicsClientId=client)
         p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=client)
         p.setCollisionFilterGroupMask(body, -1, 8, 4, physicsClientId=client)
-        self._obstacles[body] = index
-        bodies.append(body)
-    return bodies
+        self._bodies.add(index, body, shape)
 
 
 @pytest.mark.parametrize("name", ["slalom", "hit", "movers"])
@@ -78,7 +75,7 @@ def test_body_numbers_count_ground_robot_and_obstacles_in_order(turtlebot):
     sizes = [(0.1, 1.0), (0.1, 1.0), (0.2, 1.0), (0.1, 1.0), (0.1, 0.01), (0.1, 0.05)]
     discs = tuple(Disc(2.0 + i, 3.0, r, h) for i, (r, h) in enumerate(sizes))
     with Engine(World("w", (0, 0, 10, 10), discs), turtlebot) as engine:
-        assert engine._obstacles == {2 + i: i for i in range(len(discs) + 4)}
+        assert engine._bodies.index == {2 + i: i for i in range(len(discs) + 4)}
         for i, disc in enumerate(discs):
             for gap, touched in ((-0.002, {i}), (0.002, set())):
                 engine.place((disc.x, disc.y - disc.radius - turtlebot.radius - gap, 0.0))

@@ -7,6 +7,8 @@ import platform
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from antdrive.base.caches import Keyed, cached
 from antdrive.planners import AStar, PlanResult, Query, Tangent, untimed
 from antdrive.sim.driving.plants import Drive
@@ -48,10 +50,11 @@ def rollout_of(
         footprint_margin=parts.guide.footprint_margin,
         outcome=log.outcome,
         reason=log.reason,
+        physics=log.physics,
         versions=versions(),
         times=TimesRecord(plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(parts.guide.walls)),
     )
-    driven = {name: array for name, array in vars(log).items() if name not in ("outcome", "reason", "actuated")}
+    driven = {name: array for name, array in vars(log).items() if isinstance(array, np.ndarray) and name != "actuated"}
     arrays: dict[str, Any] = {**driven, "route": route.xy, "cells": answer.cells}
     for part in parts.logs:
         arrays |= part.logged(log, s.physics_hz // s.control_hz)

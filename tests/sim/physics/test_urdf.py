@@ -174,7 +174,7 @@ def _xy(place):
 def _nearest(engine, count):
     """The distances of the chassis from the first obstacles, as PyBullet tells them."""
     p, near = engine._p, []
-    for obstacle in list(engine._obstacles)[:count]:
+    for obstacle in list(engine._bodies.index)[:count]:
         points = p.getClosestPoints(engine._robot, obstacle, 0.02, linkIndexA=-1, physicsClientId=engine._client)
         near.append(min(point[8] for point in points))
     return near

@@ -164,7 +164,7 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     localiser = localiser_of("fixes", robot, c.noise, 1.0, period, task.start, seed)
     with Engine(task.world, robot, physics_hz=c.physics_hz) as engine:
         log = follow(engine, c.controller, path, task, limit=limit, control_hz=c.control_hz, localiser=localiser)
-    if log.outcome is not Outcome.SUCCEEDED:
+    if log.outcome is not Outcome.SUCCEEDED or log.physics:
         return Loss(math.inf, math.inf)
     disc = log.clearance if c.outlined else point_clearance(task.world, log.pose[:, :2]) - robot.radius
     return Loss(*(margin - least_bound(log, robot.radius, clearance) for clearance in (log.clearance, disc)))

@@ -36,6 +36,7 @@ class Drive:
     movers: Floats  # positions of the movers (T, M, 2) [m]
     contacts: Floats  # one row per contact (K, 4): row, obstacle, distance [m], force [N]
     actuated: Floats  # motor targets (T, 2) [m/s, rad/s]
+    physics: str  # why contacts in physics are worth nothing, see `Engine.audit`; else empty
 
 
 class Bullet:
@@ -122,6 +123,7 @@ class Bullet:
             movers=movers,
             contacts=contacts,
             actuated=np.ascontiguousarray(in_force[:, 3:]),
+            physics=engine.audit(),
         )
 
 

@@ -81,7 +81,7 @@ def replay(rollout: Rollout) -> ReplayCheck:
     position, turn, twist = offsets(again.pose, again.twist, rollout)
     same = np.array_equal(again.pose, rollout.pose) and np.array_equal(again.twist, rollout.twist)
     exact = same and np.array_equal(again.contacts, rollout.contacts)
-    problems = []
+    problems = [f"replay: physics' contacts are no evidence, since {again.physics}"] if again.physics else []
     if not max(position, turn, twist) <= ROUNDING:
         problems.append(
             f"replay: the logged commands lead to poses up to {position:.3g} m and {turn:.3g} rad off the log"

@@ -273,6 +273,8 @@ def _clock(rollout: Rollout) -> Floats:
 def _check_agreement(rollout: Rollout, clearance: Floats, bound: float) -> Iterator[str]:
     """Check that physics, closed form and bound agree on positive clearance at every moment."""
     touched, least = len(rollout.contacts), float(clearance.min())
+    if rollout.record.physics:
+        yield f"physics: its contacts are no evidence, since {rollout.record.physics}"
     if touched:
         step = int(rollout.contacts[0, 0])
         yield f"physics reports {touched} contact points, the first at t = {rollout.t[step]:.3f} s"

@@ -272,6 +272,8 @@ class DriveRecord:
         times: wall-clock times, not covered by the digest
         footprint_margin: clearance of plans that keep the robot's footprint clear [m]; omitted where all plans keep the disc
             around the robot clear
+        physics: which body of physics was not in the place of its obstacle, so that its contacts are no evidence; omitted
+            where all were
         digest: SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
     Raises:
@@ -309,6 +311,7 @@ class DriveRecord:
     sensing: SensingRecord | None = dataclasses.field(default=None, metadata=LATER)
     settings: Mapping[str, Any] | None = dataclasses.field(default=None, metadata=LATER | CHOSEN)
     footprint_margin: float | None = dataclasses.field(default=None, metadata=LATER | REPLAYED)
+    physics: str = dataclasses.field(default="", metadata=LATER | REPLAYED)
     digest: str | None = dataclasses.field(default=None, metadata=LOGGED)
 
     def __post_init__(self) -> None:

@@ -11,7 +11,6 @@ from typing import Any
 
 # Collision groups. The chassis collides with obstacles and walls only, so its contacts are exactly the collisions.
 GROUND, WHEELS, CHASSIS, OBSTACLE = 1, 2, 4, 8
-BELOW = -1000.0  # height of parked bodies [m]
 
 
 @functools.cache

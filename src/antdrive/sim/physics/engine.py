@@ -13,7 +13,7 @@ import math
 import struct
 from collections.abc import Iterator, Sequence
 from types import TracebackType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from antdrive.base.types import Floats, Pose
 from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.physics import _kernels_states
+from antdrive.sim.physics.bodies import Bodies, Point3, size_of
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies
 from antdrive.sim.physics.near import NearBodies
@@ -29,9 +30,6 @@ from antdrive.sim.physics.urdf import CASTER_GAP, chassis_mesh, robot_urdf, roll
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc, World
 
-Point3: TypeAlias = tuple[float, float, float]  # [m]
-
-MIN_HEIGHT = 0.05  # least height of obstacles: the chassis hangs 5 mm above the floor and must not pass over them [m]
 SETTLING_TIME = 0.1  # time in which a placed robot settles on its wheels [s]
 TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
 MAX_JOINT_VELOCITY = 1e6  # speed limit of wheels; Bullet's default of 100 would slow small ones [rad/s]
@@ -98,6 +96,7 @@ class Engine:
         self.physics_hz = physics_hz
         self.trajectories = trajectories
         self._steps = 0  # since placement
+        self._fault = ""  # the first fault found since placement
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Engine:
@@ -115,17 +114,17 @@ class Engine:
         self._drawn = drawn_as(self._client)
         self._build_ground()
         self._build_robot()
-        self._obstacles: dict[int, int] = {}  # contact index by body number, without movers
+        walls = list(_walls(self.world, max(2 * self.robot.height, 0.2)))
+        self._bodies = Bodies(self.world, walls, self._client)
         # Bullet's search tree, and with it the order of contacts, follows the order of creation.
         self._shapes: dict[tuple[float, float], int] = {}
         self._near = self._near_bodies() if len(self.world.obstacles) > MANY_BODIES else None
         if self._near is None:
-            for _, alike in itertools.groupby(enumerate(self.world.obstacles), lambda one: _size(one[1])):
-                indices, discs = zip(*alike, strict=True)
-                self._build_cylinders(discs[0], list(indices))
+            for _, alike in itertools.groupby(enumerate(self.world.obstacles), lambda one: size_of(one[1])):
+                self._build_cylinders([index for index, _ in alike])
         self._movers = self._mover_bodies(self.trajectories) if self.trajectories else None
         standing = len(self.world.obstacles) + len(self.world.movers)
-        for i, (half_extents, centre) in enumerate(_walls(self.world, max(2 * self.robot.height, 0.2)), standing):
+        for i, (half_extents, centre) in enumerate(walls, standing):
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half_extents, physicsClientId=self._client)
             self._build_obstacles([i], shape, [centre])
         return self
@@ -147,6 +146,7 @@ class Engine:
         p.resetBaseVelocity(self._robot, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
         self.command(0.0, 0.0)
         self._steps = 0
+        self._fault = ""
         if self._near is not None:
             self._near.start(x, y)
         if self._movers is not None:
@@ -188,6 +188,7 @@ class Engine:
         p, robot, number, movers, near = self._p, self._robot, self._client, self._movers, self._near
         step, points_of = p.stepSimulation, p.getContactPoints
         pack, place_of, velocity_of = MOTION.pack, p.getBasePositionAndOrientation, p.getBaseVelocity
+        fresh = self._bodies.fresh
         touched: list[tuple[int, Contact]] = []
         for k in range(steps):
             if movers is not None:
@@ -197,6 +198,8 @@ class Engine:
                 near.follow(x, y)
             self._steps += 1
             step(number)
+            if fresh:
+                self._note(self._bodies.fault(self._expected(), fresh))
             points = points_of(robot, *CHASSIS_AND_ANY, number)
             if points:
                 touched += [(k, contact) for contact in self._touching(points)]
@@ -209,6 +212,16 @@ class Engine:
         """Return the chassis's current contacts, without advancing time."""
         self._p.performCollisionDetection(physicsClientId=self._client)
         return self._touching(self._p.getContactPoints(bodyA=self._robot, linkIndexA=-1, physicsClientId=self._client))
+
+    def audit(self) -> str:
+        """Return a sentence on the first body that was not in its place since placement; empty if all were.
+
+        Each step checks the bodies placed or parked before it, and each contact must be with a known body. This call
+        checks every body and that nothing near the robot lacks one. Contacts are worth nothing after a fault.
+        """
+        (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
+        self._note(self._bodies.fault(self._expected()) or self._bodies.lacking(x, y, self.robot.radius))
+        return self._fault
 
     def state(self) -> State:
         """Return the pose and velocity of the axle's centre."""
@@ -244,18 +257,19 @@ class Engine:
 
     def _touching(self, points: Sequence[Any]) -> list[Contact]:
         # Bullet also lists points some millimetres apart. A pressing contact may be listed 0.05 mm apart, but has a force.
-        return [
-            Contact(self._index(point[2]), point[8], point[9])
-            for point in points
-            if point[8] <= TOUCHING_DISTANCE or point[9] > 0
-        ]
+        touching = [point for point in points if point[8] <= TOUCHING_DISTANCE or point[9] > 0]
+        index = self._bodies.index
+        for body in {point[2] for point in touching} - index.keys():
+            self._note(f"physics reports a contact with body {body}, which is of no obstacle")
+        return [Contact(index[point[2]], point[8], point[9]) for point in touching if point[2] in index]
 
-    def _index(self, body: int) -> int:
-        """Return the contact index of a body."""
-        if body in self._obstacles:
-            return self._obstacles[body]
-        assert self._movers is not None
-        return len(self.world.obstacles) + self._movers.indices[body]
+    def _expected(self) -> Floats:
+        """Return the positions of the movers by their trajectories (M, 2) [m]."""
+        return self._movers.trajectory(self._steps) if self._movers else np.empty((0, 2))
+
+    def _note(self, fault: str) -> None:
+        """Keep the first fault since placement, with its time."""
+        self._fault = self._fault or (f"{fault} at t = {self.time:.3f} s" if fault else "")
 
     def _build_ground(self) -> None:
         p = self._p
@@ -298,26 +312,31 @@ class Engine:
             return x, y
 
         fast = OVERSPEED * self.robot.max_speed
-        return MoverBodies(trajectories, self.robot.radius, fast, where, self.physics_hz, self._client)
+        return MoverBodies(self.world, trajectories, self.robot.radius, fast, where, self.physics_hz, self._bodies)
 
     def _near_bodies(self) -> NearBodies:
         """Create the bodies near the robot, within a range that it cannot leave between two updates."""
         way = OVERSPEED * self.robot.max_speed * CHECK_EVERY / self.physics_hz
         reach = self.robot.radius + way + NEAR_MARGIN
-        return NearBodies(self.world.obstacles, reach, _size, self._build_cylinders, self._obstacles, self._client)
+        return NearBodies(self.world.obstacles, reach, self._shape_of, self._build_cylinders, self._bodies)
 
-    def _build_cylinders(self, alike: Disc, indices: list[int]) -> list[int]:
-        """Build the bodies of obstacles of one size, given one of them; return the bodies' numbers."""
-        radius, height = size = _size(alike)
+    def _shape_of(self, cylinder: Disc) -> int:
+        """Return the collision shape of a cylinder, created for the first of its size."""
+        radius, height = size = size_of(cylinder)
         if size not in self._shapes:
             self._shapes[size] = self._p.createCollisionShape(
                 self._p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client
             )
-        places = [(disc.x, disc.y, height / 2) for disc in map(self.world.obstacles.__getitem__, indices)]
-        return self._build_obstacles(indices, self._shapes[size], places)
+        return self._shapes[size]
 
-    def _build_obstacles(self, indices: list[int], shape: int, centres: list[Point3]) -> list[int]:
-        """Build bodies of one shape with these contact indices; return their numbers.
+    def _build_cylinders(self, indices: list[int]) -> None:
+        """Build the bodies of cylinders of one size."""
+        discs = [self.world.obstacles[index] for index in indices]
+        _, height = size_of(discs[0])
+        self._build_obstacles(indices, self._shape_of(discs[0]), [(disc.x, disc.y, height / 2) for disc in discs])
+
+    def _build_obstacles(self, indices: list[int], shape: int, centres: list[Point3]) -> None:
+        """Build bodies of one shape with these contact indices.
 
         A batched call takes a tenth of the time of single calls.
         """
@@ -337,13 +356,7 @@ class Engine:
         for index, body in zip(indices, bodies, strict=True):
             p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=self._client)
             p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
-            self._obstacles[body] = index
-        return bodies
-
-
-def _size(disc: Disc) -> tuple[float, float]:
-    """Return the built radius and height of a cylinder [m]."""
-    return disc.radius, max(disc.height, MIN_HEIGHT)
+            self._bodies.add(index, body, shape)
 
 
 def _walls(world: World, height: float) -> Iterator[tuple[Point3, Point3]]:

@@ -14,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.types import Floats
-from antdrive.sim.physics.bullet import BELOW, CHASSIS, OBSTACLE, bullet, drawn_as
+from antdrive.sim.physics.bodies import Bodies, Point3, size_of
+from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE, bullet, drawn_as
 from antdrive.worlds.trajectories import Trajectories
+from antdrive.worlds.world import World
 
 SAME_VELOCITY = 1e-10  # velocities within this differ by rounding only [m/s]
 CHUNK = 480  # physics steps whose velocities are computed together
@@ -28,42 +30,43 @@ Change: TypeAlias = tuple[int, float, float, tuple[float, float] | None]
 
 
 class MoverBodies:
-    """Bodies of the movers near the robot. Velocities take them exactly from one step's position to the next.
-
-    Attributes:
-        bodies: PyBullet's body numbers by mover index, for the movers with a body
-        indices: mover indices by PyBullet's body number, for the same movers
-    """
+    """Bodies of the movers near the robot. Velocities take them exactly from one step's position to the next."""
 
     def __init__(
         self,
+        world: World,
         trajectories: Trajectories,
         radius: float,
         speed: float,
         where: Callable[[], tuple[float, float]],
         hz: int,
-        client: int,
+        bodies: Bodies,
     ) -> None:
-        p = self._p = bullet()
-        self._trajectories, self._hz, self._client = trajectories, hz, client
+        p, client = bullet(), bodies.client
+        self._p, self._client, self._bodies = p, client, bodies
+        self._trajectories, self._hz = trajectories, hz
         self._radius, self._speed, self._where = radius, speed, where
-        self._half_heights = [max(height, 0.05) / 2 for height in trajectories.heights.tolist()]
-        self._sizes = list(zip(trajectories.radii.tolist(), self._half_heights, strict=True))
-        self._shapes = {
-            size: p.createCollisionShape(p.GEOM_CYLINDER, radius=size[0], height=2 * size[1], physicsClientId=client)
-            for size in dict.fromkeys(self._sizes)
+        self._first = len(world.obstacles)  # contact index of the first mover
+        sizes = [size_of(mover) for mover in world.movers]
+        shapes = {
+            size: p.createCollisionShape(p.GEOM_CYLINDER, radius=size[0], height=size[1], physicsClientId=client)
+            for size in dict.fromkeys(sizes)
         }
-        self._spare: dict[tuple[float, float], list[int]] = {size: [] for size in self._shapes}  # parked bodies, by size
+        self._shapes, self._heights = [shapes[size] for size in sizes], [height for _, height in sizes]
         self._chunk = _Chunk.of(trajectories, hz, 0)
         self._past = [self._chunk.positions]
         self._drawn = drawn_as(client)
-        self.bodies: dict[int, int] = {}
-        self.indices: dict[int, int] = {}
+
+    @property
+    def held(self) -> dict[int, int]:
+        """Body numbers by mover index, for the movers with a body."""
+        held, movers = self._bodies.held, range(len(self._shapes))
+        return {m: held[self._first + m] for m in movers if self._first + m in held}
 
     def park(self) -> None:
-        """Move all bodies far below the floor."""
-        for m in list(self.bodies):
-            self._release(m)
+        """Park all bodies."""
+        for m in self.held:
+            self._park(m)
 
     def restart(self) -> None:
         """Place the movers at their positions at time 0."""
@@ -80,17 +83,24 @@ class MoverBodies:
                 self._past.append(self._chunk.positions)
             self._choose(step)
         for m, vx, vy, jump in self._chunk.changes.get(step, ()):
-            if m in self.bodies:
+            if self._first + m in self._bodies.held:
                 if jump is not None:
-                    self._set_position(m, *jump)
+                    self._bodies.move(self._first + m, self._place(m, jump))
                 self._set_velocity(m, vx, vy)
 
     def positions(self, step: int) -> Floats:
         """Return the positions of all movers before a physics step (M, 2) [m]: those of bodies where they exist."""
-        places: Floats = self._trajectories.positions(step / self._hz)[0]
-        for m, body in self.bodies.items():
+        places = self.trajectory(step).copy()
+        for m, body in self.held.items():
             places[m] = self._p.getBasePositionAndOrientation(body, self._client)[0][:2]
         return places
+
+    def trajectory(self, step: int) -> Floats:
+        """Return the positions of the trajectories before a physics step (M, 2) [m]."""
+        chunk = self._chunk
+        if chunk.first <= step < chunk.end:
+            return np.asarray(chunk.positions[step - chunk.first])
+        return np.asarray(self._trajectories.positions(step / self._hz)[0])
 
     def track(self, steps: int) -> Floats:
         """Return the positions of all movers before each of the first steps since the restart (steps, M, 2) [m]."""
@@ -108,43 +118,38 @@ class MoverBodies:
         travel = (self._speed * WINDOW + chunk.fastest[w] * (WINDOW + 1)) / self._hz
         off = np.maximum(np.maximum(chunk.low[w] - robot, robot - chunk.high[w]), 0.0)
         away = np.hypot(off[:, 0], off[:, 1]) - self._trajectories.radii - self._radius - travel
-        for m in [m for m in self.bodies if away[m] > MARGIN + HOLD]:
-            self._release(m)
+        held = self.held
+        for m in held:
+            if away[m] > MARGIN + HOLD:
+                self._park(m)
         for m in np.flatnonzero(away <= MARGIN).tolist():
-            if m not in self.bodies:
+            if m not in held:
                 self._add(m, step)
 
     def _add(self, m: int, step: int) -> None:
         position, velocity = self._chunk.state(m, step)
-        spare = self._spare[self._sizes[m]]
-        body = spare.pop() if spare else self._create(m)
-        self.bodies[m], self.indices[body] = body, m
-        self._set_position(m, *position)
+        place = self._place(m, position)
+        if not self._bodies.reuse(self._first + m, self._shapes[m], place):
+            self._create(m, place)
         self._set_velocity(m, *velocity)
 
-    def _create(self, m: int) -> int:
-        p = self._p
+    def _create(self, m: int, place: Point3) -> None:
+        p, shape, client = self._p, self._shapes[m], self._client
         # Unlike an obstacle, a mover must be awake; with maximal coordinates it would not move.
-        body: int = p.createMultiBody(
-            0, self._shapes[self._sizes[m]], self._drawn, basePosition=(0, 0, BELOW), physicsClientId=self._client
-        )
-        p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
-        return body
+        body = p.createMultiBody(0, shape, self._drawn, basePosition=place, physicsClientId=client)
+        p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=client)
+        self._bodies.add(self._first + m, body, shape)
 
-    def _release(self, m: int) -> None:
-        """Park a mover's body. A removed body's number would be reused, and batches of bodies would get wrong numbers."""
-        self._set_position(m, 0.0, 0.0, BELOW)
+    def _park(self, m: int) -> None:
         self._set_velocity(m, 0.0, 0.0)
-        body = self.bodies.pop(m)
-        del self.indices[body]
-        self._spare[self._sizes[m]].append(body)
+        self._bodies.park(self._first + m)
 
-    def _set_position(self, m: int, x: float, y: float, z: float | None = None) -> None:
-        place = (x, y, self._half_heights[m] if z is None else z)
-        self._p.resetBasePositionAndOrientation(self.bodies[m], place, (0, 0, 0, 1), physicsClientId=self._client)
+    def _place(self, m: int, position: tuple[float, float]) -> Point3:
+        return (*position, self._heights[m] / 2)
 
     def _set_velocity(self, m: int, vx: float, vy: float) -> None:
-        self._p.resetBaseVelocity(self.bodies[m], (vx, vy, 0), (0, 0, 0), physicsClientId=self._client)
+        body = self._bodies.held[self._first + m]
+        self._p.resetBaseVelocity(body, (vx, vy, 0), (0, 0, 0), physicsClientId=self._client)
 
 
 class _Chunk(NamedTuple):
