@@ -40,7 +40,7 @@ def default_margin(robot: RobotSpec, controller: PurePursuit, noise: float, smoo
     if not (noise and robot.noise.nonzero):
         return LEAST
     raw = smoothing == "none"
-    loss = DEVIATIONS[smoothing] * deviation(robot, controller, noise, raw=raw)
+    loss = noise_loss(robot, controller, noise, smoothing)
     _, right, _, left = robot.footprint.bounds
     width = min(1.0, max(left, -right) / robot.radius)
     cut = (1 - controller.lookahead_margin) * width
@@ -48,6 +48,35 @@ def default_margin(robot: RobotSpec, controller: PurePursuit, noise: float, smoo
         loss *= width
     steps = math.ceil((RESERVE + loss) / (1 - cut) / STEP - 1e-9)
     return max(LEAST, round(steps * STEP, 3))
+
+
+def noise_loss(robot: RobotSpec, controller: PurePursuit, noise: float, smoothing: str) -> float:
+    """Return the loss of clearance by noise that one drive in a thousand exceeds [m].
+
+    Args:
+        robot: the robot
+        controller: its controller
+        noise: factor on the robot's documented noise
+        smoothing: how plans become routes
+    """
+    return DEVIATIONS[smoothing] * deviation(robot, controller, noise, raw=smoothing == "none")
+
+
+def clearances_off_route(robot: RobotSpec, controller: PurePursuit, noise: float) -> tuple[float, float]:
+    """Return the clearances of the circle and the outline that motions off the route keep from obstacles [m].
+
+    They hold the same losses by noise as margins, and the reserve. Such motions are chosen again in each control period, so no
+    long turn adds its slip. Without noise both are 0.
+
+    Args:
+        robot: the robot
+        controller: its controller
+        noise: factor on the robot's documented noise
+    """
+    if not (noise and robot.noise.nonzero):
+        return 0.0, 0.0
+    outline = LINE_DEVIATIONS * line_deviation(robot, controller, noise, turn=0.0)
+    return RESERVE + noise_loss(robot, controller, noise, "none"), RESERVE + outline
 
 
 def deviation(robot: RobotSpec, controller: PurePursuit, noise: float, *, raw: bool) -> float:
@@ -88,21 +117,22 @@ def line_margin(robot: RobotSpec, controller: PurePursuit, noise: float) -> floa
     return max(LEAST, round(math.ceil((RESERVE + loss) / STEP - 1e-9) * STEP, 3))
 
 
-def line_deviation(robot: RobotSpec, controller: PurePursuit, noise: float) -> float:
+def line_deviation(robot: RobotSpec, controller: PurePursuit, noise: float, turn: float = math.pi) -> float:
     """Return the standard deviation of the outline's farthest corner from its planned sweep, by noise [m].
 
     Independent parts add up: the estimated position; the heading, over the circumscribed radius and the distance over which
-    errors decay; wheel slip on straights, which bends the path over that distance; and slip during a turn of half a circle.
+    errors decay; wheel slip on straights, which bends the path over that distance; and slip during a turn on the spot.
 
     Args:
         robot: the robot
         controller: its controller
         noise: factor on the robot's documented noise
+        turn: the longest turn [rad]
     """
     levels = robot.noise.scaled(noise)
     speed = min(robot.max_speed, controller.min_speed_near_obstacles + LEAST / controller.clearance_time)
     decay = max(NEAREST, RESPONSE * speed)
     position, heading = steady_errors(levels, robot.track)
     bend = math.sqrt(2) * levels.slip / robot.track
-    turning = levels.slip / math.sqrt(2) * math.pi * robot.track / 2
+    turning = levels.slip / math.sqrt(2) * turn * robot.track / 2
     return math.hypot(position, heading * (robot.radius + decay), bend * decay * (robot.radius + decay), turning)

@@ -13,9 +13,11 @@ from typing import NamedTuple
 from antdrive.base.kernel_cache import compiled
 from antdrive.planners import GridPlanner
 from antdrive.robots import LIMITERS, Avoidance
+from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.drive import full_turn, no_scan
 from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import localiser_of
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.parts import Localiser, Logs, RouteGuide, Rule, Scanning
@@ -79,7 +81,14 @@ def compose(s: Scenario) -> Parts:
         share = DRIFTING_SHARE if drifts else GOAL_SHARE
         blind = drifts and not _lidar(s).full_circle
         backwards = BLIND_SHARE * s.robot.max_speed if blind else math.inf
-        rules.append(Avoid(avoidance, movers, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards))
+        habits = Habits(movers, hz) if movers.uncertain else None
+        delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.controller, s.noise)
+        rules.append(
+            Avoid(
+                avoidance, movers, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
+                losses=losses, habits=habits,
+            )
+        )  # fmt: skip
     if survey:
         # A scan may be one scan period old, and commands are delayed.
         reaction = 1 / hz + 1 / survey.lidar.rate + s.robot.noise.scaled(s.noise).delay

@@ -31,14 +31,20 @@ def in_turn(situation, contact_distances, near):
     steps = len(places) - 1
     everyone = kernels.Reachable(np.tile(near, (steps, 1)), np.full(steps, len(near)))
     window = limits.speed * (weights.step * steps) + tuning.lookahead_max
-    required = kernels.least_clearance(x, y, yaw, False, obstacles, tuning)
-    best, best_score, best_contact, unpassed = 0, -math.inf, -1.0, []
+    keeps = {
+        on_route: kernels.least_clearance(x, y, yaw, on_route, False, obstacles, tuning, weights)
+        for on_route in (False, True)
+    }
+    best, best_score, best_contact, unpassed = -1, -math.inf, -1.0, []
     for n, candidate in enumerate(candidates):
+        required = keeps[candidate[kernels.KIND] == kernels.FOLLOW_ROUTE]
         trail = np.empty((steps + 1, 5))
         trail[0] = x, y, yaw, v, w
         end = kernels.follow(
-            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, True, required, False, trail
+            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, True, required, trail
         )  # fmt: skip
+        if end.blocked:
+            continue
         met = kernels.encounter(trail, end, places, radii, near, everyone, contact_distances, weights, math.inf)
         if met.contact < math.inf:
             if best_contact < math.inf and met.contact > best_contact + 1e-9:
@@ -100,9 +106,10 @@ def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked):
         for n, candidate in enumerate(TABLE):
             trail = np.empty((steps + 1, 5))
             trail[0] = here
-            required = kernels.least_clearance(*here[:3], False, tracked.obstacles, tuning)
+            on_route = candidate[kernels.KIND] == kernels.FOLLOW_ROUTE
+            required = kernels.least_clearance(*here[:3], on_route, False, tracked.obstacles, tuning, weights)
             path = tracked.samples, tracked.obstacles, tracked.limits, tuning
-            motion = (*path, weights.step, 0, True, required, False, trail)
+            motion = (*path, weights.step, 0, True, required, trail)
             if not kernels.follow(*here, s, False, candidate, *motion).blocked:
                 worth = kernels.worth(trail[-1], s, window, tracked.samples, tuning, weights)
                 assert worth <= limit[n]

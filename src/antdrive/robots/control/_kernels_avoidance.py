@@ -68,6 +68,8 @@ class AvoidanceWeights(NamedTuple):
         corners: of the robot's outline (K, 2); none for a disc around the axle [m]
         rounding: of that outline [m]
         outlined: whether the outline is kept from obstacles on every route, not only on those with turns
+        loss: least distance of the circle from obstacles off the route, against noise [m]
+        outline_loss: the same of the outline [m]
     """
 
     step: float
@@ -85,6 +87,20 @@ class AvoidanceWeights(NamedTuple):
     corners: Array
     rounding: float
     outlined: bool
+    loss: float
+    outline_loss: float
+
+
+class Required(NamedTuple):
+    """Clearances that trails from a pose must keep from obstacles.
+
+    Attributes:
+        centre: of the robot's centre, -inf if only the outline counts [m]
+        outline: of its outline, -inf if only the centre counts [m]
+    """
+
+    centre: float
+    outline: float
 
 
 class Trail(NamedTuple):
@@ -207,13 +223,28 @@ def intrusion(pose: Array, places: Array, k: int, radii: Array, near: Array, wei
 
 @leaf
 def least_clearance(
-    x: float, y: float, yaw: float, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning
-) -> float:
-    """Return the required clearance of trails from a pose, of the robot's centre or outline, less if the pose is closer [m]."""
+    x: float, y: float, yaw: float, on_route: bool, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning,
+    weights: AvoidanceWeights,
+) -> Required:  # fmt: skip
+    """Return the required clearances of trails from a pose.
+
+    On the route they are the controller's, less if the pose is closer. Off the route they also hold the loss by noise; from a
+    pose that is closer, no trail may come closer. Where the circle lacks room, a turn could bring the outline closer.
+    """
+    slack, centre = CLOSER if on_route else ROUNDING, -math.inf
     if not outlined:
-        return min(tuning.stopping_clearance, clearance_at(x, y, obstacles) - CLOSER)
-    most = max(tuning.stopping_clearance - tuning.robot_radius, 0.0)
-    return min(most, outline_clearance(x, y, yaw, obstacles, tuning, most + CLOSER) - CLOSER)
+        required = tuning.stopping_clearance
+        if not on_route:
+            required = max(required, tuning.robot_radius + weights.loss)
+        here = clearance_at(x, y, obstacles)
+        centre = min(required, here - slack)
+        if here >= required or weights.corners.shape[0] == 0:
+            return Required(centre, -math.inf)
+    required = max(tuning.stopping_clearance - tuning.robot_radius, 0.0)
+    if not on_route:
+        required = max(required, weights.outline_loss)
+    here = outline_clearance(x, y, yaw, obstacles, tuning, required + slack)
+    return Required(centre, min(required, here - slack))
 
 
 @leaf
@@ -235,8 +266,7 @@ def outline_between(
 def passes_within(
     trail: Array,
     k: int,
-    required: float,
-    outlined: bool,
+    keeps: Required,
     obstacles: ObstacleIndex,
     tuning: PursuitTuning,
     step: float,
@@ -245,25 +275,27 @@ def passes_within(
 
     A step is straight, or a few poses of the outline.
     """
-    length = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step
+    length, outlined = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step, keeps.outline > -math.inf
     if abs(length) <= 1e-6 and not outlined:
         return False
     ax, ay, bx, by = trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1]
-    most, bounds = (required + tuning.robot_radius if outlined else required), obstacles.bounds
+    most, bounds = (keeps.outline + tuning.robot_radius if outlined else keeps.centre), obstacles.bounds
     discs = nearby(ax, ay, most + math.hypot(bx - ax, by - ay), obstacles)
     distance = clearance_below(most, ax, ay, bx, by, discs, bounds)
-    if not outlined or distance >= most:
-        return bool(distance < required)
-    return outline_between(trail[k], trail[k + 1], length, required, discs, bounds, tuning)
+    if distance < keeps.centre:
+        return True
+    return outlined and distance < most and outline_between(
+        trail[k], trail[k + 1], length, keeps.outline, discs, bounds, tuning
+    )  # fmt: skip
 
 
 @leaf
 def meets_obstacle(
-    trail: Array, required: float, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float
+    trail: Array, required: Required, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float
 ) -> bool:
     """Return whether a trail that was followed without obstacle checks comes closer to an obstacle than required."""
     k, steps = 0, trail.shape[0] - 1
-    while k < steps and not passes_within(trail, k, required, outlined, obstacles, tuning, step):
+    while k < steps and not passes_within(trail, k, required, obstacles, tuning, step):
         k += 1
     return bool(k < steps)
 
@@ -290,7 +322,7 @@ def beside_route(
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidate: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
-    step: float, first: int, looks: bool, required: float, outlined: bool, trail: Array,
+    step: float, first: int, looks: bool, required: Required, trail: Array,
 ) -> Trail:  # fmt: skip
     """Follow a candidate from step `first`, where the robot is at (x, y, yaw, v, w), to the last row of `trail` (K + 1, 5).
 
@@ -324,7 +356,7 @@ def follow(
         x1, y1 = x + length * cos, y + length * sin
         yaw1 = yaw + 0.5 * (w + w1) * step
         trail[k + 1, 0], trail[k + 1, 1], trail[k + 1, 2], trail[k + 1, 3], trail[k + 1, 4] = x1, y1, yaw1, v1, w1
-        if looks and passes_within(trail, k, required, outlined, obstacles, tuning, step):
+        if looks and passes_within(trail, k, required, obstacles, tuning, step):
             return Trail(k + 1, True)
         x, y, yaw, v, w, now = x1, y1, yaw1, v1, w1, now + step
     return Trail(trail.shape[0] - 1, False)
@@ -333,7 +365,7 @@ def follow(
 @kernel
 def follow_all(
     s: float, rotating: bool, candidates: Array, path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits,
-    tuning: PursuitTuning, step: float, required: float, outlined: bool, trails: Array, steps: Array, blocked: Array,
+    tuning: PursuitTuning, step: float, route: Required, off: Required, trails: Array, steps: Array, blocked: Array,
 ) -> None:  # fmt: skip
     """Fill `trails` (N, K + 1, 5), `steps` and `blocked` (N,) for the candidates after the first.
 
@@ -355,9 +387,10 @@ def follow_all(
         if stem >= 0 and first == steps[stem]:
             steps[n], blocked[n] = steps[stem], blocked[stem]
             continue
+        required = route if candidate[KIND] == FOLLOW_ROUTE else off
         got = follow(
             trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4], s, rotating,
-            candidate, path, obstacles, limits, tuning, step, first, True, required, outlined, trail,
+            candidate, path, obstacles, limits, tuning, step, first, True, required, trail,
         )  # fmt: skip
         steps[n], blocked[n] = got.steps, got.blocked
         if candidate[KIND] == TWO_TWISTS and candidate[DURATION] == math.inf:
@@ -610,28 +643,34 @@ def choose(
     """Return the index of the chosen candidate (N, 6), and the time of its first contact [s], inf if never.
 
     Row 0 is the controller's motion, row 1 the last decision. Row 0 is chosen if it has the preferred clearance and no
-    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact. A line
-    beside the route has worth only where it leads past all movers.
+    risk; otherwise the candidate of highest worth without contact; if all have contact, the one with the latest contact that
+    keeps clear of obstacles, -1 if none does. A line beside the route has worth only where it leads past all movers.
+
+    Without movers, too, the controller's motion must keep clear of obstacles after another decision, whose speed it may be
+    unable to brake, and where the circle has less room than on the route. There, others may replace it if it does not move.
 
     Obstacles only exclude candidates, and movers only lower their worth. So the search is best-first: the candidate with the
     highest bound is followed, which lowers its bound to its worth without movers. When it is first again, it is evaluated
     among obstacles and movers. The search ends when no bound exceeds the best worth.
     """
     near, contact_distances = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
-    if near.shape[0] == 0:
+    turns = path.turns.shape[0] > 0
+    tight = not turns and clearance_at(x, y, obstacles) < tuning.stopping_clearance
+    if near.shape[0] == 0 and not tight and candidates[1, KIND] == FOLLOW_ROUTE:
         return 0, math.inf
-    outlined = weights.outlined or path.turns.shape[0] > 0
+    outlined = weights.outlined or turns
     count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
     by_step = reachable_by_step(x, y, fastest(v, candidates, limits), weights, places, radii, near, cap)
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
-    required = least_clearance(x, y, yaw, outlined, obstacles, tuning)
+    route = least_clearance(x, y, yaw, True, outlined, obstacles, tuning, weights)
+    off = least_clearance(x, y, yaw, False, outlined, obstacles, tuning, weights)
     own = follow(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True,
-        required, outlined, trails[0],
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, route, trails[0],
     )  # fmt: skip
     steps[0], blocked[0] = own.steps, own.blocked
     met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
-    if met.contact == math.inf and met.clearance >= cap and met.intrusion == 0.0:
+    idle = tight and own.steps > 0 and np.abs(trails[0, own.steps] - trails[0, 0]).max() < ROUNDING
+    if met.contact == math.inf and met.clearance >= cap and met.intrusion == 0.0 and not idle:
         return 0, met.contact
     span = weights.step * (instants - 1)
     window = limits.speed * span + tuning.lookahead_max
@@ -651,16 +690,18 @@ def choose(
         if not followed[n]:
             follow(
                 x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights.step, 0, False,
-                required, outlined, trails[n],
+                off, trails[n],
             )  # fmt: skip
             followed[n] = True
             limit[n] = worth(trails[n, instants - 1], s, window, path, tuning, weights)
             if n <= 1:
                 limit[n] += weights.persistence
             continue
-        beside = candidates[n, KIND] == BESIDE_ROUTE
+        beside, required = candidates[n, KIND] == BESIDE_ROUTE, off
+        if candidates[n, KIND] == FOLLOW_ROUTE:
+            required = route
         if (beside and not passes_all(trails[n], places, near)) or meets_obstacle(
-            trails[n], required, outlined, obstacles, tuning, weights.step
+            trails[n], required, obstacles, tuning, weights.step
         ):
             limit[n] = -math.inf
             continue
@@ -677,24 +718,14 @@ def choose(
     if best >= 0:
         return best, math.inf
     follow_all(
-        s,
-        rotating,
-        candidates,
-        path,
-        obstacles,
-        limits,
-        tuning,
-        weights.step,
-        required,
-        outlined,
-        trails,
-        steps,
-        blocked,
-    )
-    best, latest = 0, -1.0
+        s, rotating, candidates, path, obstacles, limits, tuning, weights.step, route, off, trails, steps, blocked
+    )  # fmt: skip
+    best, latest = -1, -1.0
     for n in range(count):
+        if blocked[n]:
+            continue
         met = encounter(
-            trails[n], Trail(steps[n], blocked[n]), places, radii, near, by_step, contact_distances, weights, cap
+            trails[n], Trail(steps[n], False), places, radii, near, by_step, contact_distances, weights, cap
         )
         if met.contact > latest + 1e-9:
             best, latest = n, met.contact
@@ -714,36 +745,24 @@ def best_escape(
     """
     near, _ = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
     outlined = weights.outlined or path.turns.shape[0] > 0
-    soon = places[: min(places.shape[0], int(ESCAPE_TIME / weights.step) + 2)]
+    soon, instants = min(places.shape[0], int(ESCAPE_TIME / weights.step) + 2), places.shape[0]
     bodies, count = radii + weights.radius, candidates.shape[0]
-    by_step = reachable_by_step(x, y, math.inf, weights, soon, radii, near, math.inf)
-    trails, steps, blocked = np.empty((count, soon.shape[0], 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
-    required = least_clearance(x, y, yaw, outlined, obstacles, tuning)
+    by_step = reachable_by_step(x, y, math.inf, weights, places[:soon], radii, near, math.inf)
+    trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
+    route = least_clearance(x, y, yaw, True, outlined, obstacles, tuning, weights)
+    off = least_clearance(x, y, yaw, False, outlined, obstacles, tuning, weights)
     own = follow(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True,
-        required, outlined, trails[0],
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, route, trails[0],
     )  # fmt: skip
     steps[0], blocked[0] = own.steps, own.blocked
     follow_all(
-        s,
-        rotating,
-        candidates,
-        path,
-        obstacles,
-        limits,
-        tuning,
-        weights.step,
-        required,
-        outlined,
-        trails,
-        steps,
-        blocked,
-    )
+        s, rotating, candidates, path, obstacles, limits, tuning, weights.step, route, off, trails, steps, blocked
+    )  # fmt: skip
     best, most = -1, -math.inf
     for n in range(count):
         if blocked[n]:
             continue
-        met = encounter(trails[n], Trail(steps[n], False), soon, radii, near, by_step, bodies, weights, math.inf)
+        met = encounter(trails[n], Trail(soon - 1, False), places, radii, near, by_step, bodies, weights, math.inf)
         if met.contact == math.inf and met.clearance > most + 1e-6:
             best, most = n, met.clearance
     return best

@@ -4,8 +4,9 @@ In every control period the controller's motion is simulated among the predicted
 clearance, it is used unchanged. Otherwise it competes with other candidates: the same route at lower speeds, and
 sequences of two constant twists, forwards or backwards, within the robot's dynamic window
 (after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
-IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing still is only
-one of the candidates, so the robot moves out of the path of an approaching mover.
+IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles: along the route as the
+controller does, elsewhere with the loss by noise that margins hold. A robot that is closer may not come closer still. Standing
+still is only one of the candidates, so the robot moves out of the path of an approaching mover.
 
 Near movers ahead the robot keeps its `near_speed`, and it reverses slowly and not far. These limits cause no contact that a
 robot without them avoids:
@@ -17,7 +18,7 @@ robot without them avoids:
 - A robot that crosses the lane of a mover that comes faster than `near_speed` is not slowed, nor one that leaves a mover behind.
 
 If a nearby mover turns, there may be no candidate that keeps the minimum clearance. While the robot can still stop in time,
-it takes the candidate with the latest contact. After that it takes the one that stays farthest from movers, and
+it takes the candidate with the latest contact with a mover. After that it takes the one that stays farthest from movers, and
 stops only if every candidate ends in a contact. T. Fraichard and
 H. Asama, *Inevitable collision states*, Advanced Robotics 18, 2004, also evaluate a state by its best escape.
 """
@@ -126,6 +127,7 @@ class Avoidance:
         velocities: Floats | None = None,
         speed_limit: float = math.inf,
         backwards: float = math.inf,
+        losses: tuple[float, float] = (0.0, 0.0),
     ) -> tuple[Twist, bool, AvoidanceState]:
         """Return the next command, whether avoidance changed it, and the state for the next period.
 
@@ -142,6 +144,7 @@ class Avoidance:
             velocities: their observed velocities (M, 2) [m/s]; None: as predicted
             speed_limit: speed limit from the schedule of a timed plan [m/s]
             backwards: maximum reverse speed, for a robot that cannot see behind; ignored if obeying it causes a contact [m/s]
+            losses: clearance of the circle and of the outline from obstacles off the route, against noise [m]
         """
         period, limits = tracked.tuning.period, tracked.limits
         reversed_ = max(0.0, state.reversed - last.speed * period)
@@ -159,7 +162,7 @@ class Avoidance:
             limits_of[:3] = [(math.inf, backwards, False)]
         given_way = None  # a decision to slow down, unless the robot can pass beside its route by its outline
         for fastest, reverse, by_outline in dict.fromkeys(limits_of):
-            weights = _weights(self, tuning.robot_radius, spec.footprint, by_outline)
+            weights = _weights(self, tuning.robot_radius, spec.footprint, by_outline, losses)
             candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse, by_outline)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
@@ -176,7 +179,9 @@ class Avoidance:
                 given_way = candidates, chosen, contact
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
             return wanted, False, AvoidanceState(reversed=reversed_)
-        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(weights, pose, places[0], radii)):
+        turning = abs(last.yaw_rate) / limits.yaw_acceleration + self.step if last.yaw_rate else 0.0
+        too_late = self._too_late(weights, pose, places[0], radii)
+        if contact < max(abs(last.speed) / limits.acceleration, turning, too_late):
             chosen = kernels.best_escape(*situation)
         twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked, pose, before.arc)
         return twist, True, after._replace(reversed=reversed_)
@@ -313,9 +318,9 @@ def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration
         most = min(max_yaw_rate, lateral_acceleration / abs(v)) if v else max_yaw_rate
         for turn in (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0):
             w = turn * most
+            rows.append((kernels.TWO_TWISTS, v, w, math.inf, 0.0, 0.0))
             if not (v or w):
                 continue
-            rows.append((kernels.TWO_TWISTS, v, w, math.inf, 0.0, 0.0))
             for duration in (0.4, 0.9):
                 rows.append((kernels.TWO_TWISTS, v, w, duration, 0.0, 0.0))
                 ahead = (v,) if v else (max_speed, -max_speed)
@@ -358,9 +363,13 @@ def _tuning(tracked: TrackedPath, step: float) -> PursuitTuning:
 
 @functools.lru_cache(maxsize=64)
 def _weights(
-    avoidance: Avoidance, radius: float, footprint: Footprint, outlined: bool = False
-) -> kernels.AvoidanceWeights:
-    """Return the settings for a robot whose circle counts with a given radius [m]; `outlined`: or its outline."""
+    avoidance: Avoidance, radius: float, footprint: Footprint, outlined: bool = False,
+    losses: tuple[float, float] = (0.0, 0.0),
+) -> kernels.AvoidanceWeights:  # fmt: skip
+    """Return the settings for a robot whose circle counts with a given radius [m]; `outlined`: or its outline.
+
+    `losses` are those of `Avoidance.avoid` [m].
+    """
     outline = outline_of(footprint, 0.0)
     return kernels.AvoidanceWeights(
         step=avoidance.step,
@@ -378,4 +387,6 @@ def _weights(
         corners=outline.corners,
         rounding=outline.reach,
         outlined=outlined,
+        loss=losses[0],
+        outline_loss=losses[1],
     )

@@ -12,6 +12,7 @@ from antdrive.base import Floats, Pose
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import TimedPlan
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, Twist
+from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.parts import Guide, Moment, Step
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.worlds import Route, Task
@@ -146,10 +147,14 @@ class Avoid:
         *,
         goal_share: float = GOAL_SHARE,
         backwards: float = math.inf,
+        delay: float = 0.0,  # from a command to the motors [s]
+        losses: tuple[float, float] = (0.0, 0.0),  # see `Avoidance.avoid`
+        habits: Habits | None = None,  # a second prediction of movers
     ) -> None:
         self._avoidance, self._movers, self._guide = avoidance, movers, guide
         self._task, self._robot, self._hz = task, robot, hz
-        self._goal_share, self._backwards = goal_share, backwards
+        self._goal_share, self._backwards, self._delay, self._losses = goal_share, backwards, delay, losses
+        self._habits = habits
         self._state = AvoidanceState()
 
     def apply(self, now: Moment, step: Step) -> Step:
@@ -161,7 +166,16 @@ class Avoid:
             step = step._replace(command=braked(last, self._robot, self._hz))
             # The drive ends when the robot stands, so only the stopping time matters.
             ahead = ahead[: 2 + math.ceil(stopping_time(last, self._robot) / avoidance.step)]
+        # The pose is that of the moment when the command takes effect.
+        ahead = ahead + self._delay
         movers, radii = self._movers.predict(tick, pose[:2], ahead)
+        velocities = self._movers.velocities(tick, pose[:2])
+        kept = radii - self._guide.clearance_reduction(tick, pose[:2])
+        if self._habits is not None:
+            again, sizes = self._habits.predict(tick, pose[:2], ahead, movers, radii)
+            if len(sizes):
+                movers, kept = np.concatenate((movers, again), axis=1), np.concatenate((kept, sizes))
+                velocities = np.concatenate((velocities, (again[1] - again[0]) / avoidance.step))
         command, avoids, self._state = avoidance.avoid(
             path,
             self._robot,
@@ -171,10 +185,11 @@ class Avoid:
             step.command,
             self._state,
             movers,
-            radii - self._guide.clearance_reduction(tick, pose[:2]),
-            self._movers.velocities(tick, pose[:2]),
+            kept,
+            velocities,
             speed_limit=step.speed_limit,
             backwards=self._backwards,
+            losses=self._losses,
         )
         if not (avoids or stopping):
             return step._replace(command=command)

@@ -1,0 +1,46 @@
+"""Movers may take ways again that one took before, in both directions."""
+
+import numpy as np
+import pytest
+
+from antdrive.sim import Perception
+from antdrive.sim.driving.habits import Habits
+from antdrive.sim.driving.perceived_movers import GroundTruth
+from antdrive.worlds import Keyframed, Trajectories, World
+
+HZ, AHEAD = 20, np.arange(26) * 0.1
+CORNER = ((0.0, 1.0, 1.0), (4.0, 5.0, 1.0), (8.0, 5.0, 5.0))  # east at 1 m/s, then north
+
+
+def predicted(t, *movers):
+    """The other predictions at a time, by a robot in the corner that has seen the movers since the start."""
+    world = World("corner", (0.0, 0.0, 10.0, 10.0), movers=movers)
+    truth = GroundTruth(Trajectories.of(world, (9.0, 9.0), 0), Perception(), HZ)
+    habits = Habits(truth, HZ)
+    for tick in range(round(t * HZ) + 1):
+        others, radii = habits.predict(tick, (5.0, 2.0), AHEAD, *truth.predict(tick, (5.0, 2.0), AHEAD))
+    return others, radii
+
+
+def walker(loop="pingpong", phase=0.0, frames=CORNER):
+    return Keyframed(radius=0.25, keyframes=frames, loop=loop, phase=phase)
+
+
+@pytest.mark.parametrize(
+    ("t", "end"), [(11.0, (3.5, 1.0)), (19.0, (5.0, 2.5))], ids=["on the way back", "on the same way again"]
+)
+def test_a_mover_is_expected_to_turn_where_it_turned_before(t, end):
+    others, radii = predicted(t, walker())
+    assert radii.tolist() == [0.25]
+    np.testing.assert_allclose(others[-1, 0], end, atol=0.1)
+
+
+def test_a_mover_at_a_new_place_has_no_other_prediction():
+    assert predicted(3.5, walker())[0].shape == (26, 0, 2)
+
+
+def test_a_mover_is_expected_to_do_what_another_did():
+    later = [(t + 9.0, x, y) for t, x, y in CORNER]
+    first = (0.0, 1.0, 1.0)
+    others, _ = predicted(12.0, walker("once"), walker("once", frames=[first, *later]))
+    np.testing.assert_allclose(others[-1], [(5.0, 2.5)], atol=0.1)
