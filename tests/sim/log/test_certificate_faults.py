@@ -829,6 +829,11 @@ def test_how_far_apart_surfaces_in_contact_may_be():
     assert says(touching(0.0, -1.0), APART)
 
 
+def test_surfaces_of_a_crushed_robot_may_be_apart_by_the_depth_of_its_overlap():
+    crushed = np.where(np.arange(len(drive().t)) < ROW, 1.0, -0.05)
+    only_beyond(2e-4 + 0.05, lambda apart: replace(touching(apart), clearance=crushed), APART)
+
+
 def test_a_robot_that_turns_or_slides_aside_or_a_mover_comes_nearer_too():
     turning = touching(0.0)
     twist = turning.twist.copy()

@@ -135,7 +135,7 @@ def nearest_bound(x: float, y: float, obstacles: ObstacleIndex) -> float:
     first = obstacles.starts[square]
     if first == obstacles.starts[square + 1]:
         return 0.0
-    return math.hypot(obstacles.discs[first, 0] - x, obstacles.discs[first, 1] - y) - obstacles.discs[first, 2]
+    return float(math.hypot(obstacles.discs[first, 0] - x, obstacles.discs[first, 1] - y) - obstacles.discs[first, 2])
 
 
 @leaf

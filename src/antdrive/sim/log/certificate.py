@@ -405,7 +405,9 @@ def _check_contacts(rollout: Rollout) -> Iterator[str]:
     if not len(contacts):
         return
     distance, force = contacts[:, 2:].T
-    near = (distance <= TOUCHING) | ((force > 0) & (distance <= TOUCHING + _approach(rollout)))
+    # Physics cannot separate a robot that is crushed: surfaces with a force may be apart by the depth of its overlap.
+    crushed = np.maximum(-rollout.clearance[contacts[:, 0].astype(np.int64)], 0.0)
+    near = (distance <= TOUCHING) | ((force > 0) & (distance <= TOUCHING + _approach(rollout) + crushed))
     if not near.all() or not (force >= 0).all():
         yield (
             f"contacts: physics reports surfaces no farther apart than {TOUCHING:g} m, or with a force than they come nearer "
