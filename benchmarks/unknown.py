@@ -42,7 +42,7 @@ from tools.shared_data import BARN
 SMALLEST = (
     "ablations --worlds 1 --variants 2 --jobs 0 --results out",
     "contacts --worlds 2 --jobs 0 --results out",
-    "fixes --worlds 4 --jobs 0 --results out --robots jackal",
+    "fixes --worlds 4 --jobs 0 --results out",
 )
 HEADS = " | certified | score | time [s] | contacts | seen [m²] | time x | length x | wall [s]"
 
@@ -196,7 +196,7 @@ def fixes(given: argparse.Namespace) -> Iterator[str]:
     last = given.first + (given.worlds or 200) // len(KINDS) - 1
     data = {
         "worlds": [{**kind, "seeds": f"{given.first}-{last}"} for kind in KINDS],
-        "planners": ["dstar-lite", "astar"],
+        "planners": given.planners.split(","),
         "robots": given.robots.split(","),
         "noise": [given.noise],
         "settings": {"map": "none", "localisation": ["fixes", "matching"]},
@@ -250,7 +250,8 @@ def main() -> None:
         barn=(BARN, "folder or archive of BARN's world_*.world files"),
         worlds=(0, "how many worlds; 0: all of BARN's, or 1,000 random ones (fixes: 200)"),
         first=(5000, "first seed of the random worlds of fixes"),
-        robots=("jackal,turtlebot", "robots of fixes"),
+        planners=("dstar-lite", "planners of fixes"),
+        robots=("jackal", "robots of fixes"),
         noise=(1.0, "noise of fixes"),
         variants=(len(VARIANTS), "how many rows of the ablations"),
         trials=(1, "how often each of BARN's worlds is driven"),

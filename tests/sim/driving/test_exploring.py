@@ -25,7 +25,7 @@ from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.physics.engine import State
-from antdrive.sim.policy import SCANNED, STALLED
+from antdrive.sim.policy import SCANNED, STALLED, Perception
 from antdrive.sim.rebuild import rebuilt
 from antdrive.sim.sensing import Scanner
 from antdrive.views.map_reconstruction import MapReconstruction
@@ -354,6 +354,13 @@ def test_without_noise_pose_fixes_are_true_poses(jackal):
     by_fixes, true = (run(scenario(jackal, localisation=kind, noise=0.0)).rollout for kind in ("fixes", "true"))
     np.testing.assert_array_equal(by_fixes.pose, true.pose)
     assert not len(by_fixes.estimate)
+
+
+@pytest.mark.parametrize(("kind", "matches"), [("positions", False), ("lidar", True)])
+def test_scans_are_matched_among_movers_only_if_they_are_tracked(kind, matches, jackal):
+    made = scenario(jackal, "people-crossing", localisation="fixes", perception=Perception(kind=kind))
+    survey = compose(made).scan.__self__
+    assert (survey._matcher is not None) is matches
 
 
 @pytest.mark.slow
