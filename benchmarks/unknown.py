@@ -8,18 +8,20 @@ Prints Markdown. Repeat the command to resume from the results in the folder. `-
   map (geometric mean, 95 % interval over worlds). `dstar-lite` repairs its search; `ants` keep their pheromone.
 - contacts: contacts while driving in random forests and worlds of BARN's automaton, half of each, with both robots.
 - fixes: `--localisation fixes` against `matching`, pair by pair, in random worlds of four kinds from seed `--first` on.
-  *Time x*, *length x*: ratio fixes / matching where both arrived (median; geometric mean, 95 % interval over worlds).
-  *Sign test*: its p-value for the pairs in which fixes were slower or faster.
+  *Contacts*: drives with contacts. *Time x*, *length x*: ratio fixes / matching where both arrived (median; geometric mean,
+  95 % interval over worlds). *Sign test*: its p-value for the pairs in which fixes were slower or faster.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import statistics
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,18 +33,21 @@ from antdrive.robots import list_robots
 from antdrive.runs.barn_challenge import campaign_data, lines, reference_times, unpacked
 from antdrive.runs.campaigns import sweep
 from antdrive.runs.campaigns.results import SweepResults
+from antdrive.runs.pool import call_all
 from antdrive.runs.statistics.intervals import means_by_world
 from antdrive.runs.statistics.price import Ratio, prices
 from antdrive.runs.statistics.run_table import RunTable
 from antdrive.runs.statistics.significance import mcnemar
 from antdrive.views.film.video import film_failures
+from antdrive.worlds import generate
+from benchmarks.drives import Result, drive
 from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import BARN
 
 SMALLEST = (
     "ablations --worlds 1 --variants 2 --jobs 0 --results out",
     "contacts --worlds 2 --jobs 0 --results out",
-    "fixes --worlds 4 --jobs 0 --results out",
+    "fixes --worlds 4 --jobs 0",
 )
 HEADS = " | certified | score | time [s] | contacts | seen [m²] | time x | length x | wall [s]"
 
@@ -183,57 +188,68 @@ def counted(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
 
 
 #: Random worlds of the table `fixes`: BARN's automaton, usual and dense, forests, and thickets of thin cylinders.
-KINDS: tuple[dict[str, Any], ...] = (
-    {"generate": "barn"},
-    {"generate": "barn", "fill": 0.25},
-    {"generate": "forest"},
-    {"generate": "forest", "count": 40, "radius": [0.05, 0.4], "clearance": 0.7},
+KINDS: tuple[tuple[str, dict[str, str]], ...] = (
+    ("barn", {}),
+    ("barn", {"fill": "0.25"}),
+    ("forest", {}),
+    ("forest", {"count": "40", "radius": "0.05,0.4", "clearance": "0.7"}),
 )
 
 
 def fixes(given: argparse.Namespace) -> Iterator[str]:
-    """Compare pose fixes with scan matching alone by planner and robot."""
-    last = given.first + (given.worlds or 200) // len(KINDS) - 1
-    data = {
-        "worlds": [{**kind, "seeds": f"{given.first}-{last}"} for kind in KINDS],
-        "planners": given.planners.split(","),
-        "robots": given.robots.split(","),
-        "noise": [given.noise],
-        "settings": {"map": "none", "localisation": ["fixes", "matching"]},
-    }
-    runs = filmed(sweep(data, given.results, jobs=given.jobs, keep="failed"), given.films).table.to_pylist()
-    heads = "planner | robot | certified: fixes | matching | contacts: fixes | matching | time [s]: fixes | matching"
-    yield from table(f"{heads} | time x: median | mean | length x | slower | faster | sign test", compared(runs))
-    for run in runs:
-        if not run["succeeded"]:
-            yield f"- {run['world']}, {run['robot']}, {run['localisation']}: {run['outcome']} {run['reason'] or ''}"
+    """Compare pose fixes with scan matching alone, in the same worlds with the same seeds."""
+    seeds = range(given.first, given.first + (given.worlds or 200) // len(KINDS))
+    tasks = [
+        (seed, generate(kind, np.random.default_rng(seed), options, name=f"{kind} {seed} {options}"))
+        for kind, options in KINDS
+        for seed in seeds
+    ]
+
+    def rows() -> Iterator[list[str]]:
+        for planner, robot in itertools.product(given.planners.split(","), given.robots.split(",")):
+            calls = (
+                partial(
+                    drive,
+                    task.world.name,
+                    task,
+                    planner,
+                    robot,
+                    map="none",
+                    localisation=kind,
+                    noise=given.noise,
+                    seed=seed,
+                )
+                for kind in ("fixes", "matching")
+                for seed, task in tasks
+            )
+            done = list(call_all(calls, given.jobs))
+            yield [f"`{planner}`", f"`{robot}`", f"{given.noise:g}", *compared(done[: len(tasks)], done[len(tasks) :])]
+
+    heads = "planner | robot | noise | certified: fixes | matching | contacts: fixes | matching | time [s]: fixes | matching"
+    yield from table(f"{heads} | time x: median | mean | length x | slower | faster | sign test", rows())
 
 
-def compared(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
-    """Yield a row of the table `fixes` for each planner and robot."""
-    for planner, robot in dict.fromkeys((run["planner"], run["robot"]) for run in runs):
-        by_kind: dict[str, dict[str, Mapping[str, Any]]] = {"fixes": {}, "matching": {}}
-        for run in runs:
-            if (run["planner"], run["robot"]) == (planner, robot):
-                by_kind[run["localisation"]][run["world"]] = run
-        fused, alone = by_kind.values()
-        both = [name for name in fused if fused[name]["succeeded"] and alone[name]["succeeded"]]
-        time, length = (
-            np.array([math.log(fused[name][key] / alone[name][key]) for name in both])
-            for key in ("arrival_s", "driven_length_m")
-        )
-        slower, faster = int((time > 0).sum()), int((time < 0).sum())
-        yield [
-            f"`{planner}`",
-            f"`{robot}`",
-            *(f"{sum(run['succeeded'] for run in kind.values())} of {len(kind)}" for kind in by_kind.values()),
-            *(f"{sum(run['contacts_driving'] or 0 for run in kind.values()):.0f}" for kind in by_kind.values()),
-            *(f"{statistics.fmean(kind[name]['arrival_s'] for name in both):.2f}" for kind in by_kind.values()),
-            f"{math.exp(float(np.median(time))):.4f}",
-            *(shown(ratio_of(values)) for values in (time, length)),
-            *(str(count) for count in (slower, faster)),
-            f"{mcnemar(slower, faster):.2g}",
-        ]
+def compared(fused: Sequence[Result], alone: Sequence[Result]) -> list[str]:
+    """Return the cells of one row of the table `fixes`."""
+    both = [
+        (one.metrics, other.metrics)
+        for one, other in zip(fused, alone, strict=True)
+        if one.succeeded and other.succeeded
+    ]
+    time, length = (
+        np.array([math.log(one[key] / other[key]) for one, other in both]) for key in ("arrival_s", "driven_length_m")
+    )
+    slower, faster = int((time > 0).sum()), int((time < 0).sum())
+    return [
+        *(f"{sum(run.succeeded for run in runs)} of {len(runs)}" for runs in (fused, alone)),
+        *(str(sum(run.contacts > 0 for run in runs)) for runs in (fused, alone)),
+        *(f"{statistics.fmean(pair[k]['arrival_s'] for pair in both):.2f}" for k in (0, 1)),
+        f"{math.exp(float(np.median(time))):.4f}",
+        *(shown(ratio_of(values)) for values in (time, length)),
+        str(slower),
+        str(faster),
+        f"{mcnemar(slower, faster):.2g}",
+    ]
 
 
 def ratio_of(logs: Any) -> Ratio:
@@ -249,7 +265,7 @@ def main() -> None:
         results=(Path("out/unknown"), "folder for what was driven"),
         barn=(BARN, "folder or archive of BARN's world_*.world files"),
         worlds=(0, "how many worlds; 0: all of BARN's, or 1,000 random ones (fixes: 200)"),
-        first=(5000, "first seed of the random worlds of fixes"),
+        first=(6000, "first seed of the random worlds of fixes"),
         planners=("dstar-lite", "planners of fixes"),
         robots=("jackal", "robots of fixes"),
         noise=(1.0, "noise of fixes"),

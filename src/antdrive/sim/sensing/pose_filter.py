@@ -41,11 +41,9 @@ class PoseFilter:
         self._fresh = np.diag([0.0, 0.0, 0.0, *[noise.slip**2 * (1 - keep * keep)] * 2, 0.0, 0.0, 0.0])
         self.covariance, self.errors = np.zeros((8, 8)), np.zeros(5)
         self._by_wheels, self._white = np.array([[0.5, 0.5], [-1 / track, 1 / track]]), np.zeros((2, 2))
-        self._of_errors, self._extra = (
-            np.zeros((2, 5)),
-            (0.0, 0.0),
-        )  # the first: from systematic errors to those of a twist
+        self._of_errors = np.zeros((2, 5))  # from systematic errors to those of a twist
         self._of_errors[1, 4] = 1.0
+        self._extra = 0.0, 0.0  # variances of samples of the speed, as a fraction of it, and of the yaw rate
         if gyro is not None:
             self._by_wheels[1] = 0.0
             self.covariance[5:, 5:] = np.diag([gyro.speed_scale**2, gyro.yaw_scale**2, gyro.gyro_bias**2])
