@@ -1,4 +1,4 @@
-"""Mapless drives: `python -m benchmarks.unknown ablations|contacts --results FOLDER [--worlds N] [--jobs N]`.
+"""Mapless drives: `python -m benchmarks.unknown ablations|contacts|fixes --results FOLDER [--worlds N] [--jobs N]`.
 
 Prints Markdown. Repeat the command to resume from the results in the folder. `--films` films failed drives into the folder
 `films` of their results.
@@ -7,19 +7,25 @@ Prints Markdown. Repeat the command to resume from the results in the folder. `-
   errors, or planner differ from the first row. *Price*: ratio of arrival times, and of lengths, to the same drives with the
   map (geometric mean, 95 % interval over worlds). `dstar-lite` repairs its search; `ants` keep their pheromone.
 - contacts: contacts while driving in random forests and worlds of BARN's automaton, half of each, with both robots.
+- fixes: `--localisation fixes` against `matching`, pair by pair, in random worlds of four kinds from seed `--first` on.
+  *Contacts*: drives with contacts. *Time x*, *length x*: ratio fixes / matching where both arrived (median; geometric mean,
+  95 % interval over worlds). *Sign test*: its p-value for the pairs in which fixes were slower or faster.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import statistics
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from antdrive.base.atomic import atomic_write
@@ -27,13 +33,22 @@ from antdrive.robots import list_robots
 from antdrive.runs.barn_challenge import campaign_data, lines, reference_times, unpacked
 from antdrive.runs.campaigns import sweep
 from antdrive.runs.campaigns.results import SweepResults
+from antdrive.runs.pool import call_all
+from antdrive.runs.statistics.intervals import means_by_world
 from antdrive.runs.statistics.price import Ratio, prices
 from antdrive.runs.statistics.run_table import RunTable
+from antdrive.runs.statistics.significance import mcnemar
 from antdrive.views.film.video import film_failures
+from antdrive.worlds import generate
+from benchmarks.drives import Result, drive
 from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import BARN
 
-SMALLEST = ("ablations --worlds 1 --variants 2 --jobs 0 --results out", "contacts --worlds 2 --jobs 0 --results out")
+SMALLEST = (
+    "ablations --worlds 1 --variants 2 --jobs 0 --results out",
+    "contacts --worlds 2 --jobs 0 --results out",
+    "fixes --worlds 4 --jobs 0",
+)
 HEADS = " | certified | score | time [s] | contacts | seen [m²] | time x | length x | wall [s]"
 
 
@@ -172,19 +187,94 @@ def counted(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
             yield [robot, kind, str(len(some)), str(certified), f"{touched:.0f}", words]
 
 
+#: Random worlds of the table `fixes`: BARN's automaton, usual and dense, forests, and thickets of thin cylinders.
+KINDS: tuple[tuple[str, dict[str, str]], ...] = (
+    ("barn", {}),
+    ("barn", {"fill": "0.25"}),
+    ("forest", {}),
+    ("forest", {"count": "40", "radius": "0.05,0.4", "clearance": "0.7"}),
+)
+
+
+def fixes(given: argparse.Namespace) -> Iterator[str]:
+    """Compare pose fixes with scan matching alone, in the same worlds with the same seeds."""
+    seeds = range(given.first, given.first + (given.worlds or 200) // len(KINDS))
+    tasks = [
+        (seed, generate(kind, np.random.default_rng(seed), options, name=f"{kind} {seed} {options}"))
+        for kind, options in KINDS
+        for seed in seeds
+    ]
+
+    def rows() -> Iterator[list[str]]:
+        for planner, robot in itertools.product(given.planners.split(","), given.robots.split(",")):
+            calls = (
+                partial(
+                    drive,
+                    task.world.name,
+                    task,
+                    planner,
+                    robot,
+                    map="none",
+                    localisation=kind,
+                    noise=given.noise,
+                    seed=seed,
+                )
+                for kind in ("fixes", "matching")
+                for seed, task in tasks
+            )
+            done = list(call_all(calls, given.jobs))
+            yield [f"`{planner}`", f"`{robot}`", f"{given.noise:g}", *compared(done[: len(tasks)], done[len(tasks) :])]
+
+    heads = "planner | robot | noise | certified: fixes | matching | contacts: fixes | matching | time [s]: fixes | matching"
+    yield from table(f"{heads} | time x: median | mean | length x | slower | faster | sign test", rows())
+
+
+def compared(fused: Sequence[Result], alone: Sequence[Result]) -> list[str]:
+    """Return the cells of one row of the table `fixes`."""
+    both = [
+        (one.metrics, other.metrics)
+        for one, other in zip(fused, alone, strict=True)
+        if one.succeeded and other.succeeded
+    ]
+    time, length = (
+        np.array([math.log(one[key] / other[key]) for one, other in both]) for key in ("arrival_s", "driven_length_m")
+    )
+    slower, faster = int((time > 0).sum()), int((time < 0).sum())
+    return [
+        *(f"{sum(run.succeeded for run in runs)} of {len(runs)}" for runs in (fused, alone)),
+        *(str(sum(run.contacts > 0 for run in runs)) for runs in (fused, alone)),
+        *(f"{statistics.fmean(pair[k]['arrival_s'] for pair in both):.2f}" for k in (0, 1)),
+        f"{math.exp(float(np.median(time))):.4f}",
+        *(shown(ratio_of(values)) for values in (time, length)),
+        str(slower),
+        str(faster),
+        f"{mcnemar(slower, faster):.2g}",
+    ]
+
+
+def ratio_of(logs: Any) -> Ratio:
+    """Return the mean ratio of one pair per world from the logarithms (N,), with its interval."""
+    ((low, high),) = means_by_world(logs[:, None], np.arange(len(logs)))
+    return Ratio(*map(math.exp, (float(logs.mean()), low, high, float(logs.max()))))
+
+
 def main() -> None:
     given = command_line(
         __doc__,
-        tables=([], "ablations, contacts"),
+        tables=([], "ablations, contacts, fixes"),
         results=(Path("out/unknown"), "folder for what was driven"),
         barn=(BARN, "folder or archive of BARN's world_*.world files"),
-        worlds=(0, "how many worlds; 0: all of BARN's, or 1,000 random ones"),
+        worlds=(0, "how many worlds; 0: all of BARN's, or 1,000 random ones (fixes: 200)"),
+        first=(6000, "first seed of the random worlds of fixes"),
+        planners=("dstar-lite", "planners of fixes"),
+        robots=("jackal", "robots of fixes"),
+        noise=(1.0, "noise of fixes"),
         variants=(len(VARIANTS), "how many rows of the ablations"),
         trials=(1, "how often each of BARN's worlds is driven"),
         jobs=(1, "processes; 0: this one"),
         films=(False, "film each drive that did not arrive"),
     )
-    print_tables(given.tables, {"ablations": ablations, "contacts": contacts}, given)
+    print_tables(given.tables, {"ablations": ablations, "contacts": contacts, "fixes": fixes}, given)
 
 
 if __name__ == "__main__":

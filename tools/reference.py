@@ -348,6 +348,7 @@ def composition() -> list[str]:
         "space-time planner": ("plaza-moving", "sipp", {}),
         "cell by cell": ("plaza-moving", "mmas-dstar", {}),
         "mapless": ("forest", "astar", {"robot": "jackal", "map": "none"}),
+        "mapless, noise": ("forest", "astar", {"robot": "jackal", "map": "none", "noise": 1.0}),
         "mapless, odometry": ("forest", "astar", {"robot": "jackal", "map": "none", "localisation": "matching"}),
         "mapless among movers": ("plaza-moving", "astar", {"robot": "jackal", "map": "none"}),
     }

@@ -120,6 +120,13 @@ def test_the_other_settings_change_the_drive(kinds, arrays, kind):
     assert [key for key, s in acting if same(arrays(s), arrays(kinds[kind])) and key not in QUIET] == []
 
 
+def test_errors_of_odometry_act_on_noisy_fixes_without_a_map(kinds, arrays):
+    noisy = replace(kinds["mapless"], noise=1.0)
+    worse = replace(noisy, odometry=2.0)
+    assert "odometry" not in worse.idle_settings()
+    assert not same(arrays(worse), arrays(noisy))
+
+
 def test_a_setting_at_its_default_is_reported_only_if_it_counts_as_given(small_scenario):
     assert small_scenario.idle_settings() == {}
     assert small_scenario.idle_settings({"seed"}) == {"seed": "astar and the drive draw no random numbers"}

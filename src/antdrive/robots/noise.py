@@ -59,14 +59,22 @@ class NoiseModel:
         fix = np.asarray(pose) + rng.standard_normal(3) * (noise.pose_xy, noise.pose_xy, noise.pose_yaw)
         self.encoders = self.odometry = self._twist(*rolled)
         if self._tick:
-            self.estimate = _moved(self.estimate, self.odometry, self._period)
+            self.estimate = self._predicted(twist)
         if self._tick % self._ticks_per_fix == 0:
-            x, y, yaw = self.estimate
-            gain_xy, gain_yaw = self._gain
-            turned = math.remainder(fix[2] - yaw, 2 * math.pi)
-            self.estimate = (x + gain_xy * (fix[0] - x), y + gain_xy * (fix[1] - y), yaw + gain_yaw * turned)
+            self.estimate = self._corrected(fix)
         self._tick += 1
         return self.estimate
+
+    def _predicted(self, twist: Twist) -> Pose:
+        """Return the estimate after a control period, by odometry of a robot with a true velocity `twist`."""
+        return _moved(self.estimate, self.odometry, self._period)
+
+    def _corrected(self, fix: Floats) -> Pose:
+        """Return the estimate after a pose fix (3,)."""
+        x, y, yaw = self.estimate
+        gain_xy, gain_yaw = self._gain
+        turned = math.remainder(fix[2] - yaw, 2 * math.pi)
+        return x + gain_xy * (fix[0] - x), y + gain_xy * (fix[1] - y), yaw + gain_yaw * turned
 
     def pose_after_delay(self) -> Pose:
         """Return the pose expected when the next command takes effect: the estimate moved by pending commands."""

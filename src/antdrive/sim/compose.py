@@ -60,8 +60,9 @@ def compose(s: Scenario) -> Parts:
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
     tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
     moving = s.moving
-    localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, s.task.start, s.seed)
-    survey = None if mapped else _survey(s, tracks_movers)
+    start, mapless = s.task.start, not mapped
+    localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, start, s.seed, mapless=mapless)
+    survey = None if mapped else _survey(s, tracks_movers, matching=localiser.matched)
     scans = _mover_detector(s) if mapped and tracks_movers else survey
     tracking = scans.tracking if scans else None
     movers: PerceivedMovers = (
@@ -173,10 +174,10 @@ def _exploration(s: Scenario, survey: Survey) -> Exploration:
     return Exploration(route_planner(s), survey, policy, ahead)
 
 
-def _survey(s: Scenario, tracks_movers: bool) -> Survey:
+def _survey(s: Scenario, tracks_movers: bool, *, matching: bool) -> Survey:
     """Create the mapping of a mapless robot."""
     tracking = MoverTracking(_lidar(s), s.control_hz) if tracks_movers else None
-    return Survey.of(s.robot, s.task, _sensor(s), matching=s.localisation == "matching", tracking=tracking)
+    return Survey.of(s.robot, s.task, _sensor(s), matching=matching, tracking=tracking)
 
 
 def _mover_detector(s: Scenario) -> MoverDetector:

@@ -37,7 +37,9 @@ def with_exact_fixes(s: Scenario, key: str) -> str:
 
 def without_odometry(s: Scenario, key: str) -> str:
     """Return a reason for a robot that is localised otherwise."""
-    return "" if s.drifting else f"localisation {s.localisation} uses no odometry errors; odometry and matching do"
+    if s.drifting or (s.localisation == "fixes" and s.map == "none" and s.noisy):
+        return ""
+    return f"localisation {s.localisation} uses no odometry errors here; odometry, matching and noisy fixes without a map do"
 
 
 def on_other_routes(s: Scenario, key: str) -> str:

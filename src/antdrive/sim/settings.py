@@ -145,8 +145,8 @@ class Settings:
     localisation: Annotated[
         str,
         Setting(
-            "the robot's pose estimate: fixes (with the robot's noise), odometry (wheels and gyro, which drift), "
-            "matching (odometry corrected by scan matching; needs map none) or true (without error)",
+            "the robot's pose estimate: fixes (with the robot's noise; with map none fused with matching), odometry (wheels "
+            "and gyro, which drift), matching (odometry corrected by scan matching; needs map none) or true (without error)",
             "Sensing",
             "KIND",
             choices=LOCALISATIONS,

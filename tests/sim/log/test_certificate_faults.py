@@ -469,6 +469,20 @@ def test_the_estimate_is_as_near_as_fixes_and_odometry_keep_it():
     assert not says(replace(noisy(), estimate=around), "estimate")
 
 
+def test_the_estimate_of_a_mapless_robot_has_errors_of_odometry_and_matching_too():
+    """Scales add to slip and encoders; a mismatch shifts by three grains."""
+    sensing = SensingRecord(map="none", localisation="fixes", odometry=2.0)
+    odometry = 20 * 8 * (0.04 + 2 * 0.03) / 20 * 0.7
+    limit = 8 * (0.01 + 0.7 * 0.01) + odometry + 0.075 + 0.02
+
+    def off(error):
+        estimate = noisy().estimate.copy()
+        estimate[77, 0] += error
+        return replace(with_record(noisy(), sensing=sensing), estimate=estimate)
+
+    only_beyond(limit, off, "estimate: up to")
+
+
 def test_the_estimate_drifts_no_faster_than_odometry():
     """At 0.4 m/s for 4 s, while it turns at 0.2 rad/s: biases and scales add up, noise grows with the root of the time."""
     sensing = SensingRecord(map="given", localisation="odometry", odometry=2.0)

@@ -1,27 +1,29 @@
 """Odometry of a logged drive, rebuilt from the seed's noise, with the covariances of the simulated errors.
 
 A log holds the estimates, which pose fixes or scans may have corrected. Odometry is what wheels and gyro alone measured.
-The covariances follow from the error models of `NoiseModel` and `DeadReckoning`, linearised along the odometry's path.
+The covariances follow from the error models of `NoiseModel` and `DeadReckoning`, see `PoseFilter`.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from antdrive.base.types import Floats
-from antdrive.robots.spec import SAMPLE_RATE, Noise, Odometry
 from antdrive.sim.log.consistency import wheel_speeds
 from antdrive.sim.log.rollout import Rollout
+
+if TYPE_CHECKING:
+    from antdrive.sim.sensing.pose_filter import PoseFilter
 
 
 @dataclass(frozen=True, eq=False)
 class LoggedOdometry:
     """Odometry in each of a log's T rows. Covariances are 0 where no noise was simulated.
 
-    The covariance of estimates is that of pose fixes in steady state, otherwise that of dead reckoning; for scan matching
+    The covariance of estimates is that of the filter for pose fixes, otherwise that of dead reckoning; for scan matching
     it is an upper bound.
     """
 
@@ -52,23 +54,23 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
     The imports load compiled code, which tables of exact drives do not need.
     """
     from antdrive.robots.control.pursuit import Twist
-    from antdrive.robots.noise import steady_errors
     from antdrive.sim.driving.localising import Exact, logged_localiser
     from antdrive.sim.physics.engine import State
+    from antdrive.sim.sensing.pose_filter import PoseFilter
 
     record, rows, track = rollout.record, len(rollout.t), rollout.record.robot.track
-    factor = 1.0 if record.sensing is None else record.sensing.odometry
     period, per_tick = 1 / record.control_hz, max(1, record.physics_hz // record.control_hz)
     start = record.task.start
     localiser = logged_localiser(record)
     if isinstance(localiser, Exact):
         return _true(rollout)
-    encoders, odometry = [], []
+    encoders, odometry, corrected = [], [], []
     for row in range(0, rows - 1 + per_tick, per_tick):
         at = min(row, rows - 1)
         localiser.sense(State(*rollout.pose[at].tolist(), *rollout.twist[at].tolist()))
         encoders.append(localiser.encoders)
         odometry.append(localiser.odometry)
+        corrected.append(localiser.covariance)
         localiser.actuate(Twist(*rollout.command[min(row + 1, rows - 1)].tolist()))
     twists = np.array([Twist(0.0, 0.0), *odometry[1:]])
     turned = start[2] + np.cumsum(twists[:, 1] * period)
@@ -81,12 +83,8 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
     elapsed = (np.arange(rows) - before * per_tick) / record.physics_hz
     pose = _moved(ticks[before], twists[of_row], elapsed)
     noise = record.robot.noise.scaled(record.noise)
-    gyro = None if record.localisation == "fixes" else Odometry().scaled(factor)
-    poses, samples = _covariances(twists, middle, noise, gyro, track, period)
-    believed = poses[of_row]
-    if gyro is None:
-        xy, yaw = steady_errors(noise, track)
-        believed = np.tile(np.diag([xy**2, xy**2, yaw**2]), (rows, 1, 1))
+    poses, samples = _covariances(ticks, twists, PoseFilter(noise, localiser.gyro, track, period))
+    believed = np.array(corrected)[np.arange(rows) // per_tick] if record.localisation == "fixes" else poses[of_row]
     wheels = wheel_speeds(np.array(encoders), track)[of_row]
     return LoggedOdometry(pose, twists[of_row], wheels, poses[of_row], samples[of_row], believed)
 
@@ -98,41 +96,12 @@ def _moved(pose: Floats, twist: Floats, time: Floats) -> Floats:
     return pose + np.column_stack([way * np.cos(middle), way * np.sin(middle), turn])
 
 
-def _covariances(
-    twists: Floats, middle: Floats, noise: Noise, gyro: Odometry | None, track: float, period: float
-) -> tuple[Floats, Floats]:
-    """Return the covariances of pose (K, 3, 3) and twist (K, 2, 2) after each control period.
-
-    Extended Kalman prediction of x, y, yaw, the slip of both wheels, and the gyro's constant errors: scale of the speed,
-    scale of the yaw rate, and bias.
-    """
-    from antdrive.robots.noise import SLIP_TIME
-
-    by_wheels = np.array([[0.5, 0.5], [-1 / track, 1 / track]])  # from rim speeds to a twist
-    keep = math.exp(-period / SLIP_TIME)
-    fade, fresh = np.array([1.0, 1.0, 1.0, keep, keep, 1.0, 1.0, 1.0]), np.zeros(8)
-    fresh[3:5] = noise.slip**2 * (1 - keep * keep)
-    first = np.zeros(8)
-    extra = np.zeros(2)
-    if gyro is not None:
-        first[5:] = gyro.speed_scale**2, gyro.yaw_scale**2, gyro.gyro_bias**2
-        extra = np.array([gyro.speed_noise, gyro.gyro_noise]) ** 2 / (SAMPLE_RATE * period)
-    covariance, poses, samples = np.diag(first), [], []
-    for (speed, rate), rim, heading in zip(twists.tolist(), wheel_speeds(twists, track), middle.tolist(), strict=True):
-        covariance = covariance * np.outer(fade, fade) + np.diag(fresh)
-        from_wheels = by_wheels * rim
-        if gyro is not None:
-            from_wheels[1] = 0.0  # the gyro measures the yaw rate
-        of_errors = np.column_stack([-from_wheels, [speed, 0.0], [0.0, rate], [0.0, 1.0]])
-        white = noise.encoder**2 * from_wheels @ from_wheels.T + np.diag(extra * (speed * speed, 1.0))
-        cos, sin = period * math.cos(heading), period * math.sin(heading)
-        moves = np.array([[cos, -speed * sin * period / 2], [sin, speed * cos * period / 2], [0.0, period]])
-        step = np.eye(8)
-        step[:2, 2] = -speed * sin, speed * cos
-        step[:3, 3:] = moves @ of_errors
-        covariance = step @ covariance @ step.T
-        covariance[:3, :3] += moves @ white @ moves.T
-        poses.append(covariance[:3, :3])
-        samples.append(of_errors @ covariance[3:, 3:] @ of_errors.T + white)
+def _covariances(ticks: Floats, twists: Floats, model: PoseFilter) -> tuple[Floats, Floats]:
+    """Return the covariances of pose (K, 3, 3) and twist (K, 2, 2) after each control period, by predictions alone."""
+    poses, samples = [], []
+    for before, twist in zip([ticks[0], *ticks[:-1]], twists, strict=True):
+        model.predict(before.tolist(), twist.tolist())
+        poses.append(model.covariance[:3, :3])
+        samples.append(model.twist_covariance)
     poses[0] = np.zeros((3, 3))  # the start is exact
     return np.array(poses), np.array(samples)

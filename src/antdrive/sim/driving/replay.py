@@ -190,7 +190,7 @@ def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pos
     if not record.exploring:
         return Scans(sensor), {}
     tracks_movers = record.perception is not None and record.perception.kind == "lidar"
-    tracking, matching = MoverTracking(lidar, hz) if tracks_movers else None, record.localisation == "matching"
+    tracking, matching = MoverTracking(lidar, hz) if tracks_movers else None, logged_localiser(record).matched
     survey = Survey.of(record.robot, record.task, sensor, matching=matching, tracking=tracking)
     return survey, dict.fromkeys(reset_ticks(record), survey.reset)
 

@@ -257,7 +257,8 @@ class Survey(Scans):
         self.map = OccupancyMap(self.lidar, MAP_CELL, start[:2], horizon, goal=goal, moving=moving)
         self.map.mark_free(start[:2], self._turning_room, sensor.world, sensor.movers_at_start)
         self._recent = math.ceil(RECENT * self.lidar.rate)
-        self._matcher = ScanMatcher(self.lidar, FAR if tracking is None else FAR_AMONG_MOVERS) if matching else None
+        matches = matching and (moving or sensor.trajectories is None)  # movers without tracks would shift the match
+        self._matcher = ScanMatcher(self.lidar, FAR_AMONG_MOVERS if moving else FAR) if matches else None
         self.whole = 0
 
     @classmethod

@@ -460,15 +460,20 @@ def _check_estimate(rollout: Rollout) -> Iterator[str]:
     if rollout.record.localisation != "fixes":
         yield from _check_unfixed_estimate(rollout)
         return
-    robot = rollout.record.robot
-    noise = robot.noise.scaled(rollout.record.noise)
+    record, robot = rollout.record, rollout.record.robot
+    noise = robot.noise.scaled(record.noise)
+    scale, shift, twist = noise.slip + noise.encoder, 0.0, 0.0
+    if record.exploring:
+        assert record.sensing is not None
+        errors, (shift, twist) = Odometry().scaled(record.sensing.odometry), MATCHED
+        scale += errors.speed_scale + errors.speed_noise
     # The filter corrects an odometry error within twenty fixes, see MIN_GAIN.
-    odometry = 20 * SIGMAS * (noise.slip + noise.encoder) / noise.pose_rate * robot.max_speed
+    odometry = 20 * SIGMAS * scale / noise.pose_rate * robot.max_speed
     off = rollout.estimate - rollout.pose
     far = float(np.hypot(off[:, 0], off[:, 1]).max())
     turned = float(np.abs(wrap_angle(off[:, 2])).max())
-    most = SIGMAS * (noise.pose_xy + robot.max_speed * noise.pose_yaw) + odometry + STILL
-    if not far <= most or not turned <= SIGMAS * noise.pose_yaw + 2 * odometry / robot.track + STILL:
+    most = SIGMAS * (noise.pose_xy + robot.max_speed * noise.pose_yaw) + odometry + shift + STILL
+    if not far <= most or not turned <= SIGMAS * noise.pose_yaw + 2 * odometry / robot.track + twist + STILL:
         yield f"estimate: up to {far:.3g} m and {turned:.3g} rad off the pose, more than the robot's noise allows"
 
 
