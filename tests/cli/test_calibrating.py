@@ -89,9 +89,9 @@ def test_where_the_chosen_margin_closes_every_way_the_reason_says_so(antdrive):
     reason = json.loads(out)["reason"]
     assert code == 1
     assert "margin 0.9" in reason
-    assert "a margin below" in reason
+    assert "; --margin 0.5 finds one" in reason
     _, out, _ = antdrive("plan", "no-path", "-p", "astar", "--margin", "auto", "--json")
-    assert "margin below" not in json.loads(out)["reason"]
+    assert "finds one" not in json.loads(out)["reason"]
 
 
 def test_a_calibration_that_is_due_is_announced(antdrive, small, monkeypatch):

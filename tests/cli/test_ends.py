@@ -31,7 +31,7 @@ def test_places_in_the_map_mean_the_same_as_those_in_the_world(antdrive, office)
     in_map = antdrive(*words, "--start", "7.6,-1.4,1.5707963267948966", "--goal", "7.6,1.4", "--frame", "map")[1]
     assert json.loads(there)["cells"] == json.loads(in_map)["cells"]
     shown = antdrive("worlds", "show", office)[1]
-    assert "frame m, m, rad    [10.0, -2.0, 1.5707963267948966]" in shown
+    assert "frame m, m, rad    [10, -2, 1.570796]" in shown
     assert "goal in its map    [9.4, 1.4]" in shown
 
 

@@ -8,7 +8,7 @@ import pytest
 from antdrive.robots import Footprint, PurePursuit, load_robot
 from antdrive.robots._kernels_footprint import footprint_clearances
 from antdrive.robots.clearance import kernel_shape
-from antdrive.robots.control._kernels_avoidance import passes_within
+from antdrive.robots.control._kernels_avoidance import Required, passes_within
 from antdrive.robots.control._kernels_lines import outline_clearance
 from antdrive.robots.control._kernels_obstacles import (
     ObstacleIndex,
@@ -113,7 +113,8 @@ def test_a_step_comes_within_the_required_clearance_where_it_does_among_all_disc
                 shares = (np.arange(1, count + 1) / count)[:, None]
                 poses = trail[0, :3] + shares * (trail[1, :3] - trail[0, :3])
                 expected = centre < required + footprint.radius and among_all(footprint, poses, listed) < required
-            assert passes_within(trail, 0, required, outlined, obstacles, tuning, step) == expected
+            keeps = Required(-math.inf, required) if outlined else Required(required, -math.inf)
+            assert passes_within(trail, 0, keeps, obstacles, tuning, step) == expected
             answers.append(expected)
     assert 0.1 < np.mean(answers) < 0.9
 

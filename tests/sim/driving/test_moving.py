@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from antdrive.base.errors import FieldError
 from antdrive.robots import PurePursuit
 from antdrive.sim import Engine, Outcome, Scenario, certify, measure, run
 from antdrive.sim.driving.drive import follow
@@ -215,11 +216,10 @@ def test_a_mover_that_appears_within_the_braking_distance_counts_as_a_teleport_h
         assert among(mover, robot=turtlebot).outcome is outcome
 
 
-def test_a_robot_that_starts_touching_a_mover_was_hit_while_standing(turtlebot):
+def test_a_robot_does_not_start_in_a_mover(turtlebot):
     mover = Keyframed(radius=0.3, keyframes=((0.0, 0.6, 1.0), (9.0, 3.0, 1.4)))
-    result = among(mover, robot=turtlebot)
-    assert result.outcome is Outcome.HIT_WHILE_STANDING
-    assert result.rollout.contacts[0, 0] == 0
+    with pytest.raises(FieldError, match=r"overlaps movers\[0\]"):
+        among(mover, robot=turtlebot)
 
 
 def test_a_contact_in_the_control_period_that_would_end_as_stuck_counts(standing):

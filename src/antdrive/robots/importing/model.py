@@ -80,7 +80,7 @@ def _refusing_pipes() -> Iterator[None]:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)  # which xacro explains
         return io.TextIOWrapper(open_regular(path, MAX_BYTES, "a xacro file"), encoding="utf-8")
 
-    modules = [sys.modules[name] for name in ("xacro", "xacrodoc.xacrodoc", "xacrodoc.packages")]
+    modules = [sys.modules[name] for name in ("xacro", "xacrodoc.xacrodoc", "xacrodoc.packages") if name in sys.modules]
     for module in modules:
         vars(module)["open"] = open_text
     try:

@@ -217,7 +217,7 @@ class Exploration(RouteGuide):
         if discs:
             grid, answer = self.plan(pose, discs)
             # Only for the footprint, whose detours have turns on the spot. For the disc the rule saves time on average, but
-            # some waits take twice the detour, and robots stay near movers for longer (docs/notebook/movers.md).
+            # some waits take twice the detour, and robots stay near movers that turn back for longer.
             if answer.solved and grid.turns:
                 free, speed = self.plan(pose), self._robot.max_speed
                 if movers.waiting_is_quicker(tick, pose, trigger, speed, answer.cost, free[1].cost):
