@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, TypeAlias, get_args
 
 import numpy as np
@@ -85,14 +85,6 @@ def scenario(kind: DriveKind, rng: np.random.Generator) -> Scenario:
         except (FieldError, InputError):  # settings that exclude each other, or a start in an obstacle
             continue
     raise LookupError(f"no drive is of the kind {dict(kind)}")
-
-
-def scenarios(count: int, seed: int) -> Iterator[tuple[DriveKind, Scenario]]:
-    """Yield random scenarios; kinds of `crossed` take turns."""
-    kinds = crossed()
-    for number in range(count):
-        kind = kinds[number % len(kinds)]
-        yield kind, scenario(kind, np.random.default_rng([seed, number]))
 
 
 def _drawn(kind: DriveKind, rng: np.random.Generator) -> Scenario:

@@ -129,6 +129,6 @@ def test_tidy_numbers_lose_only_their_rounding_error(value):
 
 
 def test_small_sizes_are_not_zero():
-    assert [format_size(n) for n in (7, 20_000, 200_000, 1_000_000, 1 << 29, 2_100_000_000)] == [
+    assert [format_size(n) for n in (7, 20_000, 200_000, 999_700, 1 << 29, 2_100_000_000)] == [
         "7 bytes", "20 kB", "200 kB", "1 MB", "537 MB", "2.1 GB",
     ]  # fmt: skip

@@ -88,6 +88,21 @@ def test_what_a_planner_needs_later_remains(monkeypatch, tmp_path):
         sys.setrecursionlimit(before)
 
 
+def test_a_stream_needs_no_more_than_to_write(monkeypatch):
+    class Tee:
+        def write(self, text):
+            return len(text)
+
+        def flush(self):
+            pass
+
+    tee = Tee()
+    monkeypatch.setattr(sys, "stdout", tee)
+    with UserCode("mine", RuntimeError), sys.stdout as stream:
+        stream.write("said")
+    assert sys.stdout is tee
+
+
 def test_a_closed_stream_is_opened_again(monkeypatch, tmp_path):
     """Where user code closes it by its buffer."""
     number = os.dup(1)

@@ -33,6 +33,7 @@ from numba.core.types import functions
 
 from antdrive.base import kernel_cache
 from antdrive.base._kernels_interpreter import ALLOWANCE, interpret
+from antdrive.base.errors import InputError
 from antdrive.base.files import MAX_BYTES, read_bytes
 from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
 
@@ -80,7 +81,13 @@ class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
         path = self._path(key)
         if not path.exists():
             return None
-        found = pickle.loads(read_bytes(path, MAX_BYTES))  # noqa: S301 - no less safe than the code in it
+        try:
+            content = read_bytes(path, MAX_BYTES)
+        except InputError:
+            if path.exists():
+                raise
+            return None  # another process has removed it
+        found = pickle.loads(content)  # noqa: S301 - no less safe than the code in it
         *is_for, data = found
         return data if is_for == [self._version, self._source_stamp, key] else None
 

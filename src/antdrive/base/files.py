@@ -116,7 +116,8 @@ def _too_large(path: str | os.PathLike[str], max_bytes: int) -> InputError:
 
 def format_size(size: int) -> str:
     """Format a number of bytes as a person writes it: 20 kB, 1.35 MB."""
-    unit, name = next(((u, n) for u, n in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")) if size >= u), (1.0, "bytes"))
+    units = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
+    unit, name = next(((u, n) for u, n in units if size >= 0.9995 * u), (1.0, "bytes"))
     return f"{size / unit:.3g} {name}"
 
 

@@ -149,7 +149,7 @@ class UserCode:
         raise self._error_of(error) from error
 
     def _leave(self) -> None:
-        """Restore the handlers of signals."""
+        """Restore the handlers of signals and the state of the process."""
         UserCode._outermost = None
         if self.limit is not None:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -160,8 +160,10 @@ class UserCode:
         if callable(self._before) and signal.getsignal(signal.SIGINT) == self._interrupt:
             signal.signal(signal.SIGINT, self._before)
         if not self._own:
-            self._state.restore()
-            supervision.end()
+            try:
+                self._state.restore()
+            finally:
+                supervision.end()
 
     def _interrupt(self, *signalled: Any) -> None:
         self._interrupted = True

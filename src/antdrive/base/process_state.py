@@ -31,6 +31,15 @@ class _Unclosable:
     def __iter__(self) -> Any:
         return iter(self._stream)
 
+    def __next__(self) -> Any:
+        return next(self._stream)
+
+    def __enter__(self) -> _Unclosable:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
         """Flush the stream."""
         with contextlib.suppress(OSError, ValueError):
@@ -122,7 +131,7 @@ def _folder() -> str | None:
 def _open_again(name: str, number: int, stream: Any) -> Any:
     """Return a standard stream, a new one if it was closed or detached."""
     with contextlib.suppress(ValueError):
-        if stream is None or not stream.closed:
+        if stream is None or not getattr(stream, "closed", False):
             return stream
     again = os.fdopen(number, "r" if name == "stdin" else "w", closefd=False)
     if getattr(sys, f"__{name}__") is stream:

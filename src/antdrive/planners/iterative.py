@@ -18,7 +18,7 @@ import numpy as np
 from antdrive.base import Floats
 from antdrive.base.errors import require
 from antdrive.base.plane import polyline_length
-from antdrive.planners.errors import PlannerError, planner_errors
+from antdrive.planners.errors import PlannerError, is_built_in, planner_errors
 from antdrive.planners.graph.search import UNREACHABLE, reachable
 from antdrive.planners.plan import (
     Capabilities,
@@ -239,5 +239,4 @@ def as_iterative(planner: Planner) -> IterativePlanner | None:
 
 def without_iterations(planner: Planner, name: str) -> str:
     """Return a sentence that a planner has no iterations, with what a user's class inherits to have them."""
-    own = not type(planner).__module__.startswith("antdrive.")
-    return f"{name} does not plan in iterations" + (f"; {INHERIT}" if own else "")
+    return f"{name} does not plan in iterations" + ("" if is_built_in(planner) else f"; {INHERIT}")

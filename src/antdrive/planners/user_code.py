@@ -146,7 +146,7 @@ def module_hash(name: str) -> str:
 
 
 def module_file(name: str) -> Path:
-    """Return the file of an imported module; one without a file, its name."""
+    """Return the file of an imported module, its name if it has no file."""
     return Path(getattr(sys.modules.get(name), "__file__", None) or name)
 
 

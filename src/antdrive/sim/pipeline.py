@@ -177,7 +177,7 @@ def driven(
     if not answer.solved:
         return grid, answer, None
     route, path = parts.guide.route(grid, answer)
-    limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot)
+    limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot, s.noise)
     warm_up_replanning(s)
     started = time.perf_counter()
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)

@@ -11,7 +11,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_number, format_position
-from antdrive.planners import AStar, Query
+from antdrive.planners import AStar, Query, is_built_in
 from antdrive.planners.graph.search import reachable
 from antdrive.planners.plan import within_goal
 from antdrive.robots.clearance import obstacle_name
@@ -186,8 +186,7 @@ def _is_small(s: RoutePlanner) -> bool:
 
 def _same(s: RoutePlanner) -> Remedy | None:
     """Return the run's own planner if it is antdrive's and its answer is certain, else A*; None among known motions."""
-    own = type(s.planner).__module__.split(".")[0] == __name__.split(".")[0]
-    if own and s.can.complete and s.can.deterministic:
+    if is_built_in(s.planner) and s.can.complete and s.can.deterministic:
         return Remedy("", s)
     return None if s.motions else _astar(s)
 

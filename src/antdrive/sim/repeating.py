@@ -37,7 +37,7 @@ def command_of(rollout: Rollout) -> str | None:
         given = written(lambda name: values.get(name, SETTINGS[name].default))
     except (FieldError, InputError):
         return None
-    limit = record.task.time_limit or usual_time_limit(polyline_length(rollout.route), record.robot)
+    limit = record.task.time_limit or usual_time_limit(polyline_length(rollout.route), record.robot, record.noise)
     usual = {
         "cell": record.cell == record.task.cell,
         "time_limit": control_periods(record.time_limit, record.control_hz)

@@ -18,6 +18,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_position
 from antdrive.planners import Planner, capabilities_of
 from antdrive.robots import RobotSpec, overlap_at
+from antdrive.robots.control.speed_limits import heading_error, steady
 from antdrive.robots.default_margin import default_margin, line_margin
 from antdrive.sim.log.record import (
     DriveRecord,
@@ -414,14 +415,15 @@ class Scenario(Settings):
         return card(picture_of(self), task.world.name, facts)
 
 
-def usual_time_limit(length: float, robot: RobotSpec) -> float:
+def usual_time_limit(length: float, robot: RobotSpec, noise: float) -> float:
     """Return the time limit of a drive for which neither scenario nor world names one [s].
 
     Args:
         length: length of the route [m]
         robot: the robot
+        noise: factor on its noise, which slows robots of low yaw acceleration
     """
-    return 30.0 + 10.0 * length / robot.max_speed
+    return 30.0 + 10.0 * length / steady(robot, heading_error(robot, noise)).max_speed
 
 
 def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:

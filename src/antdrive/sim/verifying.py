@@ -83,7 +83,7 @@ def logged_settings(rollout: Rollout) -> dict[str, Any]:
 
 
 def _logged_changes(record: DriveRecord) -> dict[str, Any]:
-    """Return the keys of `settings` in `result.json` that the log repeats; what was asked of movers' rules, it does not."""
+    """Return the keys of `settings` in `result.json` that the log repeats, without the rules among movers that were asked for."""
     sensed = record.sensing or SensingRecord(map="given", localisation="fixes", odometry=1.0)
     return {
         "controller": record.controller.settings,

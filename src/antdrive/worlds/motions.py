@@ -96,7 +96,7 @@ def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, start: Po
 
 
 def first_place(mover: Mover, bounds: Bounds, discs: Floats) -> Point | None:
-    """Return a mover's centre at a run's start [m]; None for a wanderer whose place depends on the seed."""
+    """Return a mover's centre at a run's start [m]; None for a wanderer without a start, or in the middle of its walk."""
     if isinstance(mover, Wandering):
         return first_cell(mover, bounds, discs) if mover.start is not None and not mover.phase else None
     x, y = motion_of(mover, 0, bounds, discs, (math.inf, math.inf), 0).at(np.zeros(1))[0].tolist()

@@ -235,7 +235,7 @@ FAULTS = {
     "a removed number is reused": (remove_and_reuse, "of obstacle"),
     "a cylinder has another size": (resize, "0.001 m off its place"),
     "two cylinders share a body": (share, "has no body of its own"),
-    "a near cylinder has none": (forget(beside), "obstacle 7 has no body of its own"),
+    "a near cylinder has none": (forget(beside), "obstacles[7] has no body of its own"),
     "a wall has none": (forget(lambda engine: len(engine.world.obstacles) + 6), "the left wall has no body of its own"),
 }
 
@@ -303,7 +303,7 @@ def faulty(monkeypatch):
 def test_a_drive_with_a_misplaced_body_is_not_certified_and_the_log_says_why(faulty, tmp_path):
     done = faulty(move(cylinder))
     assert (done.outcome.key, done.succeeded) == ("succeeded", False)
-    assert done.rollout.record.physics.startswith("body 2 of obstacle 0 is 0.001 m off its place at t = ")
+    assert done.rollout.record.physics.startswith("body 2 of obstacles[0] is 0.001 m off its place at t = ")
     assert done.certificate.problems == (f"physics: its contacts are no evidence, since {done.rollout.record.physics}",)
     done.rollout.save(tmp_path / "log.npz")
     assert certify(Rollout.load(tmp_path / "log.npz")) == done.certificate
@@ -331,7 +331,7 @@ def test_a_fault_is_found_at_the_swap_and_not_forgotten(faulty):
         engine.step()
         bodies.move(0, (2.0, 1.5, 0.5))
 
-    assert faulty(plant).rollout.record.physics == "body 2 of obstacle 0 is 0.1 m off its place at t = 1.004 s"
+    assert faulty(plant).rollout.record.physics == "body 2 of obstacles[0] is 0.1 m off its place at t = 1.004 s"
 
 
 def test_a_drive_with_its_bodies_in_place_says_nothing_about_them():
@@ -342,5 +342,5 @@ def test_a_drive_with_its_bodies_in_place_says_nothing_about_them():
 
 def test_a_replay_with_a_misplaced_body_is_no_evidence(monkeypatch):
     done = run(Scenario.of(OPEN, "astar"))
-    monkeypatch.setattr(Engine, "audit", lambda engine: "body 2 of obstacle 0 does not exist at t = 1.000 s")
+    monkeypatch.setattr(Engine, "audit", lambda engine: "body 2 of obstacles[0] does not exist at t = 1.000 s")
     assert "physics' contacts are no evidence, since body 2" in replay(done.rollout).problems[0]

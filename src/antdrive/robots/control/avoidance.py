@@ -163,7 +163,8 @@ class Avoidance:
         given_way = None  # a decision to slow down, unless the robot can pass beside its route by its outline
         for fastest, reverse, by_outline in dict.fromkeys(limits_of):
             weights = _weights(self, tuning.robot_radius, spec.footprint, by_outline, losses)
-            candidates = self._candidates(spec, state, min(speed_limit, fastest), fastest, reverse, by_outline)
+            most = min(fastest, spec.max_speed, limits.speed)
+            candidates = self._candidates(spec, state, min(speed_limit, most), most, reverse, by_outline)
             situation = (
                 *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
                 limits, tuning, weights, places, radii,
@@ -231,17 +232,16 @@ class Avoidance:
     def _candidates(
         self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float, beside: bool
     ) -> Floats:
-        """Return the candidates (N, 6) within speed limits [m/s].
+        """Return the candidates (N, 6) within speed limits, `fastest` at most the robot's [m/s].
 
         Row 0 keeps the speed limit, row 1 is the last decision.
         """
-        fastest, reverse = min(fastest, spec.max_speed), min(reverse, spec.max_speed)
         able = spec.max_speed, spec.max_yaw_rate, spec.max_lateral_acceleration
         table = _limited_table(*able, beside, fastest, reverse)
         if not state.candidate and speed_limit >= fastest:
             return table
         table = table.copy()
-        table[0, kernels.SPEED] = min(spec.max_speed, speed_limit)
+        table[0, kernels.SPEED] = speed_limit
         if state.candidate:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining

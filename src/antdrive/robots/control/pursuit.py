@@ -223,7 +223,7 @@ class PurePursuit:
         tolerance: float = math.inf,
         spacing: float = SPACING,
         indexed: bool = True,
-        noise: float = 1.0,
+        noise: float = 0.0,
     ) -> TrackedPath:
         """Prepare a route for tracking.
 

@@ -1,8 +1,8 @@
-"""Ways that movers took before, as a second prediction of what they do next.
+"""Prediction of movers by the ways that movers took before.
 
 Constant velocity is wrong wherever a mover turns. Movers in buildings take the same ways again, in both directions: maps of
-dynamics (T. P. Kucner et al., *Survey of maps of dynamics for mobile robots*, IJRR 42, 2023). A mover that is where one was
-before, with the velocity of that one or the opposite, may go on as that one did, or go back where it came from.
+dynamics (T. P. Kucner et al., *Survey of maps of dynamics for mobile robots*, IJRR 42, 2023). A mover may go on as one did
+before at the same place with the same velocity. With the opposite velocity it may go back where that one came from.
 """
 
 from __future__ import annotations
@@ -59,9 +59,12 @@ class Habits:
 
     def __init__(self, movers: PerceivedMovers, hz: int) -> None:
         self._movers, self._hz = movers, hz
-        self._every, self._old = max(1, round(PERIOD * hz)), round(AGO / PERIOD)
-        self._ways: dict[int, list[Point]] = {}  # positions by mover
-        self._squares: dict[tuple[int, int], list[tuple[int, int]]] = {}  # mover and index of its positions by square
+        self._every = max(1, round(PERIOD * hz))  # control periods
+        self._period = self._every / hz  # [s]
+        self._old = round(AGO / self._period)
+        self._ways: list[tuple[int, list[Point]]] = []  # movers, and positions without a gap
+        self._latest: dict[int, tuple[int, int]] = {}  # the way on which a mover was last, and when [control periods]
+        self._squares: dict[tuple[int, int], list[tuple[int, int]]] = {}  # way and index of its positions by square
         self._known: list[Way] = []
 
     def predict(
@@ -92,10 +95,12 @@ class Habits:
         self._known = []
         for number, velocity in zip(numbers.tolist(), velocities.tolist(), strict=True):
             x, y = everywhere[number].tolist()
-            way, speed = self._ways.setdefault(number, []), math.hypot(*velocity)
+            speed = math.hypot(*velocity)
+            taken = self._way_of(number, tick, (x, y), speed)
+            way = self._ways[taken][1]
             if speed >= STANDS:
                 square = self._squares.setdefault((math.floor(x / NEAR), math.floor(y / NEAR)), [])
-                square.append((number, len(way)))
+                square.append((taken, len(way)))
                 del square[:-KEPT]
             way.append((x, y))
             if speed >= STANDS and math.dist((x, y), position) <= REACH + 2 * speed:
@@ -103,7 +108,16 @@ class Habits:
                     points, pace = self._recalled(number, (x, y), velocity, forwards)
                     if len(points) > 1:
                         moved = np.array(points) + (np.array((x, y)) - points[0])
-                        self._known.append(Way(number, moved, PERIOD * pace, tick / self._hz))
+                        self._known.append(Way(number, moved, self._period * pace, tick / self._hz))
+
+    def _way_of(self, number: int, tick: int, place: Point, speed: float) -> int:
+        """Return the index of a mover's way: a new one after a gap in time or a jump."""
+        taken, latest = self._latest.get(number, (-1, tick))
+        if latest != tick - self._every or math.dist(self._ways[taken][1][-1], place) > NEAR + 2 * speed * self._period:
+            taken = len(self._ways)
+            self._ways.append((number, []))
+        self._latest[number] = taken, tick
+        return taken
 
     def _recalled(self, number: int, place: Point, velocity: list[float], forwards: bool) -> tuple[list[Point], float]:
         """Return how a mover once went on from a place with a velocity, or came there with the opposite, and its pace.
@@ -115,14 +129,14 @@ class Habits:
         column, row = math.floor(x / NEAR), math.floor(y / NEAR)
         for square in itertools.product((column - 1, column, column + 1), (row - 1, row, row + 1)):
             for one, k in self._squares.get(square, ()):
-                way = self._ways[one]
+                mover, way = self._ways[one]
                 if not 0 < k < len(way) - (self._old if forwards else 1):
                     continue
-                rank = one != number, math.dist(way[k], place)
+                rank = mover != number, math.dist(way[k], place)
                 if rank[1] > NEAR or rank >= best:
                     continue
                 (ax, ay), (bx, by) = way[k - 1], way[k + 1]
-                vx, vy = (bx - ax) / (2 * PERIOD), (by - ay) / (2 * PERIOD)
+                vx, vy = (bx - ax) / (2 * self._period), (by - ay) / (2 * self._period)
                 if math.dist((sign * vx, sign * vy), velocity) <= ALIKE * speed:
                     best, found = rank, (way, k, math.hypot(vx, vy) / speed)
         if found is None:

@@ -36,7 +36,7 @@ class Drive:
     movers: Floats  # positions of the movers (T, M, 2) [m]
     contacts: Floats  # one row per contact (K, 4): row, obstacle, distance [m], force [N]
     actuated: Floats  # motor targets (T, 2) [m/s, rad/s]
-    physics: str  # why contacts in physics are worth nothing, see `Engine.audit`; else empty
+    physics: str  # why contacts in physics are no evidence, see `Engine.audit`; else empty
 
 
 class Bullet:

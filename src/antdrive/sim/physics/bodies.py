@@ -134,5 +134,5 @@ class Bodies:
             return "no obstacle"
         first, end = self._moving.start, self._moving.stop
         if index < first:
-            return f"obstacle {index}"
+            return f"obstacles[{index}]"
         return f"movers[{index - first}]" if index < end else WALLS[index - end]

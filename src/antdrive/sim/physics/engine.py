@@ -217,7 +217,7 @@ class Engine:
         """Return a sentence on the first body that was not in its place since placement; empty if all were.
 
         Each step checks the bodies placed or parked before it, and each contact must be with a known body. This call
-        checks every body and that nothing near the robot lacks one. Contacts are worth nothing after a fault.
+        checks every body and that nothing near the robot lacks one. Contacts are no evidence after a fault.
         """
         (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
         self._note(self._bodies.fault(self._expected()) or self._bodies.lacking(x, y, self.robot.radius))
