@@ -112,6 +112,16 @@ def test_a_route_that_ends_short_of_a_goal_with_room_for_the_disc_is_genuine():
     assert made.succeeded, made.certificate.problems
 
 
+def test_a_plan_for_a_footprint_on_finer_cells_is_made_again_from_its_log(tmp_path):
+    """The footprint is planned on cells of 0.05 m, and only because the way of the disc on the asked cells is long."""
+    world = World("open", (0.0, 0.0, 6.0, 3.0), (Disc(3.0, 1.5, 0.2),))
+    done = run(Scenario.of(Task(world, (1.0, 1.5, 0.0), (5.0, 1.5), cell=0.5), "astar", "husky"))
+    record = done.rollout.record
+    assert record.cell < record.asked_cell == 0.5
+    assert record.footprint_margin is not None
+    assert not replayed(Rollout.load(done.rollout.save(tmp_path / "rollout.npz"))).problems
+
+
 def test_an_exact_footprint_is_recorded(driven):
     made = driven("jackal", 0.0)
     exact = run(replace(made.scenario, footprint="exact"))

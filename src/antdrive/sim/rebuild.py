@@ -61,6 +61,7 @@ def scenario_values(record: DriveRecord) -> dict[str, Any]:
     fields |= record.settings or {}
     if record.sensing is not None:
         fields |= dataclasses.asdict(record.sensing)
+    fields["cell"] = record.asked_cell or record.cell
     fields["smoothing"] = record.smoothing.asked
     fields["controller"] = _settings(PurePursuit, record.controller.settings, "controller.settings")
     perception = record.perception

@@ -82,6 +82,7 @@ def configuration_of(s: Scenario, parts: Parts, grid: Grid, answer: PlanResult) 
         "sensing": s.sensing,
         "settings": s.other_settings,
         "cell": grid.cell,
+        "asked_cell": None if grid.cell == s.planning_cell else s.planning_cell,
         "physics_hz": s.physics_hz,
         "control_hz": s.control_hz,
     }

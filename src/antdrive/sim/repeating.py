@@ -39,7 +39,7 @@ def command_of(rollout: Rollout) -> str | None:
         return None
     limit = record.task.time_limit or usual_time_limit(polyline_length(rollout.route), record.robot, record.noise)
     usual = {
-        "cell": record.cell == record.task.cell,
+        "cell": values["cell"] == record.task.cell,
         "time_limit": control_periods(record.time_limit, record.control_hz)
         == control_periods(limit, record.control_hz),
     }

@@ -7,6 +7,7 @@ count up to the contact.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 
@@ -36,6 +37,9 @@ def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
         yield from _check_cells(rollout)
         yield from _check_cost(rollout)
         yield from _check_followed(rollout, end)
+    elif len(rollout.cells):
+        yield "cells: must be empty without a map"
+        rollout = dataclasses.replace(rollout, cells=rollout.cells[:0])
     yield from _check_length(rollout)
     yield from _check_optima(rollout)
     yield from _check_movers_known(rollout)

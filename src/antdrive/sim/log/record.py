@@ -273,6 +273,7 @@ class DriveRecord:
         times: wall-clock times, not covered by the digest
         footprint_margin: clearance of plans that keep the robot's footprint clear [m]; omitted where all plans keep the disc
             around the robot clear
+        asked_cell: side of the cells that were asked for [m]; omitted where plans use these
         physics: which body of physics was not in the place of its obstacle, so that its contacts are no evidence; omitted
             where all were
         digest: SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
@@ -312,6 +313,7 @@ class DriveRecord:
     sensing: SensingRecord | None = dataclasses.field(default=None, metadata=LATER)
     settings: Mapping[str, Any] | None = dataclasses.field(default=None, metadata=LATER | CHOSEN)
     footprint_margin: float | None = dataclasses.field(default=None, metadata=LATER | REPLAYED)
+    asked_cell: float | None = dataclasses.field(default=None, metadata=LATER | CHOSEN)
     physics: str = dataclasses.field(default="", metadata=LATER | REPLAYED)
     digest: str | None = dataclasses.field(default=None, metadata=LOGGED)
 
@@ -329,6 +331,8 @@ class DriveRecord:
         for key in ("cell", "time_limit"):
             if not getattr(self, key) > 0:
                 raise FieldError(key, f"must be greater than 0, got {getattr(self, key)!r:.40}")
+        if self.asked_cell is not None and not self.cell < self.asked_cell <= MAX_COORDINATE:
+            raise FieldError("asked_cell", f"must be greater than cell, got {self.asked_cell!r:.40}")
         if self.footprint_margin is not None and not 0 <= self.footprint_margin <= MAX_MARGIN:
             raise FieldError(
                 "footprint_margin", f"must be at least 0 and at most {MAX_MARGIN:g}, got {self.footprint_margin}"
