@@ -34,10 +34,10 @@ from antdrive.robots import Footprint, load_robot
 from antdrive.runs.margins.choice import with_chosen_margin
 from antdrive.sim import Perception, Rollout, Scenario, certify, run
 from antdrive.sim.driving.replay import replay
+from antdrive.sim.log.consistency import wrong_optima
 from antdrive.sim.log.record import PROOFS, DriveRecord, Proof, differences, plain_value
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.rerun import mismatches, rerun
-from antdrive.sim.verifying import wrong_optima
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
 from benchmarks.forged_fields import ENTRIES, LEVEL_OF, POOL
 from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log

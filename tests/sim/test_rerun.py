@@ -11,12 +11,12 @@ from antdrive.robots import Footprint, load_robot
 from antdrive.sim import Perception, Scenario, plan, run
 from antdrive.sim import rerun as rerun_module
 from antdrive.sim.driving.replay import ROUNDING, replay
+from antdrive.sim.log.consistency import wrong_optima
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import PROOFS, Proof
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.recording import optima_of
 from antdrive.sim.rerun import mismatches, replayed, rerun
-from antdrive.sim.verifying import wrong_optima
 from tests.records import changed
 
 KINDS = {

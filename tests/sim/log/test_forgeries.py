@@ -27,7 +27,7 @@ SENTENCES = {
     "a plan along the wall": ("turtlebot", "the robot is"),
     "a plan that costs half": ("jackal", "cost_m: "),
     "a route with 5 m more": ("jackal", "length_m: "),
-    "an optimum longer than the plan": ("jackal", "is longer than the shortest path in its world"),
+    "an optimum longer than the plan": ("jackal", "m in its world"),
     "an optimum shorter than the straight line": ("jackal", "start and goal are farther apart"),
     "nothing perceived among movers": ("turtlebot, movers", "must not be null among movers"),
     "movers perceived where there are none": ("turtlebot", "must be null without movers"),
