@@ -288,6 +288,10 @@ for _name, _path, _to in (
     ("a time limit of 400 digits", ("time_limit",), _HUGE),
     ("a margin of 400 digits", ("margin",), _HUGE),
     ("an unknown outcome", ("outcome",), "won"),
+    ("an unknown smoothing", ("smoothing", "asked"), "magic"),
+    ("a route of unknown smoothing", ("smoothing", "made"), "magic"),
+    ("an unknown perception", ("perception",), {"kind": "clairvoyance", "range_m": None}),
+    ("a perception within -3 m", ("perception",), {"kind": "positions", "range_m": -3.0}),
     ("physics at 1 MHz", ("physics_hz",), 1_000_000),
     ("a time limit of 0", ("time_limit",), 0.0),
     ("a cell of -1", ("cell",), -1.0),
@@ -794,6 +798,14 @@ def _(log: Log) -> None:
 def _(log: Log) -> None:
     log.record["settings"] = {**(log.record.get("settings") or {}), "footprint": "exact"}
     log.record.pop("footprint_margin", None)
+
+
+@forgery("an optimum longer than the plan's line and its leads", "verify", "gridded")
+def _(log: Log) -> None:
+    r = log.rollout().record
+    first, last = (log["cells"][[0, -1], ::-1] + 0.5) * r.cell + r.world.bounds[:2]
+    leads = math.dist(first, r.task.start[:2]) + math.dist(last, r.task.goal)
+    log.record["plan"]["length_m"] = max(0.0, (r.plan.euclidean_optimum_m or 0.0) - leads - 0.05)
 
 
 @forgery("a route cut short, as by a planner that decides cell by cell", "verify", "mapped moving")

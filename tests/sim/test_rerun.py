@@ -128,7 +128,7 @@ def test_every_derived_key_of_the_record_is_compared(key, seen):
         with_other = replace(seen.record.replans[0], solved=False, route=())
         record = replace(seen.record, replans=(with_other, *seen.record.replans[1:]))
     else:
-        choices = {"outcome": Outcome.STUCK, "footprint_margin": 0.05}
+        choices = {"outcome": Outcome.STUCK, "footprint_margin": 0.05, "smoothing.made": "taut"}
         value = choices[key] if key in choices else other(logged)
         record = rewritten(seen.record, key, value)
     again = replace(seen, record=record)

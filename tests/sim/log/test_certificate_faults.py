@@ -662,6 +662,23 @@ def test_no_shortest_path_is_longer_than_the_paths_in_the_log():
     only_beyond(4.0, lambda metres: optimum(metres, key="grid_optimum_m"), "m, but the cells are 4 m long", share=1e-5)
 
 
+def test_no_line_of_a_plan_is_shorter_than_the_shortest_path():
+    """A wall forces a detour; the line of an any-angle planner may be shorter than its cells, but not than the detour."""
+    wall = tuple(Disc(3.0, 0.2 + 0.3 * k, 0.2) for k in range(7))
+    task = replace(drive().record.task, world=replace(drive().record.task.world, obstacles=wall))
+    shortest = optima_of(task, 0.25, ROBOT, 0.05)[1]
+    leads = math.dist((1.0, 1.0), (1.125, 1.125)) + math.dist((5.0, 1.0), (5.125, 1.125))
+
+    def drawn(short, **plan):
+        values = {"length_m": shortest - short, "cost_m": None, "euclidean_optimum_m": shortest, **plan}
+        return changed(with_record(drive(), task=task), "record.plan", **values)
+
+    assert shortest > 4.0 + 2 * leads
+    only_beyond(leads, drawn, "m, but the shortest path in its world has", share=1e-4)
+    cells = drawn(2 * leads, cost_m=shortest - 2 * leads)
+    assert not says(cells, "m, but the shortest path in its world has")
+
+
 def test_a_search_decides_where_the_log_has_no_path():
     """A mapless robot squeezes through a gap too narrow for the margin, so the shortest path is longer than its drive."""
     wall = tuple(Disc(3.0, y, 0.2) for y in (0.2, 0.6, 1.4, 1.8, 2.2))

@@ -197,14 +197,31 @@ def _check_cost(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_length(rollout: Rollout) -> Iterator[str]:
-    """Check that the plan's line leads from start to goal, and is no longer than its cells allow."""
+    """Check that the plan's length is that of its cells, or of a line no longer than they allow and no shorter than any path."""
     record, plan, leads = rollout.record, rollout.record.plan, sum(_leads(rollout))
-    if plan.length_m < _straight(rollout) - max(leads, 2 * NEAR * record.cell):
+    slack = SAME_LENGTH * max(1.0, plan.length_m)
+    drawn = not record.exploring and (plan.cost_m is None or abs(plan.length_m - plan.cost_m) > slack)
+    if plan.length_m < _straight(rollout) - leads - slack:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but start and goal are farther apart"
-    if plan.cost_m is None:
-        return
-    if plan.length_m > longest_line(plan.cost_m, leads, record.cell) + SAME_LENGTH * max(1.0, plan.cost_m):
+    elif drawn and plan.length_m < (plan.euclidean_optimum_m or 0.0) - leads - slack:
+        yield from _shorter_than_any(record, leads + slack)
+    if plan.cost_m is not None and plan.length_m > longest_line(plan.cost_m, leads, record.cell) + slack:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
+
+
+def _shorter_than_any(record: DriveRecord, short: float) -> Iterator[str]:
+    """Yield whether the plan's line is shorter than any path, by more than a length [m].
+
+    Contact closes a gap to the shortest path, but not to a line, so the search is for slightly less margin.
+    """
+    less = dataclasses.replace(record, margin=max(0.0, record.margin - 2 * JUST_ROOM), margin_choice=None)
+    try:
+        shortest = _optima(less)[1]
+    except ValueError as error:  # the grid has too many cells
+        yield f"record.{error}"
+        return
+    if shortest is not None and record.plan.length_m < shortest - short:
+        yield f"record.plan.length_m: {record.plan.length_m:.6g} m, but the shortest path in its world has {shortest:.6g} m"
 
 
 def _straight(rollout: Rollout) -> float:
@@ -244,10 +261,8 @@ def _check_optima(rollout: Rollout) -> Iterator[str]:
 
 def wrong_optima(record: DriveRecord, keys: Collection[str] = OPTIMA) -> Iterator[str]:
     """Yield the shortest paths in a record, of some keys of its plan, that its world does not have."""
-    from antdrive.sim.recording import optima_of  # imports the compiler
-
     try:
-        computed = optima_of(record.task, record.cell, record.robot, record.margin, record.footprint_margin)
+        computed = _optima(record)
     except ValueError as error:  # the grid has too many cells
         yield f"record.{error}"
         return
@@ -259,6 +274,12 @@ def wrong_optima(record: DriveRecord, keys: Collection[str] = OPTIMA) -> Iterato
             and not (logged and right and math.isclose(logged, right, rel_tol=SAME_OPTIMUM))
         ):
             yield f"record.plan.{key}: {_length(logged)} in the log, {_length(right)} in its world"
+
+
+def _optima(record: DriveRecord) -> tuple[float | None, float | None]:
+    from antdrive.sim.recording import optima_of  # imports the compiler
+
+    return optima_of(record.task, record.cell, record.robot, record.margin, record.footprint_margin)
 
 
 def _length(metres: float | None) -> str:
