@@ -815,7 +815,6 @@ def _(log: Log) -> None:
     replan = {"t": 0.0, "trigger": "decision", "solved": False, "cost_m": None, "work": 1, "route": []}
     log.record["replans"] = [replan]
     log.record["times"]["replans_s"] = [0.1]
-    log.record["plan"] |= {"length_m": 0.0, "grid_optimum_m": 0.0}
 
 
 @forgery("other rules that limited the speed", "replay")

@@ -251,7 +251,7 @@ def _check_optima(rollout: Rollout) -> Iterator[str]:
             yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
         elif value is not None and value <= min(longest, default=0.0) + slack:
             continue
-        elif value is not None and longest == [plan.cost_m]:
+        elif value is not None and longest is on_grid and not record.exploring and plan.cost_m is not None:
             yield f"record.plan.{key}: {value:.6g} m, but the cells are {plan.cost_m:.6g} m long"
         else:
             doubted.append(key)
