@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from antdrive.sim import Rollout
 from antdrive.sim.log.record import LABELS, PROOFS, Proof
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS
-from benchmarks.forged_logs import Array, Log
+from benchmarks.forged_logs import KINDS, Array, Log
 
 Generator = np.random.Generator
 
@@ -178,3 +179,24 @@ def another(value: Any, rng: Generator) -> Any:
 
 #: An entry for every array and every key of the record.
 ENTRIES = {entry.name: entry for entry in (*map(_array, FORMS), *map(_key, PROOFS))}
+
+
+def level_of(name: str) -> str:
+    """Return the last level at which a kind of forgery must be found."""
+    return LEVEL_OF[ENTRIES[name].proof] if name in ENTRIES else KINDS[name].level
+
+
+def forgery_of(name: str, genuine: Rollout, rng: Generator | None = None) -> Log | None:
+    """Return a log with one forgery of either catalogue; None if it makes no sense for the log, or breaks a file.
+
+    Args:
+        name: an array or key, or a kind written by hand
+        genuine: the log
+        rng: draws what becomes of an array or key
+    """
+    log = Log.of(genuine)
+    if name in ENTRIES:
+        assert rng is not None
+        return log if ENTRIES[name].forge(log, rng) else None
+    forge = KINDS[name].forge
+    return None if forge is None else forge(log)

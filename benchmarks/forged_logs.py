@@ -22,8 +22,11 @@ import numpy.typing as npt
 from antdrive.base.errors import FieldError, InputError
 from antdrive.sim import Rollout
 from antdrive.sim.log.certificate import closed_form_clearance
+from antdrive.sim.log.consistency import OPTIMA
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import FORMS, SENSED
+from antdrive.sim.recording import optima_of
+from antdrive.worlds import point_clearance
 
 Array = npt.NDArray[Any]
 LEVELS = ("load", "verify", "files", "replay", "none")
@@ -196,6 +199,10 @@ WHEN: dict[str, Callable[[Log], bool]] = {
     "moving": moving,
     "still": lambda log: not moving(log),
     "long": lambda log: len(log["t"]) > 4 * log.hz,
+    "mapped": lambda log: (log.record.get("sensing") or {}).get("map") != "none",
+    "gridded": lambda log: len(log["cells"]) > 1 and log.record["plan"]["cost_m"] is not None,
+    "angular": lambda log: not log.rollout().record.robot.footprint.is_disc,
+    "disc": lambda log: "footprint_margin" not in log.record,
     "short": lambda log: len(log["t"]) <= 4 * log.hz,
 }
 
@@ -281,6 +288,10 @@ for _name, _path, _to in (
     ("a time limit of 400 digits", ("time_limit",), _HUGE),
     ("a margin of 400 digits", ("margin",), _HUGE),
     ("an unknown outcome", ("outcome",), "won"),
+    ("an unknown smoothing", ("smoothing", "asked"), "magic"),
+    ("a route of unknown smoothing", ("smoothing", "made"), "magic"),
+    ("an unknown perception", ("perception",), {"kind": "clairvoyance", "range_m": None}),
+    ("a perception within -3 m", ("perception",), {"kind": "positions", "range_m": -3.0}),
     ("physics at 1 MHz", ("physics_hz",), 1_000_000),
     ("a time limit of 0", ("time_limit",), 0.0),
     ("a cell of -1", ("cell",), -1.0),
@@ -750,6 +761,60 @@ def _(log: Log) -> None:
 @forgery("an optimum longer than the plan", "verify")
 def _(log: Log) -> None:
     log.record["plan"]["grid_optimum_m"] = 2 * log.record["plan"]["length_m"]
+
+
+def _with_optima(log: Log) -> None:
+    """Let the optima be those of the record's world, margins and cells."""
+    r = log.rollout().record
+    found = optima_of(r.task, r.cell, r.robot, r.margin, r.footprint_margin)
+    log.record["plan"] |= dict(zip(OPTIMA, found, strict=True))
+
+
+@forgery("an optimum of a margin that closes the cells' gaps", "verify", "gridded disc")
+def _(log: Log) -> None:
+    """Raise the margin by less than the routes' slack, just above the room of the cells."""
+    r, cells = log.rollout().record, log["cells"]
+    room = float(point_clearance(r.task.world, (cells[:, ::-1] + 0.5) * r.cell + r.world.bounds[:2]).min())
+    log.record |= {"margin": room + 1e-3 - r.robot.radius, "inflate": room + 1e-3}
+    _with_optima(log)
+
+
+for _more in (7e-4, 0.0117, 0.6):  # margins are whole millimetres
+
+    @forgery(f"an optimum of a footprint kept {1000 * _more:g} mm clearer", "verify")
+    def _(log: Log, more: float = _more) -> None:
+        log.record["footprint_margin"] = log.record.get("footprint_margin", log.record["margin"]) + more
+        _with_optima(log)
+
+
+@forgery("an optimum of a footprint where the settings plan for the disc", "verify", "disc")
+def _(log: Log) -> None:
+    log.record["settings"] = {**(log.record.get("settings") or {}), "footprint": "disc"}
+    log.record["footprint_margin"] = log.record["margin"]
+    _with_optima(log)
+
+
+@forgery("no footprint's margin where the settings plan for it", "verify", "angular")
+def _(log: Log) -> None:
+    log.record["settings"] = {**(log.record.get("settings") or {}), "footprint": "exact"}
+    log.record.pop("footprint_margin", None)
+
+
+@forgery("an optimum longer than the plan's line and its leads", "verify", "gridded")
+def _(log: Log) -> None:
+    r = log.rollout().record
+    first, last = (log["cells"][[0, -1], ::-1] + 0.5) * r.cell + r.world.bounds[:2]
+    leads = math.dist(first, r.task.start[:2]) + math.dist(last, r.task.goal)
+    log.record["plan"]["length_m"] = max(0.0, (r.plan.euclidean_optimum_m or 0.0) - leads - 0.05)
+
+
+@forgery("a route cut short, as by a planner that decides cell by cell", "verify", "mapped moving")
+def _(log: Log) -> None:
+    start = log["route"][0]
+    log.arrays["route"] = np.array([start, start + (0.2, 0.0)])
+    replan = {"t": 0.0, "trigger": "decision", "solved": False, "cost_m": None, "work": 1, "route": []}
+    log.record["replans"] = [replan]
+    log.record["times"]["replans_s"] = [0.1]
 
 
 @forgery("other rules that limited the speed", "replay")

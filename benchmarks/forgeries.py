@@ -34,12 +34,12 @@ from antdrive.robots import Footprint, load_robot
 from antdrive.runs.margins.choice import with_chosen_margin
 from antdrive.sim import Perception, Rollout, Scenario, certify, run
 from antdrive.sim.driving.replay import replay
+from antdrive.sim.log.consistency import wrong_optima
 from antdrive.sim.log.record import PROOFS, DriveRecord, Proof, differences, plain_value
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.rerun import mismatches, rerun
-from antdrive.sim.verifying import wrong_optima
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
-from benchmarks.forged_fields import ENTRIES, LEVEL_OF, POOL
+from benchmarks.forged_fields import ENTRIES, POOL, forgery_of, level_of
 from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
 from benchmarks.kinds import DriveKind, crossed, scenario
 from benchmarks.markdown import command_line, print_table
@@ -225,16 +225,12 @@ JUDGE = Judge()
 
 def forged(kind: Kind, genuine: Rollout, path: Path) -> bool:
     """Write the forged log; whether the kind makes sense for this drive."""
-    log = Log.of(genuine)
-    if kind.forge is not None:
-        changed = kind.forge(log)
-        if changed is None:
-            return False
-        changed.write(path)
-        return True
-    assert kind.breaks is not None
+    log = Log.of(genuine) if kind.breaks is not None else forgery_of(kind.name, genuine)
+    if log is None:
+        return False
     log.write(path)
-    path.write_bytes(kind.breaks(path.read_bytes()))
+    if kind.breaks is not None:
+        path.write_bytes(kind.breaks(path.read_bytes()))
     return True
 
 
@@ -251,16 +247,11 @@ def drawn(
     drive = whose[rng.integers(len(whose))]
     if name not in ENTRIES:
         return (name, drive) if forged(KINDS[name], drives[drive], path) else None
-    log = Log.of(drives[drive])
-    if not ENTRIES[name].forge(log, rng):
+    log = forgery_of(name, drives[drive], rng)
+    if log is None:
         return None
     log.write(path)
     return name, drive
-
-
-def level_of(name: str) -> str:
-    """Return the last level at which a kind of forgery must be found."""
-    return LEVEL_OF[ENTRIES[name].proof] if name in ENTRIES else KINDS[name].level
 
 
 def accepted(finding: Finding) -> bool:

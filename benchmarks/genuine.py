@@ -26,7 +26,7 @@ from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import Proof
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.verifying import verify_log
-from benchmarks.forged_fields import ENTRIES, LEVEL_OF, POOL, another
+from benchmarks.forged_fields import ENTRIES, POOL, another, forgery_of, level_of
 from benchmarks.forged_logs import KINDS, Log
 from benchmarks.kinds import CROSSED, DriveKind, crossed, scenario
 from benchmarks.markdown import command_line, print_table
@@ -83,16 +83,12 @@ def forged(log: Rollout, folder: Path, rng: np.random.Generator) -> tuple[str, s
                 continue
             (folder / "result.json").write_text(json.dumps({**result, key: changed}), encoding="utf-8")
             return f"result.json: {key}", "verify"
-        copy, name = Log.of(log), str(rng.choice(OPTIMA if manner == "optimum" else SHOWN))
-        if name in KINDS:
-            made = KINDS[name].forge(copy)  # type: ignore[misc]
-            level = KINDS[name].level
-        else:
-            made, level = copy if ENTRIES[name].forge(copy, rng) else None, LEVEL_OF[ENTRIES[name].proof]
+        name = str(rng.choice(OPTIMA if manner == "optimum" else SHOWN))
+        made = forgery_of(name, log, rng)
         if made is not None and (made.sealed or made.record != log.record.as_dict() or name in FORMS):
             made.write(folder / "rollout.npz")
             _renew(folder, made)
-            return name, level
+            return name, level_of(name)
 
 
 def _changed_claim(value: Any, rng: np.random.Generator) -> Any:

@@ -11,12 +11,12 @@ from antdrive.robots import Footprint, load_robot
 from antdrive.sim import Perception, Scenario, plan, run
 from antdrive.sim import rerun as rerun_module
 from antdrive.sim.driving.replay import ROUNDING, replay
+from antdrive.sim.log.consistency import wrong_optima
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import PROOFS, Proof
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.recording import optima_of
 from antdrive.sim.rerun import mismatches, replayed, rerun
-from antdrive.sim.verifying import wrong_optima
 from tests.records import changed
 
 KINDS = {
@@ -128,7 +128,7 @@ def test_every_derived_key_of_the_record_is_compared(key, seen):
         with_other = replace(seen.record.replans[0], solved=False, route=())
         record = replace(seen.record, replans=(with_other, *seen.record.replans[1:]))
     else:
-        choices = {"outcome": Outcome.STUCK, "footprint_margin": 0.05}
+        choices = {"outcome": Outcome.STUCK, "footprint_margin": 0.05, "smoothing.made": "taut"}
         value = choices[key] if key in choices else other(logged)
         record = rewritten(seen.record, key, value)
     again = replace(seen, record=record)

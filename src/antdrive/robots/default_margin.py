@@ -22,6 +22,11 @@ DEVIATIONS = {"none": 2.5, "taut": 1.0, "clearance": 1.0}
 LINE_DEVIATIONS = 2.2
 LINE_ROUNDING = 0.005  # loss of lines without noise, apart from corners passed without a stop [m]
 STEP = 0.001  # margins are multiples of this [m]
+#: Plans for the footprint keep this margin if possible: the controller refuses turns closer to hits [m].
+TURNABLE = 0.025
+#: Scattered hits narrow a passage that is hardly wider than the robot: a last plan for the footprint comes this much closer to
+#: them, so that the robot goes there and sees better. The controller and the stopping constraint still keep it from hits [m].
+SQUEEZED = -0.02
 
 
 def default_margin(robot: RobotSpec, controller: PurePursuit, noise: float, smoothing: str) -> float:
@@ -115,6 +120,31 @@ def line_margin(robot: RobotSpec, controller: PurePursuit, noise: float) -> floa
     if noise and robot.noise.nonzero:
         loss += LINE_DEVIATIONS * line_deviation(robot, controller, noise)
     return max(LEAST, round(math.ceil((RESERVE + loss) / STEP - 1e-9) * STEP, 3))
+
+
+def outline_margins(
+    robot: RobotSpec, controller: PurePursuit, noise: float, margin: float, *, of_lines: bool
+) -> tuple[float, ...]:
+    """Return the clearances of plans for the footprint, in turn until there is a path [m].
+
+    Args:
+        robot: the robot
+        controller: its controller
+        noise: factor on the robot's documented noise
+        margin: clearance of plans on top of the robot's radius [m]
+        of_lines: whether the margin of lines comes first
+    """
+    return tuple(dict.fromkeys((max(margin, line_margin(robot, controller, noise)), margin) if of_lines else (margin,)))
+
+
+def mapless_margins(margins: tuple[float, ...], margin: float) -> tuple[float, ...]:
+    """Return the clearances of a mapless robot's plans for its footprint, in turn [m].
+
+    Args:
+        margins: those of `outline_margins`
+        margin: clearance of plans on top of the robot's radius [m]
+    """
+    return tuple(dict.fromkeys((*margins, min(TURNABLE, margin), 0.0, SQUEEZED)))
 
 
 def line_deviation(robot: RobotSpec, controller: PurePursuit, noise: float, turn: float = math.pi) -> float:

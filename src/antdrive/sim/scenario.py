@@ -19,7 +19,7 @@ from antdrive.base.plane import format_position
 from antdrive.planners import Planner, capabilities_of
 from antdrive.robots import RobotSpec, overlap_at
 from antdrive.robots.control.speed_limits import heading_error, steady
-from antdrive.robots.default_margin import default_margin, line_margin
+from antdrive.robots.default_margin import default_margin, outline_margins
 from antdrive.sim.log.record import (
     DriveRecord,
     MarginRecord,
@@ -287,9 +287,8 @@ class Scenario(Settings):
         margin of lines.
         """
         margin, of_disc = self.planned_margin, self.chosen is not None and self.footprint == "auto"
-        if margin != self.usual_margin and not of_disc:
-            return (margin,)
-        return tuple(dict.fromkeys((max(margin, line_margin(self.robot, self.controller, self.noise)), margin)))
+        of_lines = of_disc or margin == self.usual_margin
+        return outline_margins(self.robot, self.controller, self.noise, margin, of_lines=of_lines)
 
     @property
     def driven_world(self) -> World:

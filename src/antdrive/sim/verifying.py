@@ -13,6 +13,7 @@ from antdrive.base.errors import input_error
 from antdrive.base.files import as_json, parse_json, read_bytes
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.log.consistency import wrong_optima
 from antdrive.sim.log.metrics import measure, succeeded
 from antdrive.sim.log.record import DriveRecord, SensingRecord, differences, hashes_of, plain_value, settings_of
 from antdrive.sim.log.rollout import Rollout
@@ -119,25 +120,6 @@ def _short(value: Any) -> str:
     text = " ".join(repr(value)[:400].split())
     text = "".join(c if c.isprintable() else " " for c in text)
     return text if len(text) <= 100 else f"{text[:100]}…"
-
-
-def wrong_optima(record: DriveRecord) -> Iterator[str]:
-    """Yield the shortest paths in a record that its world does not have."""
-    from antdrive.sim.recording import optima_of
-
-    try:
-        computed = optima_of(record.task, record.cell, record.robot, record.margin, record.footprint_margin)
-    except ValueError as error:  # the grid has too many cells
-        yield f"record.{error}"
-        return
-    for key, right in zip(("grid_optimum_m", "euclidean_optimum_m"), computed, strict=True):
-        logged = getattr(record.plan, key)
-        if logged != right and not (logged and right and math.isclose(logged, right, rel_tol=SAME)):
-            yield f"record.plan.{key}: {_length(logged)} in the log, {_length(right)} in its world"
-
-
-def _length(metres: float | None) -> str:
-    return "null" if metres is None else f"{metres:.6g} m"
 
 
 def verify_log(

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 
 from antdrive.planners import PlanResult, PlanStatus
 from antdrive.robots import PursuitState, Twist
+from antdrive.robots.default_margin import SQUEEZED, TURNABLE
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, check, near_polyline, point_at, surrounding
 from antdrive.sim.driving.drive import Driver
-from antdrive.sim.driving.exploring import INTERVAL, SQUEEZED, TURNABLE
+from antdrive.sim.driving.exploring import INTERVAL
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import IDLE_TIME, Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of

@@ -19,7 +19,14 @@ from antdrive.robots.spec import Footprint
 from antdrive.sim import Outcome, Rollout, certify
 from antdrive.sim.log.certificate import Certificate, closed_form_clearance
 from antdrive.sim.log.metrics import driven_length_m
-from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord, SensingRecord
+from antdrive.sim.log.record import (
+    DECISION,
+    ComponentRecord,
+    MarginRecord,
+    PerceptionRecord,
+    ReplanRecord,
+    SensingRecord,
+)
 from antdrive.sim.recording import optima_of
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, World
 from antdrive.worlds.route import end_reach
@@ -28,6 +35,7 @@ from tests.records import changed, made_up_log, made_up_record
 HZ, ROWS = 240, 1201
 ROBOT = load_robot("turtlebot")
 DISC = Disc(3.0, 2.5, 0.3)
+CHOICE = MarginRecord(loss_m=0.0, reserve_m=0.01, probability=0.01, drives=80)
 
 
 @functools.cache
@@ -535,16 +543,93 @@ def test_the_lead_of_a_footprint_keeps_the_room_of_the_start_pose():
     for x, fits in ((1.5, True), (2.5, False)):
         world = World("made-up", (0.0, 0.0, 6.0, 4.0), (before, Disc(x, 1.335, 0.1)))
         task = Task(world, (1.0, 1.0, math.pi / 2), (5.0, 1.0))
-        log = with_record(drive(), task=task, robot=jackal, inflate=jackal.radius + 0.05, footprint_margin=0.05)
+        log = replace(drive(), cells=drive().cells[:0])
+        log = with_record(log, task=task, robot=jackal, inflate=jackal.radius + 0.05, footprint_margin=0.05)
         assert says(log, "past an obstacle") is not fits
 
 
-def test_a_route_of_decisions_need_not_reach_the_goal():
+def test_a_route_of_decisions_leads_to_the_goal_too():
+    """The log has the route of the whole plan, which the first decision replaces."""
     short = replace(drive(), route=np.array([(1.0, 1.0), (1.25, 1.0)]))
-    step = ReplanRecord(t=1.0, trigger="cell", solved=True, cost_m=1.0, work=1, route=((1.0, 1.0), (5.0, 1.0)))
-    assert says(short, "route: ends")
-    assert says(with_record(short, replans=(replace(step, trigger="waited"),)), "route: ends")
-    assert not says(with_record(short, replans=(replace(step, trigger=DECISION),)), "route: ends")
+    step = ReplanRecord(t=1.0, trigger=DECISION, solved=True, cost_m=1.0, work=1, route=((1.0, 1.0), (5.0, 1.0)))
+    assert says(with_record(short, replans=(step,)), "route: ends")
+
+
+def test_cells_are_free_at_the_records_margin():
+    """The row of cells passes a cylinder at 0.4 m, in the middle of a move; those under a line without a path may overlap it."""
+    room = 0.4
+    task = replace(drive().record.task, world=replace(drive().record.world, obstacles=(Disc(3.0, 1.525 + 0.1, 0.1),)))
+
+    def passes(inflate, **plan):
+        return changed(
+            with_record(drive(), task=task, margin=inflate - ROBOT.radius, inflate=inflate), "record.plan", **plan
+        )
+
+    only_beyond(room, passes, "cells: leads 0.4 m past an obstacle; the plan's inflation", share=1e-4)
+    assert not says(passes(0.5, cost_m=None, grid_optimum_m=None), "cells: leads")
+
+
+def test_cells_are_free_for_the_footprint_along_their_moves():
+    """The jackal is wider along its diagonal than across, so a row passes where a zigzag does not."""
+    jackal, row = load_robot("jackal"), drive().cells
+    half = jackal.footprint.bounds[3]
+    task = replace(
+        drive().record.task, world=replace(drive().record.world, obstacles=(Disc(3.125, 1.125 + half + 0.15, 0.1),))
+    )
+
+    def passes(margin, cells=row):
+        values = {"margin": margin, "footprint_margin": margin, "inflate": jackal.radius + margin}
+        return with_record(replace(drive(), cells=cells), task=task, robot=jackal, **values)
+
+    only_beyond(0.05, passes, "cells: leads", share=1e-4)
+    zigzag = np.array([(4 - (c % 2), c) for c in range(4, 21)], np.int32)
+    assert says(passes(0.04, zigzag), "cells: leads")
+
+
+@pytest.mark.parametrize(
+    ("record", "margins"),
+    [
+        ({}, "settings give 0.05 m"),
+        ({"noise": 1.0, "margin": 0.03}, "0.03 m or 0.052 m"),
+        ({"noise": 1.0}, "settings give 0.05 m"),
+        ({"noise": 1.0, "margin_choice": CHOICE}, "0.05 m or 0.052 m"),
+        ({"noise": 1.0, "margin_choice": CHOICE, "settings": {"footprint": "exact"}}, "settings give 0.05 m"),
+        ({"sensing": SensingRecord(map="none", localisation="true", odometry=1.0)}, "0 m or 0.025 m or 0.05 m"),
+        ({"settings": {"footprint": "disc"}}, "plan for the disc"),
+        ({"robot": ROBOT}, "plan for the disc"),
+        ({"planner": ComponentRecord(name="tangent", settings={})}, "plan for the disc"),
+        ({"controller": ComponentRecord(name="PurePursuit", settings={"lookahead_max": "far"})}, "plan for the disc"),
+    ],
+)
+def test_the_margin_of_footprints_is_one_that_the_settings_give(record, margins):
+    values = {"robot": load_robot("jackal"), "controller": ComponentRecord(name="PurePursuit", settings={}), **record}
+    said = certify(with_record(drive(), footprint_margin=0.2, **values)).problems
+    (problem,) = [one for one in said if one.startswith("record.footprint_margin: 0.2 m")]
+    assert problem.endswith(margins)
+    for margin in margins.removeprefix("settings give ").split(" or ") if " m" in margins else ():
+        given = with_record(drive(), footprint_margin=float(margin[:-2]), **values)
+        assert not says(given, "record.footprint_margin")
+
+
+def test_a_planner_that_decides_cell_by_cell_among_movers_plans_for_the_disc():
+    jackal, movers = load_robot("jackal"), PerceptionRecord(kind="lidar", range_m=None)
+    for name, around, fits in (
+        ("mmas-dstar", True, False),
+        ("mmas-dstar", False, True),
+        ("astar", True, True),
+        ("mine", True, True),
+    ):
+        log = with_record(
+            drive(), robot=jackal, footprint_margin=0.05, perception=movers, replanning={"around_movers": around},
+            planner=ComponentRecord(name=name, settings={}), controller=ComponentRecord(name="PurePursuit", settings={}),
+        )  # fmt: skip
+        assert says(log, "plan for the disc") != fits, name
+
+
+def test_a_plan_for_the_exact_footprint_has_its_margin():
+    for robot, fits in ((load_robot("jackal"), False), (ROBOT, True)):
+        log = with_record(drive(), robot=robot, settings={"footprint": "exact"})
+        assert says(log, "record.footprint_margin: missing") is not fits
 
 
 @pytest.mark.parametrize(
@@ -569,12 +654,29 @@ def test_no_shortest_path_is_longer_than_the_paths_in_the_log():
     def optimum(metres, key="euclidean_optimum_m", **arrays):
         return changed(replace(drive(), **arrays), "record.plan", **{key: metres})
 
-    searched = "m is longer than the shortest path in its world; that has 4 m"
+    searched = "m in the log, 4 m in its world"
     only_beyond(4.0, optimum, searched, share=1e-5)
     only_beyond(polyline_length(long_way), lambda metres: optimum(metres, route=long_way), searched, share=1e-5)
     far = np.array([(1.0, 1.0), (1.0, 3.0), (5.0, 3.0), (5.0, 1.0)])
     only_beyond(4.0 + leads, lambda metres: optimum(metres, route=far), searched, share=1e-5)
-    only_beyond(4.0, lambda metres: optimum(metres, key="grid_optimum_m"), searched, share=1e-5)
+    only_beyond(4.0, lambda metres: optimum(metres, key="grid_optimum_m"), "m, but the cells are 4 m long", share=1e-5)
+
+
+def test_no_line_of_a_plan_is_shorter_than_the_shortest_path():
+    """A wall forces a detour; the line of an any-angle planner may be shorter than its cells, but not than the detour."""
+    wall = tuple(Disc(3.0, 0.2 + 0.3 * k, 0.2) for k in range(7))
+    task = replace(drive().record.task, world=replace(drive().record.task.world, obstacles=wall))
+    shortest = optima_of(task, 0.25, ROBOT, 0.05)[1]
+    leads = math.dist((1.0, 1.0), (1.125, 1.125)) + math.dist((5.0, 1.0), (5.125, 1.125))
+
+    def drawn(short, **plan):
+        values = {"length_m": shortest - short, "cost_m": None, "euclidean_optimum_m": shortest, **plan}
+        return changed(with_record(drive(), task=task), "record.plan", **values)
+
+    assert shortest > 4.0 + 2 * leads
+    only_beyond(leads, drawn, "m, but the shortest path in its world has", share=1e-4)
+    cells = drawn(2 * leads, cost_m=shortest - 2 * leads)
+    assert not says(cells, "m, but the shortest path in its world has")
 
 
 def test_a_search_decides_where_the_log_has_no_path():
@@ -592,17 +694,16 @@ def test_a_search_decides_where_the_log_has_no_path():
 
     assert not says(optima(free, grid), "optimum_m")
     for euclidean, on_grid, key, what in (
-        (60.0, grid, "euclidean_optimum_m", "60 m is longer"),
-        (free, 60.0, "grid_optimum_m", "60 m is longer"),
-        (None, grid, "euclidean_optimum_m", "must not be null"),
-        (free, None, "grid_optimum_m", "must not be null"),
+        (60.0, grid, "euclidean_optimum_m", "60 m in the log"),
+        (free, 60.0, "grid_optimum_m", "60 m in the log"),
+        (None, grid, "euclidean_optimum_m", "null in the log"),
+        (free, None, "grid_optimum_m", "null in the log"),
     ):
         assert says(optima(euclidean, on_grid), f"record.plan.{key}: {what}")
 
 
 def test_no_path_is_shorter_than_the_straight_line_between_the_ends():
     """A path ends off a goal without room by at most its tolerance, and the grid's path at the cells, where the log has them."""
-    by_cells = ReplanRecord(t=1.0, trigger=DECISION, solved=False, cost_m=None, work=1, route=())
     text = "start and goal are farther apart"
 
     def shorter(metres, key="euclidean_optimum_m", **record):
@@ -615,7 +716,8 @@ def test_no_path_is_shorter_than_the_straight_line_between_the_ends():
     leads = math.dist((1.0, 1.0), (1.125, 1.125)) + math.dist((5.0, 1.0), (5.125, 1.125))
     only_beyond(leads, lambda metres: shorter(metres, "grid_optimum_m"), text)
     reach = 2 * end_reach(ROBOT.radius + 0.05, 0.25)
-    only_beyond(reach, lambda metres: shorter(metres, "grid_optimum_m", replans=(by_cells,)), text)
+    none = drive().cells[:0]
+    assert not says(replace(shorter(reach * 0.99, "grid_optimum_m"), cells=none), text)
 
 
 def test_the_plan_is_as_long_as_its_cells():

@@ -20,6 +20,7 @@ from antdrive.base.records import derived
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
 from antdrive.robots import TrackedPath, Twist, outline_of
 from antdrive.robots.control.pursuit import obstacles_around
+from antdrive.robots.default_margin import mapless_margins
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
@@ -56,11 +57,6 @@ FORGIVING = 0.005  # arcs of a disc-shaped robot may come this much closer to hi
 CORNERED = 0.1  # other shapes: additional allowance per metre by which their corners protrude [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from hits than from known obstacles [m]
 TURNING_IN = 0.1  # a robot that brakes for a rotation turns in if it then stops this far from hits [m]
-#: Plans for the footprint keep this margin if possible: the controller refuses turns closer to hits [m].
-TURNABLE = 0.025
-#: Scattered hits narrow a passage that is hardly wider than the robot: a last plan for the footprint comes this much closer to
-#: them, so that the robot goes there and sees better. The controller and the stopping constraint still keep it from hits [m].
-SQUEEZED = -0.02
 SEEN = PointWorld.of("seen", (0.0, 0.0, 1.0, 1.0), np.empty((0, 3)))
 LATELY = 30.0  # the ending's reason mentions failed searches up to this age [s]
 
@@ -189,9 +185,7 @@ class Exploration(RouteGuide):
     def _margins(self, outlined: bool) -> tuple[float, ...]:
         """Return the margins to plan with, in turn [m]."""
         if outlined:
-            return tuple(
-                dict.fromkeys((*self._routes.outline_margins, min(TURNABLE, self._routes.margin), 0.0, SQUEEZED))
-            )
+            return mapless_margins(self._routes.outline_margins, self._routes.margin)
         return tuple(share * self._routes.margin for share in MARGINS)
 
     def _grid(self, task: Task, margin: float, *, outlined: bool = False) -> Grid:

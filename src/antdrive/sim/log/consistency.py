@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base.plane import arc_lengths, polyline_length, wrap_angle
 from antdrive.base.types import Floats
@@ -19,13 +20,15 @@ from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
 from antdrive.sim.log.ending import false_endings
 from antdrive.sim.log.metrics import driven_length_m, succeeded
-from antdrive.sim.log.record import DECISION, free_radius
+from antdrive.sim.log.record import DriveRecord, free_radius
 from antdrive.sim.log.rollout import Rollout, estimates_of
 from antdrive.worlds.route import NEAR, longest_line, short_of_goal
 
 JUST_ROOM = 1e-6  # a goal with at most this much more room than the inflation may count as too narrow [m]
 ROUTE_SLACK = 0.012  # smoothed routes keep the inflation; logged replans are rounded to 0.1 mm [m]
 SAME_LENGTH = 1e-6  # relative tolerance of lengths that are computed twice
+OPTIMA = ("grid_optimum_m", "euclidean_optimum_m")  # in the order of `optima_of`
+SAME_OPTIMUM = 1e-9  # relative tolerance of optima
 AWAY_TIME = 0.5  # largest deviation from the route: the radius plus the travel in this time [s]
 POINT_SPACING = 0.05  # spacing of the route points whose clearance is checked [m]
 
@@ -46,18 +49,13 @@ def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
     yield from _check_replans(rollout)
 
 
-def _by_cells(rollout: Rollout) -> bool:
-    """Return whether the planner decided cell by cell, so that its first route need not reach the goal."""
-    return any(replan.trigger == DECISION for replan in rollout.record.replans)
-
-
 def _check_routes(rollout: Rollout) -> Iterator[str]:
     """Check that routes lie in the world, avoid static obstacles, and lead from the start to the goal."""
     record, route = rollout.record, rollout.route
     task, near = record.task, NEAR * record.cell
     if math.dist(route[0], task.start[:2]) > near:
         yield f"route: begins {math.dist(route[0], task.start[:2]):.3g} m from the task's start"
-    if not _by_cells(rollout) and math.dist(route[-1], task.goal) > _short_of_goal(rollout):
+    if math.dist(route[-1], task.goal) > _short_of_goal(rollout):
         yield f"route: ends {math.dist(route[-1], task.goal):.3g} m from the task's goal"
     routes = [("route", route)]
     routes += [(f"record.replans[{i}].route", np.array(r.route)) for i, r in enumerate(record.replans) if r.solved]
@@ -66,7 +64,7 @@ def _check_routes(rollout: Rollout) -> Iterator[str]:
         if (points < (xmin, ymin)).any() or (points > (xmax, ymax)).any():
             yield f"{name}: leaves the world's bounds"
             continue
-        yield from _check_room(rollout, name, points)
+        yield from _check_room(rollout, name, _spaced(points), ROUTE_SLACK)
 
 
 def _short_of_goal(rollout: Rollout) -> float:
@@ -86,13 +84,12 @@ def _has_room(rollout: Rollout, radius: float) -> bool:
     return float(_room(rollout, np.array([rollout.record.task.goal]))[0]) >= radius + JUST_ROOM
 
 
-def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
-    """Check that a route keeps the inflation from static obstacles; near a narrow start, the room of the start.
+def _check_room(rollout: Rollout, name: str, points: Floats, slack: float) -> Iterator[str]:
+    """Check that points (N, 2) along a route keep the inflation, less a slack [m]; near a narrow start, the room of the start.
 
-    A replan begins anywhere, even beside a mover, so its first leg may pass closer to other obstacles.
+    A replan begins anywhere, even beside a mover, so its first leg may pass closer to other obstacles. Cells have no lead.
     """
     record = rollout.record
-    points = _spaced(route)
     if record.footprint_margin is None:
         keeps, what, rooms = record.inflate, "inflation", _room(rollout, points)
         begin = rooms[0]
@@ -100,10 +97,10 @@ def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
         keeps, what, rooms = record.footprint_margin, "margin", _room_of_footprint(rollout, points)
         begin = footprint_clearance(record.task.world, record.robot.footprint, record.task.start)[0]
     own = min(keeps, float(begin)) if name == "route" else -math.inf
-    leaving = np.hypot(*(points - route[0]).T) <= record.reach[0]
+    leaving = (np.hypot(*(points - points[0]).T) <= record.reach[0]) & (name != "cells")
     needed = np.where(leaving, own, keeps)
     worst = int((rooms - needed).argmin())
-    if not rooms[worst] >= needed[worst] - ROUTE_SLACK:
+    if not rooms[worst] >= needed[worst] - slack:
         start = f", its start has {own:.3g} m" if leaving[worst] and own < keeps else ""
         yield f"{name}: leads {rooms[worst]:.3g} m past an obstacle; the plan's {what} is {keeps:.3g} m{start}"
 
@@ -152,7 +149,7 @@ def _room_of_footprint(rollout: Rollout, points: Floats) -> Floats:
 
 
 def _check_cells(rollout: Rollout) -> Iterator[str]:
-    """Check that cells are neighbours on the grid, and lead from near the start to near the goal."""
+    """Check that cells are neighbours on the grid, free in the record's world, and lead from near the start to near the goal."""
     record, cells = rollout.record, rollout.cells
     xmin, ymin, xmax, ymax = record.world.bounds
     rows, cols = math.ceil((ymax - ymin) / record.cell) + 1, math.ceil((xmax - xmin) / record.cell) + 1
@@ -161,6 +158,14 @@ def _check_cells(rollout: Rollout) -> Iterator[str]:
         return
     if (np.abs(np.diff(cells, axis=0)) > 1).any():
         yield "cells: must be neighbours on the grid"
+    elif record.plan.cost_m is not None:  # else they are those under a line
+        moves = (np.diff(cells, axis=0) != 0).any(axis=1)  # plans in time may wait
+        if moves.any():
+            some = _centres(rollout, np.concatenate([cells[:1], cells[1:][moves]]))
+            each = math.ceil(math.sqrt(2) * record.cell / POINT_SPACING)
+            along = np.linspace(0.0, len(some) - 1, (len(some) - 1) * each + 1)
+            points = np.stack([np.interp(along, np.arange(len(some)), some[:, k]) for k in (0, 1)], axis=1)
+            yield from _check_room(rollout, "cells", points, SAME_LENGTH)
     ends = zip(_leads(rollout), record.reach, ("begin", "end"), ("start", "goal"), strict=True)
     for lead, reach, does, end in ends:
         if lead > reach + SAME_LENGTH:
@@ -171,9 +176,14 @@ def _leads(rollout: Rollout) -> tuple[float, float]:
     """Return the distances of the first cell from the start and of the last from the goal [m]; the largest without cells."""
     if not len(rollout.cells):
         return rollout.record.reach
-    task, cells = rollout.record.task, rollout.cells[[0, -1], ::-1]
-    first, last = (cells + 0.5) * rollout.record.cell + rollout.record.world.bounds[:2]
+    task, (first, last) = rollout.record.task, _centres(rollout, rollout.cells[[0, -1]])
     return math.dist(first, task.start[:2]), math.dist(last, task.goal)
+
+
+def _centres(rollout: Rollout, cells: npt.NDArray[np.int32]) -> Floats:
+    """Return the centres (N, 2) of cells (N, 2) of the plan's grid [m]."""
+    record = rollout.record
+    return np.asarray((cells[:, ::-1] + 0.5) * record.cell + record.world.bounds[:2])
 
 
 def _check_cost(rollout: Rollout) -> Iterator[str]:
@@ -187,14 +197,31 @@ def _check_cost(rollout: Rollout) -> Iterator[str]:
 
 
 def _check_length(rollout: Rollout) -> Iterator[str]:
-    """Check that the plan's line leads from start to goal, and is no longer than its cells allow."""
+    """Check that the plan's length is that of its cells, or of a line no longer than they allow and no shorter than any path."""
     record, plan, leads = rollout.record, rollout.record.plan, sum(_leads(rollout))
-    if not _by_cells(rollout) and plan.length_m < _straight(rollout) - max(leads, 2 * NEAR * record.cell):
+    slack = SAME_LENGTH * max(1.0, plan.length_m)
+    drawn = not record.exploring and (plan.cost_m is None or abs(plan.length_m - plan.cost_m) > slack)
+    if plan.length_m < _straight(rollout) - leads - slack:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but start and goal are farther apart"
-    if plan.cost_m is None:
-        return
-    if plan.length_m > longest_line(plan.cost_m, leads, record.cell) + SAME_LENGTH * max(1.0, plan.cost_m):
+    elif drawn and plan.length_m < (plan.euclidean_optimum_m or 0.0) - leads - slack:
+        yield from _shorter_than_any(record, leads + slack)
+    if plan.cost_m is not None and plan.length_m > longest_line(plan.cost_m, leads, record.cell) + slack:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
+
+
+def _shorter_than_any(record: DriveRecord, short: float) -> Iterator[str]:
+    """Yield whether the plan's line is shorter than any path, by more than a length [m].
+
+    Contact closes a gap to the shortest path, but not to a line, so the search is for slightly less margin.
+    """
+    less = dataclasses.replace(record, margin=max(0.0, record.margin - 2 * JUST_ROOM), margin_choice=None)
+    try:
+        shortest = _optima(less)[1]
+    except ValueError as error:  # the grid has too many cells
+        yield f"record.{error}"
+        return
+    if shortest is not None and record.plan.length_m < shortest - short:
+        yield f"record.plan.length_m: {record.plan.length_m:.6g} m, but the shortest path in its world has {shortest:.6g} m"
 
 
 def _straight(rollout: Rollout) -> float:
@@ -205,49 +232,58 @@ def _straight(rollout: Rollout) -> float:
 def _check_optima(rollout: Rollout) -> Iterator[str]:
     """Check that the shortest paths are no shorter than the straight line and no longer than the paths in the log.
 
-    A path in the log may pass where those of the optimum do not: a plan on the occupancy map with less margin, a robot that left
-    its route. A search in the record's world then decides, as it does without a path in the log, or if the optimum is null.
+    The cells are a path on the grid. Another path in the log may pass where those of the optimum do not: a plan on the occupancy
+    map with less margin, a gap that contact closes, a robot that left its route. A search in the record's world then decides,
+    as it does without a path in the log, or if the optimum is null.
     """
     record, plan, straight = rollout.record, rollout.record.plan, _straight(rollout)
-    leads = sum(record.reach if _by_cells(rollout) else _leads(rollout))
+    leads, slack = sum(_leads(rollout)), SAME_LENGTH * max(1.0, straight)
     narrow = not _has_room(rollout, free_radius(record.robot, record.margin, record.footprint_margin))
     paths = [driven_length_m(rollout) + record.task.goal_tolerance] if succeeded(rollout) else []
-    cells = plan.length_m if plan.cost_m is None else plan.cost_m
+    cells, on_grid = plan.length_m if plan.cost_m is None else plan.cost_m, paths
     if not record.exploring:
         route = polyline_length(rollout.route) + math.dist(rollout.route[-1], record.task.goal)
-        paths += [cells + leads, route]
-    doubted = {}
-    for key, short, longest in (
-        ("grid_optimum_m", leads, paths if record.exploring else [cells]),
-        ("euclidean_optimum_m", record.task.goal_tolerance * narrow, paths),
-    ):
-        value, slack = getattr(plan, key), SAME_LENGTH * max(1.0, straight)
+        on_grid, paths = [cells], [*paths, cells + leads, route]
+    doubted = []
+    for key, short, longest in zip(OPTIMA, (leads, record.task.goal_tolerance * narrow), (on_grid, paths), strict=True):
+        value = getattr(plan, key)
         if value is not None and value < straight - short - slack:
             yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
-        elif value is None or value > min(longest, default=0.0) + slack:
-            doubted[key] = value
+        elif value is not None and value <= min(longest, default=0.0) + slack:
+            continue
+        elif value is not None and longest is on_grid and not record.exploring and plan.cost_m is not None:
+            yield f"record.plan.{key}: {value:.6g} m, but the cells are {plan.cost_m:.6g} m long"
+        else:
+            doubted.append(key)
     if doubted:
-        yield from _longer_than_shortest(rollout, doubted)
+        yield from wrong_optima(record, doubted)
 
 
-def _longer_than_shortest(rollout: Rollout, doubted: Mapping[str, float | None]) -> Iterator[str]:
-    """Yield the optima by key [m] that are longer than the shortest paths in the record's world, or null where it has one."""
-    from antdrive.sim.recording import optima_of  # imports the compiler
-
-    record = rollout.record
+def wrong_optima(record: DriveRecord, keys: Collection[str] = OPTIMA) -> Iterator[str]:
+    """Yield the shortest paths in a record, of some keys of its plan, that its world does not have."""
     try:
-        found = optima_of(record.task, record.cell, record.robot, record.margin, record.footprint_margin)
+        computed = _optima(record)
     except ValueError as error:  # the grid has too many cells
         yield f"record.{error}"
         return
-    for key, shortest in zip(("grid_optimum_m", "euclidean_optimum_m"), found, strict=True):
-        if key not in doubted or (value := doubted[key]) == shortest:
-            continue
-        if value is None:
-            yield f"record.plan.{key}: must not be null; the shortest path in its world has {shortest:.6g} m"
-        elif shortest is None or value > shortest * (1 + SAME_LENGTH):
-            longest = "there is none" if shortest is None else f"that has {shortest:.6g} m"
-            yield f"record.plan.{key}: {value:.6g} m is longer than the shortest path in its world; {longest}"
+    for key, right in zip(OPTIMA, computed, strict=True):
+        logged = getattr(record.plan, key)
+        if (
+            key in keys
+            and logged != right
+            and not (logged and right and math.isclose(logged, right, rel_tol=SAME_OPTIMUM))
+        ):
+            yield f"record.plan.{key}: {_length(logged)} in the log, {_length(right)} in its world"
+
+
+def _optima(record: DriveRecord) -> tuple[float | None, float | None]:
+    from antdrive.sim.recording import optima_of  # imports the compiler
+
+    return optima_of(record.task, record.cell, record.robot, record.margin, record.footprint_margin)
+
+
+def _length(metres: float | None) -> str:
+    return "null" if metres is None else f"{metres:.6g} m"
 
 
 def _check_movers_known(rollout: Rollout) -> Iterator[str]:
@@ -335,6 +371,22 @@ def inconsistencies(rollout: Rollout) -> Iterator[str]:
     yield from false_endings(rollout)
 
 
+def _check_footprint_margin(record: DriveRecord) -> Iterator[str]:
+    """Check that plans kept the footprint clear if the settings say so, and by a margin that the settings give."""
+    found, exact = record.footprint_margin, (record.settings or {}).get("footprint") == "exact"
+    if found is None:
+        if exact and not record.robot.footprint.is_disc:
+            yield "record.footprint_margin: missing, since the footprint is exact"
+        return
+    from antdrive.sim.log.margin import footprint_margins  # imports the compiler
+
+    margins = sorted({max(margin, 0.0) for margin in footprint_margins(record)})
+    if not margins:
+        yield f"record.footprint_margin: {found:g} m, but planner, robot and settings plan for the disc"
+    elif not any(abs(found - margin) <= EXACT for margin in margins):
+        yield f"record.footprint_margin: {found:g} m; margin and settings give {' or '.join(f'{m:g} m' for m in margins)}"
+
+
 def _check_record(rollout: Rollout) -> Iterator[str]:
     """Check that margin, inflation and rates fit each other."""
     record = rollout.record
@@ -343,6 +395,7 @@ def _check_record(rollout: Rollout) -> Iterator[str]:
             f"record.inflate: {record.inflate:g} m is not the robot's radius {record.robot.radius:g} m plus the margin "
             f"{record.margin:g} m"
         )
+    yield from _check_footprint_margin(record)
     if record.physics_hz < SLOWEST_PHYSICS:
         yield f"record.physics_hz: must be at least {SLOWEST_PHYSICS} Hz, found {record.physics_hz}"
     if record.physics_hz % record.control_hz:

@@ -18,10 +18,11 @@ from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import PurePursuit
 from antdrive.robots.clearance import footprint_clearance
-from antdrive.robots.default_margin import default_margin, line_margin
+from antdrive.robots.default_margin import default_margin, line_margin, mapless_margins, outline_margins
 from antdrive.sim.log.metrics import nearest_segments
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import point_clearance
 
 #: Causes of a loss of margin, with descriptions.
@@ -84,6 +85,33 @@ def has_default(record: DriveRecord) -> bool:
         return record.margin == usual and record.footprint_margin in (None, lines)
     except (KeyError, TypeError, ValueError):  # settings or noise that no drive has
         return False
+
+
+def footprint_margins(record: DriveRecord) -> tuple[float, ...]:
+    """Return the margins that a record's settings give to plans for the footprint [m]; empty if they plan for the disc.
+
+    A controller or planner of one's own is believed where only its code knows.
+    """
+    from antdrive.planners import PLANNERS, capabilities_of
+
+    asked = (record.settings or {}).get("footprint", SETTINGS["footprint"].default)
+    can = capabilities_of(PLANNERS[record.planner.name]) if record.planner.name in PLANNERS else None
+    moving = record.perception is not None and not record.exploring
+    by_cell = moving and (record.replanning or {}).get("around_movers") and can is not None and can.cell_by_cell
+    if asked == "disc" or record.robot.footprint.is_disc or by_cell or not (can is None or can.turns):
+        return ()
+    robot, noise, margin = record.robot, record.noise, record.margin
+    settings, own = record.controller.settings, record.controller.name != PurePursuit.__name__
+    known = {field.name for field in dataclasses.fields(PurePursuit)}
+    try:
+        restored = {key: math.inf if value is None else value for key, value in settings.items()}
+        controller = PurePursuit(**{key: value for key, value in restored.items() if key in known or not own})
+        usual = [default_margin(robot, controller, noise, kind) for kind in (record.smoothing.asked, "none")]
+    except (KeyError, TypeError, ValueError):  # settings that no drive has
+        return ()
+    of_lines = own or margin in usual or (record.margin_choice is not None and asked == "auto")
+    margins = outline_margins(robot, controller, noise, margin, of_lines=of_lines)
+    return mapless_margins(margins, margin) if record.exploring else margins
 
 
 def budget(rollout: Rollout) -> Budget:

@@ -29,6 +29,7 @@ from antdrive.base.records import STRICT, attributes_of
 from antdrive.base.types import Point
 from antdrive.robots.spec import Odometry, RobotSpec
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.policy import Perception
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
 from antdrive.worlds.limits import MAX_COORDINATE
@@ -123,6 +124,11 @@ class SmoothingRecord:
     made: str = dataclasses.field(metadata=REPLAYED)
     note: str = dataclasses.field(metadata=REPLAYED)
 
+    def __post_init__(self) -> None:
+        for key in ("asked", "made"):
+            if getattr(self, key) not in (choices := SETTINGS["smoothing"].setting.choices):
+                raise FieldError(key, f"must be one of {', '.join(choices)}, got {_shown(getattr(self, key))}")
+
 
 @dataclass(frozen=True, kw_only=True)
 class PerceptionRecord:
@@ -135,6 +141,11 @@ class PerceptionRecord:
 
     kind: str = dataclasses.field(metadata=CHOSEN)
     range_m: float | None = dataclasses.field(metadata=CHOSEN)
+
+    def __post_init__(self) -> None:
+        Perception(kind=self.kind)  # type: ignore[arg-type]
+        if self.range_m is not None and not 0 < self.range_m < math.inf:
+            raise FieldError("range_m", f"must be greater than 0, got {self.range_m:g}")
 
 
 @dataclass(frozen=True, kw_only=True)
