@@ -70,8 +70,8 @@ def noise_loss(robot: RobotSpec, controller: PurePursuit, noise: float, smoothin
 def clearances_off_route(robot: RobotSpec, controller: PurePursuit, noise: float) -> tuple[float, float]:
     """Return the clearances of the circle and the outline that motions off the route keep from obstacles [m].
 
-    They hold the same losses by noise as margins, and the reserve. Such motions are chosen again in each control period, so no
-    long turn adds its slip. Without noise both are 0.
+    They hold the same losses as margins, and the reserve. Such motions are chosen again in each control period, so no long turn
+    adds its slip.
 
     Args:
         robot: the robot
@@ -79,8 +79,8 @@ def clearances_off_route(robot: RobotSpec, controller: PurePursuit, noise: float
         noise: factor on the robot's documented noise
     """
     if not (noise and robot.noise.nonzero):
-        return 0.0, 0.0
-    outline = LINE_DEVIATIONS * line_deviation(robot, controller, noise, turn=0.0)
+        return RESERVE, RESERVE + LINE_ROUNDING
+    outline = LINE_ROUNDING + LINE_DEVIATIONS * line_deviation(robot, controller, noise, turn=0.0)
     return RESERVE + noise_loss(robot, controller, noise, "none"), RESERVE + outline
 
 

@@ -24,9 +24,17 @@ from antdrive.sim.driving.parts import Localiser, Logs, RouteGuide, Rule, Scanni
 from antdrive.sim.driving.perceived_movers import GroundTruth, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.rules import EXPLORING_LIMITERS, GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, TurnToScan
+from antdrive.sim.driving.rules import (
+    EXPLORING_LIMITERS,
+    GOAL_SHARE,
+    Avoid,
+    KeepToSchedule,
+    Pursuit,
+    SlowAtCorners,
+    TurnToScan,
+)
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import MoverDetector, MoverTracking, SimulatedLidar, Survey
+from antdrive.sim.driving.survey import PERSON, MoverDetector, MoverTracking, SimulatedLidar, Survey
 from antdrive.sim.policy import OBSTRUCTED, Perception, ReplanPolicy
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
@@ -78,6 +86,8 @@ def compose(s: Scenario) -> Parts:
     if s.timed:
         rules.append(KeepToSchedule(guide, s.robot, hz))
     if moving and avoidance is not None:
+        if tracking:
+            rules.append(SlowAtCorners(tracking, s.robot, hz))
         drifts = survey is not None and tracks_movers
         share = DRIFTING_SHARE if drifts else GOAL_SHARE
         blind = drifts and not _lidar(s).full_circle
@@ -144,15 +154,19 @@ def mapless_task(task: Task) -> Task:
 
 
 def avoidance_of(s: Scenario) -> Avoidance | None:
-    """Return the avoidance settings, adapted to the perception of movers.
+    """Return the avoidance settings, adapted to the robot and to the perception of movers.
 
-    Movers with known motions do not reverse unexpectedly, so reversals are ignored. Plans in space and time already avoid
-    movers, so the horizon is short.
+    A slow robot needs more time to move out of a person's way, so its horizon is longer. Movers with known motions do not
+    reverse unexpectedly, so reversals are ignored. Plans in space and time already avoid movers, so the horizon is short.
     """
-    if s.avoidance is None or perception_of(s).kind != "motions":
-        return s.avoidance
-    horizon = min(s.avoidance.horizon, 1.0) if s.timed else s.avoidance.horizon
-    return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=horizon)
+    if s.avoidance is None:
+        return None
+    if s.timed:
+        return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=min(s.avoidance.horizon, 1.0))
+    aside = s.robot.radius + PERSON / 2 + s.avoidance.min_clearance + s.avoidance.preferred_clearance
+    steps = math.ceil((aside / s.robot.max_speed + 0.5 * math.pi / s.robot.max_yaw_rate) / s.avoidance.step)
+    settings: dict[str, float] = {"reversal_weight": 0.0} if perception_of(s).kind == "motions" else {}
+    return dataclasses.replace(s.avoidance, horizon=max(s.avoidance.horizon, steps * s.avoidance.step), **settings)
 
 
 def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:

@@ -46,6 +46,8 @@ CLOSER = 1e-3  # a robot that is closer to obstacles than required may come clos
 ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
 LEVELS = 64  # tabulated distances for progress
 BESIDE_DISTANCE, BESIDE_TIME = 0.5, 0.3  # offsets decay over this distance, or this time at speed [m], [s]
+ROOM, ROOM_WEIGHT = 0.1, 20.0  # a robot that halts values so much more room, each metre as so much progress [m], [m/m]
+LEAST_ROOM = 0.005  # it moves for at least so much room [m]
 ROUTE_END = 0.1  # distance from the route's end below which the heading is ignored [m]
 
 
@@ -634,6 +636,24 @@ def passes_all(trail: Array, places: Array, near: Array) -> bool:
     return True
 
 
+@leaf
+def halts(trail: Array, s: float, window: float, path: PathSamples) -> bool:
+    """Return whether a trail ends with a robot that stands, before the end of its route."""
+    k = trail.shape[0] - 1
+    if trail[k, 3] != 0.0 or trail[k, 4] != 0.0 or trail[k - 1, 3] != 0.0 or trail[k - 1, 4] != 0.0:
+        return False
+    progress, _ = project(trail[k, 0], trail[k, 1], s, window, path.xy, path.arc)
+    return bool(path.arc[-1] - progress > ROUTE_END)
+
+
+@leaf
+def room_at(row: Array, outlined: bool, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
+    """Return the clearance of the robot's circle, or of its outline, at a row of a trail [m]."""
+    if outlined:
+        return float(outline_clearance(row[0], row[1], row[2], obstacles, tuning, tuning.robot_radius))
+    return float(clearance_at(row[0], row[1], obstacles) - tuning.robot_radius)
+
+
 @kernel
 def choose(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidates: Array,
@@ -647,7 +667,8 @@ def choose(
     keeps clear of obstacles, -1 if none does. A line beside the route has worth only where it leads past all movers.
 
     Without movers, too, the controller's motion must keep clear of obstacles after another decision, whose speed it may be
-    unable to brake, and where the circle has less room than on the route. There, others may replace it if it does not move.
+    unable to brake, and where the circle has less room than on the route. A robot that would halt before the end of its route,
+    and not for movers, makes room for a new one.
 
     Obstacles only exclude candidates, and movers only lower their worth. So the search is best-first: the candidate with the
     highest bound is followed, which lowers its bound to its worth without movers. When it is first again, it is evaluated
@@ -656,7 +677,8 @@ def choose(
     near, contact_distances = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
     turns = path.turns.shape[0] > 0
     tight = not turns and clearance_at(x, y, obstacles) < tuning.stopping_clearance
-    if near.shape[0] == 0 and not tight and candidates[1, KIND] == FOLLOW_ROUTE:
+    held = v == 0.0 and w == 0.0 and path.arc[-1] - s > ROUTE_END and candidates[0, SPEED] > 0.0
+    if near.shape[0] == 0 and not (tight or held) and candidates[1, KIND] == FOLLOW_ROUTE:
         return 0, math.inf
     outlined = weights.outlined or turns
     count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
@@ -669,11 +691,12 @@ def choose(
     )  # fmt: skip
     steps[0], blocked[0] = own.steps, own.blocked
     met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
-    idle = tight and own.steps > 0 and np.abs(trails[0, own.steps] - trails[0, 0]).max() < ROUNDING
-    if met.contact == math.inf and met.clearance >= cap and met.intrusion == 0.0 and not idle:
-        return 0, met.contact
     span = weights.step * (instants - 1)
     window = limits.speed * span + tuning.lookahead_max
+    alone = encounter(trails[0], Trail(own.steps, False), places, radii, near, by_step, contact_distances, weights, cap)
+    undisturbed = alone.contact == math.inf and alone.clearance >= cap and alone.intrusion == 0.0
+    if undisturbed and not own.blocked and not halts(trails[0], s, window, path):
+        return 0, math.inf
     limit = limit_worths(x, y, yaw, v, w, s, candidates, path, limits, tuning, weights, span, window)
     if (candidates[1] == candidates[0]).all():
         limit[1] = -math.inf  # never better than row 0
@@ -681,8 +704,8 @@ def choose(
     followed = np.zeros(count, np.bool_)
     best, best_score = -1, -math.inf
     if met.contact == math.inf:
-        alone = worth(trails[0, instants - 1], s, window, path, tuning, weights)
-        best, best_score = 0, among_movers(alone, met, weights) + weights.persistence
+        value = worth(trails[0, instants - 1], s, window, path, tuning, weights)
+        best, best_score = 0, among_movers(value, met, weights) + weights.persistence
     while True:
         n = int(np.argmax(limit))
         if limit[n] == -math.inf or limit[n] < best_score or (limit[n] == best_score and n > best):
@@ -708,18 +731,33 @@ def choose(
         met = encounter(
             trails[n], Trail(instants - 1, False), places, radii, near, by_step, contact_distances, weights, cap
         )
-        alone = worth(trails[n, instants - 1], s, window, path, tuning, weights)
-        value = among_movers(alone, met, weights)
+        value = among_movers(worth(trails[n, instants - 1], s, window, path, tuning, weights), met, weights)
         if n <= 1:
             value += weights.persistence
         if met.contact == math.inf and (value > best_score or (value == best_score and n < best)):
             best, best_score = n, value
         limit[n] = -math.inf
-    if best >= 0:
+    if best >= 0 and not (undisturbed and halts(trails[best], s, window, path)):
         return best, math.inf
     follow_all(
         s, rotating, candidates, path, obstacles, limits, tuning, weights.step, route, off, trails, steps, blocked
     )  # fmt: skip
+    if best >= 0:
+        here = room_at(trails[0, 0], outlined, obstacles, tuning)
+        for n in range(1, count):
+            if blocked[n] or candidates[n, KIND] != TWO_TWISTS:
+                continue
+            room = min(room_at(trails[n, instants - 1], outlined, obstacles, tuning) - here, ROOM)
+            met = encounter(
+                trails[n], Trail(steps[n], False), places, radii, near, by_step, contact_distances, weights, cap
+            )
+            if room < LEAST_ROOM or met.contact < math.inf:
+                continue
+            value = among_movers(worth(trails[n, instants - 1], s, window, path, tuning, weights), met, weights)
+            value += ROOM_WEIGHT * room + (weights.persistence if n == 1 else 0.0)
+            if value > best_score:
+                best, best_score = n, value
+        return best, math.inf
     best, latest = -1, -1.0
     for n in range(count):
         if blocked[n]:

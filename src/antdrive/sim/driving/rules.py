@@ -11,7 +11,8 @@ import numpy as np
 from antdrive.base import Floats, Pose
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import TimedPlan
-from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, Twist
+from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, TrackedPath, Twist
+from antdrive.sim.driving.blockage import points_at
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.parts import Guide, Moment, Step
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
@@ -19,6 +20,7 @@ from antdrive.worlds import Route, Task
 
 if TYPE_CHECKING:
     from antdrive.sim.driving.exploring import Exploration
+    from antdrive.sim.driving.survey import MoverTracking
 
 LOOKAHEAD = 0.4  # lookahead of the schedule's speed limit [s]
 MAX_LAG = 0.5  # a robot farther behind its schedule is late [m]
@@ -75,6 +77,8 @@ def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> T
     return Twist(v, command.yaw_rate * v / command.speed)
 
 
+WALKING = 1.2  # speed of people who step out of hidden ground [m/s]
+CORNER_STEP = 0.1  # between the places of a route that are compared with corners [m]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop within this fraction of the goal's tolerance
 AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
@@ -131,6 +135,35 @@ class KeepToSchedule:
         limit = schedule.speed_limit(now.tick / self._hz, step.pursuit.arc)
         command = slow_down(step.command, now.before.command, limit, self._max_change)
         return step._replace(command=command, speed_limit=limit, waits=limit < WAITING_SPEED)
+
+
+class SlowAtCorners:
+    """Rule: someone who steps out of hidden ground reaches the robot's way no sooner than it can stop.
+
+    The robot need not be slower than its `near_speed`.
+    """
+
+    def __init__(self, tracking: MoverTracking, robot: RobotSpec, hz: int) -> None:
+        self._tracking, self._robot, self._max_change = tracking, robot, robot.max_acceleration / hz
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """Return the command, limited to the speed for the corners ahead."""
+        limit = self._limit(now.path, step.pursuit.arc, step.command.speed)
+        if limit >= min(step.command.speed, step.speed_limit):
+            return step
+        command = slow_down(step.command, now.before.command, limit, self._max_change)
+        return step._replace(command=command, speed_limit=limit)
+
+    def _limit(self, path: TrackedPath, arc: float, speed: float) -> float:
+        """Return the speed limit at an arc length [m/s]."""
+        corners, slowest, brake = self._tracking.corners, self._robot.near_speed, self._robot.max_acceleration
+        if speed <= slowest or not len(corners):
+            return math.inf
+        arcs = np.arange(arc, min(arc + speed * speed / brake, path.length) + CORNER_STEP, CORNER_STEP)
+        gaps = points_at(path, arcs)[:, None] - corners
+        room = np.hypot(gaps[..., 0], gaps[..., 1]).min(axis=1) - self._robot.radius
+        there = np.maximum(slowest, brake * room / WALKING)
+        return float(np.sqrt(there * there + 2 * brake * (arcs - arc)).min())
 
 
 class Avoid:

@@ -23,7 +23,7 @@ from antdrive.sim.policy import SCANNED
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
 from antdrive.sim.sensing.scanner import Scanner
-from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers
+from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers, ends
 from antdrive.worlds import Route, Task, Trajectories, World
 
 MAP_CELL = 0.05  # side of the map's cells [m]
@@ -34,6 +34,7 @@ PATIENCE = 3  # failed plans in a row before the map is reset
 TOLERANCE = 0.008  # clearance that a route may lose without a replan [m]
 ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 BLUR = 0.02  # additional allowance per metre of distance [m/m]
+PERSON = 0.5  # width of a person [m]
 SHARPEST = 0.05  # arcs of a smaller radius are treated as turns on the spot [m]
 FAR_AMONG_MOVERS = 15.0  # matching range among movers, which hide near landmarks [m]
 
@@ -95,13 +96,15 @@ class MoverTracking:
         tick: the control period of the last scan
         sight: area covered by its beams within `reach` [m^2]
         reach: range up to which beams lie no farther apart than a map cell [m]
+        corners: where the ground hidden from the last scan begins, without that behind movers (N, 2) [m]
     """
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
         lidar = lidar.at(hz)
         self.tracker, self.tick = MoverTracker(lidar, None, pose_xy, pose_yaw), 0
         self.sight, self.reach = 0.0, min(lidar.max_range, MAP_CELL / lidar.spacing)
-        self._hz, self._spacing = hz, lidar.spacing
+        self.corners: Floats = np.empty((0, 2))
+        self._hz, self._spacing, self._lidar = hz, lidar.spacing, lidar
         self._settle = max(2, round(self.tracker.policy.settle * lidar.rate))
         self._log: list[tuple[int, TrackedMovers]] = []
 
@@ -112,7 +115,17 @@ class MoverTracking:
         crossed = np.clip(ranges, 0.0, self.reach)
         self.sight = float(0.5 * self._spacing * (crossed * crossed).sum())
         self._log.append((tick, self.tracker.movers()))
+        self.corners = self._corners(pose, ranges, theirs)
         return theirs
+
+    def _corners(self, pose: Pose, ranges: Floats, theirs: npt.NDArray[np.bool_]) -> Floats:
+        """Return the ends of beams beside which a beam reaches farther by a person's width (N, 2) [m]."""
+        far = np.minimum(ranges, self._lidar.max_range)
+        beyond = np.maximum(*(np.roll(far, side) for side in (-1, 1)))
+        if not self._lidar.full_circle:
+            beyond[[0, -1]] = far[[1, -2]]
+        nearer = np.flatnonzero(np.isfinite(ranges) & ~theirs & (beyond - far > PERSON))
+        return ends(self._lidar, pose, ranges, nearer)
 
     def update_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
         """Update with a scan of a robot that makes its own map, before the map takes the scan."""
