@@ -43,6 +43,7 @@ from antdrive.worlds import (
     load_task,
     rasterise,
 )
+from benchmarks.kinds import with_lidar
 from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import DYNABARN
 
@@ -314,8 +315,7 @@ class Way(NamedTuple):
 
 def way_of(task: Task, robot: str, **settings: Any) -> Way:
     """Drive once and return what the robot did."""
-    spec = load_robot(robot)
-    spec = dataclasses.replace(spec, lidar=spec.lidar or load_robot("jackal").lidar)
+    spec = with_lidar(robot)
     done = run(Scenario.of(task, "dstar-lite", spec, **settings))
     log = done.rollout
     if log is None:

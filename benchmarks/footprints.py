@@ -15,7 +15,6 @@ Tables:
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import itertools
 import math
 import statistics
@@ -43,6 +42,7 @@ from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 from antdrive.worlds.headings import Outline, turn_clear
 from antdrive.worlds.world import PointWorld, by_geometry
 from benchmarks.drives import Result, barn_tasks, drive
+from benchmarks.kinds import with_lidar
 from benchmarks.lattice import Flood, Point, Shape, flood
 from benchmarks.markdown import command_line, print_tables, table
 from tools.shared_data import BARN
@@ -70,7 +70,6 @@ CHANGES = {
     "post": "a post of 2 to 5 cm appears beside the path: a new grid",
 }
 SEARCHES = {"disc": 8, "8 headings": 8, "16 headings": 16}
-LIDAR = "jackal"  # the robot whose lidar mapless drives borrow: neither rectangle has one
 SEED = 1
 
 
@@ -268,7 +267,7 @@ def robot_of(name: str, *, mapped: bool = True) -> RobotSpec:
     robot = load_robot(name)
     length, width, (ahead, aside) = robot.footprint.box or (math.nan, math.nan, (math.nan, math.nan))
     assert np.allclose((length, width, ahead, aside), (*SIZES[name], 0.0)), robot.footprint
-    return robot if mapped else dataclasses.replace(robot, lidar=load_robot(LIDAR).lidar)
+    return robot if mapped else with_lidar(name)
 
 
 def driven(given: argparse.Namespace, name: str, among: Collection[str] = (), **settings: Any) -> list[Result]:

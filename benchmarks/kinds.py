@@ -91,7 +91,7 @@ def _drawn(kind: DriveKind, rng: np.random.Generator) -> Scenario:
     values = {name: _value(choices, rng) for name, choices in axes().items()} | dict(kind)
     seen = values.pop("perception")
     disc = values["footprint"] == "disc" and rng.random() < DISC_SHARE
-    robot = robot_of(str(rng.choice(DISCS if disc else ROBOTS)))
+    robot = with_lidar(str(rng.choice(DISCS if disc else ROBOTS)))
     values["perception"] = None if seen == STILL else Perception(kind=seen)
     planner = str(rng.choice(QUICK if rng.integers(RARELY) else list(PLANNERS)))
     planner = values.pop("planner", planner)
@@ -104,7 +104,7 @@ def _value(choices: tuple[Any, ...], rng: np.random.Generator) -> Any:
     return choices[0] if rng.integers(RARELY) else choices[rng.integers(len(choices))]
 
 
-def robot_of(name: str) -> RobotSpec:
+def with_lidar(name: str) -> RobotSpec:
     """Load a robot of the catalogue; one without a lidar gets the jackal's."""
     spec = load_robot(name)
     return spec if spec.lidar is not None else dataclasses.replace(spec, lidar=load_robot("jackal").lidar)

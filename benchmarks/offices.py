@@ -27,11 +27,12 @@ import numpy.typing as npt
 
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import PLANNERS, Query, smooth
-from antdrive.robots import RobotSpec, load_robot
+from antdrive.robots import RobotSpec
 from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
 from antdrive.sim.log.contacts import touches_of
 from antdrive.worlds import CellMap, Keyframed, Task, Trajectories, World, map_task, point_clearance, rasterise
 from antdrive.worlds.formats.cellmap import largest_ground
+from benchmarks.kinds import with_lidar
 from benchmarks.markdown import command_line, table
 
 SMALLEST = ("--offices 1 --only astar/velocities/0",)
@@ -189,8 +190,7 @@ def walkers(task: Task, rng: np.random.Generator) -> Iterator[Keyframed]:
 
 def robot(number: int) -> RobotSpec:
     """Return the robot of an office; all have a lidar."""
-    spec = load_robot(ROBOTS[number % len(ROBOTS)])
-    return dataclasses.replace(spec, lidar=spec.lidar or load_robot("jackal").lidar)
+    return with_lidar(ROBOTS[number % len(ROBOTS)])
 
 
 def scenario(number: int, seed: int, kind: str) -> Scenario:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from antdrive.planners import AStar, GridPlanner, PlanResult, PlanStatus
 from antdrive.robots import Footprint
-from antdrive.sim import Outcome, Scenario, plan, run
+from antdrive.sim import Outcome, Scenario, plan, reasons, run
 from antdrive.worlds import Cruising, Disc, Task, World, load_task
 from tests.records import changed
 
@@ -39,6 +40,24 @@ def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_wo
         "; the widest disc that passes has a radius of 0.225 m, at (3.00, 2.00), between obstacles[0] at (3, 2.475) with "
         f"radius 0.25 and obstacles[{len(tight.task.world.obstacles) // 2}] at (3, 1.525) with radius 0.25; {remedy} finds one"
     )
+
+
+@pytest.mark.parametrize("most", [0, 20_000, 100_000, 10_000_000])
+def test_the_cells_of_all_plans_for_a_remedy_are_bounded_and_only_a_planned_one_is_named(turtlebot, most, monkeypatch):
+    tried, first = [], reasons._first_that_works
+
+    def spied(remedies, finds_path):
+        return first(remedies, lambda routes: tried.append((routes, finds_path(routes))) or tried[-1][1])
+
+    monkeypatch.setattr(reasons, "_first_that_works", spied)
+    monkeypatch.setattr(reasons, "MOST_WORK", most)
+    tight = gate(turtlebot, 0.45, margin=0.08)
+    reason = plan(tight)[1].reason
+    area = math.prod(tight.task.world.size)
+    assert sum(area / routes.cell**2 for routes, _ in tried) <= most
+    assert reason.endswith("finds one") == any(found for _, found in tried)
+    if most == 10_000_000:
+        assert reason.endswith("; --margin 0.04 --cell 0.01 finds one")
 
 
 def test_less_than_the_default_is_said_to_be_a_risk(turtlebot):

@@ -41,6 +41,73 @@ def test_two_doors_between_two_rooms(inflate, reached, passed):
     assert tuple(door.passed for door in result.doors) == passed
 
 
+@pytest.mark.parametrize("cell", [0.1, 0.25])
+def test_a_door_that_is_reached_from_one_side_only_is_not_passed(cell):
+    """The robot fits beside the wall's line, where the gap is a little wider, but not on it."""
+    world = two_rooms([(3.05, 0.9)])
+    for start in ((1.0, 3.0), (7.0, 3.0)):
+        fine, coarse = coverage(world, [rasterise(world, each, 0.451) for each in (0.1, cell)], start)
+        assert fine.reached[30, 39 if start[0] < 4 else 40]
+        assert [door.passed for each in (fine, coarse) for door in each.doors] == [False, False]
+
+
+def doors_driven(world, cell, inflate, doors):
+    """Oracle: the doors (x, y, width) that a flood fill from the middle of the first room drives through."""
+    discs, (_, _, width, height) = world.discs, world.bounds
+    shape = round(height / cell), round(width / cell)
+    points = cell * (np.stack(np.indices(shape)[::-1], axis=-1) + 0.5)
+    walls = np.minimum(points, (width, height) - points).min(axis=-1)
+
+    def clear(dr, dc):
+        """Return whether a move of this many rows and columns from each cell (R, C) touches no disc."""
+        way, away = cell * np.array([dc, dr]), discs[:, :2] - points[:, :, None]
+        part = (away @ way / max(way @ way, 1e-12)).clip(0, 1)
+        return (np.hypot(*np.moveaxis(away - part[..., None] * way, 3, 0)) - discs[:, 2]).min(axis=2) > inflate
+
+    ways = [(dr, dc) for dr in (-1, 0, 1) for dc in (-1, 0, 1) if dr or dc]
+    moves, free = {way: clear(*way) for way in ways}, clear(0, 0) & (walls > inflate)
+    todo, driven = [(shape[0] // 2, round(1 / cell))], set()
+    seen = set(todo)
+    while todo:
+        r, c = todo.pop()
+        for dr, dc in ways:
+            there = r + dr, c + dc
+            if not (moves[dr, dc][r, c] and free[there] and free[r + dr, c] and free[r, c + dc]):
+                continue
+            middle = (points[r, c] + points[there]) / 2
+            over = [(points[r, c, 0] < door[0]) != (points[there][0] < door[0]) for door in doors]
+            driven |= {door for door, on in zip(doors, over, strict=True) if on and abs(middle[1] - door[1]) < 0.6}
+            todo += {there} - seen
+            seen.add(there)
+    return driven
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.lists(st.floats(0.5, 1.1), min_size=3, max_size=3),
+    st.lists(st.floats(0.9, 1.1), min_size=3, max_size=3),
+    st.floats(0.25, 0.55),
+    st.sampled_from([0.1, 0.2]),
+)
+def test_a_door_is_passed_exactly_if_a_flood_fill_drives_through_it(widths, middles, inflate, cell):
+    """Two walls part three rooms of 2 x 4 m; the first wall has two doors."""
+    (first, second, third), (low, high, single) = widths, middles
+    doors, discs = [(2.0, low, first), (2.0, high + 2, second), (4.0, single, third)], []
+    for x in (2.0, 4.0):
+        gaps = [(at, width) for wall, at, width in doors if wall == x]
+        rims = [at + side * (width / 2 + 0.05) for at, width in gaps for side in (-1, 1)]
+        solid = [y for y in np.arange(0, 4.001, 0.08) if all(abs(y - at) > width / 2 + 0.05 for at, width in gaps)]
+        discs += [Disc(x, float(y), 0.05) for y in (*solid, *rims)]
+    world = World("rooms", (0.0, 0.0, 6.0, 4.0), tuple(discs))
+    driven = doors_driven(world, cell, inflate, doors)
+    found = coverage(world, [rasterise(world, each, inflate) for each in (0.1, cell)], (1.05, 2.05))[1].doors
+    assert len(found) == len(doors)
+    for door in found:
+        near = min(doors, key=lambda one: np.hypot(one[0] - door.at[0], one[1] - door.at[1]))
+        assert door.width == pytest.approx(near[2])
+        assert door.passed == (near in driven)
+
+
 def test_a_closed_room_is_no_part_of_the_floor():
     result = covered(two_rooms([]), 0.2)
     assert result.room_count == 1

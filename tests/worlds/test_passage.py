@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from antdrive.planners.anyangle.tangent import shortest
-from antdrive.worlds import Disc, Task, World, point_clearance
+from antdrive.worlds import Disc, Task, World, _kernels_passage, point_clearance
 from antdrive.worlds.passage import Passage, feasible, widest_passage
 
 STEP = 0.03  # of the field [m]
@@ -131,3 +131,16 @@ def test_an_end_with_little_room_counts_by_the_roomiest_place_within_reach():
     row = tuple(Disc(x, 2.6, 0.05) for x in np.arange(0.0, 4.1, 0.1).tolist())
     behind = Task(World("row", room.bounds, row), (0.6, 0.6, 0.0), (2.0, 2.8))
     assert widest_passage(behind, (0.4, 0.4)) is None
+
+
+def test_gaps_are_listed_again_only_for_a_wider_disc(monkeypatch):
+    """Start and goal have room for several positions each."""
+    asked, gaps = [], _kernels_passage.gaps
+    monkeypatch.setattr(_kernels_passage, "gaps", lambda *given: asked.append(given[-1]) or gaps(*given))
+    wall = tuple(Disc(3.0, y, 0.2) for y in np.arange(0.0, 4.01, 0.5).tolist())
+    task = Task(World("wall", (0.0, 0.0, 6.0, 4.0), (*wall, Disc(0.7, 0.3, 0.1))), (0.5, 0.5, 0.0), (5.6, 3.6))
+    assert widest_passage(task, (0.3, 0.3)).radius == pytest.approx(0.05)
+    assert asked == sorted(set(asked))
+    asked.clear()
+    assert not feasible(task, 0.1, (0.3, 0.3))
+    assert len(asked) == 1

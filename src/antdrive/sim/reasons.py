@@ -26,8 +26,10 @@ if TYPE_CHECKING:
 
 CELLS = (0.5, 0.25, 0.1, 0.05, 0.025, 0.01)  # sides of finer cells to try [m]
 MARGINS = (0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01)  # smaller margins to try [m]
-MOST_CELLS, MOST_OUTLINED = 2_000_000, 500_000  # largest grids to try: for the disc, and for a footprint
+MOST_CELLS = 2_000_000  # of the largest grid to try
+MOST_WORK = 24_000_000  # cells of all grids to try for remedies
 MOST_TRIES = 20  # plans to try for a remedy
+OUTLINED, TIMED = 4, 4  # a cell of a footprint's grid, or among known motions, counts as this many
 NEAR = 1.0  # longest move of a start or a goal as a remedy [m]
 ROUNDING = 1e-6  # [m]
 
@@ -165,23 +167,23 @@ def _other_ends(s: RoutePlanner, same: Remedy, grid: Grid, query: Query, passage
 
 def _first_that_works(remedies: Iterator[Remedy], finds_path: FindsPath) -> Remedy | None:
     """Return the first remedy whose plan is a path, of a bounded number and size."""
-    tries = 0
+    tries, left = 0, float(MOST_WORK)
     for remedy in remedies:
         if tries == MOST_TRIES:
             return None
-        if _is_small(remedy.routes):
-            tries += 1
+        cells = _cells(remedy.routes)
+        if max(cells) <= MOST_CELLS and sum(cells) <= left:  # a later remedy may need fewer
+            tries, left = tries + 1, left - sum(cells)
             if finds_path(remedy.routes):
                 return remedy
     return None
 
 
-def _is_small(s: RoutePlanner) -> bool:
-    """Return whether the grids of a plan are small enough to try it."""
-    width, height = s.task.world.size
-    outlined = not s.turns or width * height <= MOST_OUTLINED * s.outlined_cell**2
-    few = MOST_OUTLINED if s.motions else MOST_CELLS
-    return outlined and width * height <= few * s.cell**2
+def _cells(s: RoutePlanner) -> list[float]:
+    """Return the cells of each grid of a plan, by what one of them costs."""
+    area = math.prod(s.task.world.size)
+    outlined = [OUTLINED * area / s.outlined_cell**2] * len(s.outline_margins) if s.turns else []
+    return [(TIMED if s.motions else 1) * area / s.cell**2, *outlined]
 
 
 def _same(s: RoutePlanner) -> Remedy | None:

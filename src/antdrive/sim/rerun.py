@@ -13,6 +13,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,7 @@ def replayed(
         rollout: the log
         planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the registered
             planner of the record's name
-        elsewhere: returns `rerun_fingerprint(rollout, planner)` of a new process; None if that is unknown
+        elsewhere: returns `rerun_fingerprint` of the log in a new process; None if that is unknown
 
     Raises:
         FieldError: the record's rates of physics and control do not fit.
@@ -122,14 +123,14 @@ def replayed(
     return dataclasses.replace(check, exact=check.exact and not found, rounded=rounded, problems=tuple(problems))
 
 
-def rerun_fingerprint(rollout: Rollout, planner: Planner | str | None = None) -> str:
+def rerun_fingerprint(log: Path, planner: Planner | str | None = None) -> str:
     """Return the `fingerprint` of a log's scenario.
 
     Args:
-        rollout: the log
+        log: the log's file
         planner: as in `rebuilt`
     """
-    return fingerprint(rerun_scenario(rollout, planner))
+    return fingerprint(rerun_scenario(Rollout.load(log), planner))
 
 
 def rerun(rollout: Rollout, planner: Planner | str | None = None) -> Rollout:

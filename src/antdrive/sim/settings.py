@@ -343,6 +343,11 @@ def part_of_key(fields: Mapping[str, Any], without: Collection[str] = ()) -> dic
     return {one.name: fields[one.name] for one in known if one.setting.since == 1 or fields[one.name] != one.default}
 
 
+def tested_settings(given: Mapping[str, Any], *, custom: bool) -> dict[str, Any]:
+    """Return the settings of a test by key: a custom planner drives its own plan unless a smoothing is given."""
+    return {**({"smoothing": COMPARED_SMOOTHING} if custom else {}), **given}
+
+
 def _columns() -> Iterator[tuple[str, str]]:
     for one in SETTINGS.values():
         plain = one.setting.form == "plain"

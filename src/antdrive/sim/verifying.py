@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -130,7 +129,7 @@ def verify_log(
     *,
     replay: bool,
     planner: str | None = None,
-    elsewhere: Callable[[Callable[[], str]], str | None] = lambda call: None,
+    elsewhere: Callable[[], str | None] = lambda: None,
 ) -> dict[str, Any]:
     """Certify a log; compare it with a world, a robot and its `result.json`; with `replay`, drive it again.
 
@@ -141,7 +140,7 @@ def verify_log(
         result: the `result.json` beside the log; None: none
         replay: whether to drive the log again
         planner: FILE.py:CLASS or MODULE:CLASS of a planner that is not registered, for the replay
-        elsewhere: returns a call's result from a new process, for the replay; None if that is unknown
+        elsewhere: returns `rerun_fingerprint(log, planner)` of a new process, for the replay; None if that is unknown
     """
     rollout = Rollout.load(log)
     certificate = certify(rollout)
@@ -153,12 +152,10 @@ def verify_log(
         problems += false_claims(read_result(result), rollout, certificate, measure(rollout), rollout.digest)
     sentence = certificate.sentence
     if replay:
-        from antdrive.sim.rerun import replayed, rerun_fingerprint
+        from antdrive.sim.rerun import replayed
 
         try:
-            check = replayed(
-                rollout, planner, lambda: elsewhere(functools.partial(rerun_fingerprint, rollout, planner))
-            )
+            check = replayed(rollout, planner, elsewhere)
         except ValueError as error:  # the record cannot describe a drive
             problems.append(f"replay: {error}")
         else:

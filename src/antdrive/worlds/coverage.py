@@ -6,6 +6,7 @@ indoor mobile robot navigation*, Artificial Intelligence 99, 1998.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -33,7 +34,7 @@ class Door:
         width: distance between its two obstacles [m]
         at: its middle [m]
         rooms: the numbers of the rooms on both sides
-        passed: whether the robot gets through
+        passed: whether the robot drives from one room into the other here
     """
 
     width: float
@@ -82,10 +83,17 @@ def reached_cells(grid: Grid, ends: Iterable[Point]) -> Cells:
     On a grid with turns, the robot sets out at any free heading.
     """
     reached = np.zeros(grid.shape, dtype=np.bool_)
+    reached.ravel()[grid.cells_of(_reached_nodes(grid, ends))] = True
+    return reached
+
+
+def _reached_nodes(grid: Grid, ends: Iterable[Point]) -> npt.NDArray[np.bool_]:
+    """Return the nodes (N,) of `reached_cells`."""
+    reached = np.zeros(len(grid.graph.mask), dtype=np.bool_)
     for x, y in ends:
         for node in grid.nodes_at(grid.cell_at(x, y)):
             if grid.graph.mask[node]:
-                reached.ravel()[grid.cells_of(_kernels_turns.led_to(grid.graph, node))] = True
+                reached |= _kernels_turns.led_to(grid.graph, node)
     return reached
 
 
@@ -116,17 +124,40 @@ def coverage(
     _kernels_coverage.rooms(bare.moves, clearance, order, NARROW, LEAST_ROOM / bare.cell**2, rooms)
     rooms[floor] = np.unique(rooms[floor], return_inverse=True)[1]
     masks = [_on_cells_of(bare, grid, reached_cells(grid, [at])) for grid, at in zip(grids, entries, strict=True)]
+    crossings = [_crossings(bare, rooms, grid, at) for grid, at in zip(grids, entries, strict=True)]
     doors: list[list[Door]] = [[] for _ in grids]
     for border in _borders(bare, rooms):
         room = clearance[tuple(border.T)]
         widest = border[room >= room.max() - bare.cell]
         found = [door for at in widest if (door := _door(world, bare, clearance, rooms, border, at))]
-        for mask, passed in zip(masks, doors, strict=True) if found else ():
-            passed.append(replace(min(found, key=_order), passed=bool(mask[tuple(border.T)].any())))
+        here = np.ravel_multi_index(tuple(border.T), bare.shape)
+        for steps, passed in zip(crossings, doors, strict=True) if found else ():
+            passed.append(replace(min(found, key=_order), passed=bool(np.isin(steps, here).all(axis=1).any())))
     return tuple(
         Coverage(grid, floor, mask, rooms, tuple(sorted(passed, key=_order)))
         for grid, mask, passed in zip(grids, masks, doors, strict=True)
     )
+
+
+def _crossings(bare: Grid, rooms: npt.NDArray[np.int64], grid: Grid, entry: Point) -> npt.NDArray[np.int64]:
+    """Return the steps between rooms in a robot's moves from where it enters its grid: flat cells of `bare` (N, 2)."""
+    nodes, scale = _reached_nodes(grid, [entry]), grid.cell / bare.cell
+    middles = (
+        np.minimum((np.arange(count) + 0.5) * scale, most - 1).astype(np.int64)
+        for count, most in zip(grid.shape, bare.shape, strict=True)
+    )
+    room, flat = rooms[np.ix_(*middles)].ravel(), rooms.ravel()
+    parts = np.linspace(0, 1, 2 + math.ceil(2 * (scale - 1)))  # samples so close that no cell of `bare` is skipped
+    steps = []
+    for k, (dr, dc) in enumerate(DIRECTIONS):
+        cells = grid.cells_of(nodes & (grid.graph.mask >> k & 1 > 0))
+        cells = np.unique(cells[room[cells] != room[cells + dr * grid.shape[1] + dc]])
+        line = np.column_stack(np.divmod(cells, grid.shape[1]))[:, None] + parts[:, None] * (dr, dc)  # (N, P, 2)
+        rc = np.floor((line + 0.5) * scale).astype(np.int64)
+        at = np.ravel_multi_index(tuple(np.moveaxis(rc, 2, 0)), bare.shape)
+        before, after = at[:, :-1].ravel(), at[:, 1:].ravel()
+        steps.append(np.column_stack([before, after])[flat[before] != flat[after]])
+    return np.concatenate(steps)
 
 
 def _on_cells_of(bare: Grid, grid: Grid, cells: Cells) -> Cells:

@@ -48,8 +48,9 @@ def feasible(task: Task, clearance: float, reach: Reach = AT_THE_ENDS) -> bool:
     Within `reach` of an end with less clearance, the path may begin or end where a straight line joins the end. That line
     keeps the end's clearance.
     """
+    gaps = _Gaps(task.world)
     return any(
-        min(room, other) >= clearance - ROUNDING and _closing(task.world, start, goal, clearance + ROUNDING) is None
+        min(room, other) >= clearance - ROUNDING and gaps.closing(start, goal, clearance + ROUNDING) is None
         for (room, start), (other, goal) in _ends(task, reach)
     )
 
@@ -59,20 +60,20 @@ def widest_passage(task: Task, reach: Reach = AT_THE_ENDS) -> Passage | None:
 
     None if not even a point passes. `reach` is that of `feasible`.
     """
-    best: Passage | None = None
+    gaps, best = _Gaps(task.world), None
     for (room, start), (other, goal) in _ends(task, reach):
         least = best.radius if best else CLOSER
-        if min(room, other) > least and not (best and _closing(task.world, start, goal, least + ROUNDING)):
-            best = _widest(task.world, start, goal, room, other)
+        if min(room, other) > least and not (best and gaps.closing(start, goal, least + ROUNDING)):
+            best = _widest(gaps, start, goal, room, other)
     return best if best and best.radius > CLOSER else None
 
 
-def _widest(world: World, start: Point, goal: Point, room: float, other: float) -> Passage:
+def _widest(gaps: _Gaps, start: Point, goal: Point, room: float, other: float) -> Passage:
     """Return the bottleneck between two positions with their clearances [m]."""
     most, fraction = min(room, other), FIRST
     passage = Passage(most, start, (), "start") if room <= other else Passage(most, goal, (), "goal")
     while most > CLOSER and fraction <= 1 and not passage.between:
-        passage = _closing(world, start, goal, fraction * most) or passage
+        passage = gaps.closing(start, goal, fraction * most) or passage
         fraction *= 2
     return passage
 
@@ -138,17 +139,26 @@ class _Around:
         return room, at
 
 
-def _closing(world: World, start: Point, goal: Point, most: float) -> Passage | None:
-    """Return the gap that separates start from goal when closed after all narrower ones; None if wider than 2 `most`."""
-    discs, bounds = world.discs, np.asarray(world.bounds, dtype=np.float64)
-    order = np.argsort(discs[:, 0] - discs[:, 2], kind="stable")
-    narrow = _kernels_passage.gaps(discs, order, bounds, 2 * most)
-    narrow = narrow[np.lexsort((narrow[:, 2], narrow[:, 1], narrow[:, 0]))]
-    k = _kernels_passage.separating(narrow, discs, bounds, np.asarray(start), np.asarray(goal))
-    if k < 0:
-        return None
-    i, j = narrow[k, 1:].astype(int).tolist()
-    return Passage(float(narrow[k, 0]) / 2, _middle(discs, bounds, i, j, narrow[k, 0]), (i, j))
+class _Gaps:
+    """The gaps of a world by rising width, listed once up to the widest that is asked for."""
+
+    def __init__(self, world: World) -> None:
+        self._discs, self._bounds = world.discs, np.asarray(world.bounds, dtype=np.float64)
+        self._most, self._rows = -math.inf, np.empty((0, 3))
+
+    def closing(self, start: Point, goal: Point, most: float) -> Passage | None:
+        """Return the gap that separates start from goal when closed after all narrower ones; None if wider than 2 `most`."""
+        discs, bounds = self._discs, self._bounds
+        if most > self._most:
+            order = np.argsort(discs[:, 0] - discs[:, 2], kind="stable")
+            rows = _kernels_passage.gaps(discs, order, bounds, 2 * most)
+            self._most, self._rows = most, rows[np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))]
+        narrow = self._rows[: np.searchsorted(self._rows[:, 0], 2 * most, side="right")]
+        k = _kernels_passage.separating(narrow, discs, bounds, np.asarray(start), np.asarray(goal))
+        if k < 0:
+            return None
+        i, j = narrow[k, 1:].astype(int).tolist()
+        return Passage(float(narrow[k, 0]) / 2, _middle(discs, bounds, i, j, narrow[k, 0]), (i, j))
 
 
 def _middle(discs: Floats, bounds: Floats, i: int, j: int, width: float) -> Point:

@@ -69,6 +69,6 @@ def test_a_line_with_finer_arcs_than_ours_is_pulled_taut_with_finer_corners():
     string = _pulled(line, WORLD.discs, INFLATE)
     drawn, _ = kernels.string_points(string, WORLD.discs, np.array(WORLD.bounds), INFLATE, bulge)
     assert length(drawn) > length(line) + 1e-6, "the usual drawing is longer"
-    piece = _smoothed(line, length(line), WORLD, INFLATE, 0.0, 0.03, 0.0, bulge)
+    piece = _smoothed(line, length(line), WORLD.discs, np.array(WORLD.bounds), INFLATE, 0.0, 0.03, 0.0, bulge)
     assert (piece.kind, piece.note) == ("taut", "")
     assert length(piece.xy) <= length(line) + 1e-9

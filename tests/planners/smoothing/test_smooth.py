@@ -235,6 +235,32 @@ PLANNERS = (
 )  # fmt: skip
 
 
+@settings(max_examples=40)
+@given(
+    st.integers(0, 10**6), st.sampled_from([0.0, 0.03]), st.sampled_from([0.2, 0.5]), st.sampled_from([0.0, 0.03, 0.4])
+)
+def test_discs_that_are_left_out_change_no_bit(seed, margin, clearance, stretch):
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+    task, more = forest(np.random.default_rng(seed)), np.random.default_rng(seed).uniform(25, 40, (100, 2)).tolist()
+    far = tuple(Disc(x, y, 0.2) for x, y in more)
+    task = dataclasses.replace(task, world=World("far", (0.0, 0.0, 41.0, 41.0), (*task.world.obstacles, *far)))
+    grid = rasterise(task.world, 0.1, 0.2 + margin)
+    plan = AStar().plan(Query.between(grid, task), RNG)
+    counts = []
+
+    def routes():
+        for kind in SMOOTHINGS if plan.solved else ():
+            made = smooth(plan, grid, task, kind=kind, clearance=clearance, stretch=stretch)
+            yield made.xy.tobytes(), None if made.curvature is None else made.curvature.tobytes(), made.kind, made.note
+
+    usual, some = list(routes()), kernels.discs_about
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "discs_about", lambda *given: counts.append(len(some(*given))) or given[-1])
+        assert list(routes()) == usual
+    assert all(count < len(task.world.discs) for count in counts)
+
+
 @pytest.mark.parametrize("name", PLANNERS)
 def test_every_planners_plans_are_smoothed(name):
     solved = 0

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.robots import Noise, PurePursuit, list_robots, load_robot
-from antdrive.robots.control._kernels_profile import turning_time
+from antdrive.robots.control._kernels_profile import samples_along, turning_time
+from antdrive.robots.control.pursuit import indexed_obstacles
 from antdrive.robots.control.speed_limits import speed_profile
-from antdrive.worlds import Route, World
+from antdrive.worlds import Route, World, forest, point_clearance
 
 
 def straight(length):
@@ -199,3 +200,20 @@ def test_settings_out_of_range_are_refused(turtlebot):
     ):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             speed_profile(straight(1.0), turtlebot, **wrong)
+
+
+@given(st.integers(0, 10**6), st.floats(0.05, 0.4))
+def test_limits_near_obstacles_are_those_of_the_clearance_among_all_discs(seed, clearance_time):
+    rng = np.random.default_rng(seed)
+    world, spacing, radius = forest(rng).world, 0.05, 0.2
+    (x_min, y_min, x_max, y_max), fastest = world.bounds, 2.0
+    route = Route(rng.uniform((x_min, y_min), (x_max, y_max), (4, 2)))
+    at = spacing * np.arange(int(route.length / spacing) + 2)
+    points = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
+    profile = np.array([[0.0, route.length], *5 * [[fastest, fastest]]])
+    obstacles, far = indexed_obstacles(world, 1.0), np.full(len(at), math.inf)
+    speed = samples_along(
+        profile, route.xy, route.arc, far, obstacles, spacing, radius, 1.0, 0.5, clearance_time, math.inf
+    )[0]
+    near = 0.5 + np.maximum(point_clearance(world, points) - radius, 0.0) / clearance_time
+    assert speed == pytest.approx(np.minimum(fastest, near), abs=1e-9)

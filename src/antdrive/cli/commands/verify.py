@@ -1,5 +1,6 @@
 """`antdrive verify`."""
 
+import functools
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,7 +28,6 @@ def verify(
     Exit code 2: a log cannot be read; the others are still certified.
     """
     from antdrive.robots.robot_file import load_robot
-    from antdrive.runs.pool import in_new_process
     from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 
@@ -42,8 +42,9 @@ def verify(
         try:
             path = str(log_at(given))
             result = given / "result.json" if given.is_dir() else None
+            elsewhere = functools.partial(_fingerprint_elsewhere, Path(path), planner)
             report = checked[path] = verify_log(
-                Path(path), task, spec, result, replay=replay, planner=planner, elsewhere=in_new_process
+                Path(path), task, spec, result, replay=replay, planner=planner, elsewhere=elsewhere
             )
         except InputError as error:
             print_error(str(error))
@@ -60,3 +61,11 @@ def verify(
     if json and (readable or len(checked) > 1):
         print_json({"certified": all_certified, "rollouts": checked})
     return all_certified if readable else INVALID_INPUT
+
+
+def _fingerprint_elsewhere(log: Path, planner: str | None) -> str | None:
+    """Return the fingerprint of a log's drive in a new process; None if that is unknown."""
+    from antdrive.runs.pool import in_new_process
+    from antdrive.sim.rerun import rerun_fingerprint
+
+    return in_new_process(functools.partial(rerun_fingerprint, log, planner))

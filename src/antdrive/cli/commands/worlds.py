@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import file_name, summary_of
 from antdrive.cli import options
-from antdrive.cli.console import bar, file_lines, show, table
+from antdrive.cli.console import bar, file_lines, show, stage, table
 from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pair
@@ -98,7 +98,8 @@ def show_world(
         outline = outline_of(spec.footprint, margin)
         grids["footprint"] = rasterise(shown.world, min(shown.cell, FINE), spec.radius + margin, outline)
     overlap = starts[spec.name]
-    planned, answer = (grids["disc"], None) if overlap else plan(Scenario.of(shown, "astar", spec, margin=margin))
+    with stage("planning with astar"):
+        planned, answer = (grids["disc"], None) if overlap else plan(Scenario.of(shown, "astar", spec, margin=margin))
     passable, why = answer is not None and answer.solved, overlap if answer is None else answer.reason
     entries = [tuple(grid.xy([Query.between(grid, shown).start])[0].tolist()) for grid in grids.values()]
     covered = dict(zip(grids, coverage(shown.world, [*grids.values()], shown.start[:2], entries), strict=True))

@@ -22,7 +22,7 @@ from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive_scenario
 from antdrive.sim.rerun import fingerprint
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.settings import COMPARED_SMOOTHING
+from antdrive.sim.settings import tested_settings
 from antdrive.views.artefacts import Results, file_name
 from antdrive.worlds import Task, list_worlds
 
@@ -181,12 +181,11 @@ class DriveFixture:
                 raise FieldError(given[0], "is part of the scenario; change it with dataclasses.replace")
             return world
         planner = "ants" if planner is None else planner
-        built_in = planner in PLANNERS if isinstance(planner, str) else is_built_in(planner)
+        custom = planner not in PLANNERS if isinstance(planner, str) else not is_built_in(planner)
         robot = "turtlebot" if robot is None else robot
         place = world if isinstance(world, Task) else self._beside(world, list_worlds())
         body = robot if isinstance(robot, RobotSpec) else self._beside(robot, list_robots())
-        usual = {} if built_in else {"smoothing": COMPARED_SMOOTHING}
-        return Scenario.of(place, planner, body, **{**usual, **settings})
+        return Scenario.of(place, planner, body, **tested_settings(settings, custom=custom))
 
     def baseline_path(self, name: str) -> Path:
         """Return the baseline file of a drive.

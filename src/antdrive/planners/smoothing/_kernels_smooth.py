@@ -74,6 +74,26 @@ class Link(NamedTuple):
 
 
 @kernel
+def discs_about(line: Array, ends: Array, stretch: float, reach: float, discs: Array) -> Array:
+    """Return the discs (N, 3) within `reach` of some way between the `ends`, at most `stretch` longer than that along a line.
+
+    All points of such ways lie in the ellipse whose points are that far from both ends in sum.
+    """
+    (ax, ay), (bx, by), count = ends[0], ends[1], 0
+    longest = math.hypot(line[0, 0] - ax, line[0, 1] - ay) + math.hypot(line[-1, 0] - bx, line[-1, 1] - by)
+    for i in range(line.shape[0] - 1):
+        longest += math.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1])
+    most, out = longest * (1.0 + stretch) + 2.0 * (reach + ROUNDING), np.empty_like(discs)
+    for k in range(discs.shape[0]):
+        x, y, radius = discs[k, 0], discs[k, 1], discs[k, 2]
+        first, second = (x - ax) * (x - ax) + (y - ay) * (y - ay), (x - bx) * (x - bx) + (y - by) * (y - by)
+        if math.sqrt(first) + math.sqrt(second) <= most + 2.0 * radius:
+            out[count, 0], out[count, 1], out[count, 2] = x, y, radius
+            count += 1
+    return out[:count]
+
+
+@kernel
 def points_along(
     line: Array, ends: Array, cos: float, sin: float, discs: Array, bounds: Array, inflate: float
 ) -> tuple[Array, Array, Array]:

@@ -29,7 +29,7 @@ from antdrive.base.plane import polyline_length
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath
 from antdrive.planners.plan import PlanResult
 from antdrive.planners.smoothing.sweeps import smooth_lines
-from antdrive.worlds import Grid, Route, Task, World
+from antdrive.worlds import Grid, Route, Task
 
 if TYPE_CHECKING:
     from antdrive.planners.smoothing._kernels_smooth import String
@@ -53,18 +53,24 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
     return Route(_points_along(plan, grid, task)[0])
 
 
-def _points_along(plan: PlanResult, grid: Grid, task: Task) -> tuple[Floats, Floats, Floats]:
-    """Return the points of the plan's line (N, 2), which differ, and clearance and length of its segments (N - 1,) [m]."""
+def _points_along(
+    plan: PlanResult, grid: Grid, task: Task, more: float = 0.0, stretch: float = 0.0
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return the points of the plan's line (N, 2), which differ, and clearance and length of its segments (N - 1,) [m].
+
+    Also returns the discs (M, 3) that count for routes at most `stretch` longer, with `more` than the grid's clearance. Others
+    are left out; the clearance of a segment is that of these discs.
+    """
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     if not plan.solved:
         raise FieldError("plan", "has no path to follow")
     (*start, yaw), world = task.start, task.world
-    line, room, lengths = kernels.points_along(
-        np.ascontiguousarray(grid.xy(plan.line)), np.array((start, task.goal)), math.cos(yaw), math.sin(yaw),
-        world.discs, np.array(world.bounds, dtype=np.float64), grid.inflate,
-    )  # fmt: skip
-    return line, room, lengths
+    cells, ends = np.ascontiguousarray(grid.xy(plan.line)), np.array((start, task.goal))
+    discs = kernels.discs_about(cells, ends, stretch, grid.inflate + more + BESIDE, world.discs)
+    bounds = np.array(world.bounds, dtype=np.float64)
+    line, room, lengths = kernels.points_along(cells, ends, math.cos(yaw), math.sin(yaw), discs, bounds, grid.inflate)
+    return line, room, lengths, discs
 
 
 #: The kinds of smoothing: the plan's line, that line pulled taut, or taut with more clearance where there is room.
@@ -81,6 +87,7 @@ NOTES: tuple[str, ...] = (
 )
 
 SLACK = 1e-9  # rounding tolerance of clearances and lengths [m]
+BESIDE = 0.01  # discs this much farther away still count: far above rounding [m]
 
 
 def smooth(
@@ -122,18 +129,18 @@ def smooth(
         raise FieldError("bulge", f"must be greater than 0, got {bulge:g}")
     if grid.turns:
         return smooth_lines(plan, grid, task, kind)
-    line, room, lengths = _points_along(plan, grid, task)
+    extra = clearance if kind == "clearance" else 0.0
+    line, room, lengths, discs = _points_along(plan, grid, task, 2 * extra + bulge, stretch)
     if kind == "none":
         return Route(line)
-    world, inflate = task.world, grid.inflate
+    bounds, inflate = np.array(task.world.bounds, dtype=np.float64), grid.inflate
     spare = max(0.0, plan.cost - lengths.cumsum().item(-1)) if math.isfinite(plan.cost) else 0.0
-    extra = clearance if kind == "clearance" else 0.0
     xy, curvature, kinds, notes = [line[:1]], [np.zeros(1)], [], []
     for first, last, clear in _runs(room, inflate):
         run, own = line[first : last + 1], float(lengths[first:last].sum())
         piece = Piece(run, np.zeros(len(run)))
         if clear:
-            piece = _smoothed(run, own, world, inflate, extra, stretch, spare, bulge)
+            piece = _smoothed(run, own, discs, bounds, inflate, extra, stretch, spare, bulge)
             spare -= max(0.0, polyline_length(piece.xy) - own)
             kinds.append(piece.kind)
         elif len(run) > 2 or not (run[0] == line[0]).all():
@@ -211,15 +218,13 @@ def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
 
 
 def _smoothed(
-    line: Floats, own: float, world: World, inflate: float, extra: float, stretch: float, spare: float, bulge: float
-) -> Piece:
+    line: Floats, own: float, discs: Floats, bounds: Floats, inflate: float, extra: float, stretch: float, spare: float,
+    bulge: float,
+) -> Piece:  # fmt: skip
     """Smooth a clear polyline of a length `own` as far as the checks allow."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
-    note, xy, curvature = kernels.smoothed(
-        line, world.discs, np.array(world.bounds, dtype=np.float64), inflate, own, extra, stretch,
-        spare, bulge,
-    )  # fmt: skip
+    note, xy, curvature = kernels.smoothed(line, discs, bounds, inflate, own, extra, stretch, spare, bulge)
     kind = ("clearance" if extra else "taut") if not note else "taut" if note == kernels.CROWDED else "none"
     return Piece(xy, curvature, kind, NOTES[note])
 

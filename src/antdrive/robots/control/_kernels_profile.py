@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
-from antdrive.robots.control._kernels_path import brake_backwards
-from antdrive.worlds._kernels import Array, inline, kernel, leaf, point_clearances
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, nearby, square_at
+from antdrive.robots.control._kernels_path import STRETCH, brake_backwards, within_reach
+from antdrive.worlds._kernels import ROUNDING, Array, inline, kernel, leaf, point_clearances
 
 TURN = 2.0 * math.pi
 
@@ -177,12 +178,13 @@ def profile_along(
 
 @kernel
 def samples_along(
-    profile: Array, xy: Array, arc: Array, lookahead: Array, discs: Array, bounds: Array, spacing: float,
-    radius: float, lookahead_time: float, speed_near: float, time_near: float, deceleration: float,
+    profile: Array, xy: Array, arc: Array, lookahead: Array, obstacles: ObstacleIndex, spacing: float, radius: float,
+    lookahead_time: float, speed_near: float, time_near: float, deceleration: float,
 ) -> Array:  # fmt: skip
     """Return speed limit, curvature and heading at the samples of a route (3, S).
 
     The limit is the minimum of profile, clearance and lookahead; near obstacles it is `speed_near` + clearance / `time_near`.
+    Discs too far away to lower the profile are left out.
     """
     count = len(lookahead)
     out, points, clearance = np.empty((3, count)), np.empty((count, 2)), np.empty(count)
@@ -197,7 +199,17 @@ def samples_along(
             k += 1
         for row in range(3):
             out[row, i] = value_at(at, k, profile[0], profile[5 if row == 0 else row + 2])
-    point_clearances(points, discs, bounds, clearance)
+    reach = radius + max(0.0, profile[5].max() - speed_near) * time_near + STRETCH + ROUNDING
+    first = 0
+    for i in range(1, count + 1):
+        x, y = points[first, 0], points[first, 1]
+        near = i < count and math.hypot(points[i, 0] - x, points[i, 1] - y) <= STRETCH
+        if near and square_at(points[i, 0], points[i, 1], obstacles) == square_at(x, y, obstacles):
+            continue
+        known = nearby(x, y, reach, obstacles)
+        discs = within_reach(x, y, reach, known, np.empty((known.shape[0], 3)))
+        point_clearances(points[first:i], discs, obstacles.bounds, clearance[first:i])
+        first = i
     for i in range(count):
         near = speed_near + max(clearance[i] - radius, 0.0) / time_near
         out[0, i] = min(min(lookahead[i] / lookahead_time, out[0, i]), near)

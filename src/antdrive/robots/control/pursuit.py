@@ -297,8 +297,11 @@ class PurePursuit:
             route.xy, route.arc, obstacles, tuning.lookahead_clearance, spacing, self.lookahead_min,
             self.lookahead_max, lookahead,
         )  # fmt: skip
+        limiting = spec.radius + (spec.max_speed - self.min_speed_near_obstacles) * self.clearance_time
+        if limiting > self.lookahead_max + tuning.lookahead_clearance:  # farther than the index reaches
+            obstacles = obstacles_around(route.xy[0], world.discs, world.bounds)
         blend = self.blend if route.curvature is not None else self.corner_blend
-        speed, curvature, heading = limits_along(route, world, spec, lookahead, tuning, blend)
+        speed, curvature, heading = limits_along(route, obstacles, spec, lookahead, tuning, blend)
         if route.curvature is None:
             curvature[:] = np.nan
         return PathSamples(route.xy, route.arc, lookahead, speed, curvature, heading)

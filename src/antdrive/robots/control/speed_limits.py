@@ -18,6 +18,7 @@ from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.control import _kernels_path
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_pursuit import PursuitTuning
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Route, World
@@ -146,14 +147,14 @@ def steady(spec: RobotSpec, error: float) -> RobotSpec:
 
 
 def limits_along(
-    route: Route, world: World, spec: RobotSpec, lookahead: Floats, tuning: PursuitTuning, blend: float
+    route: Route, obstacles: ObstacleIndex, spec: RobotSpec, lookahead: Floats, tuning: PursuitTuning, blend: float
 ) -> Floats:
     """Return speed limit, curvature and heading at the samples of a route (3, S)."""
     from antdrive.robots.control import _kernels_profile
 
     samples: Floats = _kernels_profile.samples_along(
-        _profile(route, spec, blend, tuning.rotate_above, tuning.braking), route.xy, route.arc, lookahead, world.discs,
-        np.asarray(world.bounds, dtype=np.float64), tuning.spacing, spec.radius, tuning.lookahead_time,
+        _profile(route, spec, blend, tuning.rotate_above, tuning.braking), route.xy, route.arc, lookahead, obstacles,
+        tuning.spacing, spec.radius, tuning.lookahead_time,
         tuning.min_speed_near_obstacles, tuning.clearance_time, tuning.braking * spec.max_acceleration,
     )  # fmt: skip
     return samples

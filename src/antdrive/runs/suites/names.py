@@ -14,7 +14,7 @@ from antdrive.planners.registry import PLANNERS, load_planner, make_planner
 from antdrive.planners.user_code import UserCodeError, is_user_code, load_object, record_name
 from antdrive.robots.robot_file import list_robots
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
-from antdrive.sim.settings import COMPARED_SMOOTHING
+from antdrive.sim.settings import tested_settings
 from antdrive.worlds.files.world_file import list_worlds
 
 #: Keys of a planner entry that give its source; other keys are options.
@@ -72,15 +72,11 @@ def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
     return any(sources) or (isinstance(name, str) and is_user_code(name))
 
 
-def settings_of(case: SuiteCase) -> dict[str, Any]:
-    """Return the settings of a test by key: those given, and the smoothing of custom planners, which drive their own plans."""
+def case_settings(case: SuiteCase) -> dict[str, Any]:
+    """Return the settings of a test by key."""
     planner = case.entry.planner
     name = planner if isinstance(planner, str) else planner.get("name")
-    return (
-        case.given
-        if name in PLANNERS and not is_own_entry(planner)
-        else {"smoothing": COMPARED_SMOOTHING, **case.given}
-    )
+    return tested_settings(case.given, custom=name not in PLANNERS or is_own_entry(planner))
 
 
 def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:

@@ -12,7 +12,7 @@ from antdrive.base.checks import show
 from antdrive.base.errors import FieldError, InputError
 from antdrive.robots import list_robots, load_robot
 from antdrive.runs.margins.choice import with_chosen_margin
-from antdrive.runs.suites.names import is_own_entry, planner_of, robot_path, settings_of, world_path
+from antdrive.runs.suites.names import case_settings, is_own_entry, planner_of, robot_path, world_path
 from antdrive.runs.suites.suite import SuiteCase, shown_path
 from antdrive.sim.forms import option_text, scenario_fields, setting_words
 from antdrive.sim.scenario import Scenario
@@ -32,7 +32,7 @@ def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = with_c
     Raises:
         InputError: an item of the suite is missing or invalid; the message has the suite's file, line and key.
     """
-    given = settings_of(case)
+    given = case_settings(case)
     auto = given.get("margin") == "auto"
     planner, name = planner_of(case)
     task = _with_ends(case, task_of(case))
@@ -67,7 +67,7 @@ def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
     """Return the `antdrive run` command of a test's scenario; None if only `antdrive check` can run it."""
     entry = case.entry
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
-    word, settings = _planner_word(case, planner, anywhere), setting_words(settings_of(case))
+    word, settings = _planner_word(case, planner, anywhere), setting_words(case_settings(case))
     if settings is None or word is None:
         return None
     world, before = _world_words(case, anywhere)

@@ -38,7 +38,7 @@ SAME_CLEARANCE = 1e-9  # tolerance of closed-form distances that are computed tw
 # closed-form clearance than this is a contradiction [m].
 CONTACT_SLACK = 0.012
 # Physics reports contacts of surfaces up to 0.1 mm apart (rounded up here), and all contacts with a force [m].
-TOUCHING = 2e-4
+REPORTED = 2e-4
 START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the task's start [m], [rad]
 # Tolerance of poses relative to integrated measured speeds: per step, and over some seconds, where errors would add up but
 # rounding does not. Genuine drives stay below 0.07 mm per step and 0.6 mm plus 1 % of the distance in any window.
@@ -407,10 +407,10 @@ def _check_contacts(rollout: Rollout) -> Iterator[str]:
     distance, force = contacts[:, 2:].T
     # Physics cannot separate a robot that is crushed: surfaces with a force may be apart by the depth of its overlap.
     crushed = np.maximum(-rollout.clearance[contacts[:, 0].astype(np.int64)], 0.0)
-    near = (distance <= TOUCHING) | ((force > 0) & (distance <= TOUCHING + _approach(rollout) + crushed))
+    near = (distance <= REPORTED) | ((force > 0) & (distance <= REPORTED + _approach(rollout) + crushed))
     if not near.all() or not (force >= 0).all():
         yield (
-            f"contacts: physics reports surfaces no farther apart than {TOUCHING:g} m, or with a force than they come nearer "
+            f"contacts: physics reports surfaces no farther apart than {REPORTED:g} m, or with a force than they come nearer "
             "in one step, and forces of at least 0"
         )
     first = contacts[contacts[:, 0] == contacts[0, 0]]

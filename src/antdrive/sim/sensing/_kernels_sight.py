@@ -7,7 +7,7 @@ import math
 from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays, grain_disc
 from antdrive.worlds._kernels import Array, kernel, leaf, polygon_distance
 
-TOUCHING = 1e-3  # distance at which the footprint meets a disc [m]
+MEETING = 1e-3  # distance at which the footprint meets a disc [m]
 SAMPLES = 8  # samples of the path, for its part of the map
 GIVE = 2e-3  # discs that overlap the footprint shrink to this distance from it [m]
 
@@ -87,7 +87,7 @@ def within_map(
             return done
         if done >= limit or forward == 0.0:
             return limit
-        done = min(limit, done + max(room - radius, TOUCHING))
+        done = min(limit, done + max(room - radius, MEETING))
 
 
 @kernel
@@ -145,7 +145,7 @@ def contact(
         if done == 0.0 and gap - size < GIVE:
             size = gap - GIVE
         away = gap - size
-        if away <= TOUCHING:
+        if away <= MEETING:
             return done
         done += away / (abs(forward) + abs(bend) * (math.sqrt(dx * dx + dy * dy) + away))
     return limit
