@@ -46,8 +46,8 @@ CLOSER = 1e-3  # a robot that is closer to obstacles than required may come clos
 ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
 LEVELS = 64  # tabulated distances for progress
 BESIDE_DISTANCE, BESIDE_TIME = 0.5, 0.3  # offsets decay over this distance, or this time at speed [m], [s]
-ROOM, ROOM_WEIGHT = 0.1, 20.0  # a robot that halts values so much more room, each metre as so much progress [m], [m/m]
-LEAST_ROOM = 0.005  # it moves for at least so much room [m]
+LEAST_ROOM, ROOM = 0.005, 0.1  # a robot that halts moves for so much more room, at least and at most [m]
+ROOM_WEIGHT = 20.0  # value of a metre of room, in metres of progress
 ROUTE_END = 0.1  # distance from the route's end below which the heading is ignored [m]
 
 
@@ -743,7 +743,7 @@ def choose(
         s, rotating, candidates, path, obstacles, limits, tuning, weights.step, route, off, trails, steps, blocked
     )  # fmt: skip
     if best >= 0:
-        here = room_at(trails[0, 0], outlined, obstacles, tuning)
+        here, best_score = room_at(trails[0, 0], outlined, obstacles, tuning), -math.inf
         for n in range(1, count):
             if blocked[n] or candidates[n, KIND] != TWO_TWISTS:
                 continue
@@ -753,8 +753,7 @@ def choose(
             )
             if room < LEAST_ROOM or met.contact < math.inf:
                 continue
-            value = among_movers(worth(trails[n, instants - 1], s, window, path, tuning, weights), met, weights)
-            value += ROOM_WEIGHT * room + (weights.persistence if n == 1 else 0.0)
+            value = among_movers(ROOM_WEIGHT * room, met, weights) + (weights.persistence if n == 1 else 0.0)
             if value > best_score:
                 best, best_score = n, value
         return best, math.inf

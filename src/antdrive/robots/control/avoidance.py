@@ -147,7 +147,8 @@ class Avoidance:
             losses: clearance of the circle and of the outline from obstacles off the route, against noise [m]
         """
         period, limits = tracked.tuning.period, tracked.limits
-        reversed_ = max(0.0, state.reversed - last.speed * period)
+        halts = not (any(last) or any(wanted))  # the robot may have to back off again
+        reversed_ = 0.0 if halts else max(0.0, state.reversed - last.speed * period)
         near = self.speed_near(spec, pose, last, places, radii)
         left = max(self.reverse_distance - reversed_, 0.0)
         slow = min(self.reverse_speed, math.sqrt(2 * limits.acceleration * left), backwards)

@@ -120,7 +120,7 @@ class MoverTracking:
 
     def _corners(self, pose: Pose, ranges: Floats, theirs: npt.NDArray[np.bool_]) -> Floats:
         """Return the ends of beams beside which a beam reaches farther by a person's width (N, 2) [m]."""
-        far = np.minimum(ranges, self._lidar.max_range)
+        far = np.clip(ranges, 0.0, self._lidar.max_range)
         beyond = np.maximum(*(np.roll(far, side) for side in (-1, 1)))
         if not self._lidar.full_circle:
             beyond[[0, -1]] = far[[1, -2]]
