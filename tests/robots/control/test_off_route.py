@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, footprint_clearance, load_robot
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control.avoidance import _weights
-from antdrive.robots.default_margin import clearances_off_route, default_margin, line_margin
+from antdrive.robots.default_margin import LINE_ROUNDING, RESERVE, clearances_off_route, default_margin, line_margin
 from antdrive.worlds import Disc, Route, World
 
 KEPT, PERIOD, PERIODS = 0.05, 1 / 20, 40
@@ -93,7 +93,7 @@ def test_motions_off_the_route_keep_the_loss_that_margins_hold(name):
     circle, outline = clearances_off_route(robot, controller, 1.0)
     assert 0.01 < circle < default_margin(robot, controller, 1.0, "none")
     assert 0.01 < outline < line_margin(robot, controller, 1.0)
-    assert clearances_off_route(robot, controller, 0.0) == (0.0, 0.0)
+    assert clearances_off_route(robot, controller, 0.0) == (RESERVE, RESERVE + LINE_ROUNDING)
 
 
 def test_the_controller_takes_over_only_a_speed_that_it_can_brake():
