@@ -112,3 +112,12 @@ def test_the_controller_takes_over_only_a_speed_that_it_can_brake():
         chosen.append(kernels.choose(*here, *situation[1:], places, np.array([0.2]))[0])
     assert chosen[0] == 0
     assert chosen[1] != 0
+
+
+@pytest.mark.parametrize("pose", [(0.0, 0.35, 0.2), (0.0, -0.3, -0.2), (-1.5, -0.3, 0.0)])
+def test_a_robot_that_would_halt_without_room_for_its_circle_makes_room(pose):
+    robot = load_robot("husky")
+    poses = driven(robot, pose, np.empty((0, 5)))
+    clearance = footprint_clearance(WORLD, robot.footprint, poses)
+    assert np.hypot(*(poses[-1] - poses[0])[:2]) > 0.5
+    assert clearance.min() >= min(KEPT, clearance[0]) - 0.002

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from antdrive.base.errors import FieldError
+from antdrive.robots import Avoidance, load_robot
 from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
-from antdrive.sim.compose import compose
+from antdrive.sim.compose import avoidance_of, compose
 from antdrive.sim.driving.perceived_movers import Tracked
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.driving.survey import MoverTracking
@@ -214,3 +215,37 @@ def test_a_replay_draws_the_noise_of_scans_again(jackal):
     assert len(noisy.scans) > 30
     assert replay(noisy).problems == ()
     assert "scans" in replay(replace(noisy, scans=noisy.scans + np.uint16(2))).problems[0]
+
+
+#: A corridor along a room; a person in the room cannot be seen from it before the door.
+WALL = tuple(Disc(0.1 * k, 1.4, 0.05) for k in range(121) if not 60 <= k < 72)
+PERSON = Keyframed(radius=0.25, keyframes=((0.0, 1.0, 0.5), (60.0, 2.0, 0.5)), loop="pingpong")
+OFFICE = Task(World("office", (0.0, 0.0, 12.0, 3.6), WALL, movers=(PERSON,)), (0.8, 2.0, 0.0), (11.2, 2.0), cell=0.1)
+
+
+def test_a_robot_slows_down_for_ground_that_its_lidar_does_not_see(jackal):
+    """Not with ground-truth positions, which it knows behind walls."""
+    seen, known = (run(Scenario.of(OFFICE, "astar", jackal, **given)) for given in ({"perception": LIDAR}, {}))
+    assert seen.succeeded
+    assert known.succeeded
+    speeds = [done.rollout.twist[np.abs(done.rollout.pose[:, 0] - 6.0) < 0.2, 0].max() for done in (seen, known)]
+    assert speeds[0] < jackal.near_speed + 0.3 < speeds[1]
+
+
+def test_corners_are_where_ground_is_hidden_but_not_behind_movers(jackal):
+    near = Keyframed(radius=0.25, keyframes=((0.0, 4.0, 2.6), (6.0, 10.0, 2.6)), loop="pingpong")
+    world = replace(OFFICE.world, movers=(near,))
+    lidar = jackal.lidar.at(60)
+    scanner, tracking, ground = Scanner.of(lidar, world), MoverTracking(lidar, 60), KnownGround(lidar, world)
+    for tick in range(0, 60, 2):
+        place = np.array([[4.0 + tick / 60, 2.6]])
+        tracking.read(ground, (2.0, 2.0, 0.0), scanner.scan((2.0, 2.0, 0.0), place, np.array([0.25])), tick)
+    assert len(tracking.tracker.movers().numbers) == 1
+    assert np.hypot(*(tracking.corners - (5.9, 1.4)).T).min() < 0.2  # the door's nearer side
+    assert np.hypot(*(tracking.corners - place).T).min() > 0.5
+
+
+def test_slow_robots_look_ahead_for_as_long_as_they_need_to_step_aside(jackal):
+    robots = load_robot("turtlebot4"), jackal
+    slow, fast = (avoidance_of(Scenario.of(OFFICE, "astar", robot)).horizon for robot in robots)
+    assert (fast, slow > 1.4 * fast) == (Avoidance().horizon, True)
