@@ -677,7 +677,8 @@ def choose(
     near, contact_distances = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
     turns = path.turns.shape[0] > 0
     tight = not turns and clearance_at(x, y, obstacles) < tuning.stopping_clearance
-    held = v == 0.0 and w == 0.0 and path.arc[-1] - s > ROUTE_END and candidates[0, SPEED] > 0.0
+    going = candidates[0, SPEED] > 0.0  # no schedule lets the robot wait
+    held = going and v == 0.0 and w == 0.0 and path.arc[-1] - s > ROUTE_END
     if near.shape[0] == 0 and not (tight or held) and candidates[1, KIND] == FOLLOW_ROUTE:
         return 0, math.inf
     outlined = weights.outlined or turns
@@ -695,7 +696,7 @@ def choose(
     window = limits.speed * span + tuning.lookahead_max
     alone = encounter(trails[0], Trail(own.steps, False), places, radii, near, by_step, contact_distances, weights, cap)
     undisturbed = alone.contact == math.inf and alone.clearance >= cap and alone.intrusion == 0.0
-    if undisturbed and not own.blocked and not halts(trails[0], s, window, path):
+    if undisturbed and not own.blocked and not (going and halts(trails[0], s, window, path)):
         return 0, math.inf
     limit = limit_worths(x, y, yaw, v, w, s, candidates, path, limits, tuning, weights, span, window)
     if (candidates[1] == candidates[0]).all():
@@ -737,7 +738,7 @@ def choose(
         if met.contact == math.inf and (value > best_score or (value == best_score and n < best)):
             best, best_score = n, value
         limit[n] = -math.inf
-    if best >= 0 and not (undisturbed and halts(trails[best], s, window, path)):
+    if best >= 0 and not (undisturbed and going and halts(trails[best], s, window, path)):
         return best, math.inf
     follow_all(
         s, rotating, candidates, path, obstacles, limits, tuning, weights.step, route, off, trails, steps, blocked
