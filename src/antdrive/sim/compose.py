@@ -34,7 +34,7 @@ from antdrive.sim.driving.rules import (
     TurnToScan,
 )
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import PERSON, MoverDetector, MoverTracking, SimulatedLidar, Survey
+from antdrive.sim.driving.survey import MoverDetector, MoverTracking, SimulatedLidar, Survey
 from antdrive.sim.policy import OBSTRUCTED, Perception, ReplanPolicy
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
@@ -76,6 +76,8 @@ def compose(s: Scenario) -> Parts:
     movers: PerceivedMovers = (
         Tracked(tracking, perception, hz) if tracking else GroundTruth(s.trajectories, perception, hz)
     )
+    # A scan may be one scan period old, and commands are delayed.
+    reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
     rules: list[Rule] = [Pursuit(s.controller, full_turn(s.robot, hz))]
     guide: RouteGuide
     if survey:
@@ -87,7 +89,7 @@ def compose(s: Scenario) -> Parts:
         rules.append(KeepToSchedule(guide, s.robot, hz))
     if moving and avoidance is not None:
         if tracking:
-            rules.append(SlowAtCorners(tracking, s.robot, hz))
+            rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
         drifts = survey is not None and tracks_movers
         share = DRIFTING_SHARE if drifts else GOAL_SHARE
         blind = drifts and not _lidar(s).full_circle
@@ -101,8 +103,6 @@ def compose(s: Scenario) -> Parts:
             )
         )  # fmt: skip
     if survey:
-        # A scan may be one scan period old, and commands are delayed.
-        reaction = 1 / hz + 1 / survey.lidar.rate + s.robot.noise.scaled(s.noise).delay
         rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_command))
     return Parts(
         localiser,
@@ -154,19 +154,15 @@ def mapless_task(task: Task) -> Task:
 
 
 def avoidance_of(s: Scenario) -> Avoidance | None:
-    """Return the avoidance settings, adapted to the robot and to the perception of movers.
+    """Return the avoidance settings, adapted to the perception of movers.
 
-    A slow robot needs more time to move out of a person's way, so its horizon is longer. Movers with known motions do not
-    reverse unexpectedly, so reversals are ignored. Plans in space and time already avoid movers, so the horizon is short.
+    Movers with known motions do not reverse unexpectedly, so reversals are ignored. Plans in space and time already avoid
+    movers, so the horizon is short.
     """
-    if s.avoidance is None:
-        return None
-    if s.timed:
-        return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=min(s.avoidance.horizon, 1.0))
-    aside = s.robot.radius + PERSON / 2 + s.avoidance.min_clearance + s.avoidance.preferred_clearance
-    steps = math.ceil((aside / s.robot.max_speed + 0.5 * math.pi / s.robot.max_yaw_rate) / s.avoidance.step)
-    settings: dict[str, float] = {"reversal_weight": 0.0} if perception_of(s).kind == "motions" else {}
-    return dataclasses.replace(s.avoidance, horizon=max(s.avoidance.horizon, steps * s.avoidance.step), **settings)
+    if s.avoidance is None or perception_of(s).kind != "motions":
+        return s.avoidance
+    horizon = min(s.avoidance.horizon, 1.0) if s.timed else s.avoidance.horizon
+    return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=horizon)
 
 
 def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:

@@ -121,3 +121,14 @@ def test_a_robot_that_would_halt_without_room_for_its_circle_makes_room(pose):
     clearance = footprint_clearance(WORLD, robot.footprint, poses)
     assert np.hypot(*(poses[-1] - poses[0])[:2]) > 0.5
     assert clearance.min() >= min(KEPT, clearance[0]) - 0.002
+
+
+@pytest.mark.parametrize(("left", "speed_limit"), [(0.15, math.inf), (3.0, 0.0)])
+def test_a_robot_that_may_stand_makes_no_room(left, speed_limit):
+    """At the end of its route, and where an earlier rule lets it stand, as a scan turn does."""
+    robot, avoidance, still = load_robot("husky"), Avoidance(), Twist(0.0, 0.0)
+    tracked = PurePursuit(goal_distance=0.2).prepare(ROUTE, WORLD, robot, 0.03, PERIOD, 0.5)
+    here = (4.0 - left, 0.35, 0.2), still, PursuitState(arc=8.0 - left), still
+    nobody = np.empty((len(avoidance.prediction_times), 0, 2)), np.empty(0)
+    answer = avoidance.avoid(tracked, robot, *here, AvoidanceState(), *nobody, speed_limit=speed_limit)
+    assert answer[:2] == (still, False)

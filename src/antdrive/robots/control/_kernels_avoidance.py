@@ -70,7 +70,7 @@ class AvoidanceWeights(NamedTuple):
         corners: of the robot's outline (K, 2); none for a disc around the axle [m]
         rounding: of that outline [m]
         outlined: whether the outline is kept from obstacles on every route, not only on those with turns
-        loss: least distance of the circle from obstacles off the route, against noise [m]
+        loss: least distance of the circle from obstacles off the route [m]
         outline_loss: the same of the outline [m]
     """
 
@@ -637,13 +637,13 @@ def passes_all(trail: Array, places: Array, near: Array) -> bool:
 
 
 @leaf
-def halts(trail: Array, s: float, window: float, path: PathSamples) -> bool:
-    """Return whether a trail ends with a robot that stands, before the end of its route."""
+def halts(trail: Array, s: float, window: float, path: PathSamples, end: float) -> bool:
+    """Return whether a trail ends with a robot that stands, farther than `end` from the end of its route [m]."""
     k = trail.shape[0] - 1
     if trail[k, 3] != 0.0 or trail[k, 4] != 0.0 or trail[k - 1, 3] != 0.0 or trail[k - 1, 4] != 0.0:
         return False
     progress, _ = project(trail[k, 0], trail[k, 1], s, window, path.xy, path.arc)
-    return bool(path.arc[-1] - progress > ROUTE_END)
+    return bool(path.arc[-1] - progress > end)
 
 
 @leaf
@@ -677,8 +677,9 @@ def choose(
     near, contact_distances = relevant_movers(x, y, yaw, limits, tuning, weights, places, radii)
     turns = path.turns.shape[0] > 0
     tight = not turns and clearance_at(x, y, obstacles) < tuning.stopping_clearance
-    going = candidates[0, SPEED] > 0.0  # no schedule lets the robot wait
-    held = going and v == 0.0 and w == 0.0 and path.arc[-1] - s > ROUTE_END
+    going = candidates[0, SPEED] > 0.0  # no earlier rule lets the robot stand
+    end = max(ROUTE_END, tuning.goal_distance)
+    held = going and v == 0.0 and w == 0.0 and path.arc[-1] - s > end
     if near.shape[0] == 0 and not (tight or held) and candidates[1, KIND] == FOLLOW_ROUTE:
         return 0, math.inf
     outlined = weights.outlined or turns
@@ -696,7 +697,7 @@ def choose(
     window = limits.speed * span + tuning.lookahead_max
     alone = encounter(trails[0], Trail(own.steps, False), places, radii, near, by_step, contact_distances, weights, cap)
     undisturbed = alone.contact == math.inf and alone.clearance >= cap and alone.intrusion == 0.0
-    if undisturbed and not own.blocked and not (going and halts(trails[0], s, window, path)):
+    if undisturbed and not own.blocked and not (going and halts(trails[0], s, window, path, end)):
         return 0, math.inf
     limit = limit_worths(x, y, yaw, v, w, s, candidates, path, limits, tuning, weights, span, window)
     if (candidates[1] == candidates[0]).all():
@@ -738,7 +739,7 @@ def choose(
         if met.contact == math.inf and (value > best_score or (value == best_score and n < best)):
             best, best_score = n, value
         limit[n] = -math.inf
-    if best >= 0 and not (undisturbed and going and halts(trails[best], s, window, path)):
+    if best >= 0 and not (undisturbed and going and halts(trails[best], s, window, path, end)):
         return best, math.inf
     follow_all(
         s, rotating, candidates, path, obstacles, limits, tuning, weights.step, route, off, trails, steps, blocked

@@ -5,8 +5,9 @@ clearance, it is used unchanged. Otherwise it competes with other candidates: th
 sequences of two constant twists, forwards or backwards, within the robot's dynamic window
 (after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
 IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles: along the route as the
-controller does, elsewhere with the loss by noise that margins hold. A robot that is closer may not come closer still. Standing
-still is only one of the candidates, so the robot moves out of the path of an approaching mover.
+controller does, elsewhere with the loss that margins hold. A robot that is closer may not come closer still. Standing
+still is only one of the candidates, so the robot moves out of the path of an approaching mover. Where the controller would halt
+before the end of the route, as avoidance may leave the robot, it moves to where it has more room, and a new route may begin.
 
 Near movers ahead the robot keeps its `near_speed`, and it reverses slowly and not far. These limits cause no contact that a
 robot without them avoids:
@@ -144,10 +145,10 @@ class Avoidance:
             velocities: their observed velocities (M, 2) [m/s]; None: as predicted
             speed_limit: speed limit from the schedule of a timed plan [m/s]
             backwards: maximum reverse speed, for a robot that cannot see behind; ignored if obeying it causes a contact [m/s]
-            losses: clearance of the circle and of the outline from obstacles off the route, against noise [m]
+            losses: clearance of the circle and of the outline from obstacles off the route [m]
         """
         period, limits = tracked.tuning.period, tracked.limits
-        halts = not (any(last) or any(wanted))  # the robot may have to back off again
+        halts = speed_limit > 0 and not (any(last) or any(wanted))  # the robot may have to back off again
         reversed_ = 0.0 if halts else max(0.0, state.reversed - last.speed * period)
         near = self.speed_near(spec, pose, last, places, radii)
         left = max(self.reverse_distance - reversed_, 0.0)

@@ -1,4 +1,4 @@
-"""Control rules, in order: pursuit, scan turn, schedule, avoidance. `StoppingConstraint` applies last."""
+"""Control rules, in order: pursuit, scan turn, schedule, corners, avoidance. `StoppingConstraint` applies last."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> T
     return Twist(v, command.yaw_rate * v / command.speed)
 
 
-WALKING = 1.2  # speed of people who step out of hidden ground [m/s]
+STEPPING_OUT = 1.2  # speed of people who step out of hidden ground [m/s]
 CORNER_STEP = 0.1  # between the places of a route that are compared with corners [m]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop within this fraction of the goal's tolerance
@@ -115,9 +115,10 @@ class TurnToScan:
         scan_turn, last = self._guide.scan_turn, now.before.command
         if scan_turn is not None and not last.speed:
             turning = step.pursuit._replace(limiter=ROTATING)
-            return step._replace(command=scan_turn.command(now.pose, last), pursuit=turning)
+            return step._replace(command=scan_turn.command(now.pose, last), pursuit=turning, speed_limit=0.0)
         if scan_turn is not None or self._guide.lost:
-            return step._replace(command=braked(last, self._robot, self._hz))
+            command = braked(last, self._robot, self._hz)
+            return step._replace(command=command, speed_limit=max(command.speed, 0.0))
         return step
 
 
@@ -143,26 +144,27 @@ class SlowAtCorners:
     The robot need not be slower than its `near_speed`.
     """
 
-    def __init__(self, tracking: MoverTracking, robot: RobotSpec, hz: int) -> None:
-        self._tracking, self._robot, self._max_change = tracking, robot, robot.max_acceleration / hz
+    def __init__(self, tracking: MoverTracking, robot: RobotSpec, hz: int, reaction: float) -> None:
+        self._tracking, self._robot, self._reaction = tracking, robot, reaction
+        self._max_change = robot.max_acceleration / hz
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command, limited to the speed for the corners ahead."""
-        limit = self._limit(now.path, step.pursuit.arc, step.command.speed)
-        if limit >= min(step.command.speed, step.speed_limit):
+        limit = self.limit(now.path, step.pursuit.arc, step.command.speed)
+        if limit >= step.command.speed:
             return step
         command = slow_down(step.command, now.before.command, limit, self._max_change)
-        return step._replace(command=command, speed_limit=limit)
+        return step._replace(command=command, speed_limit=min(max(limit, command.speed), step.speed_limit))
 
-    def _limit(self, path: TrackedPath, arc: float, speed: float) -> float:
-        """Return the speed limit at an arc length [m/s]."""
+    def limit(self, path: TrackedPath, arc: float, speed: float) -> float:
+        """Return the speed limit of a robot at an arc length [m] and a speed [m/s]; infinite without corners ahead."""
         corners, slowest, brake = self._tracking.corners, self._robot.near_speed, self._robot.max_acceleration
         if speed <= slowest or not len(corners):
             return math.inf
-        arcs = np.arange(arc, min(arc + speed * speed / brake, path.length) + CORNER_STEP, CORNER_STEP)
+        arcs = np.arange(arc, min(arc + speed * speed / (2 * brake), path.length) + CORNER_STEP, CORNER_STEP)
         gaps = points_at(path, arcs)[:, None] - corners
         room = np.hypot(gaps[..., 0], gaps[..., 1]).min(axis=1) - self._robot.radius
-        there = np.maximum(slowest, brake * room / WALKING)
+        there = np.maximum(slowest, brake * (room / STEPPING_OUT - self._reaction))
         return float(np.sqrt(there * there + 2 * brake * (arcs - arc)).min())
 
 

@@ -96,7 +96,7 @@ class MoverTracking:
         tick: the control period of the last scan
         sight: area covered by its beams within `reach` [m^2]
         reach: range up to which beams lie no farther apart than a map cell [m]
-        corners: where the ground hidden from the last scan begins, without that behind movers (N, 2) [m]
+        corners: where ground that may hide people from the last scan begins, movers apart (N, 2) [m]
     """
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
@@ -119,13 +119,16 @@ class MoverTracking:
         return theirs
 
     def _corners(self, pose: Pose, ranges: Floats, theirs: npt.NDArray[np.bool_]) -> Floats:
-        """Return the ends of beams beside which a beam reaches farther by a person's width (N, 2) [m]."""
+        """Return the ends of surfaces that can hide a person: at least as wide, and with as much space behind (N, 2) [m]."""
         far = np.clip(ranges, 0.0, self._lidar.max_range)
-        beyond = np.maximum(*(np.roll(far, side) for side in (-1, 1)))
-        if not self._lidar.full_circle:
-            beyond[[0, -1]] = far[[1, -2]]
-        nearer = np.flatnonzero(np.isfinite(ranges) & ~theirs & (beyond - far > PERSON))
-        return ends(self._lidar, pose, ranges, nearer)
+        steps = np.diff(far)
+        jumps = np.flatnonzero(np.abs(steps) > PERSON)
+        first, last = np.append(0, jumps + 1), np.append(jumps, len(far) - 1)  # beams of each surface
+        begins, finishes = (ends(self._lidar, pose, far, beams) for beams in (first, last))
+        wide = np.hypot(*(finishes - begins).T) >= PERSON
+        nearer = np.where(steps[jumps] > 0, jumps, jumps + 1)
+        hides = np.where(steps[jumps] > 0, wide[:-1], wide[1:]) & np.isfinite(ranges[nearer]) & ~theirs[nearer]
+        return ends(self._lidar, pose, ranges, nearer[hides])
 
     def update_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
         """Update with a scan of a robot that makes its own map, before the map takes the scan."""
