@@ -117,7 +117,7 @@ class RobotSpec:
         max_wheel_speed: limit of each wheel's speed [rad/s]
         wheel_torque: highest torque of each wheel's motor [N m]
         wheel_friction: Coulomb friction coefficient of the wheels on the floor
-        near_speed: highest speed near movers ahead, see `Avoidance.near_distance`; by lidar also near hidden ground [m/s]
+        near_speed: highest speed near movers ahead, see `Avoidance.near_distance`, and near hidden ground [m/s]
         noise: the robot's noise at noise level 1
         source: origin of these values
         lidar: the robot's lidar; None: no lidar

@@ -598,7 +598,6 @@ def test_cells_are_free_for_the_footprint_along_their_moves():
         ({"settings": {"footprint": "disc"}}, "plan for the disc"),
         ({"robot": ROBOT}, "plan for the disc"),
         ({"planner": ComponentRecord(name="tangent", settings={})}, "plan for the disc"),
-        ({"controller": ComponentRecord(name="PurePursuit", settings={"lookahead_max": "far"})}, "plan for the disc"),
     ],
 )
 def test_the_margin_of_footprints_is_one_that_the_settings_give(record, margins):
@@ -609,6 +608,12 @@ def test_the_margin_of_footprints_is_one_that_the_settings_give(record, margins)
     for margin in margins.removeprefix("settings give ").split(" or ") if " m" in margins else ():
         given = with_record(drive(), footprint_margin=float(margin[:-2]), **values)
         assert not says(given, "record.footprint_margin")
+
+
+def test_a_margin_of_footprints_needs_settings_that_a_controller_takes():
+    controller = ComponentRecord(name="PurePursuit", settings={"lookahead_max": "far"})
+    log = with_record(drive(), footprint_margin=0.2, robot=load_robot("jackal"), controller=controller)
+    assert says(log, "record.controller.settings: none that a drive has")
 
 
 def test_a_planner_that_decides_cell_by_cell_among_movers_plans_for_the_disc():

@@ -277,6 +277,7 @@ def wrong_optima(record: DriveRecord, keys: Collection[str] = OPTIMA) -> Iterato
 
 
 def _optima(record: DriveRecord) -> tuple[float | None, float | None]:
+    """Search the shortest paths on the grid and in the plane [m]; None for one that does not exist."""
     from antdrive.sim.recording import optima_of  # imports the compiler
 
     return optima_of(record.task, record.cell, record.robot, record.margin, record.footprint_margin)
@@ -380,10 +381,14 @@ def _check_footprint_margin(record: DriveRecord) -> Iterator[str]:
         return
     from antdrive.sim.log.margin import footprint_margins  # imports the compiler
 
-    margins = sorted({max(margin, 0.0) for margin in footprint_margins(record)})
+    try:
+        margins = sorted({max(margin, 0.0) for margin in footprint_margins(record)})
+    except (KeyError, TypeError, ValueError):
+        yield "record.controller.settings: none that a drive has"
+        return
     if not margins:
         yield f"record.footprint_margin: {found:g} m, but planner, robot and settings plan for the disc"
-    elif not any(abs(found - margin) <= EXACT for margin in margins):
+    elif not any(abs(found - margin) <= JUST_ROOM for margin in margins):
         yield f"record.footprint_margin: {found:g} m; margin and settings give {' or '.join(f'{m:g} m' for m in margins)}"
 
 

@@ -91,6 +91,9 @@ def footprint_margins(record: DriveRecord) -> tuple[float, ...]:
     """Return the margins that a record's settings give to plans for the footprint [m]; empty if they plan for the disc.
 
     A controller or planner of one's own is believed where only its code knows.
+
+    Raises:
+        KeyError, TypeError, ValueError: the controller's settings are none that a drive has.
     """
     from antdrive.planners import PLANNERS, capabilities_of
 
@@ -103,12 +106,9 @@ def footprint_margins(record: DriveRecord) -> tuple[float, ...]:
     robot, noise, margin = record.robot, record.noise, record.margin
     settings, own = record.controller.settings, record.controller.name != PurePursuit.__name__
     known = {field.name for field in dataclasses.fields(PurePursuit)}
-    try:
-        restored = {key: math.inf if value is None else value for key, value in settings.items()}
-        controller = PurePursuit(**{key: value for key, value in restored.items() if key in known or not own})
-        usual = [default_margin(robot, controller, noise, kind) for kind in (record.smoothing.asked, "none")]
-    except (KeyError, TypeError, ValueError):  # settings that no drive has
-        return ()
+    restored = {key: math.inf if value is None else value for key, value in settings.items()}
+    controller = PurePursuit(**{key: value for key, value in restored.items() if key in known or not own})
+    usual = [default_margin(robot, controller, noise, kind) for kind in (record.smoothing.asked, "none")]
     of_lines = own or margin in usual or (record.margin_choice is not None and asked == "auto")
     margins = outline_margins(robot, controller, noise, margin, of_lines=of_lines)
     return mapless_margins(margins, margin) if record.exploring else margins
