@@ -88,7 +88,7 @@ def compose(s: Scenario) -> Parts:
     if s.timed:
         rules.append(KeepToSchedule(guide, s.robot, hz))
     if moving and avoidance is not None:
-        if tracking:
+        if mapped and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
         drifts = survey is not None and tracks_movers
         share = DRIFTING_SHARE if drifts else GOAL_SHARE

@@ -141,7 +141,7 @@ class KeepToSchedule:
 class SlowAtCorners:
     """Rule: someone who steps out of hidden ground reaches the robot's way no sooner than it can stop.
 
-    The robot need not be slower than its `near_speed`.
+    The robot need not be slower than its `near_speed`. It has a map; without one, `StoppingConstraint` holds it back.
     """
 
     def __init__(self, tracking: MoverTracking, robot: RobotSpec, hz: int, reaction: float) -> None:
