@@ -121,3 +121,16 @@ def test_a_closed_stream_is_opened_again(monkeypatch, tmp_path):
     finally:
         os.dup2(number, 1)
         os.close(number)
+
+
+def test_a_process_that_user_code_forks_ends_with_the_block():
+    reading, writing = os.pipe()
+    with UserCode("planner", RuntimeError):
+        child = os.fork()
+    if child == 0:  # never, or the child would run the rest of the tests
+        os.write(writing, b"goes on")
+        os._exit(1)
+    assert os.waitpid(child, 0) == (child, 0)
+    os.close(writing)
+    assert os.read(reading, 10) == b""
+    os.close(reading)

@@ -93,7 +93,8 @@ class UserCode:
 
     `InputError`, errors of the caller's choice, Ctrl-C and SIGTERM pass unchanged. A `KeyboardInterrupt` that user
     code raises without Ctrl-C is an error like any other, and so is `OverLimit`, which an alarm raises after the limit on
-    planning time. The block restores the `ProcessState`. Blocks within a block of the main thread belong to it.
+    planning time. The block restores the `ProcessState`. A process that the code forks ends with the block. Blocks within a
+    block of the main thread belong to it.
 
     Args:
         who: the code's name in messages about the end of the process
@@ -123,7 +124,7 @@ class UserCode:
         self.limit = plan_limit()
         if not self._own:
             supervision.begin(self._who, self.limit)
-            self._state = ProcessState()
+            self._state, self._process = ProcessState(), os.getpid()
             self._before = signal.getsignal(signal.SIGINT)
         UserCode._outermost = self
         if callable(self._before):
@@ -138,6 +139,8 @@ class UserCode:
         outermost = UserCode._outermost is self
         if outermost:
             if not self._own:
+                if os.getpid() != self._process:
+                    os._exit(0)
                 self._state.restore_depth()
             self._leave()
         if error is None or issubclass(type(error), self._passing):
