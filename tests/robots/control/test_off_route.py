@@ -132,3 +132,25 @@ def test_a_robot_that_may_stand_makes_no_room(left, speed_limit):
     nobody = np.empty((len(avoidance.prediction_times), 0, 2)), np.empty(0)
     answer = avoidance.avoid(tracked, robot, *here, AvoidanceState(), *nobody, speed_limit=speed_limit)
     assert answer[:2] == (still, False)
+
+
+@pytest.mark.parametrize("noise", [0.0, KEPT])
+def test_the_controllers_motion_off_its_route_keeps_the_loss_too(noise):
+    """Its own stopping clearance is less; the route's margin would hold the loss."""
+    robot, avoidance, pose = load_robot("husky"), Avoidance(), (-2.6, 0.2, 0.35)
+    tracked, last = PurePursuit().prepare(ROUTE, WORLD, robot, 0.03, PERIOD), Twist(0.0, 0.0)
+    before, state, poses = PursuitState(arc=1.4), AvoidanceState(), [pose]
+    nobody = np.empty((len(avoidance.prediction_times), 0, 2)), np.empty(0)
+    for _ in range(PERIODS):
+        wanted, after = PurePursuit().step(tracked, pose, last, before)
+        last, avoids, state = avoidance.avoid(
+            tracked, robot, pose, last, before, wanted, state, *nobody, losses=(noise, noise)
+        )
+        before = before if avoids else after
+        x, y, yaw = pose
+        middle, way = yaw + last.yaw_rate * PERIOD / 2, last.speed * PERIOD
+        pose = x + way * math.cos(middle), y + way * math.sin(middle), yaw + last.yaw_rate * PERIOD
+        poses.append(pose)
+    clearance = footprint_clearance(WORLD, robot.footprint, np.array(poses))
+    off = np.abs(np.array(poses)[:, 1]) > 0.12
+    assert clearance[off].min() >= min(noise, clearance[0]) - 0.002

@@ -46,6 +46,7 @@ CLOSER = 1e-3  # a robot that is closer to obstacles than required may come clos
 ROUNDING = 1e-6  # movers are skipped only with this slack, so that no result changes [m]
 LEVELS = 64  # tabulated distances for progress
 BESIDE_DISTANCE, BESIDE_TIME = 0.5, 0.3  # offsets decay over this distance, or this time at speed [m], [s]
+OFF_ROUTE = 0.1  # a robot farther from its route is off it [m]
 LEAST_ROOM, ROOM = 0.005, 0.1  # a robot that halts moves for so much more room, at least and at most [m]
 ROOM_WEIGHT = 20.0  # value of a metre of room, in metres of progress
 ROUTE_END = 0.1  # distance from the route's end below which the heading is ignored [m]
@@ -637,6 +638,14 @@ def passes_all(trail: Array, places: Array, near: Array) -> bool:
 
 
 @leaf
+def off_route(x: float, y: float, s: float, path: PathSamples, limits: MotionLimits, tuning: PursuitTuning) -> bool:
+    """Return whether a robot at progress s or more is off its route, whose margin then holds no loss for it."""
+    s, k = project(x, y, s, tuning.lookahead_max + limits.speed, path.xy, path.arc)
+    px, py, _ = point_at(s, k, path.xy, path.arc)
+    return math.hypot(x - px, y - py) > OFF_ROUTE
+
+
+@leaf
 def halts(trail: Array, s: float, window: float, path: PathSamples, end: float) -> bool:
     """Return whether a trail ends with a robot that stands, farther than `end` from the end of its route [m]."""
     k = trail.shape[0] - 1
@@ -667,8 +676,8 @@ def choose(
     keeps clear of obstacles, -1 if none does. A line beside the route has worth only where it leads past all movers.
 
     Without movers, too, the controller's motion must keep clear of obstacles after another decision, whose speed it may be
-    unable to brake, and where the circle has less room than on the route. A robot that would halt before the end of its route,
-    and not for movers, makes room for a new one.
+    unable to brake, off the route, and where the circle has less room than on it. A robot that would halt before the end of its
+    route, and not for movers, makes room for a new one.
 
     Obstacles only exclude candidates, and movers only lower their worth. So the search is best-first: the candidate with the
     highest bound is followed, which lowers its bound to its worth without movers. When it is first again, it is evaluated
@@ -680,13 +689,14 @@ def choose(
     going = candidates[0, SPEED] > 0.0  # no earlier rule lets the robot stand
     end = max(ROUTE_END, tuning.goal_distance)
     held = going and v == 0.0 and w == 0.0 and path.arc[-1] - s > end
-    if near.shape[0] == 0 and not (tight or held) and candidates[1, KIND] == FOLLOW_ROUTE:
+    strayed = off_route(x, y, s, path, limits, tuning)
+    if near.shape[0] == 0 and not (tight or held or strayed) and candidates[1, KIND] == FOLLOW_ROUTE:
         return 0, math.inf
     outlined = weights.outlined or turns
     count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
     by_step = reachable_by_step(x, y, fastest(v, candidates, limits), weights, places, radii, near, cap)
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
-    route = least_clearance(x, y, yaw, True, outlined, obstacles, tuning, weights)
+    route = least_clearance(x, y, yaw, not strayed, outlined, obstacles, tuning, weights)
     off = least_clearance(x, y, yaw, False, outlined, obstacles, tuning, weights)
     own = follow(
         x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, route, trails[0],
@@ -788,7 +798,8 @@ def best_escape(
     bodies, count = radii + weights.radius, candidates.shape[0]
     by_step = reachable_by_step(x, y, math.inf, weights, places[:soon], radii, near, math.inf)
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
-    route = least_clearance(x, y, yaw, True, outlined, obstacles, tuning, weights)
+    strayed = off_route(x, y, s, path, limits, tuning)
+    route = least_clearance(x, y, yaw, not strayed, outlined, obstacles, tuning, weights)
     off = least_clearance(x, y, yaw, False, outlined, obstacles, tuning, weights)
     own = follow(
         x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, route, trails[0],
