@@ -3,7 +3,7 @@
 Kinds are those of `benchmarks.kinds`. Each drive is certified, and its folder verified, also with its world and robot. Then
 values of its log or its `result.json` are forged, one at a time, and the digest renewed. Plain `verify`, or
 `--world --robot`, must refuse each, as declared. A drive that is refused, and a forgery that is accepted, is printed with the
-command that repeats it. Contacts are no refusals.
+command that repeats it. Contacts, and drives within 2 mm of one, are no refusals.
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ ASKED = ("perception", "avoidance", "replanning")  # settings that the log has a
 SHOWN = [name for name, entry in ENTRIES.items() if entry.proof in (Proof.LOG, Proof.WORLD, Proof.ROBOT)]
 OPTIMA = [name for name in KINDS if "optimum" in name]
 CONTACT = ("physics reports", "closed form: ", "checks disagree", "between two logged poses")
+CLOSE = 0.002  # a drive closer to an obstacle may be too close to certify [m]
 
 
 def folder_of(done: Run, folder: Path) -> Path:
@@ -65,8 +66,12 @@ def refusals(done: Run, folder: Path) -> list[str]:
         None if s.unseen and s.task.world.movers else s.task
     )  # movers avoid unseen cylinders, so their world is another
     report = verify_log(path, task, s.robot, folder / "result.json", replay=False)
-    touched = len(log.contacts) > 0
-    return [one for one in report["problems"] if not (touched and one.startswith(CONTACT))]
+    return [one for one in report["problems"] if not (touches(log) and one.startswith(CONTACT))]
+
+
+def touches(log: Rollout) -> bool:
+    """Return whether a drive touched something, or came too close to certify that it did not."""
+    return len(log.contacts) > 0 or float(log.clearance.min()) < CLOSE
 
 
 def forged(log: Rollout, folder: Path, rng: np.random.Generator) -> tuple[str, str]:
@@ -119,8 +124,8 @@ def accepted(done: Run, folder: Path, level: str) -> bool:
         report = verify_log(folder / "rollout.npz", *given, folder / "result.json", replay=False)
     except InputError:
         return False
-    touched = len(done.rollout.contacts) > 0 if done.rollout is not None else False
-    return not [one for one in report["problems"] if not (touched and one.startswith(CONTACT))]
+    assert done.rollout is not None
+    return not [one for one in report["problems"] if not (touches(done.rollout) and one.startswith(CONTACT))]
 
 
 def numbered(count: int, first: int, seed: int, words: list[str]) -> Iterator[tuple[int, DriveKind, Run]]:
@@ -159,7 +164,7 @@ def main() -> None:
             row["drives"] += 1
             row[log.record.shape] += 1
             row["arrived"] += done.succeeded
-            row["contacts"] += len(log.contacts) > 0
+            row["contacts"] += touches(log)
             problems = refusals(done, folder)
             if problems:
                 row["refused"] += 1
