@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from antdrive.base import InputError
 from antdrive.base.errors import Terminated
 from antdrive.planners import (
+    AStar,
     Capabilities,
     GridPlanner,
     History,
@@ -63,10 +64,28 @@ def with_cells(cells):
     return dataclasses.replace(RIGHT, cells=cells, cost=path_cost(cells, QUERY.grid.cell))
 
 
-def test_a_valid_plan_is_unchanged():
-    assert checked(QUERY, RIGHT) is RIGHT
-    assert checked(QUERY, LINE) is LINE
+def test_a_valid_plan_is_unchanged_and_a_copy():
+    for plan in (RIGHT, LINE):
+        kept = checked(QUERY, plan)
+        assert kept.cells is not plan.cells
+        assert np.array_equal(kept.cells, plan.cells)
+        assert np.array_equal(kept.line, plan.line)
     assert check_plan(*timed()) == ""
+
+
+class Unlocking(AStar):
+    """Make the grid writable and block a cell."""
+
+    def plan(self, query, rng):
+        query.grid.free.flags.writeable = True
+        return super().plan(query, rng)
+
+
+def test_a_planner_must_leave_the_grid_read_only():
+    world = World("hall", (0.0, 0.0, 4.0, 4.0))
+    query = Query.between(rasterise(world, 0.5, 0.25), Task(world, (1.0, 1.0, 0.0), (3.0, 3.0)))
+    with pytest.raises(PlannerError, match="made the grid writable"):
+        request_plan(Unlocking(), query, RNG(0))
 
 
 @given(st.data())

@@ -42,8 +42,13 @@ def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name:
         InputError: the planner rejects the query.
         PlannerError: the planner raised another exception, or did not return a `PlanResult`.
     """
+    arrays = query.grid.free, query.grid.moves
+    locked = [not array.flags.writeable for array in arrays]
     with planner_errors(planner, name):
-        return require_result(planner, planner.plan(query, rng), name)
+        answer = require_result(planner, planner.plan(query, rng), name)
+    if any(lock and array.flags.writeable for lock, array in zip(locked, arrays, strict=True)):
+        raise PlannerError(name or type(planner).__name__, f"made the grid writable ({place_of(planner)})")
+    return answer
 
 
 def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
@@ -77,14 +82,22 @@ def checked(query: Query, answer: PlanResult) -> PlanResult:
     """
     problem = check_plan(query, answer)
     if not problem:
+        # Copied: the planner may reuse its arrays.
+        copies: dict[str, Any] = {key: np.array(getattr(answer, key)) for key in _arrays(answer)}
+        answer = dataclasses.replace(answer, **copies)
         if len(answer.cells) and answer.cells.dtype != np.int32:
-            answer = dataclasses.replace(answer, cells=np.ascontiguousarray(answer.cells, dtype=np.int32))
+            answer = dataclasses.replace(answer, cells=answer.cells.astype(np.int32))
         reason = one_line(answer.reason) if answer.reason else ""
         return answer if reason == answer.reason else dataclasses.replace(answer, reason=reason)
     sane = isinstance(answer.wall_s, float) and 0 <= answer.wall_s < math.inf
     options = answer.options if type(answer.options) is dict else {}
     wall = answer.wall_s if sane else 0.0
     return PlanResult(status=PlanStatus.INVALID, reason=problem, wall_s=wall, options=options)
+
+
+def _arrays(answer: PlanResult) -> list[str]:
+    """Return the names of the fields that hold a path."""
+    return [field.name for field in dataclasses.fields(answer) if isinstance(getattr(answer, field.name), np.ndarray)]
 
 
 def check_plan(query: Query, result: PlanResult) -> str:

@@ -969,3 +969,29 @@ def test_a_robot_that_turns_or_slides_aside_or_a_mover_comes_nearer_too():
     moving = with_task(turning, world=world)
     places = moving.trajectories().positions(moving.t)
     only_beyond(2e-4 + 1.0 / HZ, lambda a: replace(moving, movers=places, contacts=touching(a).contacts), APART)
+
+
+def test_replans_lead_to_the_goal():
+    assert says(replanned(((1.2, 1.0), (2.0, 1.0))), "record.replans[0].route: ends")
+
+
+def test_only_planners_that_decide_cell_by_cell_make_decisions():
+    step = ReplanRecord(t=2.0, trigger=DECISION, solved=True, cost_m=1.0, work=1, route=((1.2, 1.0), (2.0, 1.0)))
+    for name, refused in (("astar", True), ("mmas-dstar", False)):
+        log = with_record(drive(0.1), replans=(step,), replanning={}, planner=ComponentRecord(name=name, settings={}))
+        assert bool(says(log, "record.replans[0].trigger: decision")) is refused
+
+
+def test_a_replan_leads_through_no_obstacle_near_the_robot():
+    through = replanned(((1.2, 1.0), (1.4, 1.3), (5.0, 1.0)))
+    post = replace(through.record.task.world, obstacles=(Disc(1.4, 1.3, 0.05),))
+    task = replace(through.record.task, world=post)
+    assert says(with_record(through, task=task), "record.replans[0].route: leads through an obstacle")
+
+
+def test_a_long_zigzag_hides_no_leg_through_an_obstacle():
+    log = drive()
+    disc = log.record.task.world.obstacles[0]
+    ends = np.tile([(1.0, 1.0), (1.0, 1.5)], (40_000, 1))
+    route = np.vstack([ends, [(1.0, 1.0), (disc.x, disc.y), log.route[-1]]])
+    assert says(replace(log, route=route), "route: leads")

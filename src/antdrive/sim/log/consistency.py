@@ -20,7 +20,7 @@ from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
 from antdrive.sim.log.ending import false_endings
 from antdrive.sim.log.metrics import driven_length_m, succeeded
-from antdrive.sim.log.record import DriveRecord, free_radius
+from antdrive.sim.log.record import DECISION, DriveRecord, free_radius
 from antdrive.sim.log.rollout import Rollout, estimates_of
 from antdrive.worlds.route import NEAR, longest_line, short_of_goal
 
@@ -30,6 +30,7 @@ SAME_LENGTH = 1e-6  # relative tolerance of lengths that are computed twice
 OPTIMA = ("grid_optimum_m", "euclidean_optimum_m")  # in the order of `optima_of`
 SAME_OPTIMUM = 1e-9  # relative tolerance of optima
 AWAY_TIME = 0.5  # largest deviation from the route: the radius plus the travel in this time [s]
+LONGEST_ROUTE = 50_000.0  # [m]
 POINT_SPACING = 0.05  # spacing of the route points whose clearance is checked [m]
 
 
@@ -64,6 +65,9 @@ def _check_routes(rollout: Rollout) -> Iterator[str]:
         if (points < (xmin, ymin)).any() or (points > (xmax, ymax)).any():
             yield f"{name}: leaves the world's bounds"
             continue
+        if polyline_length(points) > LONGEST_ROUTE:
+            yield f"{name}: is {polyline_length(points):.3g} m long; the longest that can be checked has {LONGEST_ROUTE:g} m"
+            continue
         yield from _check_room(rollout, name, _spaced(points), ROUTE_SLACK)
 
 
@@ -87,7 +91,8 @@ def _has_room(rollout: Rollout, radius: float) -> bool:
 def _check_room(rollout: Rollout, name: str, points: Floats, slack: float) -> Iterator[str]:
     """Check that points (N, 2) along a route keep the inflation, less a slack [m]; near a narrow start, the room of the start.
 
-    A replan begins anywhere, even beside a mover, so its first leg may pass closer to other obstacles. Cells have no lead.
+    A replan begins anywhere, even beside a mover, so its first leg may pass closer to other obstacles, but does not bring the
+    robot's inner circle into one. Cells have no lead.
     """
     record = rollout.record
     if record.footprint_margin is None:
@@ -98,6 +103,11 @@ def _check_room(rollout: Rollout, name: str, points: Floats, slack: float) -> It
         begin = footprint_clearance(record.task.world, record.robot.footprint, record.task.start)[0]
     own = min(keeps, float(begin)) if name == "route" else -math.inf
     leaving = (np.hypot(*(points - points[0]).T) <= record.reach[0]) & (name != "cells")
+    if name not in ("route", "cells"):
+        centres = _room(rollout, points[leaving])
+        if not centres.min() >= min(record.robot.footprint.inner_radius, float(centres[0])) - slack:
+            yield f"{name}: leads through an obstacle"
+            return
     needed = np.where(leaving, own, keeps)
     worst = int((rooms - needed).argmin())
     if not rooms[worst] >= needed[worst] - slack:
@@ -108,7 +118,7 @@ def _check_room(rollout: Rollout, name: str, points: Floats, slack: float) -> It
 def _spaced(route: Floats) -> Floats:
     """Return points (N, 2) along a route, `POINT_SPACING` apart or closer [m]."""
     arc = arc_lengths(route)
-    along = np.linspace(0.0, arc[-1], min(100_000, 2 + math.ceil(float(arc[-1]) / POINT_SPACING)))
+    along = np.linspace(0.0, arc[-1], 2 + math.ceil(float(arc[-1]) / POINT_SPACING))
     return np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
 
 
@@ -320,6 +330,19 @@ def _check_replans(rollout: Rollout) -> Iterator[str]:
             if math.dist(replan.route[0], here) > near + late:
                 away = math.dist(replan.route[0], here)
                 yield f"record.replans[{i}].route: begins {away:.3g} m from the robot"
+            left = math.dist(replan.route[-1], record.task.goal)
+            if replan.trigger != DECISION and not record.exploring and left > _short_of_goal(rollout):
+                yield f"record.replans[{i}].route: ends {left:.3g} m from the task's goal"
+        if replan.trigger == DECISION and not _decides(record):
+            yield f"record.replans[{i}].trigger: {DECISION}, but the planner plans whole routes"
+
+
+def _decides(record: DriveRecord) -> bool:
+    """Return whether the planner may decide cell by cell; one of the user's own is believed."""
+    from antdrive.planners import PLANNERS, capabilities_of
+
+    name = record.planner.name
+    return name not in PLANNERS or capabilities_of(PLANNERS[name]).cell_by_cell
 
 
 def _check_followed(rollout: Rollout, end: int) -> Iterator[str]:
