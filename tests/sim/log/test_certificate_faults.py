@@ -11,13 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from antdrive import Scenario, run
-from antdrive.base.plane import polyline_length
+from antdrive.base.plane import polyline_length, wrap_angle
 from antdrive.robots import load_robot
 from antdrive.robots.spec import Footprint
 from antdrive.sim import Outcome, Rollout, certify
 from antdrive.sim.log.certificate import Certificate, closed_form_clearance
+from antdrive.sim.log.consistency import POINT_SPACING, _spaced
 from antdrive.sim.log.metrics import driven_length_m
 from antdrive.sim.log.record import (
     DECISION,
@@ -995,3 +998,15 @@ def test_a_long_zigzag_hides_no_leg_through_an_obstacle():
     ends = np.tile([(1.0, 1.0), (1.0, 1.5)], (40_000, 1))
     route = np.vstack([ends, [(1.0, 1.0), (disc.x, disc.y), log.route[-1]]])
     assert says(replace(log, route=route), "route: leads")
+
+
+@given(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), min_size=2, max_size=8, unique=True))
+def test_the_checked_points_of_a_route_have_the_headings_of_its_legs(corners):
+    """A footprint is checked with these headings, also on legs shorter than the spacing."""
+    route = np.array(corners) * 0.03
+    points = _spaced(route)
+    steps, legs = np.diff(points, axis=0), np.diff(route, axis=0)
+    assert np.hypot(*steps.T).max() <= POINT_SPACING + 1e-9
+    assert all(np.hypot(*(points - corner).T).min() < 1e-9 for corner in route)
+    turned = np.arctan2(steps[:, 1], steps[:, 0])[:, None] - np.arctan2(legs[:, 1], legs[:, 0])
+    assert np.abs(wrap_angle(turned)).min(axis=1).max() < 1e-6

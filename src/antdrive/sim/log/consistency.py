@@ -116,9 +116,15 @@ def _check_room(rollout: Rollout, name: str, points: Floats, slack: float) -> It
 
 
 def _spaced(route: Floats) -> Floats:
-    """Return points (N, 2) along a route, `POINT_SPACING` apart or closer [m]."""
+    """Return points (N, 2) along a route, its corners among them, `POINT_SPACING` apart or closer [m]."""
     arc = arc_lengths(route)
+    corners = arc[np.append(True, np.diff(arc) > SAME_LENGTH)]
     along = np.linspace(0.0, arc[-1], 2 + math.ceil(float(arc[-1]) / POINT_SPACING))
+    after = np.searchsorted(corners, along)
+    apart = np.minimum(
+        along - corners[np.maximum(after - 1, 0)], np.abs(corners[np.minimum(after, len(corners) - 1)] - along)
+    )
+    along = np.sort(np.concatenate((corners, along[np.abs(apart) > SAME_LENGTH])))
     return np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
 
 
