@@ -51,6 +51,15 @@ def test_a_door_that_is_reached_from_one_side_only_is_not_passed(cell):
         assert [door.passed for each in (fine, coarse) for door in each.doors] == [False, False]
 
 
+@pytest.mark.parametrize("start", [(1.2, 1.2), (6.8, 1.2)])
+def test_a_room_is_reached_only_through_a_passed_door(start):
+    """The border lies up to some fine cells off the door's line, within the last coarse cell before it."""
+    world = two_rooms([(1.3, 0.71), (3.7, 0.48)])
+    for each in coverage(world, [rasterise(world, cell, 0.36) for cell in (0.5, 0.05)], start):
+        assert [door.passed for door in each.doors] == [False, False]
+        assert len(each.rooms_reached) == 1
+
+
 def doors_driven(world, cell, inflate, doors):
     """Oracle: the doors (x, y, width) that a flood fill from the middle of the first room drives through."""
     discs, (_, _, width, height) = world.discs, world.bounds
@@ -100,8 +109,11 @@ def test_a_door_is_passed_exactly_if_a_flood_fill_drives_through_it(widths, midd
         discs += [Disc(x, float(y), 0.05) for y in (*solid, *rims)]
     world = World("rooms", (0.0, 0.0, 6.0, 4.0), tuple(discs))
     driven = doors_driven(world, cell, inflate, doors)
-    found = coverage(world, [rasterise(world, each, inflate) for each in (0.1, cell)], (1.05, 2.05))[1].doors
+    result = coverage(world, [rasterise(world, each, inflate) for each in (0.1, cell)], (1.05, 2.05))[1]
+    found = result.doors
     assert len(found) == len(doors)
+    entered = bool(driven & set(doors[:2]))
+    assert len(result.rooms_reached) == 1 + entered + (entered and doors[2] in driven)
     for door in found:
         near = min(doors, key=lambda one: np.hypot(one[0] - door.at[0], one[1] - door.at[1]))
         assert door.width == pytest.approx(near[2])

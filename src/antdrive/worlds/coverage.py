@@ -53,6 +53,7 @@ class Coverage:
         reached: where the robot's centre gets (R, C)
         rooms: number of each cell's room (R, C), -1 off the floor
         doors: the doors, the narrowest first
+        rooms_reached: the numbers of the rooms at the robot's positions, the middles of its own grid's cells
     """
 
     by: Grid
@@ -60,6 +61,7 @@ class Coverage:
     reached: Cells
     rooms: npt.NDArray[np.int64]
     doors: tuple[Door, ...]
+    rooms_reached: frozenset[int]
 
     @property
     def share(self) -> float:
@@ -70,11 +72,6 @@ class Coverage:
     def room_count(self) -> int:
         """The number of rooms."""
         return int(self.rooms.max(initial=-1)) + 1
-
-    @property
-    def rooms_reached(self) -> frozenset[int]:
-        """The numbers of the rooms that the robot reaches."""
-        return frozenset(np.unique(self.rooms[self.reached & self.floor]).tolist())
 
 
 def reached_cells(grid: Grid, ends: Iterable[Point]) -> Cells:
@@ -124,23 +121,28 @@ def coverage(
     _kernels_coverage.rooms(bare.moves, clearance, order, NARROW, LEAST_ROOM / bare.cell**2, rooms)
     rooms[floor] = np.unique(rooms[floor], return_inverse=True)[1]
     masks = [_on_cells_of(bare, grid, reached_cells(grid, [at])) for grid, at in zip(grids, entries, strict=True)]
-    crossings = [_crossings(bare, rooms, grid, at) for grid, at in zip(grids, entries, strict=True)]
+    crossed = [_crossings(bare, rooms, grid, at) for grid, at in zip(grids, entries, strict=True)]
     doors: list[list[Door]] = [[] for _ in grids]
     for border in _borders(bare, rooms):
         room = clearance[tuple(border.T)]
         widest = border[room >= room.max() - bare.cell]
         found = [door for at in widest if (door := _door(world, bare, clearance, rooms, border, at))]
         here = np.ravel_multi_index(tuple(border.T), bare.shape)
-        for steps, passed in zip(crossings, doors, strict=True) if found else ():
+        for (_, steps), passed in zip(crossed, doors, strict=True) if found else ():
             passed.append(replace(min(found, key=_order), passed=bool(np.isin(steps, here).all(axis=1).any())))
     return tuple(
-        Coverage(grid, floor, mask, rooms, tuple(sorted(passed, key=_order)))
-        for grid, mask, passed in zip(grids, masks, doors, strict=True)
+        Coverage(grid, floor, mask, rooms, tuple(sorted(passed, key=_order)), entered)
+        for grid, mask, passed, (entered, _) in zip(grids, masks, doors, crossed, strict=True)
     )
 
 
-def _crossings(bare: Grid, rooms: npt.NDArray[np.int64], grid: Grid, entry: Point) -> npt.NDArray[np.int64]:
-    """Return the steps between rooms in a robot's moves from where it enters its grid: flat cells of `bare` (N, 2)."""
+def _crossings(
+    bare: Grid, rooms: npt.NDArray[np.int64], grid: Grid, entry: Point
+) -> tuple[frozenset[int], npt.NDArray[np.int64]]:
+    """Return the rooms that a robot's moves from where it enters its grid lead to, and the steps between rooms.
+
+    Steps are pairs of flat cells of `bare` (N, 2).
+    """
     nodes, scale = _reached_nodes(grid, [entry]), grid.cell / bare.cell
     middles = (
         np.minimum((np.arange(count) + 0.5) * scale, most - 1).astype(np.int64)
@@ -157,7 +159,7 @@ def _crossings(bare: Grid, rooms: npt.NDArray[np.int64], grid: Grid, entry: Poin
         at = np.ravel_multi_index(tuple(np.moveaxis(rc, 2, 0)), bare.shape)
         before, after = at[:, :-1].ravel(), at[:, 1:].ravel()
         steps.append(np.column_stack([before, after])[flat[before] != flat[after]])
-    return np.concatenate(steps)
+    return frozenset(np.unique(room[grid.cells_of(nodes)]).tolist()) - {-1}, np.concatenate(steps)
 
 
 def _on_cells_of(bare: Grid, grid: Grid, cells: Cells) -> Cells:
