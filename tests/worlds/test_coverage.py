@@ -1,5 +1,7 @@
 """Shares, rooms and doors of floors with known ones."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -58,6 +60,30 @@ def test_a_room_is_reached_only_through_a_passed_door(start):
     for each in coverage(world, [rasterise(world, cell, 0.36) for cell in (0.5, 0.05)], start):
         assert [door.passed for door in each.doors] == [False, False]
         assert len(each.rooms_reached) == 1
+
+
+def walled(*walls):
+    """A floor of 9 x 5 m; walls of overlapping discs (along axis, at, from, opening's middle, width) end at its sides."""
+    discs = []
+    for axis, at, first, middle, width in walls:
+        for low, high in ((first, middle - width / 2 - 0.1), (middle + width / 2 + 0.1, (9.0, 5.0)[axis])):
+            along = np.linspace(low, high, math.ceil((high - low) / 0.15) + 1).tolist()
+            discs += [Disc(*((s, at) if axis == 0 else (at, s)), 0.1) for s in along]
+    return World("walled", (0.0, 0.0, 9.0, 5.0), tuple(discs))
+
+
+@pytest.mark.parametrize(
+    "walls",
+    [
+        [(1, 3.0, 0.0, 2.69, 0.71), (1, 6.0, 0.0, 2.1, 0.77)],
+        [(1, 4.5, 0.0, 1.25, 0.84), (0, 2.5, 4.7, 6.9, 1.39)],
+    ],
+)
+def test_no_door_lies_inside_a_wall(walls):
+    """Cells of 0.5 m see the floor's sides behind the walls' ends, which hold no door."""
+    found = covered(walled(*walls), 0.2, (1.2, 1.2), 0.5).doors
+    real = [(*((at, middle) if axis else (middle, at)), width) for axis, at, _, middle, width in walls]
+    assert [(*door.at, door.width) for door in found] == [pytest.approx(door) for door in real]
 
 
 def doors_driven(world, cell, inflate, doors):

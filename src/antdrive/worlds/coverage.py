@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from antdrive.base.types import Point
 from antdrive.worlds import _kernels_coverage, _kernels_turns
-from antdrive.worlds.geometry import point_clearance
+from antdrive.worlds.geometry import point_clearance, segment_clearance
 from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
 from antdrive.worlds.world import World
 
@@ -24,6 +24,7 @@ Cells = npt.NDArray[np.bool_]
 NARROW = 0.7  # a door's clearance is at most this fraction of the maximum in both rooms; 0.707 at crossing corridors
 LEAST_ROOM = 1.0  # a room is larger [m²]
 OPPOSITE = -0.5  # cosine of the angle between the directions to a door's two sides
+TOUCH = 1e-9  # an obstacle reaches further into a gap that is not empty [m]
 
 
 @dataclass(frozen=True)
@@ -210,7 +211,7 @@ def _door(
 ) -> Door | None:
     """Return the door at a border of two rooms: the narrowest gap around a cell of the border.
 
-    None if the gap is not there: the border ends at other rooms.
+    None if no empty gap is there: the border ends at other rooms.
     """
     point = grid.xy(at)[0]
     discs, (xmin, ymin, xmax, ymax) = world.discs, world.bounds
@@ -221,19 +222,22 @@ def _door(
     room, most = np.hypot(*away.T) - radii, clearance[tuple(at)] + 2 * grid.cell
     near = np.flatnonzero(room <= most)
     first, second = near[np.stack(np.triu_indices(len(near), 1))]
-    lengths = np.hypot(*away.T)
-    across = (away[first] * away[second]).sum(axis=1) < OPPOSITE * lengths[first] * lengths[second]
-    first, second = first[across], second[across]
-    if not len(first):
-        return None
     ends = np.stack([centres[first], centres[second]])
     wall = second >= len(discs)  # the gap is perpendicular to it
     axis = (second[wall] - len(discs)) % 2
     ends[1, wall, 1 - axis] = ends[0, wall, 1 - axis]
+    sides = ends - point
+    across = (sides[0] * sides[1]).sum(axis=1) < OPPOSITE * np.hypot(*sides[0].T) * np.hypot(*sides[1].T)
     gaps = np.hypot(*(ends[1] - ends[0]).T)
     widths = gaps - radii[first] - radii[second]
-    k = int(widths.argmin())
-    width = float(widths[k])
-    mid_x, mid_y = (ends[0, k] + (ends[1, k] - ends[0, k]) * ((radii[first[k]] + width / 2) / gaps[k])).tolist()
+    tried = np.flatnonzero(across & (widths > 0))
+    tried = tried[np.argsort(widths[tried], kind="stable")]
+    along = (ends[1, tried] - ends[0, tried]) / gaps[tried, None]
+    rims = ends[0, tried] + along * radii[first[tried], None], ends[1, tried] - along * radii[second[tried], None]
+    empty = np.flatnonzero(segment_clearance(world, *rims) > -TOUCH)
+    if not len(empty):
+        return None
+    k = empty[0]
+    mid_x, mid_y = ((rims[0][k] + rims[1][k]) / 2).tolist()
     low, high = np.unique(rooms[tuple(border.T)]).tolist()
-    return Door(width, (mid_x, mid_y), (low, high))
+    return Door(float(widths[tried[k]]), (mid_x, mid_y), (low, high))
