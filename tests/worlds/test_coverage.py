@@ -77,10 +77,11 @@ def walled(*walls):
     [
         [(1, 3.0, 0.0, 2.69, 0.71), (1, 6.0, 0.0, 2.1, 0.77)],
         [(1, 4.5, 0.0, 1.25, 0.84), (0, 2.5, 4.7, 6.9, 1.39)],
+        [(1, 4.5, 0.0, 3.75, 0.46)],
     ],
 )
-def test_no_door_lies_inside_a_wall(walls):
-    """Cells of 0.5 m see the floor's sides behind the walls' ends, which hold no door."""
+def test_cells_of_half_a_metre_find_the_doors_and_none_inside_a_wall(walls):
+    """They see the floor's sides behind the walls' ends, and their middles lie 0.25 m off a wall's line."""
     found = covered(walled(*walls), 0.2, (1.2, 1.2), 0.5).doors
     real = [(*((at, middle) if axis else (middle, at)), width) for axis, at, _, middle, width in walls]
     assert [(*door.at, door.width) for door in found] == [pytest.approx(door) for door in real]

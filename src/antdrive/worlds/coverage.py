@@ -125,9 +125,12 @@ def coverage(
     crossed = [_crossings(bare, rooms, grid, at) for grid, at in zip(grids, entries, strict=True)]
     doors: list[list[Door]] = [[] for _ in grids]
     for border in _borders(bare, rooms):
+        low, high = np.unique(rooms[tuple(border.T)]).tolist()
         room = clearance[tuple(border.T)]
         widest = border[room >= room.max() - bare.cell]
-        found = [door for at in widest if (door := _door(world, bare, clearance, rooms, border, at))]
+        spots = np.concatenate([widest, *_middles(bare, rooms, widest, low + high)])
+        most = room.max() + 2 * bare.cell
+        found = [door for at in bare.xy(spots) if (door := _door(world, at, most, (low, high)))]
         here = np.ravel_multi_index(tuple(border.T), bare.shape)
         for (_, steps), passed in zip(crossed, doors, strict=True) if found else ():
             passed.append(replace(min(found, key=_order), passed=bool(np.isin(steps, here).all(axis=1).any())))
@@ -201,26 +204,34 @@ def _borders(grid: Grid, rooms: npt.NDArray[np.int64]) -> Iterable[npt.NDArray[n
             yield np.array(sorted(group))
 
 
-def _door(
-    world: World,
-    grid: Grid,
-    clearance: npt.NDArray[np.float64],
-    rooms: npt.NDArray[np.int64],
-    border: npt.NDArray[np.int64],
-    at: npt.NDArray[np.int64],
-) -> Door | None:
-    """Return the door at a border of two rooms: the narrowest gap around a cell of the border.
+def _middles(
+    grid: Grid, rooms: npt.NDArray[np.int64], cells: npt.NDArray[np.int64], both: int
+) -> Iterable[npt.NDArray[np.float64]]:
+    """Yield the middles (N, 2) of the moves from cells into the other of two rooms, whose numbers sum to `both`."""
+    for k, step in enumerate(DIRECTIONS):
+        here = cells[grid.moves[tuple(cells.T)] >> k & 1 > 0]
+        over = rooms[tuple(here.T)] + rooms[tuple((here + step).T)] == both
+        over &= rooms[tuple(here.T)] != rooms[tuple((here + step).T)]
+        yield here[over] + np.array(step) / 2
+
+
+def _door(world: World, point: npt.NDArray[np.float64], most: float, rooms: tuple[int, int]) -> Door | None:
+    """Return the door at a border of two rooms: the narrowest gap around a point of the border.
 
     None if no empty gap is there: the border ends at other rooms.
+
+    Args:
+        world: the world
+        point: the point [m]
+        most: the largest distance of the gap's obstacles from the point [m]
+        rooms: the rooms' numbers
     """
-    point = grid.xy(at)[0]
     discs, (xmin, ymin, xmax, ymax) = world.discs, world.bounds
     x, y = point.tolist()
     feet = np.array([(xmin, y), (x, ymin), (xmax, y), (x, ymax)])  # the nearest points of the walls
     centres, radii = np.vstack([discs[:, :2], feet]), np.append(discs[:, 2], np.zeros(4))
     away = centres - point
-    room, most = np.hypot(*away.T) - radii, clearance[tuple(at)] + 2 * grid.cell
-    near = np.flatnonzero(room <= most)
+    near = np.flatnonzero(np.hypot(*away.T) - radii <= most)
     first, second = near[np.stack(np.triu_indices(len(near), 1))]
     ends = np.stack([centres[first], centres[second]])
     wall = second >= len(discs)  # the gap is perpendicular to it
@@ -239,5 +250,4 @@ def _door(
         return None
     k = empty[0]
     mid_x, mid_y = ((rims[0][k] + rims[1][k]) / 2).tolist()
-    low, high = np.unique(rooms[tuple(border.T)]).tolist()
-    return Door(float(widths[tried[k]]), (mid_x, mid_y), (low, high))
+    return Door(float(widths[tried[k]]), (mid_x, mid_y), rooms)
