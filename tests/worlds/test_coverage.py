@@ -1,5 +1,7 @@
 """Shares, rooms and doors of floors with known ones."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -51,6 +53,40 @@ def test_a_door_that_is_reached_from_one_side_only_is_not_passed(cell):
         assert [door.passed for each in (fine, coarse) for door in each.doors] == [False, False]
 
 
+@pytest.mark.parametrize("start", [(1.2, 1.2), (6.8, 1.2)])
+def test_a_room_is_reached_only_through_a_passed_door(start):
+    """The border lies up to some fine cells off the door's line, within the last coarse cell before it."""
+    world = two_rooms([(1.3, 0.71), (3.7, 0.48)])
+    for each in coverage(world, [rasterise(world, cell, 0.36) for cell in (0.5, 0.05)], start):
+        assert [door.passed for door in each.doors] == [False, False]
+        assert len(each.rooms_reached) == 1
+
+
+def walled(*walls):
+    """A floor of 9 x 5 m; walls of overlapping discs (along axis, at, from, opening's middle, width) end at its sides."""
+    discs = []
+    for axis, at, first, middle, width in walls:
+        for low, high in ((first, middle - width / 2 - 0.1), (middle + width / 2 + 0.1, (9.0, 5.0)[axis])):
+            along = np.linspace(low, high, math.ceil((high - low) / 0.15) + 1).tolist()
+            discs += [Disc(*((s, at) if axis == 0 else (at, s)), 0.1) for s in along]
+    return World("walled", (0.0, 0.0, 9.0, 5.0), tuple(discs))
+
+
+@pytest.mark.parametrize(
+    "walls",
+    [
+        [(1, 3.0, 0.0, 2.69, 0.71), (1, 6.0, 0.0, 2.1, 0.77)],
+        [(1, 4.5, 0.0, 1.25, 0.84), (0, 2.5, 4.7, 6.9, 1.39)],
+        [(1, 4.5, 0.0, 3.75, 0.46)],
+    ],
+)
+def test_cells_of_half_a_metre_find_the_doors_and_none_inside_a_wall(walls):
+    """They see the floor's sides behind the walls' ends, and their middles lie 0.25 m off a wall's line."""
+    found = covered(walled(*walls), 0.2, (1.2, 1.2), 0.5).doors
+    real = [(*((at, middle) if axis else (middle, at)), width) for axis, at, _, middle, width in walls]
+    assert [(*door.at, door.width) for door in found] == [pytest.approx(door) for door in real]
+
+
 def doors_driven(world, cell, inflate, doors):
     """Oracle: the doors (x, y, width) that a flood fill from the middle of the first room drives through."""
     discs, (_, _, width, height) = world.discs, world.bounds
@@ -100,8 +136,11 @@ def test_a_door_is_passed_exactly_if_a_flood_fill_drives_through_it(widths, midd
         discs += [Disc(x, float(y), 0.05) for y in (*solid, *rims)]
     world = World("rooms", (0.0, 0.0, 6.0, 4.0), tuple(discs))
     driven = doors_driven(world, cell, inflate, doors)
-    found = coverage(world, [rasterise(world, each, inflate) for each in (0.1, cell)], (1.05, 2.05))[1].doors
+    result = coverage(world, [rasterise(world, each, inflate) for each in (0.1, cell)], (1.05, 2.05))[1]
+    found = result.doors
     assert len(found) == len(doors)
+    entered = bool(driven & set(doors[:2]))
+    assert len(result.rooms_reached) == 1 + entered + (entered and doors[2] in driven)
     for door in found:
         near = min(doors, key=lambda one: np.hypot(one[0] - door.at[0], one[1] - door.at[1]))
         assert door.width == pytest.approx(near[2])

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from antdrive.base.types import Point
 from antdrive.worlds import _kernels_coverage, _kernels_turns
-from antdrive.worlds.geometry import point_clearance
+from antdrive.worlds.geometry import point_clearance, segment_clearance
 from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
 from antdrive.worlds.world import World
 
@@ -24,6 +24,7 @@ Cells = npt.NDArray[np.bool_]
 NARROW = 0.7  # a door's clearance is at most this fraction of the maximum in both rooms; 0.707 at crossing corridors
 LEAST_ROOM = 1.0  # a room is larger [m²]
 OPPOSITE = -0.5  # cosine of the angle between the directions to a door's two sides
+TOUCH = 1e-9  # an obstacle reaches further into a gap that is not empty [m]
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Coverage:
         reached: where the robot's centre gets (R, C)
         rooms: number of each cell's room (R, C), -1 off the floor
         doors: the doors, the narrowest first
+        rooms_reached: the numbers of the rooms at the robot's positions, the middles of its own grid's cells
     """
 
     by: Grid
@@ -60,6 +62,7 @@ class Coverage:
     reached: Cells
     rooms: npt.NDArray[np.int64]
     doors: tuple[Door, ...]
+    rooms_reached: frozenset[int]
 
     @property
     def share(self) -> float:
@@ -70,11 +73,6 @@ class Coverage:
     def room_count(self) -> int:
         """The number of rooms."""
         return int(self.rooms.max(initial=-1)) + 1
-
-    @property
-    def rooms_reached(self) -> frozenset[int]:
-        """The numbers of the rooms that the robot reaches."""
-        return frozenset(np.unique(self.rooms[self.reached & self.floor]).tolist())
 
 
 def reached_cells(grid: Grid, ends: Iterable[Point]) -> Cells:
@@ -124,23 +122,31 @@ def coverage(
     _kernels_coverage.rooms(bare.moves, clearance, order, NARROW, LEAST_ROOM / bare.cell**2, rooms)
     rooms[floor] = np.unique(rooms[floor], return_inverse=True)[1]
     masks = [_on_cells_of(bare, grid, reached_cells(grid, [at])) for grid, at in zip(grids, entries, strict=True)]
-    crossings = [_crossings(bare, rooms, grid, at) for grid, at in zip(grids, entries, strict=True)]
+    crossed = [_crossings(bare, rooms, grid, at) for grid, at in zip(grids, entries, strict=True)]
     doors: list[list[Door]] = [[] for _ in grids]
     for border in _borders(bare, rooms):
+        low, high = np.unique(rooms[tuple(border.T)]).tolist()
         room = clearance[tuple(border.T)]
         widest = border[room >= room.max() - bare.cell]
-        found = [door for at in widest if (door := _door(world, bare, clearance, rooms, border, at))]
+        spots = np.concatenate([widest, *_middles(bare, rooms, widest, low + high)])
+        most = room.max() + 2 * bare.cell
+        found = [door for at in bare.xy(spots) if (door := _door(world, at, most, (low, high)))]
         here = np.ravel_multi_index(tuple(border.T), bare.shape)
-        for steps, passed in zip(crossings, doors, strict=True) if found else ():
+        for (_, steps), passed in zip(crossed, doors, strict=True) if found else ():
             passed.append(replace(min(found, key=_order), passed=bool(np.isin(steps, here).all(axis=1).any())))
     return tuple(
-        Coverage(grid, floor, mask, rooms, tuple(sorted(passed, key=_order)))
-        for grid, mask, passed in zip(grids, masks, doors, strict=True)
+        Coverage(grid, floor, mask, rooms, tuple(sorted(passed, key=_order)), entered)
+        for grid, mask, passed, (entered, _) in zip(grids, masks, doors, crossed, strict=True)
     )
 
 
-def _crossings(bare: Grid, rooms: npt.NDArray[np.int64], grid: Grid, entry: Point) -> npt.NDArray[np.int64]:
-    """Return the steps between rooms in a robot's moves from where it enters its grid: flat cells of `bare` (N, 2)."""
+def _crossings(
+    bare: Grid, rooms: npt.NDArray[np.int64], grid: Grid, entry: Point
+) -> tuple[frozenset[int], npt.NDArray[np.int64]]:
+    """Return the rooms that a robot's moves from where it enters its grid lead to, and the steps between rooms.
+
+    Steps are pairs of flat cells of `bare` (N, 2).
+    """
     nodes, scale = _reached_nodes(grid, [entry]), grid.cell / bare.cell
     middles = (
         np.minimum((np.arange(count) + 0.5) * scale, most - 1).astype(np.int64)
@@ -157,7 +163,7 @@ def _crossings(bare: Grid, rooms: npt.NDArray[np.int64], grid: Grid, entry: Poin
         at = np.ravel_multi_index(tuple(np.moveaxis(rc, 2, 0)), bare.shape)
         before, after = at[:, :-1].ravel(), at[:, 1:].ravel()
         steps.append(np.column_stack([before, after])[flat[before] != flat[after]])
-    return np.concatenate(steps)
+    return frozenset(np.unique(room[grid.cells_of(nodes)]).tolist()) - {-1}, np.concatenate(steps)
 
 
 def _on_cells_of(bare: Grid, grid: Grid, cells: Cells) -> Cells:
@@ -198,40 +204,50 @@ def _borders(grid: Grid, rooms: npt.NDArray[np.int64]) -> Iterable[npt.NDArray[n
             yield np.array(sorted(group))
 
 
-def _door(
-    world: World,
-    grid: Grid,
-    clearance: npt.NDArray[np.float64],
-    rooms: npt.NDArray[np.int64],
-    border: npt.NDArray[np.int64],
-    at: npt.NDArray[np.int64],
-) -> Door | None:
-    """Return the door at a border of two rooms: the narrowest gap around a cell of the border.
+def _middles(
+    grid: Grid, rooms: npt.NDArray[np.int64], cells: npt.NDArray[np.int64], both: int
+) -> Iterable[npt.NDArray[np.float64]]:
+    """Yield the middles (N, 2) of the moves from cells into the other of two rooms, whose numbers sum to `both`."""
+    for k, step in enumerate(DIRECTIONS):
+        here = cells[grid.moves[tuple(cells.T)] >> k & 1 > 0]
+        over = rooms[tuple(here.T)] + rooms[tuple((here + step).T)] == both
+        over &= rooms[tuple(here.T)] != rooms[tuple((here + step).T)]
+        yield here[over] + np.array(step) / 2
 
-    None if the gap is not there: the border ends at other rooms.
+
+def _door(world: World, point: npt.NDArray[np.float64], most: float, rooms: tuple[int, int]) -> Door | None:
+    """Return the door at a border of two rooms: the narrowest gap around a point of the border.
+
+    None if no empty gap is there: the border ends at other rooms.
+
+    Args:
+        world: the world
+        point: the point [m]
+        most: the largest distance of the gap's obstacles from the point [m]
+        rooms: the rooms' numbers
     """
-    point = grid.xy(at)[0]
     discs, (xmin, ymin, xmax, ymax) = world.discs, world.bounds
     x, y = point.tolist()
     feet = np.array([(xmin, y), (x, ymin), (xmax, y), (x, ymax)])  # the nearest points of the walls
     centres, radii = np.vstack([discs[:, :2], feet]), np.append(discs[:, 2], np.zeros(4))
     away = centres - point
-    room, most = np.hypot(*away.T) - radii, clearance[tuple(at)] + 2 * grid.cell
-    near = np.flatnonzero(room <= most)
+    near = np.flatnonzero(np.hypot(*away.T) - radii <= most)
     first, second = near[np.stack(np.triu_indices(len(near), 1))]
-    lengths = np.hypot(*away.T)
-    across = (away[first] * away[second]).sum(axis=1) < OPPOSITE * lengths[first] * lengths[second]
-    first, second = first[across], second[across]
-    if not len(first):
-        return None
     ends = np.stack([centres[first], centres[second]])
     wall = second >= len(discs)  # the gap is perpendicular to it
     axis = (second[wall] - len(discs)) % 2
     ends[1, wall, 1 - axis] = ends[0, wall, 1 - axis]
+    sides = ends - point
+    across = (sides[0] * sides[1]).sum(axis=1) < OPPOSITE * np.hypot(*sides[0].T) * np.hypot(*sides[1].T)
     gaps = np.hypot(*(ends[1] - ends[0]).T)
     widths = gaps - radii[first] - radii[second]
-    k = int(widths.argmin())
-    width = float(widths[k])
-    mid_x, mid_y = (ends[0, k] + (ends[1, k] - ends[0, k]) * ((radii[first[k]] + width / 2) / gaps[k])).tolist()
-    low, high = np.unique(rooms[tuple(border.T)]).tolist()
-    return Door(width, (mid_x, mid_y), (low, high))
+    tried = np.flatnonzero(across & (widths > 0))
+    tried = tried[np.argsort(widths[tried], kind="stable")]
+    along = (ends[1, tried] - ends[0, tried]) / gaps[tried, None]
+    rims = ends[0, tried] + along * radii[first[tried], None], ends[1, tried] - along * radii[second[tried], None]
+    empty = np.flatnonzero(segment_clearance(world, *rims) > -TOUCH)
+    if not len(empty):
+        return None
+    k = empty[0]
+    mid_x, mid_y = ((rims[0][k] + rims[1][k]) / 2).tolist()
+    return Door(float(widths[tried[k]]), (mid_x, mid_y), rooms)

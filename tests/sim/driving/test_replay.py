@@ -34,9 +34,16 @@ def test_speeds_count_as_poses_do_and_differences_have_no_sign(small_run):
 
 def test_only_values_within_rounding_are_listed():
     check = ReplayCheck(False, 0.1, 0.0, 0.0, ("replay: something",), ("pose",))
-    assert check.sentence.startswith("differs: at most 0.1 m")
+    assert check.sentence.startswith("the replay differs: at most 0.1 m")
     assert replace(check, problems=()).sentence.startswith("replayed within rounding (pose): at most")
     assert replace(check, problems=(), rounded=()).sentence.startswith("replayed within rounding: at most")
+
+
+def test_only_poses_and_twists_that_differ_have_figures():
+    check = ReplayCheck(False, 0.0, 0.0, 0.0, ("replay: something",), ("route",))
+    assert check.sentence == "the replay differs"
+    assert replace(check, problems=()).sentence == "replayed within rounding (route)"
+    assert "nan rad" in replace(check, turn=np.nan).sentence
 
 
 def test_a_log_with_a_command_for_each_row_replays(small_scenario):

@@ -52,8 +52,10 @@ class ReplayCheck:
         """The result in words."""
         if self.exact:
             return "replayed bit for bit"
-        same = "differs" if self.problems else "replayed within rounding"
+        same = "the replay differs" if self.problems else "replayed within rounding"
         same += f" ({', '.join(self.rounded)})" if self.rounded and not self.problems else ""
+        if not any((self.position, self.turn, self.twist)):  # the difference is elsewhere, for example in the route
+            return same
         return f"{same}: at most {self.position:.3g} m, {self.turn:.3g} rad and {self.twist:.3g} m/s or rad/s off"
 
     def as_dict(self) -> dict[str, Any]:
