@@ -107,7 +107,11 @@ def _ended_after(limit: float | None) -> Iterator[None]:
 def _received(future: Any, chunk: list[Ticket[Item]], waiting: Waiting[Item], slow: bool) -> Iterator[Done[Item, Any]]:
     """Yield the results of a chunk. A chunk that killed its workers while alone may have been too slow."""
     if future.status == "finished":
-        results, seconds = future.result()
+        try:
+            results, seconds = future.result()
+        except OSError:  # the connection was lost before the results came
+            waiting.put_back(chunk)
+            return
         waiting.measured(seconds, len(chunk))
         for ticket, result in zip(chunk, results, strict=True):
             yield Done(ticket.item, ticket.number, result)
