@@ -74,7 +74,7 @@ def test_a_valid_plan_is_unchanged_and_a_copy():
 
 
 class Unlocking(AStar):
-    """Make the grid writable and block a cell."""
+    """A planner that makes the grid writable."""
 
     def plan(self, query, rng):
         query.grid.free.flags.writeable = True

@@ -84,9 +84,7 @@ def checked(query: Query, answer: PlanResult) -> PlanResult:
     if not problem:
         # Copied: the planner may reuse its arrays.
         copies: dict[str, Any] = {key: np.array(getattr(answer, key)) for key in _arrays(answer)}
-        answer = dataclasses.replace(answer, **copies)
-        if len(answer.cells) and answer.cells.dtype != np.int32:
-            answer = dataclasses.replace(answer, cells=answer.cells.astype(np.int32))
+        answer = dataclasses.replace(answer, **{**copies, "cells": copies["cells"].astype(np.int32, copy=False)})
         reason = one_line(answer.reason) if answer.reason else ""
         return answer if reason == answer.reason else dataclasses.replace(answer, reason=reason)
     sane = isinstance(answer.wall_s, float) and 0 <= answer.wall_s < math.inf

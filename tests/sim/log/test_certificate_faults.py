@@ -1010,3 +1010,7 @@ def test_the_checked_points_of_a_route_have_the_headings_of_its_legs(corners):
     assert all(np.hypot(*(points - corner).T).min() < 1e-9 for corner in route)
     turned = np.arctan2(steps[:, 1], steps[:, 0])[:, None] - np.arctan2(legs[:, 1], legs[:, 0])
     assert np.abs(wrap_angle(turned)).min(axis=1).max() < 1e-6
+
+
+def test_a_route_without_length_has_points_to_check():
+    assert _spaced(np.array([(1.0, 1.0)] * 3)).tolist() == [[1.0, 1.0]] * 2

@@ -702,11 +702,13 @@ def choose(
         x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, route, trails[0],
     )  # fmt: skip
     steps[0], blocked[0] = own.steps, own.blocked
-    met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
     span = weights.step * (instants - 1)
     window = limits.speed * span + tuning.lookahead_max
     alone = encounter(trails[0], Trail(own.steps, False), places, radii, near, by_step, contact_distances, weights, cap)
     undisturbed = alone.contact == math.inf and alone.clearance >= cap and alone.intrusion == 0.0
+    met = alone
+    if own.blocked:
+        met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
     if undisturbed and not own.blocked and not (going and halts(trails[0], s, window, path, end)):
         return 0, math.inf
     limit = limit_worths(x, y, yaw, v, w, s, candidates, path, limits, tuning, weights, span, window)

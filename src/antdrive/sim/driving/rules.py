@@ -158,8 +158,8 @@ class SlowAtCorners:
 
     def limit(self, path: TrackedPath, arc: float, speed: float) -> float:
         """Return the speed limit of a robot at an arc length [m] and a speed [m/s]; infinite without corners ahead."""
-        corners, slowest, brake = self._tracking.corners, self._robot.near_speed, self._robot.max_acceleration
-        if speed <= slowest or not len(corners):
+        slowest, brake = self._robot.near_speed, self._robot.max_acceleration
+        if speed <= slowest or not len(corners := self._tracking.corners):
             return math.inf
         arcs = np.arange(arc, min(arc + speed * speed / (2 * brake), path.length) + CORNER_STEP, CORNER_STEP)
         gaps = points_at(path, arcs)[:, None] - corners

@@ -96,14 +96,14 @@ class MoverTracking:
         tick: the control period of the last scan
         sight: area covered by its beams within `reach` [m^2]
         reach: range up to which beams lie no farther apart than a map cell [m]
-        corners: where ground that may hide people from the last scan begins, movers apart (N, 2) [m]
     """
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
         lidar = lidar.at(hz)
         self.tracker, self.tick = MoverTracker(lidar, None, pose_xy, pose_yaw), 0
         self.sight, self.reach = 0.0, min(lidar.max_range, MAP_CELL / lidar.spacing)
-        self.corners: Floats = np.empty((0, 2))
+        self._last: tuple[Pose, Floats, npt.NDArray[np.bool_]] | None = None
+        self._known_corners: Floats | None = None
         self._hz, self._spacing, self._lidar = hz, lidar.spacing, lidar
         self._settle = max(2, round(self.tracker.policy.settle * lidar.rate))
         self._log: list[tuple[int, TrackedMovers]] = []
@@ -115,11 +115,21 @@ class MoverTracking:
         crossed = np.clip(ranges, 0.0, self.reach)
         self.sight = float(0.5 * self._spacing * (crossed * crossed).sum())
         self._log.append((tick, self.tracker.movers()))
-        self.corners = self._corners(pose, ranges, theirs)
+        self._last, self._known_corners = (pose, ranges, theirs), None
         return theirs
 
+    @property
+    def corners(self) -> Floats:
+        """Where ground that may hide people from the last scan begins, movers apart (N, 2) [m].
+
+        These are ends of surfaces at least as wide as a person, and with as much space behind.
+        """
+        if self._known_corners is None:
+            self._known_corners = self._corners(*self._last) if self._last else np.empty((0, 2))
+        return self._known_corners
+
     def _corners(self, pose: Pose, ranges: Floats, theirs: npt.NDArray[np.bool_]) -> Floats:
-        """Return the ends of surfaces that can hide a person: at least as wide, and with as much space behind (N, 2) [m]."""
+        """Return the corners that a scan shows (N, 2) [m]."""
         far = np.clip(ranges, 0.0, self._lidar.max_range)
         steps = np.diff(far)
         jumps = np.flatnonzero(np.abs(steps) > PERSON)

@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import arc_lengths, polyline_length, wrap_angle
+from antdrive.base.plane import polyline_length, wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
@@ -117,15 +117,13 @@ def _check_room(rollout: Rollout, name: str, points: Floats, slack: float) -> It
 
 def _spaced(route: Floats) -> Floats:
     """Return points (N, 2) along a route, its corners among them, `POINT_SPACING` apart or closer [m]."""
-    arc = arc_lengths(route)
-    corners = arc[np.append(True, np.diff(arc) > SAME_LENGTH)]
-    along = np.linspace(0.0, arc[-1], 2 + math.ceil(float(arc[-1]) / POINT_SPACING))
-    after = np.searchsorted(corners, along)
-    apart = np.minimum(
-        along - corners[np.maximum(after - 1, 0)], np.abs(corners[np.minimum(after, len(corners) - 1)] - along)
-    )
-    along = np.sort(np.concatenate((corners, along[np.abs(apart) > SAME_LENGTH])))
-    return np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
+    steps = np.diff(route, axis=0)
+    counts = np.ceil(np.hypot(*steps.T) / POINT_SPACING).astype(np.int64)
+    if not counts.any():
+        return route[[0, -1]]
+    leg = np.repeat(np.arange(len(steps)), counts)
+    share = (np.arange(len(leg)) - (np.cumsum(counts) - counts)[leg]) / counts[leg]
+    return np.vstack([route[leg] + share[:, None] * steps[leg], route[-1:]])
 
 
 def _room(rollout: Rollout, points: Floats) -> Floats:
@@ -345,10 +343,10 @@ def _check_replans(rollout: Rollout) -> Iterator[str]:
 
 def _decides(record: DriveRecord) -> bool:
     """Return whether the planner may decide cell by cell; one of the user's own is believed."""
-    from antdrive.planners import PLANNERS, capabilities_of
+    from antdrive.sim.log.margin import known_capabilities  # imports the compiler
 
-    name = record.planner.name
-    return name not in PLANNERS or capabilities_of(PLANNERS[name]).cell_by_cell
+    can = known_capabilities(record)
+    return can is None or can.cell_by_cell
 
 
 def _check_followed(rollout: Rollout, end: int) -> Iterator[str]:

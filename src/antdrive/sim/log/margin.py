@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,9 @@ from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import point_clearance
+
+if TYPE_CHECKING:
+    from antdrive.planners import Capabilities
 
 #: Causes of a loss of margin, with descriptions.
 CAUSES: dict[str, str] = {
@@ -87,6 +90,13 @@ def has_default(record: DriveRecord) -> bool:
         return False
 
 
+def known_capabilities(record: DriveRecord) -> Capabilities | None:
+    """Return what a record's planner can do; None for a planner of one's own."""
+    from antdrive.planners import PLANNERS, capabilities_of
+
+    return capabilities_of(PLANNERS[record.planner.name]) if record.planner.name in PLANNERS else None
+
+
 def footprint_margins(record: DriveRecord) -> tuple[float, ...]:
     """Return the margins that a record's settings give to plans for the footprint [m]; empty if they plan for the disc.
 
@@ -95,10 +105,7 @@ def footprint_margins(record: DriveRecord) -> tuple[float, ...]:
     Raises:
         KeyError, TypeError, ValueError: the controller's settings are none that a drive has.
     """
-    from antdrive.planners import PLANNERS, capabilities_of
-
-    asked = (record.settings or {}).get("footprint", SETTINGS["footprint"].default)
-    can = capabilities_of(PLANNERS[record.planner.name]) if record.planner.name in PLANNERS else None
+    asked, can = (record.settings or {}).get("footprint", SETTINGS["footprint"].default), known_capabilities(record)
     moving = record.perception is not None and not record.exploring
     by_cell = moving and (record.replanning or {}).get("around_movers") and can is not None and can.cell_by_cell
     if asked == "disc" or record.robot.footprint.is_disc or by_cell or not (can is None or can.turns):
