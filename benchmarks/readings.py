@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from antdrive.planners import Query
-from antdrive.runs.papers.experiments import Experiment, ibraheem2016
+from antdrive.runs.papers.experiment import Experiment
+from antdrive.runs.papers.ibraheem2016 import ibraheem2016
 from antdrive.runs.papers.maps import blocks, scattered
 from antdrive.runs.papers.paper_runs import PaperRun, solve
 from antdrive.runs.statistics.intervals import medians_by_world

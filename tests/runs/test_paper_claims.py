@@ -64,7 +64,7 @@ def claim(statistic, relation, bound=0.0, *, maps=1, **facts):
     """A claim on arms ONE and TWO, or on ONE alone where the statistic is of a single planner."""
     arms = (ONE,) if statistic in ("median", "mean", "arrived", "failed") else (ONE, TWO)
     facts = {"cases": (arms,) * maps, **facts}
-    words = {"paper": "lee2008", "source": "s", "sentence": "x", "printed": "p"}
+    words = {"paper": "lee2008", "id": "L1", "kind": "claim", "source": "s", "sentence": "x", "printed": "p"}
     return Claim(statistic=statistic, relation=relation, bound=bound, **{**words, **facts})
 
 

@@ -15,7 +15,8 @@ from antdrive.planners import capabilities_of
 from antdrive.robots import load_robot
 from antdrive.runs.papers import maps
 from antdrive.runs.papers.claims import Arm
-from antdrive.runs.papers.experiments import PAPERS, Experiment
+from antdrive.runs.papers.experiment import Experiment
+from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.maps import HAN_ANTS
 from antdrive.runs.papers.paper_runs import PaperRun, solve
 from antdrive.sim.pipeline import run

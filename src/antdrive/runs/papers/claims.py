@@ -1,23 +1,24 @@
-"""Claims of the papers, one row of `claims.csv` each, and their verdicts from the runs of the experiments.
+"""Claims of the papers, one row of `rows/PAPER.csv` each, and their verdicts from the runs of the experiments.
 
-A claim is one sentence that an experiment can refute, and the test that decides it.
+A claim is one sentence that an experiment can refute, and the test that decides it. A check is such a sentence of ours about
+an arm, for instance that a colony learns at all.
 """
 
 from __future__ import annotations
 
-import csv
 import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.paper_runs import PaperRun
+from antdrive.runs.papers.paragraphs import read_table
 from antdrive.runs.statistics.intervals import Interval, means_by_world, medians_by_world, resampled, wilson
 from antdrive.runs.statistics.significance import wilcoxon
 
@@ -41,6 +42,8 @@ class Claim:
     """
 
     paper: str
+    id: str  # shared by the rows of one sentence on several maps or in several readings
+    kind: str  # "claim" of the paper, or "check" of an arm
     source: str  # section, table or figure
     sentence: str
     reading: str = "ours"  # interpretation of the planner, if not our default
@@ -58,24 +61,19 @@ class Claim:
         return frozenset(arm for case in self.cases for arm in case)
 
 
-def _claim(row: dict[str, str]) -> Claim:
+def _claim(paper: str, row: dict[str, str]) -> Claim:
     maps, planners = _listed(row.pop("maps")), _listed(row.pop("planners"))
     quantity, bound = _listed(row.pop("quantity")), float(row.pop("bound"))
     cases = tuple(tuple(Arm(name, planner) for planner in planners) for name in maps)
-    return Claim(**row, quantity=quantity, bound=bound, cases=cases)
+    return Claim(paper=paper, **row, quantity=quantity, bound=bound, cases=cases)
 
 
 def _listed(cell: str) -> tuple[str, ...]:
     return tuple(cell.split(" | "))
 
 
-def _claims() -> tuple[Claim, ...]:
-    with Path(__file__).with_suffix(".csv").open(newline="", encoding="utf-8") as file:
-        return tuple(_claim(row) for row in csv.DictReader(file))
-
-
 #: All claims, in the order of the papers.
-CLAIMS = _claims()
+CLAIMS = tuple(_claim(paper, row) for paper in PAPERS for row in read_table("rows", paper))
 
 
 Floats = npt.NDArray[np.float64]
@@ -127,12 +125,12 @@ class Measured:
     exact: bool = False  # the interval is valid for any number of runs, so that even few can refute
 
 
-#: By relation, whether an interval confirms it, and whether it refutes it.
+#: By relation, whether an interval confirms it, and whether it refutes it. An interval that touches the bound does not refute.
 RELATIONS: Mapping[str, Callable[[Interval, float], tuple[bool, bool]]] = MappingProxyType(
     {
-        "<": lambda interval, bound: (interval.high < bound, interval.low >= bound),
+        "<": lambda interval, bound: (interval.high < bound, interval.low > bound),
         "<=": lambda interval, bound: (interval.high <= bound + EQUAL, interval.low > bound + EQUAL),
-        ">": lambda interval, bound: (interval.low > bound, interval.high <= bound),
+        ">": lambda interval, bound: (interval.low > bound, interval.high < bound),
         ">=": lambda interval, bound: (interval.low >= bound, interval.high < bound),
         "about": lambda interval, bound: (
             bound * (1 - ABOUT) <= interval.low and interval.high <= bound * (1 + ABOUT),
@@ -324,7 +322,8 @@ def _undecided(measured: Measured, claim: Claim) -> str:
     value, bound = measured.value, claim.bound
     if claim.relation == "about":
         bound = min(bound * (1 - ABOUT), bound * (1 + ABOUT), key=lambda end: abs(value - end))
-    words = f"the interval contains {bound:g}"
+    low, high = measured.interval
+    words = f"the interval {'touches' if bound in (low, high) else 'contains'} {bound:g}"
     towards = measured.interval.high - value if bound > value else value - measured.interval.low
     if abs(bound - value) < 1e-9 or not abs(towards) < NO_PATH / 10:
         return words

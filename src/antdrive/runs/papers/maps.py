@@ -8,6 +8,7 @@ is exactly as long as the paper's best. That length is an upper bound of the opt
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,6 +37,19 @@ HAN_GENES = ((3, 3), (10, 10), (14, 10), (14, 4), (8, 14), (6, 18))
 def optimum(query: Query) -> float:
     """Return the length of the shortest path with the same moves; inf if there is none."""
     return PLANNERS["astar"].plan(query, np.random.default_rng(0)).cost
+
+
+def cutting_corners(query: Query) -> Query:
+    """Return a query with moves to every free neighbour of eight, also diagonally past blocked cells."""
+    free = query.grid.free
+    moves = np.zeros(free.shape, dtype=np.uint8)
+    for bit, (row, col) in enumerate(DIRECTIONS):
+        ahead = np.zeros(free.shape, dtype=np.bool_)
+        to, at = np.s_[max(0, -row) : free.shape[0] - max(0, row)], np.s_[max(0, -col) : free.shape[1] - max(0, col)]
+        ahead[to, at] = np.roll(free, (-row, -col), axis=(0, 1))[to, at]
+        moves |= np.where(free & ahead, np.uint8(1 << bit), np.uint8(0))
+    moves.setflags(write=False)
+    return dataclasses.replace(query, grid=dataclasses.replace(query.grid, moves=moves))
 
 
 def han_ants(*discs: tuple[float, float, float] | None) -> Query:

@@ -42,7 +42,8 @@ from antdrive.runs.papers.claims import (
     verdict_cells,
     verdict_facts,
 )
-from antdrive.runs.papers.experiments import PAPERS, Experiment
+from antdrive.runs.papers.experiment import Experiment
+from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.paper_runs import PaperRun, drive_among, solve
 from antdrive.runs.pool import Pool, call_now, processes_for
 from antdrive.runs.statistics.intervals import medians_by_world
@@ -75,7 +76,11 @@ def code_hash() -> str:
     for package in (antdrive.worlds, antdrive.planners, antdrive.runs.papers):
         for folder in package.__path__:
             for path in sorted(Path(folder).rglob("*.py")):
-                if package is antdrive.runs.papers and path.stem == "claims":  # runs do not depend on it
+                if package is antdrive.runs.papers and path.stem in (
+                    "claims",
+                    "paragraphs",
+                    "arms",
+                ):  # runs do not depend on it
                     continue
                 digest.update(path.read_bytes())
     return digest.hexdigest()
