@@ -1,43 +1,86 @@
 """Write the results of `antdrive reproduce all` into the papers' pages: `python -m tools.paper_tables FOLDER`.
 
 FOLDER is the output of that command. In `docs/papers/PAPER.md` the table of the paper's claims replaces the lines between
-`<!-- claims -->` and `<!-- end -->`; in `docs/papers/README.md` their counts replace the lines between `<!-- counts -->` and
-`<!-- end -->`. `--check` needs no folder: it lists claims that the pages omit or show with other printed figures.
+`<!-- claims -->` and `<!-- end -->`, and the settings of their arms those between `<!-- arms -->` and `<!-- end -->`; in
+`docs/papers/README.md` their counts replace the lines between `<!-- counts -->` and `<!-- end -->`.
+`docs/notebook/paper-paragraphs.md` lists the papers' paragraphs with their rows. `--check` needs no folder: it lists claims
+that the pages omit or show with other printed figures.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from antdrive.base.atomic import atomic_write
+from antdrive.runs.papers.arms import HEADS as ARM_HEADS
 from antdrive.runs.papers.claims import CLAIMS, Claim
+from antdrive.runs.papers.experiments import PAPERS
+from antdrive.runs.papers.paragraphs import paragraphs
 
 PAGES = Path(__file__).parent.parent / "docs" / "papers"
-HEADS = ("claim", "reading", "printed", "ours", "verdict", "why", "source")
+PARAGRAPHS = PAGES.parent / "notebook" / "paper-paragraphs.md"
+HEADS = ("row", "claim", "reading", "printed", "ours", "verdict", "arms", "why", "source")
 VERDICTS = ("holds", "does not hold", "cannot be told")
+VERDICT = HEADS.index("verdict")
 END = "<!-- end -->"
+
+
+PARAGRAPHS_HEAD = """# Paragraphs of the five papers that claim something
+
+Each paragraph, figure and table, with the rows of its page that test it. Lines count those of the papers' plain text.
+`python -m tools.paper_tables` writes this page from `runs/papers/paragraphs/PAPER.csv`."""
 
 
 def claims_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
     """Return the table of a paper's claims as lines of Markdown."""
     cells = [[row[head] for head in HEADS] for row in rows]
     for line in cells:
-        line[4] = f"**{line[4]}**"
+        line[VERDICT] = f"**{line[VERDICT]}**"
     return [_line(HEADS), _line(["---"] * len(HEADS)), *map(_line, cells)]
+
+
+def arms_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
+    """Return the settings of a paper's arms as lines of Markdown, one bullet an arm."""
+    settings: dict[str, dict[str, list[str]]] = {}
+    for row in rows:
+        for name, facts in json.loads(row["arms"]).items():
+            for head, value in facts.items():
+                settings.setdefault(name, {}).setdefault(head, []).extend(value.split(" / "))
+    facts = {name: [" / ".join(dict.fromkeys(one)) for one in arm.values()] for name, arm in settings.items()}
+    return [
+        _line(["arm", *ARM_HEADS]),
+        _line(["---"] * (1 + len(ARM_HEADS))),
+        *(_line([n, *f]) for n, f in facts.items()),
+    ]
+
+
+def paragraphs_page() -> str:
+    """Return the page that lists each paragraph of each paper that claims something, with its rows."""
+    parts = [PARAGRAPHS_HEAD]
+    for paper in PAPERS:
+        lines = [["lines", "place", "text", "rows", "why none, or not all of it"], ["---"] * 5]
+        lines += [[p.lines, p.place, f"“{p.quote}”", ", ".join(p.rows), p.reason] for p in paragraphs(paper)]
+        parts.append(f"## {paper}\n\n" + "\n".join(_line([one.replace("|", "\\|") for one in line]) for line in lines))
+    return "\n\n".join(parts) + "\n"
 
 
 def counts_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
     """Return the counts of each paper's claims by verdict as lines of Markdown."""
     papers = dict.fromkeys(row["paper"] for row in rows)
-    lines = [_line(["paper", "rows", *VERDICTS]), _line(["---"] * 5)]
+    lines = [_line(["paper", "claims", "rows", *VERDICTS, "checks"]), _line(["---"] * 7)]
     for paper in (*papers, "all"):
-        mine = [row["verdict"] for row in rows if paper in (row["paper"], "all")]
+        mine = [row for row in rows if paper in (row["paper"], "all")]
+        claims = [row for row in mine if row["kind"] == "claim"]
+        found = [row["verdict"] for row in claims]
         name = f"[{paper}]({paper}.md)" if paper != "all" else "all"
-        lines.append(_line([name, str(len(mine)), *(str(mine.count(verdict)) for verdict in VERDICTS)]))
+        ids = {(row["paper"], row["row"]) for row in claims}
+        numbers = (len(ids), len(claims), *map(found.count, VERDICTS), len(mine) - len(claims))
+        lines.append(_line([name, *map(str, numbers)]))
     return lines
 
 
@@ -52,7 +95,7 @@ def missing(claims: Sequence[Claim], pages: Mapping[str, str]) -> list[str]:
     """Return claims without a row on their page, with reading and printed figures."""
     found = []
     for claim in claims:
-        start = _line([claim.sentence, claim.reading, claim.printed]).removesuffix(" |")
+        start = _line([claim.id, claim.sentence, claim.reading, claim.printed]).removesuffix(" |")
         if f"{start} | " not in pages.get(claim.paper, ""):
             found.append(f"{claim.paper}.md: no row begins with {start}")
     return found
@@ -66,14 +109,21 @@ def _write(folder: Path) -> None:
     with (folder / "claims.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for paper in dict.fromkeys(row["paper"] for row in rows):
-        _replace(PAGES / f"{paper}.md", "claims", claims_table([row for row in rows if row["paper"] == paper]))
+        mine = [row for row in rows if row["paper"] == paper]
+        _replace(PAGES / f"{paper}.md", "claims", claims_table(mine))
+        _replace(PAGES / f"{paper}.md", "arms", arms_table(mine))
     _replace(PAGES / "README.md", "counts", counts_table(rows))
+    _write_text(PARAGRAPHS, paragraphs_page())
 
 
 def _replace(page: Path, name: str, lines: Sequence[str]) -> None:
     changed = replaced(page.read_text(encoding="utf-8"), name, lines)
+    _write_text(page, changed)
+
+
+def _write_text(page: Path, text: str) -> None:
     with atomic_write(page) as temporary:
-        temporary.write_text(changed, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8")
 
 
 def main() -> int:

@@ -1,6 +1,7 @@
 """Experiments of papers are run and written to files; every figure that is called printed stands in its paper."""
 
 import csv
+import json
 import math
 import re
 from pathlib import Path
@@ -10,11 +11,12 @@ import pytest
 
 from antdrive.base import InputError
 from antdrive.runs.papers import maps, reproduction
+from antdrive.runs.papers.arms import HEADS as ARM_HEADS
 from antdrive.runs.papers.claims import CLAIMS, Decision
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.reproduction import reproduce as measure_again
 from antdrive.views import papers as pictures
-from tools.paper_tables import claims_table, counts_table, missing, replaced
+from tools.paper_tables import arms_table, claims_table, counts_table, missing, replaced
 from tools.shared_data import data_folder
 
 
@@ -73,7 +75,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
     found = measure_again(["han2007"], tmp_path, seeds=2, progress=seen.append)
     rows, files = (
         found.rows,
-        found.files | pictures.draw_figures("han2007", found.of("han2007"), tmp_path, 2, (".png",)),
+        found.files | pictures.draw_figures({"han2007": found.of("han2007")}, tmp_path, 2, (".png",)),
     )
     assert seen[-1] == 1
     assert [row.printed for row in rows] == [45.357, 38.6223, 33.1798]
@@ -82,7 +84,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
         assert row.arrived == row.seeds == 2
         assert row.gap > -0.15
     figures = {"han2007 maps", "han2007 history", "han2007 run", "han2007 ants", "han2007 sweep"}
-    assert set(files) == {"table", "csv", "claims", "claims csv"} | figures
+    assert set(files) == {"table", "csv", "claims", "claims csv", "arms"} | figures
     # Those claims are judged whose experiments were run: two on each kind of mean, and that of 10 and 100 ants.
     assert [verdict.claim.source for verdict in found.verdicts].count("§5.2, Table 5.2.1") == 4
     assert {verdict.decision for verdict in found.verdicts} == {Decision.OPEN}  # two seeds tell nothing
@@ -206,9 +208,18 @@ def test_the_papers_pages_show_every_claim_with_its_printed_figures():
 
 
 def test_the_pages_tables_are_written_from_the_verdicts():
-    row = {"paper": "hasan", "claim": "c", "reading": "r", "printed": "1", "ours": "2", "verdict": "holds", "why": "w"}
-    rows = [{**row, "source": "s"}, {**row, "source": "s", "verdict": "does not hold"}]
-    assert claims_table(rows)[2] == "| c | r | 1 | 2 | **holds** | w | s |"
-    assert counts_table(rows)[2:] == ["| [hasan](hasan.md) | 2 | 1 | 1 | 0 |", "| all | 2 | 1 | 1 | 0 |"]
+    row = {"paper": "hasan", "row": "H1", "kind": "claim", "claim": "c", "reading": "r", "printed": "1", "ours": "2"}
+    facts = dict.fromkeys(ARM_HEADS, "x")
+    arms = json.dumps({"one": facts, "two": facts | {"budget": "5"}}), json.dumps({"one": facts | {"budget": "6"}})
+    row |= {"verdict": "holds", "arms": "one : two", "why": "w", "source": "s"}
+    rows = [row, row | {"verdict": "does not hold"}, row | {"row": "H2", "kind": "check"}]
+    assert claims_table(rows)[2] == "| H1 | c | r | 1 | 2 | **holds** | one : two | w | s |"
+    assert counts_table(rows)[2:] == [
+        "| [hasan](hasan.md) | 1 | 2 | 1 | 1 | 0 | 1 |",
+        "| all | 1 | 2 | 1 | 1 | 0 | 1 |",
+    ]
+    written = arms_table([row | {"arms": one} for one in arms])
+    assert len(written) == 4
+    assert "| x / 6 |" in written[2]
     page = "a\n<!-- claims -->\nold\n<!-- end -->\nb\n"
     assert replaced(page, "claims", ["new"]) == "a\n<!-- claims -->\n\nnew\n\n<!-- end -->\nb\n"

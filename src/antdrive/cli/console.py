@@ -214,14 +214,14 @@ def show(json: bool, facts: Any, lines: Iterable[str]) -> None:
             print_line(line)
 
 
-def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Yield the lines of a table: aligned columns where they fit the terminal, and elsewhere than on terminals.
+def table(headers: Sequence[str], rows: Iterable[Sequence[str]], *, columns: int | None = None) -> Iterator[str]:
+    """Yield the lines of a table: aligned columns where they fit the terminal, or `columns` elsewhere (None: any width).
 
     Where they do not fit, only the last column is wrapped; else rows become columns; else each row is a block with a line
     for each column. Nothing is cut.
     """
     heads, body = tuple(headers), [tuple(row) for row in rows]
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else columns
     lines = [heads, *body]
     aligned = list(_aligned(lines))
     if columns is None or _fits(aligned, columns):

@@ -21,6 +21,7 @@ from antdrive.runs.papers.maps import HAN_ANTS
 from antdrive.runs.papers.paper_runs import PaperRun, solve
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
+from antdrive.views.colours import LabelStyle, label_styles
 from antdrive.views.figures.canvas import endings
 from antdrive.views.figures.paper_figures import (
     ConvergenceCurve,
@@ -47,13 +48,24 @@ PRELUDE, DRIVE = 3.0, 9.0  # length of planning and drive in a film [s]
 Measured: TypeAlias = Sequence[tuple[Experiment, list[PaperRun]]]
 
 
-def draw_figures(paper: str, found: Measured, folder: Path, seeds: int, suffixes: Sequence[str]) -> dict[str, str]:
-    """Draw a paper's figures and return their paths by name.
+def draw_figures(papers: Mapping[str, Measured], folder: Path, seeds: int, suffixes: Sequence[str]) -> dict[str, str]:
+    """Draw the figures of papers and return their paths by name. A planner with its setting has one colour in all of them.
 
     There are two figures of length by iteration: `history` shows all seeds with intervals, `run` one run as in the papers.
     """
+    drawn = {e.name: e.planner for found in papers.values() for e in [*_convergent(found), *_painted(found)]}
+    styles = dict(zip(drawn, label_styles(list(drawn), list(drawn.values())), strict=True))
     files: dict[str, str] = {}
-    curves = _curves(found)
+    for paper, found in papers.items():
+        files |= _paper_figures(paper, found, folder, seeds, suffixes, styles)
+    return files
+
+
+def _paper_figures(
+    paper: str, found: Measured, folder: Path, seeds: int, suffixes: Sequence[str], styles: Mapping[str, LabelStyle]
+) -> dict[str, str]:
+    files: dict[str, str] = {}
+    curves = _curves(found, styles)
     for suffix, end in endings(suffixes):
         if curves:
             for name, single in (("history", False), ("run", True)):
@@ -61,7 +73,7 @@ def draw_figures(paper: str, found: Measured, folder: Path, seeds: int, suffixes
                 convergence_figure(curves, path, single=single)
                 files[f"{paper} {name}{end}"] = str(path)
         drawn_on = folder / f"{paper}-maps{suffix}"
-        maps_figure(_drawn(found), drawn_on)
+        maps_figure(_drawn(found), drawn_on, styles=styles)
         files[f"{paper} maps{end}"] = str(drawn_on)
         if paper == "han2007":
             drawn = _han_figures(found, folder, seeds, suffix)
@@ -69,18 +81,16 @@ def draw_figures(paper: str, found: Measured, folder: Path, seeds: int, suffixes
     return files
 
 
-def _curves(found: Measured) -> dict[str, list[ConvergenceCurve]]:
+def _curves(found: Measured, styles: Mapping[str, LabelStyle]) -> dict[str, list[ConvergenceCurve]]:
     """Return the histories of the first `CURVES` planners with a history, by map."""
+    runs = {(e.map, e.name): trials for e, trials in found}
     curves: dict[str, list[ConvergenceCurve]] = {}
-    for experiment, trials in _printed_first(found):
-        on_map = curves.setdefault(experiment.map, [])
-        if len(on_map) == CURVES or not any(len(trial.result.history) for trial in trials):
-            continue
-        counted = math.isfinite(experiment.work)
-        on_map.append(
+    for experiment in _convergent(found):
+        trials, counted = runs[experiment.map, experiment.name], math.isfinite(experiment.work)
+        curves.setdefault(experiment.map, []).append(
             ConvergenceCurve(
                 name=experiment.name,
-                planner=experiment.planner,
+                style=styles[experiment.name],
                 best=[trial.result.history.best for trial in trials],
                 maps=np.array([trial.world for trial in trials], dtype=np.int64),
                 steps=np.array([trial.work for trial in trials]) if counted else None,
@@ -88,7 +98,23 @@ def _curves(found: Measured) -> dict[str, list[ConvergenceCurve]]:
                 printed=experiment.printed,
             )
         )
-    return {name: on_map for name, on_map in curves.items() if on_map}
+    return curves
+
+
+def _convergent(found: Measured) -> list[Experiment]:
+    """Return the first `CURVES` experiments of each map whose histories show a path."""
+    told = [e for e, trials in _printed_first(found) if any(trial.result.history.arrived.any() for trial in trials)]
+    return _first_of_each_map(told, CURVES)
+
+
+def _painted(found: Measured) -> list[Experiment]:
+    """Return the first `PAINTED` experiments of each map."""
+    # `steps` are the same plans as those of the total costs.
+    return _first_of_each_map([e for e, _ in _printed_first(found) if e.name != "steps"], PAINTED)
+
+
+def _first_of_each_map(experiments: Sequence[Experiment], most: int) -> list[Experiment]:
+    return [e for k, e in enumerate(experiments) if sum(e.map == one.map for one in experiments[:k]) < most]
 
 
 def _printed_first(found: Measured) -> Measured:
@@ -100,15 +126,14 @@ def _printed_first(found: Measured) -> Measured:
 
 def _drawn(found: Measured) -> dict[str, tuple[Query, dict[str, PlanResult]]]:
     """Return each experiment's first map with the paths of the median seeds of `PAINTED` planners."""
+    runs = {(e.map, e.name): trials for e, trials in found}
     maps_drawn: dict[str, tuple[Query, dict[str, PlanResult]]] = {}
-    for experiment, trials in _printed_first(found):
-        if experiment.name == "steps":  # the same plans as those of the total costs
-            continue
+    for experiment in _painted(found):
+        trials = runs[experiment.map, experiment.name]
         query = experiment.query(experiment.world(trials[0].seed))
         plans = maps_drawn.setdefault(experiment.map, (query, {}))[1]
         on_it = sorted((t for t in trials if t.world == trials[0].world), key=lambda trial: trial.length)
-        if len(plans) < PAINTED:
-            plans[experiment.name] = on_it[(len(on_it) - 1) // 2].result
+        plans[experiment.name] = on_it[(len(on_it) - 1) // 2].result
     return maps_drawn
 
 

@@ -7,6 +7,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib
 import numpy as np
@@ -26,6 +27,7 @@ from antdrive.views.figures.paper_figures import (
     ants_figure,
     convergence_figure,
     history_figure,
+    maps_figure,
     sweep_figure,
 )
 from antdrive.views.figures.plan_figures import bars_figure, contours_figure, plan_figure, plan_figures
@@ -34,7 +36,7 @@ from antdrive.views.figures.run_figures import certificate_figure, comparison_fi
 from antdrive.views.figures.sight_figure import LISTED, sight_figure
 from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.views.scene import Scene
-from antdrive.worlds import Disc, Keyframed, Task, Wandering, World, rasterise
+from antdrive.worlds import Disc, Grid, Keyframed, Task, Wandering, World, rasterise
 from antdrive.worlds.coverage import coverage
 from tests.made_up_drive import scanned, undriven
 from tests.records import changed
@@ -212,9 +214,12 @@ def test_lengths_by_ants_and_sweeps_are_drawn(tmp_path):
 RUNS = [np.array([9.0, 8.0, 7.0, 6.0]), np.array([12.0, 9.0, 5.0, 5.0]), np.array([np.inf, np.inf, 8.0, 7.0])]
 
 
+STYLES = dict(zip(("as", "as, again"), label_styles(["as", "as, again"], ["as", "as"]), strict=True))
+
+
 def curve(name, steps=None, printed=None):
     return ConvergenceCurve(
-        name=name, planner="as", best=RUNS, maps=np.array([0, 1, 0]), steps=steps, optimum=4.0, printed=printed
+        name=name, style=STYLES[name], best=RUNS, maps=np.array([0, 1, 0]), steps=steps, optimum=4.0, printed=printed
     )
 
 
@@ -456,3 +461,15 @@ def test_the_words_beside_the_curves_lie_in_the_picture_and_on_nothing_else(log)
 def test_a_log_without_scans_has_no_such_figure(made_up_drive):
     with pytest.raises(ValueError, match="no scans"):
         sight_figure(made_up_drive())
+
+
+def test_a_planner_has_one_colour_in_all_figures_of_papers():
+    plan = SimpleNamespace(solved=True, line_length=3.0, cells=np.array([[0, 0], [1, 1]]), waypoints=None)
+    query = Query(Grid.from_free(np.ones((3, 3), dtype=bool)), (0, 0), (1, 1))
+    two_maps = {"one": (query, {"as": plan, "as, again": plan}), "two": (query, {"as, again": plan})}
+    painted = maps_figure(two_maps, styles=STYLES)
+    drawn = [line for axes in painted.axes for line in axes.lines]
+    drawn += convergence_figure({"a map": [curve("as, again"), curve("as")]}).axes[0].lines
+    for name in STYLES:
+        colours = {line.get_color() for line in drawn if line.get_label().partition(":")[0] == name}
+        assert colours == {STYLES[name].light}

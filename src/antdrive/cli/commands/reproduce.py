@@ -12,6 +12,7 @@ from antdrive.views.run_folder import suffixes
 
 MARKER = "reproduce.json"
 QUICK_SEEDS = 6
+COLUMNS = 80  # width of the tables in files and pipes
 
 
 def reproduce(
@@ -32,7 +33,7 @@ def reproduce(
     paper's figures. 50 seeds decide every claim; with fewer, a line counts the undecidable ones. Repeat the command to resume
     it.
     """
-    from antdrive.runs.papers.claims import VERDICT_HEADS, verdict_cells, verdict_facts
+    from antdrive.runs.papers.claims import VERDICT_HEADS, verdict_cells
     from antdrive.runs.papers.experiments import PAPERS
     from antdrive.runs.papers.reproduction import HEADS, RUNS_FOLDER, row_cells, too_few_seeds
     from antdrive.runs.papers.reproduction import reproduce as repeat
@@ -47,11 +48,9 @@ def reproduce(
             print_error(few)
         with bar("planning") as progress:
             reproduction = repeat(papers, folder, seeds=seeds, jobs=jobs, quick=quick, progress=progress)
-            files = dict(reproduction.files)
+            found = {one: reproduction.of(one) for one in papers}
+            files = reproduction.files | draw_figures(found, folder, 1 if quick else min(seeds, 10), suffixes(vector))
             for one in papers:
-                files |= draw_figures(
-                    one, reproduction.of(one), folder, 1 if quick else min(seeds, 10), suffixes(vector)
-                )
                 if films:
                     from antdrive.views.papers import film_paper
 
@@ -59,14 +58,14 @@ def reproduce(
                     files |= {} if film is None else {f"{one} film": str(film)}
         result = {
             "rows": [vars(row) for row in reproduction.rows],
-            "claims": [verdict_facts(verdict) for verdict in reproduction.verdicts],
+            "claims": reproduction.claims,
             "files": files,
             "kept": reproduction.kept,
         }
         write_json(folder / MARKER, {**facts, **result})
     lines = [
-        *table(HEADS, map(row_cells, reproduction.rows)),
-        *table(VERDICT_HEADS, map(verdict_cells, reproduction.verdicts)),
+        *table(HEADS, map(row_cells, reproduction.rows), columns=COLUMNS),
+        *table(VERDICT_HEADS, map(verdict_cells, reproduction.verdicts), columns=COLUMNS),
     ]
     lines += file_lines(files)
     if reproduction.kept:

@@ -436,7 +436,7 @@ def _written(value: float, digits: int) -> str:
 
 
 #: Headings of the table of claims; the verdict is first, as a terminal may cut the lines.
-VERDICT_HEADS = ("verdict", "paper", "claim", "reading", "printed", "ours", "why", "source")
+VERDICT_HEADS = ("verdict", "paper", "row", "claim", "reading", "printed", "ours", "arms", "why", "source")
 
 
 def verdict_cells(verdict: Verdict) -> list[str]:
@@ -445,10 +445,12 @@ def verdict_cells(verdict: Verdict) -> list[str]:
     return [
         verdict.decision.value,
         claim.paper,
+        claim.id,
         claim.sentence,
         claim.reading,
         claim.printed,
         verdict.ours,
+        " : ".join(dict.fromkeys(arm.name for case in claim.cases for arm in case)),
         verdict.why,
         claim.source,
     ]
@@ -459,4 +461,4 @@ def verdict_facts(verdict: Verdict) -> dict[str, Any]:
     cells = dict(zip(VERDICT_HEADS, verdict_cells(verdict), strict=True))
     numbers = {"value": verdict.value, "low": verdict.low, "high": verdict.high}
     known: Callable[[float], float | None] = lambda number: number if math.isfinite(number) else None  # noqa: E731
-    return {**cells, **{key: known(number) for key, number in numbers.items()}}
+    return {**cells, "kind": verdict.claim.kind, **{key: known(number) for key, number in numbers.items()}}

@@ -30,6 +30,8 @@ from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import InputError
 from antdrive.base.files import open_regular
 from antdrive.planners import History, PlanResult, PlanStatus
+from antdrive.runs.papers.arms import HEADS as ARM_HEADS
+from antdrive.runs.papers.arms import arm_facts, merged
 from antdrive.runs.papers.claims import (
     CLAIMS,
     VERDICT_HEADS,
@@ -183,6 +185,7 @@ class Reproduction:
     measured: Measurements
     rows: list[ResultRow]  # one for each experiment
     verdicts: list[Verdict]  # one for each claim whose experiments were run
+    claims: list[dict[str, Any]]  # the verdicts as plain data, each with the settings of its arms
     files: dict[str, str]  # by name
     kept: int  # number of experiments loaded from an earlier, interrupted command
 
@@ -210,13 +213,41 @@ def reproduce(
     rows = [_row(experiment, runs) for experiment, runs in measured]
     arms = {(e.paper, e.map, e.name): runs for e, runs in measured if e.name != "steps"}
     verdicts = [evaluate(claim, runs) for claim, runs in _measured_claims(arms)]
+    settings = _settings(experiments)
+    claims = [verdict_facts(one) | {"arms": _arms_of(one.claim, settings)} for one in verdicts]
     files = {
         "table": _write_table(HEADS, map(row_cells, rows), folder / "table.md", NOTE),
         "csv": _write_csv([vars(row) for row in rows], folder / "table.csv"),
         "claims": _write_table(VERDICT_HEADS, map(verdict_cells, verdicts), folder / "claims.md"),
-        "claims csv": _write_csv([verdict_facts(verdict) for verdict in verdicts], folder / "claims.csv"),
+        "claims csv": _write_csv([row | {"arms": json.dumps(row["arms"])} for row in claims], folder / "claims.csv"),
+        "arms": _write_table(("paper", "arm", *ARM_HEADS), _arm_rows(settings), folder / "arms.md"),
     }
-    return Reproduction(measured, rows, verdicts, files, kept)
+    return Reproduction(measured, rows, verdicts, claims, files, kept)
+
+
+Settings = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]  # by paper, arm and map
+
+
+def _settings(experiments: Sequence[Experiment]) -> Settings:
+    settings: dict[str, dict[str, dict[str, dict[str, str]]]] = {}
+    for one in experiments:
+        settings.setdefault(one.paper, {}).setdefault(one.name, {})[one.map] = arm_facts(one)
+    return settings
+
+
+def _arms_of(claim: Claim, settings: Settings) -> dict[str, dict[str, str]]:
+    """Return the settings of a claim's arms on its maps, by the arms' names."""
+    maps: dict[str, list[str]] = {}
+    for case in claim.cases:
+        for arm in case:
+            maps.setdefault(arm.name, []).append(arm.map)
+    return {name: merged([settings[claim.paper][name][where] for where in places]) for name, places in maps.items()}
+
+
+def _arm_rows(settings: Settings) -> Iterator[list[str]]:
+    for paper, arms in settings.items():
+        for name, places in arms.items():
+            yield [paper, name, *merged(list(places.values())).values()]
 
 
 def _experiments(papers: Sequence[str], quick: bool) -> list[Experiment]:

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from antdrive.base.types import Floats, Ints
 from antdrive.runs.statistics.intervals import medians_by_world
-from antdrive.views.colours import INK, MUTED, hexed, label_styles
+from antdrive.views.colours import INK, MUTED, LabelStyle, hexed, label_styles
 from antdrive.views.figures.canvas import colour_bar, sheet
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ POINTS = 80  # of a curve
 RESAMPLES = 500  # bootstrap resamples for the intervals
 NO_PATH = 1e9  # represents infinity in medians
 HIGHEST = 6.0  # upper end of the length axis, as a multiple of the optimum
-TWICE = 0.35  # fraction of ink in the colour of a planner's second curve in a panel
 
 
 def history_figure(
@@ -56,8 +55,18 @@ def history_figure(
     return figure
 
 
-def maps_figure(paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], path: str | Path | None = None) -> Figure:
-    """Draw paths on maps in the papers' style: blocked cells black, start a red square, goal a blue square."""
+def maps_figure(
+    paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]],
+    path: str | Path | None = None,
+    *,
+    styles: Mapping[str, LabelStyle] | None = None,
+) -> Figure:
+    """Draw paths on maps in the papers' style: blocked cells black, start a red square, goal a blue square.
+
+    `styles` are those of the paths' names; by default a name has one style on all maps.
+    """
+    names = list(dict.fromkeys(name for _, plans in paths.values() for name in plans))
+    styles = styles or dict(zip(names, label_styles(names), strict=True))
     across = min(len(paths), 3)
     down = -(-len(paths) // across)
     with sheet(path, (3.3 * across, 4.1 * down)) as figure:
@@ -66,14 +75,13 @@ def maps_figure(paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], pat
         for k, (title, (query, plans)) in enumerate(paths.items()):
             axes: Any = figure.add_subplot(down, across, k + 1, label=title)
             axes.imshow(query.grid.free, cmap="gray", origin="lower", vmin=0, vmax=1, interpolation="nearest")
-            for number, (name, plan) in enumerate(plans.items()):
-                colour = ("#1f4fd8", "#d81f1f", label_styles([name])[0].light)[min(number, 2)]
+            for name, plan in plans.items():
                 length = f"{plan.line_length:.2f}" if plan.solved else "no path"
                 line = np.empty((0, 2))
                 if plan.solved:
                     cells = query.grid.fractional(query.grid.xy(plan.cells))
                     line = cells if plan.waypoints is None else plan.waypoints
-                axes.plot(line[:, 1], line[:, 0], color=colour, lw=1.6, label=f"{name}: {length}")
+                axes.plot(line[:, 1], line[:, 0], color=styles[name].light, lw=1.6, label=f"{name}: {length}")
             for cell, colour in ((query.start, "#d81f1f"), (query.goal, "#1f4fd8")):
                 axes.plot(cell[1], cell[0], "s", ms=6, color=colour, clip_on=False, zorder=4)
             axes.set_title(title)
@@ -146,7 +154,7 @@ class ConvergenceCurve:
     """Runs of one planner on the maps of one panel."""
 
     name: str  # the planner with its setting
-    planner: str  # the planner's name, for its style
+    style: LabelStyle
     best: Sequence[Floats]  # best length so far by iteration, for each run [cells]; inf before the first path
     maps: Ints  # index of each run's map (N,)
     # ant steps of each run (N,), spread evenly over its iterations; None: the axis counts iterations
@@ -174,7 +182,7 @@ def convergence_figure(
             top = min(max(span[1] for span in spans), HIGHEST * optimum)
             axes.set_ylim(low - 0.06 * (top - low) - 0.1, top + 0.06 * (top - low) + 0.1)
             axes.set_xlim(left=0.0)
-            axes.legend(loc="upper right", fontsize=7)
+            axes.legend(loc="best", fontsize=7)
     return figure
 
 
@@ -182,7 +190,7 @@ def _draw(
     axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool
 ) -> tuple[float, float]:
     """Draw a curve and return the smallest and the largest length to show."""
-    colour, dash = _style(curve, number, among, single)
+    colour, dash = curve.style.light, curve.style.dash
     scale = 1.0 if curve.steps is None else 1e-6
     if single:
         run = _typical(curve)
@@ -209,19 +217,6 @@ def _draw(
     shown = [*middle[known], *high[known][-1:], *low[known][-1:], *([] if curve.printed is None else [curve.printed])]
     finite = [float(value) for value in shown if value < NO_PATH / 10] or [curve.optimum]
     return min(finite), max(finite)
-
-
-def _style(curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool) -> tuple[str, Any]:
-    """Return colour and dashes: red and blue for single runs; a planner's second curve is darker and dotted."""
-    if single:
-        return ("#1f4fd8", "#d81f1f", "#222222")[min(number, 2)], "-"
-    colour, _, dash = label_styles([curve.planner])[0]
-    if any(other.planner == curve.planner for other in among[:number]):
-        dark = TWICE * sum(other.planner == curve.planner for other in among[:number])
-        red, green, blue = (round((1 - dark) * part + dark * ink) for part, ink in zip(colour, INK, strict=True))
-        colour = (red, green, blue)
-        dash = (":", "-.")[number % 2]
-    return hexed(colour), dash
 
 
 def _typical(curve: ConvergenceCurve) -> int:

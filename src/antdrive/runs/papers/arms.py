@@ -1,0 +1,98 @@
+"""Settings of an experiment's planner in the terms that decide a comparison, read from the planner and its map."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from antdrive.planners import Planner, Query, load_planner
+from antdrive.planners.colonies.colony import Colony, ColonyGraph
+from antdrive.planners.iterative import as_iterative
+from antdrive.runs.papers.experiment import Experiment
+from antdrive.worlds import Grid
+
+#: By heading, the options of planners that it shows.
+OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "walk": ("backtrack", "shortcut", "revisit", "memory", "min_weight", "tries"),
+        "first pheromone": ("mix",),
+        "deposit": (
+            *("deposit", "ranks", "evaporation", "min_pheromone", "q_max", "q_min", "elite", "depositors", "elitism"),
+        ),
+        "ants": ("ants", "explorers", "population"),
+        "iterations": ("iterations",),
+    }
+)
+UNSHOWN = ("time_budget", "threads", "max_steps", "initial")  # without effect here, or shown by other words
+WORDS = MappingProxyType({"True": "yes", "False": "no", "None": "none"})
+REST = "further options"
+HEADS = ("moves", *OPTIONS, "step limit of an ant", "budget", "counted as work", REST)
+
+
+def arm_facts(experiment: Experiment) -> dict[str, str]:
+    """Return the settings of an experiment's planner by heading of `HEADS`, in words."""
+    planner = experiment.made or load_planner(experiment.planner, **experiment.options)
+    query = experiment.query(experiment.world(0))
+    values = {field.name: getattr(planner, field.name) for field in dataclasses.fields(planner)}  # type: ignore[arg-type]
+    facts = {"moves": moves_in_words(query)}
+    for head, names in OPTIONS.items():
+        facts[head] = _listed({name: values[name] for name in names if name in values})
+    shown = {*UNSHOWN, *(name for names in OPTIONS.values() for name in names)}
+    ants = as_iterative(planner)
+    if ants is not None and math.isfinite(experiment.work):
+        facts["iterations"] = "until the budget is spent"
+    facts["first pheromone"] = ", ".join(filter(None, (facts["first pheromone"], _first_trail(planner, query))))
+    facts["step limit of an ant"] = _step_limit(planner, query)
+    facts["budget"] = f"{experiment.work:,.0f} {ants.work_unit}" if ants and math.isfinite(experiment.work) else "–"
+    facts["counted as work"] = _work_unit(planner, query)
+    facts[REST] = _listed({name: value for name, value in values.items() if name not in shown})
+    return {head: facts[head] or "–" for head in HEADS}
+
+
+def moves_in_words(query: Query) -> str:
+    """Return which moves a query's grid allows beyond or short of those that cut no corner."""
+    usual, moves = Grid.from_free(query.grid.free).moves, query.grid.moves
+    more, fewer = (int(np.unpackbits(one & ~other).sum()) // 2 for one, other in ((moves, usual), (usual, moves)))
+    words = "eight, corners may be cut" if more else "eight, none cuts a corner"
+    return f"{words}; {fewer} closed" if fewer else words
+
+
+def merged(facts: Sequence[Mapping[str, str]]) -> dict[str, str]:
+    """Return the facts of one arm on several maps: where maps differ, all values in their order."""
+    return {head: " / ".join(dict.fromkeys(one[head] for one in facts)) for head in HEADS}
+
+
+def _listed(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} {WORDS.get(str(value)) or _number(value)}" for name, value in values.items())
+
+
+def _number(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else f"{value}"
+
+
+def _first_trail(planner: Planner, query: Query) -> str:
+    """Return the range of a colony's pheromone before its first iteration; empty for other planners."""
+    if not isinstance(planner, Colony):
+        return ""
+    graph = ColonyGraph.of(query)
+    trail = planner.initial_trail(graph, np.random.default_rng(0))
+    low, high = float(trail.min()), float(trail.max())
+    return f"{low:g}{'' if low == high else f' to {high:.3g}'} on {'cells' if trail.ndim == 1 else 'arcs'}"
+
+
+def _step_limit(planner: Planner, query: Query) -> str:
+    default = getattr(planner, "default_steps", None)
+    if default is None:
+        return ""
+    steps = getattr(planner, "max_steps", None) or default(query.grid.free.size)
+    return f"{steps:,}"
+
+
+def _work_unit(planner: Planner, query: Query) -> str:
+    ants = as_iterative(planner)
+    return ants.work_unit if ants else planner.plan(query, np.random.default_rng(0)).work_unit
