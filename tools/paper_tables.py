@@ -3,6 +3,7 @@
 FOLDER is the output of that command. In `docs/papers/PAPER.md` the table of the paper's claims replaces the lines between
 `<!-- claims -->` and `<!-- end -->`, and the settings of their arms those between `<!-- arms -->` and `<!-- end -->`; in
 `docs/papers/README.md` their counts replace the lines between `<!-- counts -->` and `<!-- end -->`.
+`docs/papers/findings.md` collects the sentences under `## In three sentences` of the papers' pages, and
 `docs/notebook/paper-paragraphs.md` lists the papers' paragraphs with their rows. `--check` needs no folder: it lists claims
 that the pages omit or show with other printed figures.
 """
@@ -26,6 +27,7 @@ PAGES = Path(__file__).parent.parent / "docs" / "papers"
 PARAGRAPHS = PAGES.parent / "notebook" / "paper-paragraphs.md"
 HEADS = ("row", "claim", "reading", "printed", "ours", "verdict", "arms", "why", "source")
 VERDICTS = ("holds", "does not hold", "cannot be told")
+SENTENCES = "## In three sentences"
 VERDICT = HEADS.index("verdict")
 END = "<!-- end -->"
 
@@ -57,6 +59,16 @@ def arms_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
         _line(["---"] * (1 + len(ARM_HEADS))),
         *(_line([n, *f]) for n, f in facts.items()),
     ]
+
+
+def findings(pages: Mapping[str, str]) -> list[str]:
+    """Return the three sentences of each paper's page as lines of Markdown."""
+    lines: list[str] = []
+    for paper in PAPERS:
+        title = pages[paper].partition("\n")[0].removeprefix("# ")
+        _, _, rest = pages[paper].partition(f"{SENTENCES}\n\n")
+        lines += [f"## [{title}]({paper}.md)", "", *rest.partition("\n\n")[0].split("\n"), ""]
+    return lines[:-1]
 
 
 def paragraphs_page() -> str:
@@ -113,6 +125,8 @@ def _write(folder: Path) -> None:
         _replace(PAGES / f"{paper}.md", "claims", claims_table(mine))
         _replace(PAGES / f"{paper}.md", "arms", arms_table(mine))
     _replace(PAGES / "README.md", "counts", counts_table(rows))
+    pages = {paper: (PAGES / f"{paper}.md").read_text(encoding="utf-8") for paper in PAPERS}
+    _replace(PAGES / "findings.md", "findings", findings(pages))
     _write_text(PARAGRAPHS, paragraphs_page())
 
 
