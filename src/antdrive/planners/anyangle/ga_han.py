@@ -110,6 +110,7 @@ class GaHan(ViaPointPlanner):
         mutation: Pm, the probability that a gene mutates; the thesis uses 0.4 with nine obstacles
         via_points: via points per chromosome, 1 to 6 in the thesis
         elitism: whether the best chromosome always survives
+        elite_breeds: whether that chromosome is also a parent; in the thesis' program it is not
         tries: maximum number of random chromosomes in the whole run
         complete: False; the planner may miss an existing path
     """
@@ -120,6 +121,7 @@ class GaHan(ViaPointPlanner):
     mutation: float = 0.2
     via_points: int = 3
     elitism: bool = True
+    elite_breeds: bool = True
     tries: int = 1_000_000
 
     @property
@@ -158,6 +160,7 @@ class GaHan(ViaPointPlanner):
                     self.crossover,
                     self.mutation,
                     self.elitism,
+                    self.elite_breeds,
                     np.uint64(state),
                 )
                 rated = self.population
