@@ -254,8 +254,8 @@ def test_seeds_that_are_too_few_are_told_of_in_one_line():
     assert line.startswith("seeds: 3 are too few to decide ")
     assert line.endswith("claims; use 35")
     assert "\n" not in line
-    assert too_few_seeds(["han2007"], 6) == ""
-    assert "use 6" in too_few_seeds(["han2007"], 5)
+    assert too_few_seeds(["han2007"], 35) == ""
+    assert "use 35" in too_few_seeds(["han2007"], 34)
     assert too_few_seeds(["lee2008"], 6, quick=True) == ""
 
 

@@ -35,9 +35,10 @@ class AcoHan(Colony):
     end. A comment in the program lets ants turn back only after visiting every neighbour; `min_weight` gives
     moves to unvisited cells that priority.
 
-    Known weakness, measured (docs/papers/han2007.md): walks are long and full of loops. On the thesis' map
-    paths are 7 per cent longer than the shortest in the median; on 100 x 100 cells with a quarter blocked,
-    19 per cent longer.
+    Known weakness, measured (docs/papers/han2007.md): the colony does not learn. Pheromone on cells also pulls
+    ants back, so walks grow. In the world `forest` the best path is that of iteration 1 of 50, and the mean walk
+    grows from 28 to 38 m. Without pheromone it stays at 28 m, and the best path is 3 per cent shorter. `mmas`
+    learns there.
 
     Attributes:
         ants: ants per iteration
