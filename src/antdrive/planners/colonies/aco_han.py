@@ -37,8 +37,7 @@ class AcoHan(Colony):
 
     Known weakness, measured (docs/papers/han2007.md): the colony does not learn. Pheromone on cells also pulls
     ants back, so walks grow. In the world `forest` the best path is that of iteration 1 of 50, and the mean walk
-    grows from 28 to 38 m. Without pheromone it stays at 28 m, and the best path is 3 per cent shorter. `mmas`
-    learns there.
+    grows from 28 to 38 m; without pheromone it stays at 28 m. `mmas` learns there.
 
     Attributes:
         ants: ants per iteration
@@ -47,10 +46,10 @@ class AcoHan(Colony):
         deposit: an ant deposits deposit / length on its cells; 1 in the thesis' text, 5 in its program
         attraction: alpha of eq. 4.2.1
         elitism: e of eq. 4.2.4, the additional deposit of the best tour in ants; 0: no elite
-        elite_of: "run": the best tour so far is the elite; "iteration": that of the last group, as in the text
-        form: "equation": as in the equations, with the cosine as pull; "letter": the same with the plain dot
-            product, which may be negative; "listing": as in the program, with absolute pheromone, one direction
-            from start to goal for all cells, moves not normalised, and evaporation only where ants deposit
+        elite_of: whose best tour is the elite, the "run" or the "iteration"
+        form: "equation": the cosine as pull; "letter": the plain dot product; "listing": as in the program, with
+            absolute pheromone, one direction from start to goal for all cells, moves not normalised, and
+            evaporation only where ants deposit
         revisit: the weight of a visited cell
         min_weight: the least weight of an unvisited cell; 0 follows the equation literally
 

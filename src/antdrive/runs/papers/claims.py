@@ -260,7 +260,9 @@ def _mean_of_one(claim: Claim, runs: RunsByArm) -> Measured:
 def _means_of_several(claim: Claim, runs: RunsByArm) -> Measured:
     """Return the means of several planners as fractions of the printed ones; the one farthest off decides."""
     (case,) = claim.cases
-    values = [np.array([value for run in runs[arm] if (value := _value(run, *claim.quantity)) < NO_PATH]) for arm in case]
+    values = [
+        np.array([value for run in runs[arm] if (value := _value(run, *claim.quantity)) < NO_PATH]) for arm in case
+    ]
     lost = sum(len(runs[arm]) for arm in case) - sum(map(len, values))
     if not all(map(len, values)):
         return Measured(math.nan, Interval(math.nan, math.nan), 0, "–", unknown="no path was found")
@@ -436,7 +438,7 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "unrest": (2, ""),
     "early_unrest": (2, ""),
     "concentration": (3, ""),
-    "share": (1, " %"),
+    "share": (2, " %"),
     "cpu_ms": (0, " ms"),
     "work": (0, " steps"),
     "settled": (0, " iterations"),

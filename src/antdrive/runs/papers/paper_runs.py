@@ -191,9 +191,9 @@ def solve(
     else:
         result = chosen.plan(query, rng)
     spent = time.process_time() - started
-    ants = float(getattr(chosen, "ants", math.nan))
+    colony = float(getattr(chosen, "ants", math.nan))
     total, shortest = total_cost(query, result), maps.optimum(query)
-    return PaperRun(seed, seed, result, shortest, spent, total, concentration(result), ants)
+    return PaperRun(seed, seed, result, shortest, spent, total, concentration(result), colony)
 
 
 def concentration(result: PlanResult) -> float:
