@@ -111,8 +111,8 @@ def unknown(path: Path) -> None:
 
 
 def pheromone(path: Path) -> None:
-    """Render pheromone on the ground at iteration 30 of 50."""
-    frames = planning_frames(drive("forest", "aco-han"), {"camera": "oblique", "size": SIZE}, 50)
+    """Render pheromone on the ground at iteration 30 of 100."""
+    frames = planning_frames(drive("forest", "mmas"), {"camera": "oblique", "size": SIZE}, 100)
     saved(next(itertools.islice(frames, 29, None)), path)
 
 

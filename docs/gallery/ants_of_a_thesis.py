@@ -16,7 +16,7 @@ scenario = Scenario.of(
 # %%
 # The plan
 # --------
-# Colours show the colony's pheromone, the chart the path length by iteration. Ants walk from cell to cell, so the path is a
+# Colours show the pheromone, the chart path lengths by iteration: walks grow. Ants walk from cell to cell, so the path is a
 # staircase.
 
 grid, found = plan(scenario)

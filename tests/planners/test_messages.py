@@ -29,8 +29,8 @@ from tests.planners.worlds_to_solve import catalogue
 #: Values out of range by class; `inf` and `nan` are floats.
 OPTIONS = {
     AcoHan: (
-        "ants 0", "iterations 0", "max_steps 0", "evaporation 1.5", "deposit 0.0", "attraction -1.0", "elitism -1", "form song",
-        "time_budget 0.0", "min_weight nan",
+        "ants 0", "iterations 0", "max_steps 0", "evaporation 1.5", "deposit 0.0", "attraction -1.0", "elitism -1", "elite_of us",
+        "form song", "time_budget 0.0", "min_weight nan",
     ),
     AntSystem: ("alpha -1.0", "beta -1.0", "initial 0.0", "threads 0", "heuristic smell", "ranks 0"),
     AgeingAnts: ("q_min 0.0", "q_max 0.01"),

@@ -20,6 +20,7 @@ from antdrive.runs.papers.claims import (
     Arm,
     Claim,
     Decision,
+    _claim,
     evaluate,
     runs_needed,
     verdict_facts,
@@ -179,6 +180,24 @@ def test_the_gain_of_one_step_is_less_than_that_of_another():
     assert evaluate(turned, arms).decision is Decision.REFUTED
 
 
+def test_several_means_are_those_printed_only_if_each_is():
+    rng = np.random.default_rng(2)
+    known = {Arm("m", name): runs(rng.normal(value, 0.5, 50) - 100) for name, value in zip("ab", (40, 30), strict=True)}
+    near = claim("means", "about", 1.0, quantity=("length",), cases=(tuple(known),), printed="41, 30")
+    found = evaluate(near, known)
+    assert found.decision is Decision.HOLDS
+    assert found.ours.startswith("means 40.")
+    assert found.value == pytest.approx(40 / 41, abs=0.01)  # the mean farthest off
+    assert evaluate(dataclasses.replace(near, printed="40, 34"), known).decision is Decision.REFUTED
+    assert evaluate(dataclasses.replace(near, printed="40, 28.6"), known).decision is Decision.OPEN
+
+
+def test_a_case_may_compare_two_maps():
+    row = dict.fromkeys(("id", "kind", "source", "sentence", "printed", "statistic", "relation"), "x")
+    made = _claim("han2007", {**row, "maps": "m / n | k", "planners": "a | b", "quantity": "work", "bound": "0"})
+    assert made.cases == ((Arm("m", "a"), Arm("n", "b")), (Arm("k", "a"), Arm("k", "b")))
+
+
 def test_two_quantities_of_the_same_runs_are_compared():
     rng = np.random.default_rng(3)
     made = []
@@ -238,8 +257,8 @@ def test_seeds_that_are_too_few_are_told_of_in_one_line():
     assert line.startswith("seeds: 3 are too few to decide ")
     assert line.endswith("claims; use 35")
     assert "\n" not in line
-    assert too_few_seeds(["han2007"], 6) == ""
-    assert "use 6" in too_few_seeds(["han2007"], 5)
+    assert too_few_seeds(["han2007"], 35) == ""
+    assert "use 35" in too_few_seeds(["han2007"], 34)
     assert too_few_seeds(["lee2008"], 6, quick=True) == ""
 
 
@@ -383,7 +402,7 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
         "total",
     )  # fmt: skip
     for before, after in zip(made, read, strict=True):
-        for name in ("seed", "world", "optimum", "concentration", *quantities):
+        for name in ("seed", "world", "optimum", "concentration", "ants", *quantities):
             np.testing.assert_equal(getattr(after, name), getattr(before, name), err_msg=name)
         np.testing.assert_array_equal(after.result.line, before.result.line)
         assert after.result.status is before.result.status
@@ -422,6 +441,7 @@ def test_the_quantities_of_a_trial_are_those_worked_out_by_hand():
     assert run.last == 6.0
     assert run.unrest == run.early_unrest == pytest.approx(np.std([9, 9, 9, 4, 6]))
     assert run.cpu_ms == 100.0
+    assert dataclasses.replace(run, ants=4.0).share == 25.0
     none = dataclasses.replace(run, result=SimpleNamespace(solved=False, history=history, work=50))
     assert (none.length, none.gap, none.steps, none.settled) == (math.inf,) * 4
 

@@ -17,6 +17,7 @@ from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.reproduction import reproduce as measure_again
 from antdrive.views import papers as pictures
 from tools.paper_tables import arms_table, claims_table, counts_table, missing, replaced
+from antdrive.worlds import DIRECTIONS
 from tools.shared_data import data_folder
 
 
@@ -29,7 +30,7 @@ def test_every_experiment_has_a_path_and_states_whether_its_map_is_recreated(pap
         assert experiment.paper == paper
         assert math.isfinite(maps.optimum(query))
         assert experiment.printed is None or experiment.printed > 0
-        assert experiment.recreated == (paper != "han2007")
+        assert experiment.recreated == (paper != "han2007" or experiment.worlds == 0)
 
 
 def test_the_shortest_path_of_a_recreated_map_is_the_best_that_its_paper_prints():
@@ -57,6 +58,36 @@ def test_known_maps_are_those_of_the_thesis():
     free = maps.han_genes((10.0, 10.0, 5.0)).grid.free
     rows, cols = np.indices(free.shape)
     assert (free == (np.hypot(rows - 10, cols - 10) > 5 + 1e-9)).all()  # touching is not free
+
+
+def test_the_moves_of_the_thesis_that_cut_corners_touch_no_circle():
+    strict, query = maps.han_ants(), maps.cutting_corners(maps.han_ants())
+    assert maps.optimum(query) == pytest.approx(29.213, abs=1e-3)
+    corners = 0
+    for row, col in np.ndindex(20, 20):
+        for bit, step in enumerate(DIRECTIONS):
+            if (int(query.grid.moves[row, col]) & ~int(strict.grid.moves[row, col])) >> bit & 1:
+                corners += 1
+                ends = np.array([[col + 1.0, row + 1.0], [col + 1.0 + step[1], row + 1.0 + step[0]]])
+                assert min(segment_distance(ends, centre) for centre in maps.HAN_ANTS) > 1.4
+    assert corners > 100
+
+
+def segment_distance(ends, point):
+    along = ends[1] - ends[0]
+    part = np.clip((point - ends[0]) @ along / (along @ along), 0, 1)
+    return float(np.hypot(*(ends[0] + part * along - point)))
+
+
+def test_scattered_circles_keep_away_from_both_ends_and_touch_the_line_on_demand():
+    for seed in range(20):
+        for across in (True, False, None):
+            discs = np.array(maps.han_scattered(9, seed, across))
+            assert len(np.unique(discs, axis=0)) == 9
+            assert (np.hypot(*discs[:, :2].T) >= 5).all()
+            assert (np.hypot(*(discs[:, :2].T - 20)) >= 5).all()
+            touching = np.abs(discs[:, 0] - discs[:, 1]) / np.sqrt(2) <= 1
+            assert across is None or (touching == across).all()
 
 
 def test_a_recreated_map_depends_on_the_seed_alone():

@@ -143,7 +143,8 @@ def _han_figures(found: Measured, folder: Path, seeds: int, suffix: str) -> dict
     lengths = {int(e.options["ants"]): [t.length for t in trials if t.result.solved] for e, trials in with_ants}
     printed = {int(experiment.options["ants"]): experiment.printed or math.nan for experiment, _ in with_ants}
     ants, sweep = folder / f"han2007-ants{suffix}", folder / f"han2007-sweep{suffix}"
-    ants_figure(lengths, ants, planner="aco-han", printed=printed, unit="cells", optimum=maps.optimum(maps.han_ants()))
+    shortest = maps.optimum(maps.cutting_corners(maps.han_ants()))
+    ants_figure(lengths, ants, planner="aco-han", printed=printed, unit="cells", optimum=shortest)
     sweep_figure(PC, PM, _sweep(seeds), sweep)
     return {"han2007 ants": ants, "han2007 sweep": sweep}
 

@@ -73,6 +73,13 @@ def test_without_variation_the_best_of_the_first_population_takes_over():
     assert result.history.best[-1] == result.history.best[0]
 
 
+def test_an_elite_that_is_no_parent_has_no_copies():
+    alone = solve(single(), population=2, crossover=0.0, mutation=0.0, iterations=30, elite_breeds=False).history
+    assert alone.iteration_mean[-1] == alone.iteration_mean[0] > alone.best[-1]
+    copied = solve(single(), population=2, crossover=0.0, mutation=0.0, iterations=30).history
+    assert copied.iteration_mean[-1] == copied.best[-1] == alone.best[-1]
+
+
 def test_eliminated_chromosomes_are_replaced_by_random_ones():
     result = solve(single(), mutation=1.0)
     assert (result.history.arrived[1:] < 100).all()

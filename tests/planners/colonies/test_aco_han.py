@@ -60,6 +60,28 @@ def test_weights_follow_equation_4_2_1():
     assert (weights[0] > 0).sum() <= 3  # a corner has three moves
 
 
+def test_to_the_letter_the_pull_is_the_plain_dot_product_and_may_be_negative():
+    graph, planner = ColonyGraph.of(OPEN), AcoHan(form="letter", min_weight=0.0)
+    weights = np.zeros((12, 8))
+    planner.choice_weights(graph, np.ones(12), planner.heuristic_values(graph), weights)
+    # From cell (1, 1) = 5 the vector to the goal is (1, 2).
+    np.testing.assert_allclose(weights[5], np.maximum(0.0, 1 / 8 + np.array([2, 3, 1, -1, -2, -3, -1, 1])))
+
+
+def test_the_elite_is_the_tour_of_the_run_or_of_the_iteration():
+    graph, before = ColonyGraph.of(OPEN), np.zeros(12)
+    this = walks(ROUND)
+    for elite_of, cells in (("run", DIRECT), ("iteration", [(0, 0), (0, 1), (1, 2), (2, 3)])):
+        trails = []
+        for elitism in (0, 7):
+            trail = before.copy()
+            AcoHan(elitism=elitism, elite_of=elite_of).update(trail, state(graph, this, walks(DIRECT)))
+            trails.append(trail)
+        expected = np.zeros((3, 4))
+        expected[tuple(np.transpose(cells))] = 7 / (1 + 2 * math.sqrt(2))
+        np.testing.assert_allclose((trails[1] - trails[0]).reshape(3, 4), expected, atol=1e-12)
+
+
 def test_the_listing_adds_raw_pheromone_to_one_fixed_direction():
     graph, planner = ColonyGraph.of(OPEN), AcoHan(form="listing", min_weight=0.0)
     weights = np.zeros((12, 8))

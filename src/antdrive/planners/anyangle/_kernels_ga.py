@@ -98,6 +98,7 @@ def next_generation(
     crossover: float,
     mutation: float,
     elitism: bool,
+    elite_breeds: bool,
     state: Any,
 ) -> tuple[int, Any]:
     """Clone, cross, mutate and eliminate in place (Han 2007, section 4.1); returns the number of survivors, state.
@@ -105,15 +106,15 @@ def next_generation(
     The survivors fill the front of `population`; with elitism the best of the last generation comes first.
     """
     room, n = population.shape[0], population.shape[1]
+    bred = np.empty_like(population)
+    keep, elite = (1, shortest_of(lengths, size)) if elitism else (0, -1)
+    if elitism:
+        copy_points(population[elite], 0, bred[0])
     # Natural selection: fill the population with clones drawn by fitness 1 / length.
     share, total = np.empty(size, dtype=np.float64), 0.0
     for i in range(size):
-        total += 1.0 / lengths[i]
+        total += 1.0 / lengths[i] if elite_breeds or i != elite or size == 1 else 0.0
         share[i] = total
-    bred = np.empty_like(population)
-    keep = 1 if elitism else 0
-    if elitism:
-        copy_points(population[shortest_of(lengths, size)], 0, bred[0])
     for i in range(keep, room):
         state = next_random(state)
         parent = np.searchsorted(share, uniform(state) * share[size - 1], side="right")

@@ -96,8 +96,8 @@ class GaHan(ViaPointPlanner):
 
     Han 2007, section 4.1: a chromosome is a sequence of via points on free cells. Each generation selects by
     1 / length, crosses, mutates, eliminates chromosomes that touch an obstacle and refills the population at
-    random. The defaults are those of the thesis. `field` counts the chromosomes of the last population that
-    pass each cell.
+    random. The thesis' program also eliminates and refills before it mutates. The defaults are those of the
+    thesis. `field` counts the chromosomes of the last population that pass each cell.
 
     Known weakness, measured (docs/notebook/planner-quality.md): the first feasible line must be found by chance.
     Among many obstacles no line over so few via points may exist, or none is drawn: the status is then `STOPPED`.
@@ -110,6 +110,7 @@ class GaHan(ViaPointPlanner):
         mutation: Pm, the probability that a gene mutates; the thesis uses 0.4 with nine obstacles
         via_points: via points per chromosome, 1 to 6 in the thesis
         elitism: whether the best chromosome always survives
+        elite_breeds: whether that chromosome is also a parent; in the thesis' program it is not
         tries: maximum number of random chromosomes in the whole run
         complete: False; the planner may miss an existing path
     """
@@ -120,6 +121,7 @@ class GaHan(ViaPointPlanner):
     mutation: float = 0.2
     via_points: int = 3
     elitism: bool = True
+    elite_breeds: bool = True
     tries: int = 1_000_000
 
     @property
@@ -158,6 +160,7 @@ class GaHan(ViaPointPlanner):
                     self.crossover,
                     self.mutation,
                     self.elitism,
+                    self.elite_breeds,
                     np.uint64(state),
                 )
                 rated = self.population

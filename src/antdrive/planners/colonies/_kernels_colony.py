@@ -432,8 +432,8 @@ def detour_weights(
 
 
 @kernel
-def goal_pull(mask: Array, cell: Array, cols: int, r1: int, c1: int, out: Array) -> None:
-    """Set out[i, k] to the cosine between move k and the direction from node i to the goal, at least 0."""
+def goal_pull(mask: Array, cell: Array, cols: int, r1: int, c1: int, plain: bool, out: Array) -> None:
+    """Set out[i, k] to the cosine between move k and the vector from node i to the goal, at least 0; or to their dot product."""
     for i in range(len(mask)):
         here = cell[i] if len(cell) else i
         dr, dc = r1 - here // cols, c1 - here % cols
@@ -441,8 +441,9 @@ def goal_pull(mask: Array, cell: Array, cols: int, r1: int, c1: int, out: Array)
         for k in range(8):
             out[i, k] = 0.0
             if distance > 0.0 and mask[i] & (1 << k):
-                along = (DROW[k] * dr + DCOL[k] * dc) / distance
-                out[i, k] = max(0.0, along / SQRT2 if k & 1 else along)
+                dot = DROW[k] * dr + DCOL[k] * dc
+                along = dot / distance
+                out[i, k] = dot if plain else max(0.0, along / SQRT2 if k & 1 else along)
 
 
 @kernel

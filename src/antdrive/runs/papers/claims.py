@@ -7,6 +7,7 @@ an arm, for instance that a colony learns at all.
 from __future__ import annotations
 
 import enum
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -64,7 +65,7 @@ class Claim:
 def _claim(paper: str, row: dict[str, str]) -> Claim:
     maps, planners = _listed(row.pop("maps")), _listed(row.pop("planners"))
     quantity, bound = _listed(row.pop("quantity")), float(row.pop("bound"))
-    cases = tuple(tuple(Arm(name, planner) for planner in planners) for name in maps)
+    cases = tuple(tuple(map(Arm, itertools.cycle(name.split(" / ")), planners)) for name in maps)
     return Claim(paper=paper, **row, quantity=quantity, bound=bound, cases=cases)
 
 
@@ -256,6 +257,31 @@ def _mean_of_one(claim: Claim, runs: RunsByArm) -> Measured:
     return Measured(value, interval, len(known), f"mean {_with_interval(value, interval, claim)}", why)
 
 
+def _means_of_several(claim: Claim, runs: RunsByArm) -> Measured:
+    """Return the means of several planners as fractions of the printed ones; the one farthest off decides."""
+    (case,) = claim.cases
+    values = [
+        np.array([value for run in runs[arm] if (value := _value(run, *claim.quantity)) < NO_PATH]) for arm in case
+    ]
+    lost = sum(len(runs[arm]) for arm in case) - sum(map(len, values))
+    if not all(map(len, values)):
+        return Measured(math.nan, Interval(math.nan, math.nan), 0, "–", unknown="no path was found")
+    fractions = [known / float(printed) for known, printed in zip(values, claim.printed.split(", "), strict=True)]
+    intervals = [means_by_world(known[:, None], np.arange(len(known)))[0] for known in fractions]
+
+    def far(k: int) -> tuple[bool, float]:
+        return RELATIONS["about"](intervals[k], 1.0)[1], max(abs(end - 1) for end in intervals[k])
+
+    k = max(range(len(case)), key=far)
+    ours = f"means {', '.join(f'{known.mean():.2f}' for known in values)}"
+    off = (
+        f"{100 * known.mean() - 100:+.1f} [{100 * low - 100:+.1f}, {100 * high - 100:+.1f}] %"
+        for known, (low, high) in zip(fractions, intervals, strict=True)
+    )
+    why = f"from the printed means: {', '.join(off)}" + (f"; {lost} runs had no path" if lost else "")
+    return Measured(float(fractions[k].mean()), intervals[k], min(map(len, values)), ours, why)
+
+
 def _arrived(claim: Claim, runs: RunsByArm) -> Measured:
     """Return the fraction of runs in which a planner finds a path."""
     count, arrived, needed = *_solved(claim, runs), runs_needed(claim)
@@ -303,6 +329,7 @@ STATISTICS: Mapping[str, Callable[[Claim, RunsByArm], Measured]] = MappingProxyT
         # A single planner, all runs together.
         "median": _median_of_one,
         "mean": _mean_of_one,
+        "means": _means_of_several,
         "arrived": _arrived,
         "failed": _failed,
         # Two planners, paired by map and seed; `gain` compares two pairs.
@@ -411,6 +438,8 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "unrest": (2, ""),
     "early_unrest": (2, ""),
     "concentration": (3, ""),
+    "share": (2, " %"),
+    "cpu_ms": (0, " ms"),
     "work": (0, " steps"),
     "settled": (0, " iterations"),
     "near": (0, " iterations"),

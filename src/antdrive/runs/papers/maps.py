@@ -12,14 +12,16 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import PLANNERS, Query
-from antdrive.worlds import DIRECTIONS, Disc, Grid, World, rasterise
+from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 
+Circle: TypeAlias = tuple[float, float, float]  # x, y, radius
 #: The fourteen obstacles of han2007's ACO listing, radius 1, on points (1, 1) to (20, 20).
 HAN_ANTS = (
     *((4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)),
@@ -52,18 +54,40 @@ def cutting_corners(query: Query) -> Query:
     return dataclasses.replace(query, grid=dataclasses.replace(query.grid, moves=moves))
 
 
-def han_ants(*discs: tuple[float, float, float] | None) -> Query:
+def han_ants(*discs: Circle | None, circles: bool = False) -> Query:
     """Return han2007's map for ants and a point robot, in the thesis' units, with its obstacles or with `discs`."""
     listed = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_ANTS)
-    obstacles = tuple(Disc(*disc) for disc in listed if disc is not None)
-    return Query(rasterise(World("han2007-aco", (0.5, 0.5, 20.5, 20.5), obstacles), 1.0), (0, 0), (19, 19))
+    return _han("han2007-aco", 1, tuple(Disc(*disc) for disc in listed if disc is not None), circles)
 
 
-def han_genes(*discs: tuple[float, float, float]) -> Query:
+def han_genes(*discs: Circle, circles: bool = False) -> Query:
     """Return han2007's map for the genetic algorithm, with its obstacles or with `discs` (x, y, radius)."""
     obstacles = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_GENES)
-    world = World("han2007-ga", (-0.5, -0.5, 20.5, 20.5), tuple(Disc(*disc) for disc in obstacles))
-    return Query(rasterise(world, 1.0), (0, 0), (20, 20))
+    return _han("han2007-ga", 0, tuple(Disc(*disc) for disc in obstacles), circles)
+
+
+def _han(name: str, first: int, discs: tuple[Disc, ...], circles: bool) -> Query:
+    """Return a query from (first, first) to (20, 20); straight lines avoid blocked cells or, with `circles`, the discs."""
+    world = World(name, (first - 0.5, first - 0.5, 20.5, 20.5), discs)
+    grid = rasterise(world, 1.0)
+    if circles:
+        return Query.between(grid, Task(world, (float(first), float(first), 0.0), (20.0, 20.0), cell=1.0))
+    return Query(grid, (0, 0), (20 - first, 20 - first))
+
+
+def han_scattered(count: int, seed: int, across: bool | None = None) -> tuple[Circle, ...]:
+    """Draw han2007's obstacles of radius 1 (section 3): grid points at least 5 from start and goal, without repetition.
+
+    With `across`, all or none of them touch the line from (0, 0) to (20, 20).
+    """
+    points = [(float(x), float(y)) for x in range(21) for y in range(21)]
+    allowed = [
+        (x, y, 1.0)
+        for x, y in points
+        if min(math.hypot(x, y), math.hypot(x - 20, y - 20)) >= 5
+        and (across is None or (abs(x - y) <= SQRT2) == across)
+    ]
+    return tuple(allowed[i] for i in np.random.default_rng(seed).permutation(len(allowed))[:count])
 
 
 def scattered(size: int, blocked: float, seed: int) -> Query:

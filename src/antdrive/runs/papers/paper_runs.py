@@ -102,6 +102,7 @@ class PaperRun:
     cpu_s: float  # processor time of the plan [s]
     total: float  # hasan's total cost of the path; inf without a path
     concentration: float = math.nan  # fraction of the planner's field on the path; nan without a path or a field
+    ants: float = math.nan  # ants per iteration; nan for other planners
 
     @property
     def length(self) -> float:
@@ -159,6 +160,11 @@ class PaperRun:
         return float(known.std()) if len(known) else math.inf
 
     @property
+    def share(self) -> float:
+        """The share of all iterations' ants that arrived [%]."""
+        return 100.0 * float(self.result.history.arrived.mean()) / self.ants
+
+    @property
     def cpu_ms(self) -> float:
         """The processor time of the plan, or of all decisions [ms]."""
         return 1000.0 * self.cpu_s
@@ -185,7 +191,9 @@ def solve(
     else:
         result = chosen.plan(query, rng)
     spent = time.process_time() - started
-    return PaperRun(seed, seed, result, maps.optimum(query), spent, total_cost(query, result), concentration(result))
+    colony = float(getattr(chosen, "ants", math.nan))
+    total, shortest = total_cost(query, result), maps.optimum(query)
+    return PaperRun(seed, seed, result, shortest, spent, total, concentration(result), colony)
 
 
 def concentration(result: PlanResult) -> float:
