@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from antdrive.planners import Query
 from antdrive.runs.papers.experiment import CANDIDATES, MANY_CANDIDATES, Experiment, candidates
-from antdrive.runs.papers.maps import scattered
+from antdrive.runs.papers.maps import cutting_corners, scattered
 
 #: Table 2 by side of the map [cells]: the lengths of ACO, PFACO and IACO [cells].
 TABLE_2 = {
@@ -26,7 +29,6 @@ KINDS: dict[int, tuple[tuple[int, int], dict[str, Any]]] = {
 STEPS = {30: 7.1e6, 50: 2e7}  # median ant steps of `iaco`
 ALL, LARGE = (10, 20, 30, 50), (20, 30, 50)
 FEW = 24  # seeds of the arms that only show whether a constant matters
-RANDOM = "50×50, 10 % blocked"
 
 
 def suganthi2019() -> list[Experiment]:
@@ -43,7 +45,8 @@ def suganthi2019() -> list[Experiment]:
         "iaco": {"ants": 25, "explorers": 75, **common, **walk},
     }
     die = {"backtrack": False, "shortcut": False}
-    unlearned = {"alpha_1": 0.0, "alpha_2": 0.0, "alpha_3": 0.0}
+    unlearned = dict.fromkeys(("alpha_1", "alpha_2", "alpha_3"), 0.0)
+    initial = {**dict.fromkeys(("alpha_1", "alpha_2", "alpha_3", "beta_1", "deposit"), 1.0), "evaporation": 0.3}
     arms: list[tuple[str, dict[str, Any], tuple[int, ...]]] = [  # label, changed options, sizes
         *((name, {}, ALL) for name in planners),
         *((f"{name}, ants die", die, ALL) for name in planners),
@@ -63,6 +66,7 @@ def suganthi2019() -> list[Experiment]:
         ("pfaco, 2 cells", {"influence": 2.0}, LARGE),
         *((f"{name}, alpha = 0", {"alpha": 0.0}, LARGE) for name in ("as", "iaco")),
         ("pfaco, alpha = 0", unlearned, LARGE),
+        ("pfaco, initial parameters", initial, LARGE),
         *((f"{name}, C = {c:g}", {"initial": c}, (30,)) for name in ("as", "iaco") for c in (0.01, 100.0)),
     ]
     table = [
@@ -79,7 +83,7 @@ def suganthi2019() -> list[Experiment]:
             slow=size >= 30,
             # Two runs with dying ants may differ by a quarter of the length.
             rounds=10 if changed is die and size < 50 else 1,
-            most_seeds=FEW if {"alpha", "alpha_1", "initial"} & changed.keys() else 10_000,
+            most_seeds=FEW if {"alpha", "initial"} & changed.keys() or changed is unlearned else 10_000,
             work=STEPS[size] if label.endswith("steps") else math.inf,
         )
         for size in TABLE_2
@@ -91,7 +95,7 @@ def suganthi2019() -> list[Experiment]:
     crossed = [
         Experiment(
             paper="suganthi2019",
-            map=RANDOM,
+            map="50×50, 10 % blocked",
             planner=planner,
             label=label,
             options={**planners[planner], **die, **changed},
@@ -105,4 +109,13 @@ def suganthi2019() -> list[Experiment]:
             ("as", "as, 100 ants, ants die", {"ants": 100}),
         )
     ]
-    return table + crossed
+    cut = [
+        dataclasses.replace(one, map=f"{one.map}, corners cut", query=partial(_cut, one.query), comparable=False)
+        for one in table
+        if one.map == "30×30" and one.name in ("as", "pfaco", "iaco", "iaco, 100 common")
+    ]
+    return table + crossed + cut
+
+
+def _cut(query: Callable[[int], Query], seed: int) -> Query:
+    return cutting_corners(query(seed))
