@@ -212,3 +212,10 @@ def test_the_pages_tables_are_written_from_the_verdicts():
     assert counts_table(rows)[2:] == ["| [hasan](hasan.md) | 2 | 1 | 1 | 0 |", "| all | 2 | 1 | 1 | 0 |"]
     page = "a\n<!-- claims -->\nold\n<!-- end -->\nb\n"
     assert replaced(page, "claims", ["new"]) == "a\n<!-- claims -->\n\nnew\n\n<!-- end -->\nb\n"
+
+
+def test_compared_ants_of_suganthi2019_walk_by_equal_rules():
+    rules = {(e.map, e.name): (e.options["backtrack"], e.options["shortcut"]) for e in PAPERS["suganthi2019"]()}
+    claims = [claim for claim in CLAIMS if claim.paper == "suganthi2019"]
+    unequal = {claim.reading for claim in claims if len({rules[arm] for arm in claim.arms}) > 1}
+    assert unequal == {"only PFACO's ants die, loops stay"}
