@@ -28,7 +28,8 @@ KINDS: dict[int, tuple[tuple[int, int], dict[str, Any]]] = {
 }
 STEPS = {30: 7.1e6, 50: 2e7}  # median ant steps of `iaco`
 ALL, LARGE = (10, 20, 30, 50), (20, 30, 50)
-FEW = 24  # seeds of the arms that only show whether a constant matters
+FEW = 24  # seeds of checks, and of further readings where a plan takes half a second
+CHECKS, SLOW = ("alpha = 0", "C = 0.01", "C = 100"), ("all deposit", "ants share", "in full", "no elite", "many steps")
 
 
 def suganthi2019() -> list[Experiment]:
@@ -83,7 +84,7 @@ def suganthi2019() -> list[Experiment]:
             slow=size >= 30,
             # Two runs with dying ants may differ by a quarter of the length.
             rounds=10 if changed is die and size < 50 else 1,
-            most_seeds=FEW if {"alpha", "initial"} & changed.keys() or changed is unlearned else 10_000,
+            most_seeds=FEW if label.endswith(CHECKS if size < 50 else (*CHECKS, *SLOW)) else 10_000,
             work=STEPS[size] if label.endswith("steps") else math.inf,
         )
         for size in TABLE_2
@@ -110,7 +111,9 @@ def suganthi2019() -> list[Experiment]:
         )
     ]
     cut = [
-        dataclasses.replace(one, map=f"{one.map}, corners cut", query=partial(_cut, one.query), comparable=False)
+        dataclasses.replace(
+            one, map=f"{one.map}, corners cut", query=partial(_cut, one.query), comparable=False, most_seeds=FEW
+        )
         for one in table
         if one.map == "30×30" and one.name in ("as", "pfaco", "iaco", "iaco, 100 common")
     ]
