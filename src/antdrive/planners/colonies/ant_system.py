@@ -185,7 +185,7 @@ class ExploringAnts(AntSystem):
 
     Known weaknesses, measured on the same page: exploratory ants do not pay. They wander, so an iteration takes
     up to ten times as long as with `AntSystem`, and as many common ants in their place find shorter paths on
-    maps of 30 x 30 and 50 x 50 cells. A heavier elite helps (`elite=25`): at 50 x 50 cells paths are 8 per cent
+    maps of 30 x 30 and 50 x 50 cells. A heavier elite helps (`elite=25`): at 50 x 50 cells paths are 7 per cent
     longer than the shortest, with that elite 3.
 
     Attributes:
