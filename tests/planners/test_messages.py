@@ -34,7 +34,7 @@ OPTIONS = {
     ),
     AntSystem: ("alpha -1.0", "beta -1.0", "initial 0.0", "threads 0", "heuristic smell", "ranks 0"),
     AgeingAnts: ("q_min 0.0", "q_max 0.01"),
-    ExploringAnts: ("depositors few", "explorers -1", "elite -1.0"),
+    ExploringAnts: ("depositors few", "explorers -1", "elite -1.0", "ties few"),
     MaxMinAnts: ("p_best 1.0", "patience 0"),
     MergingAnts: ("scouts -1", "settled 0", "beta 2.0", "heuristic step"),
     MaxMinDStar: ("alpha 0.0", "beta -1.0", "alpha_max 0.5", "evaporation 1.0"),

@@ -254,3 +254,10 @@ def test_the_pages_tables_are_written_from_the_verdicts():
     assert "| x / 6 |" in written[2]
     page = "a\n<!-- claims -->\nold\n<!-- end -->\nb\n"
     assert replaced(page, "claims", ["new"]) == "a\n<!-- claims -->\n\nnew\n\n<!-- end -->\nb\n"
+
+
+def test_compared_ants_of_suganthi2019_walk_by_equal_rules():
+    rules = {(e.map, e.name): (e.options["backtrack"], e.options["shortcut"]) for e in PAPERS["suganthi2019"]()}
+    claims = [claim for claim in CLAIMS if claim.paper == "suganthi2019"]
+    unequal = {claim.reading for claim in claims if len({rules[arm] for arm in claim.arms}) > 1}
+    assert unequal == {"only PFACO's ants die, loops stay"}

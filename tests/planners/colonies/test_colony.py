@@ -269,12 +269,6 @@ def test_exploratory_ants_avoid_what_common_ants_follow():
     assert tables[1][5, 1] / tables[1][5, 0] == pytest.approx(eta / 4)  # eq. 5
 
 
-def test_the_elite_of_an_iteration_deposits_more():
-    tours = walks(BEND, DIRECT, [])
-    amounts = ExploringAnts(elite=2.0, deposit=5.0).amounts(state(tours))
-    np.testing.assert_allclose(amounts, [5 / tours.lengths[0], 3 * 5 / tours.lengths[1], 0])  # eq. 7-8
-
-
 # MAX-MIN ant system (Stützle & Hoos 2000)
 
 
@@ -398,11 +392,32 @@ def test_merging_ants_get_through_a_maze():
 
 
 @pytest.mark.parametrize("best", [1, 2, 3])
-def test_best_ants_share_the_additional_deposit_of_the_elite(best):
+@pytest.mark.parametrize("ties", ["arc", "ant", "share"])
+def test_the_additional_deposit_of_the_best_ants_depends_on_ties(best, ties):
     tours = walks(BEND, *[DIRECT] * best, [])
-    amounts = ExploringAnts(elite=2.0, deposit=5.0).amounts(state(tours))
-    each = (1 + 2 / best) * 5 / tours.lengths[1]  # eq. 7-8 of suganthi2019
-    np.testing.assert_allclose(amounts, [5 / tours.lengths[0], *[each] * best, 0])
+    trail = np.zeros((12, 8))
+    ExploringAnts(elite=2.0, deposit=5.0, ties=ties).update(trail, state(tours))
+    extra = {"arc": 2, "ant": 2 * best, "share": 2}[ties]  # eq. 7-8 of suganthi2019; all tours but BEND are one
+    assert [trail[arc] for arc in arcs(DIRECT)] == pytest.approx([(best + extra) * 5 / tours.lengths[1]] * 3)
+    assert [trail[arc] for arc in arcs(BEND)[:-1]] == pytest.approx([5 / tours.lengths[0]] * 3)
+
+
+def test_by_the_letter_of_equation_8_each_arc_of_two_best_tours_receives_the_full_deposit():
+    other = [(0, 0), (0, 1), (1, 2), (2, 3)]  # as long as DIRECT
+    trails = {ties: np.zeros((12, 8)) for ties in ("arc", "ant", "share")}
+    for ties, trail in trails.items():
+        ExploringAnts(elite=2.0, ties=ties, depositors="all").update(trail, state(walks(DIRECT, other)))
+    full = 1 / walks(DIRECT).lengths[0]
+    for arc in {*arcs(DIRECT), *arcs(other)}:
+        assert {ties: trail[arc] / full for ties, trail in trails.items()} == pytest.approx(
+            {"arc": 3, "ant": 3, "share": 2}
+        )
+
+
+def test_without_an_arrival_the_elite_deposits_nothing():
+    trail = np.ones((12, 8))
+    ExploringAnts(evaporation=0.3).update(trail, state(walks([], [])))
+    assert trail == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize("mix", [0.0, 0.3, 1.0])

@@ -433,6 +433,7 @@ def _quartile_range(values: Floats, counts: Numbers) -> float:
 #: Digits and unit of a quantity.
 UNITS: Mapping[str, tuple[int, str]] = {
     "gap": (1, " %"),
+    "missing": (0, ""),
     "length": (2, ""),
     "last": (2, ""),
     "unrest": (2, ""),

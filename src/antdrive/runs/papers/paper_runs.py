@@ -120,6 +120,11 @@ class PaperRun:
         return float(len(self.result.cells) - 1) if self.result.solved else math.inf
 
     @property
+    def missing(self) -> float:
+        """1 without a path, 0 with one."""
+        return float(not self.result.solved)
+
+    @property
     def last(self) -> float:
         """The best path of the last iteration in which an ant arrived; inf if none did."""
         known = self.result.history.iteration_best
