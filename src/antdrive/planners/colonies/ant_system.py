@@ -154,17 +154,19 @@ class AgeingAnts(AntSystem):
 
     def amounts(self, state: IterationState) -> Floats:
         """Return Q_m / L_m for each ant m of `state`, with Q_m by eq. 5."""
-        count = len(state.tours)
-        return self.aged(state.rng.random(count)) / state.tours.lengths  # eq. 4
+        rand = state.rng.random(len(state.tours))
+        return self.aged(rand, state.first, sum(self.kinds)) / state.tours.lengths  # eq. 4
 
-    def aged(self, rand: Floats) -> Floats:
-        """Return Q_m of ants m = 1 to M (eq. 5), clipped to its bounds, which eq. 5 as printed may exceed.
+    def aged(self, rand: Floats, first: int, count: int) -> Floats:
+        """Return Q_m of successive ants m (eq. 5), clipped to its bounds, as eq. 5 as printed falls below Q_min.
 
         Args:
-            rand: a random number in [0, 1) for each ant (M,)
+            rand: a random number in [0, 1) for each of the ants (N,)
+            first: the number of these ants' first, from 0
+            count: M, the number of all ants
         """
-        span, m = self.q_max - self.q_min, np.arange(1, len(rand) + 1)
-        amounts = self.q_max - span / 2 * rand - span / len(rand) * m  # eq. 5
+        span, m = self.q_max - self.q_min, first + np.arange(1, len(rand) + 1)
+        amounts = self.q_max - span / 2 * rand - span / count * m  # eq. 5
         return np.clip(amounts, self.q_min, self.q_max)
 
 
@@ -243,7 +245,7 @@ class ExploringAnts(AntSystem):
         """Return Q / L_k for depositors plus, for the best ants of `state`, elite Q / L_best divided among them."""
         lengths = state.tours.lengths
         best = lengths <= lengths.min() + 1e-9
-        usual = 1.0 if self.depositors == "all" else np.arange(len(lengths)) < self.ants
+        usual = 1.0 if self.depositors == "all" else state.first + np.arange(len(lengths)) < self.ants
         return np.where(best, usual + self.elite / best.sum(), usual) * self.deposit / lengths  # eq. 4, 7 and 8
 
 
