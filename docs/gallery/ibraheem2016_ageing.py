@@ -3,7 +3,7 @@ Ants that age (Ibraheem 2016)
 =============================
 
 Ibraheem and Ajeil (2016) let older ants deposit less pheromone to delay convergence. Here their colony and the ant system
-search a map of 20 × 20 cells with 10 obstacles.
+search a map of 20 × 20 cells with ten obstacles, made to have the length that the paper prints.
 """
 
 from antdrive import Scenario, film, plan, run

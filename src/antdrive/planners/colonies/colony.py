@@ -342,7 +342,8 @@ class Colony(IterativePlanner):
                     walks, taken = construction.construct(rng, pool, ants)
                     tours = construction.shorten(ants)
                     daemon_tour = self.daemon_action(graph, tours, memory.tour if best is None else best)
-                    leader, row = tours, tours.summary().shortest
+                    summary = tours.summary()
+                    leader, row = tours, summary.shortest
                     if daemon_tour is not None and daemon_tour.lengths[0] <= tours.lengths[row]:
                         leader, row = daemon_tour, 0
                     steps, iteration_best = steps + taken, min(iteration_best, float(leader.lengths[row]))
@@ -351,7 +352,7 @@ class Colony(IterativePlanner):
                         best_cells, best_number = graph.cells(best.cells[0]), number
                     since = number - best_number
                     state = IterationState(number, graph, walks, tours, daemon_tour, best, since, rng, ants.start)
-                    if self.update_every is None or tours.summary().arrived:
+                    if self.update_every is None or summary.arrived:
                         self.update(trail, state)
                 summary = construction.shortened.summary()
                 graph.draw(trail, picture)

@@ -64,8 +64,14 @@ class Claim:
 def _claim(paper: str, row: dict[str, str]) -> Claim:
     maps, planners = _listed(row.pop("maps")), _listed(row.pop("planners"))
     quantity, bound = _listed(row.pop("quantity")), float(row.pop("bound"))
-    cases = tuple(tuple(Arm(name, planner) for planner in planners) for name in maps)
+    cases = tuple(tuple(_arm(name, planner) for planner in planners) for name in maps)
     return Claim(paper=paper, **row, quantity=quantity, bound=bound, cases=cases)
+
+
+def _arm(name: str, planner: str) -> Arm:
+    """Return a planner on a map; "PLANNER @ MAP" is on a map of its own."""
+    planner, _, other = planner.partition(" @ ")
+    return Arm(other or name, planner)
 
 
 def _listed(cell: str) -> tuple[str, ...]:
@@ -213,6 +219,15 @@ def _balance(claim: Claim, runs: RunsByArm) -> Measured:
     return Measured(value, interval, len(signs), ours, median, _never(first, second))
 
 
+def _ratio(claim: Claim, runs: RunsByArm) -> Measured:
+    """Return the median of the paired ratios of the first value to the second."""
+    first, second, world = _paired(claim, runs)
+    value, interval = _median(first / second, world)
+    ours = f"median ratio {value:.2f} [{_written(interval.low, 2)}, {_written(interval.high, 2)}]"
+    medians = f"medians {np.median(first):.0f} and {np.median(second):.0f}"
+    return Measured(value, interval, len(first), ours, medians, _never(first, second))
+
+
 def _scatter(claim: Claim, runs: RunsByArm) -> Measured:
     """Return the difference of the interquartile ranges; its interval resamples maps, then runs.
 
@@ -308,6 +323,7 @@ STATISTICS: Mapping[str, Callable[[Claim, RunsByArm], Measured]] = MappingProxyT
         # Two planners, paired by map and seed; `gain` compares two pairs.
         "difference": _difference,
         "balance": _balance,
+        "ratio": _ratio,
         "scatter": _scatter,
         "gain": _gain,
         # Two planners, map by map.
@@ -414,6 +430,7 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "work": (0, " steps"),
     "settled": (0, " iterations"),
     "near": (0, " iterations"),
+    "reached": (0, " iterations"),
     "effort": (0, " steps"),
 }
 
