@@ -165,7 +165,7 @@ def test_no_worse_lets_a_small_effect_pass_and_no_larger_one():
 
 
 def test_a_ratio_compares_planners_on_maps_of_their_own():
-    row = {"maps": "large", "planners": "a | a @ small", "quantity": "gap", "bound": "2", "statistic": "ratio"}
+    row = {"maps": "large / small", "planners": "a | a", "quantity": "gap", "bound": "2", "statistic": "ratio"}
     words = {
         "id": "I1",
         "kind": "claim",

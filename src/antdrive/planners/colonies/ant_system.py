@@ -36,10 +36,10 @@ class AntSystem(Colony):
     """Ant system: ants guided by pheromone on arcs and a heuristic.
 
     Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q / length
-    on its arcs. The defaults are those of ibraheem2016. suganthi2019 uses beta 1 and heuristic "step"; lee2008
-    uses 500 ants, beta 2 and evaporation 0.01.
+    on its arcs. alpha, beta and evaporation are those of ibraheem2016, which gives ranges of ants and iterations
+    and no Q. suganthi2019 uses beta 1 and heuristic "step"; lee2008 uses 500 ants, beta 2 and evaporation 0.01.
 
-    Known weaknesses, measured (docs/notebook/planner-quality.md): ants die in dead ends, as in the papers. With a
+    Known weaknesses, measured (docs/notebook/planner-quality.md): ants die in dead ends. With a
     quarter of the cells blocked, 6 of 10 runs cross 50 x 50 cells, with paths twice as long as the shortest, and
     none crosses 100 x 100. With `backtrack` and `shortcut` all arrive.
 
@@ -140,7 +140,7 @@ class AgeingAnts(AntSystem):
     170 of 400 runs and shorter in 71; no values of the bounds change that.
 
     Attributes:
-        q_max: Q_max, the deposit of a young ant
+        q_max: Q_max, the deposit of a young ant, in place of `deposit`
         q_min: Q_min, the deposit of an old ant
     """
 

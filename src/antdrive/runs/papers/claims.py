@@ -7,6 +7,7 @@ an arm, for instance that a colony learns at all.
 from __future__ import annotations
 
 import enum
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -64,14 +65,8 @@ class Claim:
 def _claim(paper: str, row: dict[str, str]) -> Claim:
     maps, planners = _listed(row.pop("maps")), _listed(row.pop("planners"))
     quantity, bound = _listed(row.pop("quantity")), float(row.pop("bound"))
-    cases = tuple(tuple(_arm(name, planner) for planner in planners) for name in maps)
+    cases = tuple(tuple(map(Arm, itertools.cycle(name.split(" / ")), planners)) for name in maps)
     return Claim(paper=paper, **row, quantity=quantity, bound=bound, cases=cases)
-
-
-def _arm(name: str, planner: str) -> Arm:
-    """Return a planner on a map; "PLANNER @ MAP" is on a map of its own."""
-    planner, _, other = planner.partition(" @ ")
-    return Arm(other or name, planner)
 
 
 def _listed(cell: str) -> tuple[str, ...]:
@@ -185,8 +180,6 @@ def _difference(claim: Claim, runs: RunsByArm) -> Measured:
     difference = np.round(first - second, 9)  # removes rounding errors
     value, interval = _median(difference, world)
     why = f"{_counts(difference)}; Wilcoxon's p {wilcoxon(difference):.2g}"
-    if claim.quantity == ("work",):
-        why += f"; processor time {_slower(claim, runs):+.0f} %"
     ours = f"median difference {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
     return Measured(value, interval, len(difference), ours, why, _never(first, second))
 
@@ -359,12 +352,6 @@ def _never(first: Floats, second: Floats) -> str:
     return NEVER if min(first.min(), second.min()) >= NO_PATH else ""
 
 
-def _slower(claim: Claim, runs: RunsByArm) -> float:
-    """Return how much slower the first planner is, by median processor time [%]; negative if faster."""
-    first, second, _ = _paired(claim, runs, quantity=(TIMED,))
-    return 100 * (float(np.median(first)) / max(float(np.median(second)), 1e-9) - 1)
-
-
 def _value(run: PaperRun, quantity: str) -> float:
     value = float(getattr(run, quantity))
     return NO_PATH if math.isnan(value) else min(value, NO_PATH)
@@ -387,15 +374,13 @@ def _paired(
     claim: Claim,
     runs: RunsByArm,
     cases: Sequence[tuple[Arm, ...]] | None = None,
-    quantity: tuple[str, ...] | None = None,
 ) -> tuple[Floats, Floats, Numbers]:
     """Return the paired values of both planners with the same map and seed, (N,) each, and the index of the map, (N,)."""
-    quantity = quantity or claim.quantity
     rows = []
     for one, other in claim.cases if cases is None else cases:
         second = {run.seed: run for run in runs[other]}
         rows += [(run, second[run.seed], (one.map, run.world)) for run in runs[one] if run.seed in second]
-    values = np.array([[_value(a, quantity[0]), _value(b, quantity[-1])] for a, b, _ in rows]).reshape(-1, 2)
+    values = np.array([[_value(a, claim.quantity[0]), _value(b, claim.quantity[-1])] for a, b, _ in rows]).reshape(-1, 2)
     return values[:, 0], values[:, 1], _numbered([place for *_, place in rows])
 
 
