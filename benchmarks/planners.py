@@ -152,7 +152,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
             ("iaco", {"ants": 25, "explorers": 75, **common, **dying}, figures[2]),
         ):
             yield "suganthi2019", f"{size}×{size}, 15 % blocked", name, options, queries, f"{figure:g}"
-    # ibraheem2016, Table 2: 5 and 10 obstacles; those of the larger maps are not stated.
+    # ibraheem2016, Table 2: the text counts 5 and 10 obstacles on the smaller maps, none on the larger.
     for size, count, figures in (
         (10, 5, (15.07, 1.217, 15.07, 1.155)), (20, 10, (28.6274, 9.073, 28.6274, 7.839)),
         (30, 15, (45.9411, 52.854, 45.1127, 52.017)), (40, 20, (62.6690, 134.771, 61.8406, 132.678)),
@@ -160,7 +160,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         queries = [blocks(size, size, count, size // 4, seed) for seed in seeds]
         options = {"ants": 50, "iterations": 100, "evaporation": 0.3}
         for name, length, wall in (("as", *figures[:2]), ("maco", *figures[2:])):
-            yield "ibraheem2016", f"{size}×{size}, {count} obstacles", name, options, queries, f"{length:g}, {wall:g} s"
+            yield "ibraheem2016", f"{size}×{size}, {count} rectangles", name, options, queries, f"{length:g}, {wall:g} s"
     # lee2008, Tables I and II.
     for number, (rows, cols), figures in (
         (1, (25, 25), (72.0833, 13326, 59.2548, 602)), (2, (50, 44), (83.3970, 3926, 64.0833, 274)),

@@ -32,7 +32,10 @@ OPTIONS = {
         "ants 0", "iterations 0", "max_steps 0", "evaporation 1.5", "deposit 0.0", "attraction -1.0", "elitism -1", "elite_of us",
         "form song", "time_budget 0.0", "min_weight nan",
     ),
-    AntSystem: ("alpha -1.0", "beta -1.0", "initial 0.0", "threads 0", "heuristic smell", "ranks 0"),
+    AntSystem: (
+        "alpha -1.0", "beta -1.0", "initial 0.0", "threads 0", "heuristic smell", "ranks 0",
+        "update_every 0", "restart_every 0",
+    ),
     AgeingAnts: ("q_min 0.0", "q_max 0.01"),
     ExploringAnts: ("depositors few", "explorers -1", "elite -1.0", "ties few"),
     MaxMinAnts: ("p_best 1.0", "patience 0"),

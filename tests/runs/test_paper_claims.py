@@ -33,6 +33,7 @@ from antdrive.runs.papers.maps import (
     environments,
     move_counts,
     optimum,
+    separate_obstacles,
     winding_candidate,
 )
 from antdrive.runs.papers.paper_runs import (
@@ -164,6 +165,25 @@ def test_no_worse_lets_a_small_effect_pass_and_no_larger_one():
     assert unclear.value == pytest.approx(14.0)
     assert unclear.decision is Decision.OPEN
     assert "contains 12; the difference is small beside the spread" in unclear.why
+
+
+def test_a_ratio_compares_planners_on_maps_of_their_own():
+    row = {"maps": "large / small", "planners": "a | a", "quantity": "gap", "bound": "2", "statistic": "ratio"}
+    words = {
+        "id": "I1",
+        "kind": "claim",
+        "source": "s",
+        "sentence": "x",
+        "reading": "ours",
+        "printed": "p",
+        "remark": "",
+    }
+    grows = _claim("ibraheem2016", {**row, **words, "relation": ">"})
+    assert grows.cases == ((Arm("large", "a"), Arm("small", "a")),)
+    small = np.random.default_rng(4).uniform(5, 9, 20)
+    found = evaluate(grows, {Arm("large", "a"): runs(3 * small), Arm("small", "a"): runs(small)})
+    assert found.decision is Decision.HOLDS
+    assert found.value == pytest.approx(3.0)
 
 
 def test_the_gain_of_one_step_is_less_than_that_of_another():
@@ -369,6 +389,18 @@ def test_a_candidate_has_the_length_asked_for_and_depends_on_the_seed_alone():
     assert (one.grid.free != other.grid.free).any()
 
 
+def test_a_candidate_has_the_obstacles_asked_for_away_from_its_ends():
+    query = candidate((20, 20), (0, 0), (19, 19), MoveCount(6, 16), 1, blocks=10, largest=4, margin=2, obstacles=10)
+    assert query.grid.free[:3, :3].all()
+    assert query.grid.free[-3:, -3:].all()
+    assert separate_obstacles(query.grid.free) == 10
+
+
+def test_obstacles_that_touch_by_a_corner_are_one():
+    picture = ["#.#.", ".#.#", "....", "#..#"]
+    assert separate_obstacles(np.array([[cell == "." for cell in row] for row in picture])) == 3
+
+
 def test_a_winding_candidate_has_the_moves_asked_for_and_turns_back_in_rows_and_columns():
     moves = MoveCount(14, 32)  # lee2008's map 1: 78 cells over rows and columns, of which the map has 24 + 24
     for seed in (101, 102):
@@ -436,7 +468,8 @@ def test_the_quantities_of_a_trial_are_those_worked_out_by_hand():
     result = SimpleNamespace(solved=True, history=history, work=50, line_length=110.0)
     run = PaperRun(0, 0, result, 100.0, 0.1, 0.0)
     assert (run.effort, run.settled, run.gap) == (30.0, 4.0, pytest.approx(10.0))
-    assert run.near == math.inf
+    assert run.near == run.reached == math.inf
+    assert dataclasses.replace(run, optimum=run.length).reached == 4.0
     assert dataclasses.replace(run, optimum=105.0).near == 4.0  # 110 is within 5 % of 105
     assert run.last == 6.0
     assert run.unrest == run.early_unrest == pytest.approx(np.std([9, 9, 9, 4, 6]))

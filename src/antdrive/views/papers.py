@@ -169,7 +169,7 @@ SCENES: Mapping[str, Arm] = MappingProxyType(
     {
         "han2007": Arm("14 obstacles", "100 ants"),
         "suganthi2019": Arm("20×20", "iaco"),
-        "ibraheem2016": Arm("20×20, 10 obstacles", "maco"),
+        "ibraheem2016": Arm("20×20", "maco"),
         "lee2008": Arm("2: 50×44", "pfaco"),
         "hasan": Arm("1a curved walls", "mmas-dstar"),
     }

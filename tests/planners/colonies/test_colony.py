@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -50,8 +50,8 @@ def walks(*paths, graph=GRAPH):
     return Walks(cells, np.array([len(p) for p in paths]), np.array(lengths))
 
 
-def state(tours, best=None, number=1, since=0):
-    return IterationState(number, GRAPH, tours, tours, None, best, since, np.random.default_rng(0))
+def state(tours, best=None, number=1, since=0, first=0):
+    return IterationState(number, GRAPH, tours, tours, None, best, since, np.random.default_rng(0), first)
 
 
 def arcs(path):
@@ -135,6 +135,35 @@ def test_ants_that_give_up_deposit_nothing():
     assert result.status is PlanStatus.STOPPED
     assert result.work == 10 * 2 * 3
     np.testing.assert_array_equal(np.unique(result.field), [1.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded(AntSystem):
+    """Ants that record the ants of each update, and the weakest trail before it."""
+
+    seen: list = field(default_factory=list)
+
+    def update(self, trail, state):
+        self.seen.append((state.number, state.first, len(state.tours), round(trail.min(), 9)))
+        super().update(trail, state)
+
+    def walked(self, iterations):
+        """Iterate without the first call's rehearsal, and return the arrivals."""
+        states = self.iterate(catalogue()["empty"], np.random.default_rng(0))
+        return [one.arrived for one in itertools.islice(states, iterations)]
+
+
+def test_trails_change_after_each_group_of_ants_and_start_anew():
+    planner = Recorded(ants=3, evaporation=0.5, backtrack=True, update_every=2, restart_every=2)
+    assert planner.walked(4) == [3, 3, 3, 3]
+    groups = [(0, 2, 1.0), (2, 1, 0.5), (0, 2, 0.25), (2, 1, 0.125)]
+    assert planner.seen == [(k, *groups[j + 2 * (k % 2)]) for k in range(4) for j in range(2)]
+
+
+def test_a_group_of_ants_that_die_changes_no_trail():
+    planner = Recorded(ants=3, max_steps=3, update_every=1)
+    assert planner.walked(2) == [0, 0]
+    assert planner.seen == []
 
 
 @pytest.mark.parametrize("planner", [AntSystem(ants=7), ExploringAnts(ants=3, explorers=4), MergingAnts(ants=5)])
@@ -246,10 +275,11 @@ def test_beta_follows_the_rule_of_ibraheem2016():
 
 
 def test_older_ants_deposit_less_by_equation_5():
-    planner = AgeingAnts(q_max=2.0, q_min=1.0)
+    planner = AgeingAnts(ants=4, q_max=2.0, q_min=1.0)
     rand = np.array([0.0, 0.5, 1.0, 0.2])
     # Q_max - (Q_max - Q_min) / 2 * rand - (Q_max - Q_min) / M * m, not below Q_min
-    np.testing.assert_allclose(planner.aged(rand), [1.75, 1.25, 1.0, 1.0])
+    np.testing.assert_allclose(planner.aged(rand, 0, 4), [1.75, 1.25, 1.0, 1.0])
+    np.testing.assert_allclose(planner.aged(rand[:1], 2, 4), [1.25])  # the third ant, on its own
     amounts = planner.amounts(state(walks(DIRECT, [], BEND)))
     assert amounts[1] == 0
     assert (1.0 / walks(DIRECT, BEND).lengths <= amounts[[0, 2]]).all()
@@ -267,6 +297,12 @@ def test_exploratory_ants_avoid_what_common_ants_follow():
     eta = 1 / math.sqrt(2)
     assert tables[0][5, 1] / tables[0][5, 0] == pytest.approx(4 * eta)  # eq. 1
     assert tables[1][5, 1] / tables[1][5, 0] == pytest.approx(eta / 4)  # eq. 5
+
+
+def test_a_deposit_of_later_ants_knows_their_kind():
+    late = ExploringAnts(ants=2, elite=0.0).amounts(state(walks(BEND, DIRECT, []), first=1))
+    lengths = walks(BEND, DIRECT, []).lengths
+    np.testing.assert_allclose(late, [1 / lengths[0], 0, 0])  # the second of these ants is exploratory
 
 
 # MAX-MIN ant system (Stützle & Hoos 2000)

@@ -37,10 +37,10 @@ class AntSystem(Colony):
     """Ant system: ants guided by pheromone on arcs and a heuristic.
 
     Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q / length
-    on its arcs. The defaults are those of ibraheem2016. suganthi2019 uses beta 1 and heuristic "step"; lee2008
-    uses 500 ants, beta 2 and evaporation 0.01.
+    on its arcs. alpha, beta and evaporation are those of ibraheem2016, which gives ranges of ants and iterations
+    and no Q. suganthi2019 uses beta 1 and heuristic "step"; lee2008 uses 500 ants, beta 2 and evaporation 0.01.
 
-    Known weaknesses, measured (docs/notebook/planner-quality.md): ants die in dead ends, as in the papers. With a
+    Known weaknesses, measured (docs/notebook/planner-quality.md): ants die in dead ends. With a
     quarter of the cells blocked, 6 of 10 runs cross 50 x 50 cells, with paths twice as long as the shortest, and
     none crosses 100 x 100. With `backtrack` and `shortcut` all arrive.
 
@@ -141,7 +141,7 @@ class AgeingAnts(AntSystem):
     170 of 400 runs and shorter in 71; no values of the bounds change that.
 
     Attributes:
-        q_max: Q_max, the deposit of a young ant
+        q_max: Q_max, the deposit of a young ant, in place of `deposit`
         q_min: Q_min, the deposit of an old ant
     """
 
@@ -155,17 +155,19 @@ class AgeingAnts(AntSystem):
 
     def amounts(self, state: IterationState) -> Floats:
         """Return Q_m / L_m for each ant m of `state`, with Q_m by eq. 5."""
-        count = len(state.tours)
-        return self.aged(state.rng.random(count)) / state.tours.lengths  # eq. 4
+        rand = state.rng.random(len(state.tours))
+        return self.aged(rand, state.first, sum(self.kinds)) / state.tours.lengths  # eq. 4
 
-    def aged(self, rand: Floats) -> Floats:
-        """Return Q_m of ants m = 1 to M (eq. 5), clipped to its bounds, which eq. 5 as printed may exceed.
+    def aged(self, rand: Floats, first: int, count: int) -> Floats:
+        """Return Q_m of successive ants m (eq. 5), clipped to its bounds, as eq. 5 as printed falls below Q_min.
 
         Args:
-            rand: a random number in [0, 1) for each ant (M,)
+            rand: a random number in [0, 1) for each of the ants (N,)
+            first: the number of these ants' first, from 0
+            count: M, the number of all ants
         """
-        span, m = self.q_max - self.q_min, np.arange(1, len(rand) + 1)
-        amounts = self.q_max - span / 2 * rand - span / len(rand) * m  # eq. 5
+        span, m = self.q_max - self.q_min, first + np.arange(1, len(rand) + 1)
+        amounts = self.q_max - span / 2 * rand - span / count * m  # eq. 5
         return np.clip(amounts, self.q_min, self.q_max)
 
 
@@ -260,7 +262,7 @@ class ExploringAnts(AntSystem):
     def amounts(self, state: IterationState) -> Floats:
         """Return Q / L_k for depositors plus, for the best ants of `state`, elite Q / L_best by `ties`."""
         lengths, best = state.tours.lengths, elite_ants(state.tours)
-        usual = 1.0 if self.depositors == "all" else np.arange(len(lengths)) < self.ants
+        usual = 1.0 if self.depositors == "all" else state.first + np.arange(len(lengths)) < self.ants
         elite = {"arc": 0.0, "ant": self.elite, "share": self.elite / max(1, best.sum())}[self.ties]
         return np.where(best, usual + elite, usual) * self.deposit / lengths  # eq. 4, 7 and 8
 

@@ -123,6 +123,10 @@ class Walks:
     def __len__(self) -> int:
         return len(self.sizes)
 
+    def rows(self, ants: slice) -> Walks:
+        """Return a view of some ants' walks."""
+        return Walks(self.cells[ants], self.sizes[ants], self.lengths[ants])
+
     def only(self, ant: int) -> Walks:
         """Return a copy of one ant's walk."""
         size = int(self.sizes[ant])
@@ -169,7 +173,10 @@ class Memory:
 
 
 class IterationState(NamedTuple):
-    """The state of an iteration, for the rules that change trails."""
+    """The state of an iteration, for the rules that change trails.
+
+    With `Colony.update_every`, walks and tours are those of the ants since the last update.
+    """
 
     number: int  # the iteration's number, from 0
     graph: ColonyGraph  # the ants' graph
@@ -179,8 +186,11 @@ class IterationState(NamedTuple):
     best: Walks | None  # the best tour so far, a single row
     since: int  # iterations since the best tour was found
     rng: np.random.Generator  # the colony's source of random numbers
+    first: int = 0  # the number of the first of these ants in its iteration, from 0
 
 
+#: All ants of an iteration.
+EVERY = slice(0, None)
 #: The context of colonies with one kind of ant.
 FIRST_KIND = ChoiceContext()
 
@@ -207,6 +217,9 @@ class Colony(IterativePlanner):
         backtrack: whether an ant in a dead end steps back until it finds another path; otherwise it dies there
         shortcut: whether tours are cut short where they pass next to an earlier part of themselves
         threads: number of threads; the plan does not depend on it
+        update_every: ants that walk between two updates of the trails; None: all ants of an iteration. If none of
+            them arrives, there is no update
+        restart_every: iterations after which the trails return to their initial values; None: never
     """
 
     ants: int = 50
@@ -215,13 +228,16 @@ class Colony(IterativePlanner):
     backtrack: bool = False
     shortcut: bool = False
     threads: int = 1
+    update_every: int | None = None
+    restart_every: int | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require("ants", self.ants, at_least=1, at_most=1_000_000)
         require("threads", self.threads, at_least=1, at_most=256)
-        if self.max_steps is not None:
-            require("max_steps", self.max_steps, at_least=1)
+        for name in ("max_steps", "update_every", "restart_every"):
+            if getattr(self, name) is not None:
+                require(name, getattr(self, name), at_least=1)
 
     @property
     def work_unit(self) -> str:
@@ -317,21 +333,28 @@ class Colony(IterativePlanner):
         with ExitStack() as stack:
             pool = stack.enter_context(ThreadPoolExecutor(self.threads)) if self.threads > 1 else None
             for number in itertools.count():
-                for kind, weights in enumerate(construction.weights):
-                    self.choice_weights(graph, trail, heuristic, weights, ChoiceContext(kind, rng.random()))
-                walks, steps = construction.construct(rng, pool)
-                tours = construction.shorten(walks)
-                daemon_tour = self.daemon_action(graph, tours, memory.tour if best is None else best)
-                summary = tours.summary()
-                leader, row = tours, summary.shortest
-                if daemon_tour is not None and daemon_tour.lengths[0] <= tours.lengths[row]:
-                    leader, row = daemon_tour, 0
-                iteration_best = float(leader.lengths[row])
-                if iteration_best < (math.inf if best is None else float(best.lengths[0]) - 1e-9):
-                    memory.tour = best = leader.only(row)
-                    best_cells, best_number = graph.cells(best.cells[0]), number
-                state = IterationState(number, graph, walks, tours, daemon_tour, best, number - best_number, rng)
-                self.update(trail, state)
+                if self.restart_every and number and number % self.restart_every == 0:
+                    trail[:] = self.initial_trail(graph, rng)
+                steps, iteration_best = 0, math.inf
+                for ants in construction.batches:
+                    for kind, weights in enumerate(construction.weights):
+                        self.choice_weights(graph, trail, heuristic, weights, ChoiceContext(kind, rng.random()))
+                    walks, taken = construction.construct(rng, pool, ants)
+                    tours = construction.shorten(ants)
+                    daemon_tour = self.daemon_action(graph, tours, memory.tour if best is None else best)
+                    summary = tours.summary()
+                    leader, row = tours, summary.shortest
+                    if daemon_tour is not None and daemon_tour.lengths[0] <= tours.lengths[row]:
+                        leader, row = daemon_tour, 0
+                    steps, iteration_best = steps + taken, min(iteration_best, float(leader.lengths[row]))
+                    if leader.lengths[row] < (math.inf if best is None else float(best.lengths[0]) - 1e-9):
+                        memory.tour = best = leader.only(row)
+                        best_cells, best_number = graph.cells(best.cells[0]), number
+                    since = number - best_number
+                    state = IterationState(number, graph, walks, tours, daemon_tour, best, since, rng, ants.start)
+                    if self.update_every is None or summary.arrived:
+                        self.update(trail, state)
+                summary = construction.shortened.summary()
                 graph.draw(trail, picture)
                 yield Iteration(
                     cells=best_cells,
@@ -367,21 +390,39 @@ class TourConstruction:
         ants = sum(planner.kinds)
         return cls(planner, graph, limit, weights, Walks.allocate(ants, room), Walks.allocate(ants, room))
 
-    def construct(self, rng: np.random.Generator, pool: Executor | None = None) -> tuple[Walks, int]:
-        """Send every ant, on the threads of `pool` if given; returns the walks and the total number of steps."""
-        # Each ant has its own random stream, so the order of ants is irrelevant.
-        seeds = rng.bit_generator.random_raw(len(self.walks)).astype(np.uint64) | np.uint64(1)
-        jobs, first = [], 0
-        for kind, count in enumerate(self.planner.kinds):
-            each = max(1, -(-count // (self.planner.threads if pool else 1)))
-            jobs += [(kind, first + i, first + min(i + each, count)) for i in range(0, count, each)]
-            first += count
-        steps = sum((pool.map if pool else map)(lambda job: self._send(seeds, *job), jobs))
-        return self.walks, steps
+    @property
+    def batches(self) -> list[slice]:
+        """The ants between two updates of the trails, as slices of all ants of an iteration."""
+        count = len(self.walks)
+        size = self.planner.update_every or count
+        return [slice(first, min(first + size, count)) for first in range(0, count, size)]
 
-    def _send(self, seeds: npt.NDArray[np.uint64], kind: int, first: int, end: int) -> int:
+    @property
+    def shortened(self) -> Walks:
+        """The tours of all ants of an iteration, once `shorten` has been called for each batch."""
+        return self.tours if self.planner.shortcut or self.planner.revisit else self.walks
+
+    def construct(
+        self, rng: np.random.Generator, pool: Executor | None = None, ants: slice = EVERY
+    ) -> tuple[Walks, int]:
+        """Send some ants, on the threads of `pool` if given; returns their walks and the total number of steps."""
+        # Each ant has its own random stream, so the order of ants is irrelevant.
+        first, end, _ = ants.indices(len(self.walks))
+        seeds = rng.bit_generator.random_raw(end - first).astype(np.uint64) | np.uint64(1)
+        jobs, earlier = [], 0
+        for kind, count in enumerate(self.planner.kinds):
+            start, stop = max(first, earlier), min(end, earlier + count)
+            each = max(1, -(-count // (self.planner.threads if pool else 1)))
+            parts = [slice(i, min(i + each, stop)) for i in range(start, stop, each)]
+            jobs += [(seeds[part.start - first : part.stop - first], kind, part) for part in parts]
+            earlier += count
+        steps = sum((pool.map if pool else map)(lambda job: self._send(*job), jobs))
+        return self.walks.rows(ants), steps
+
+    def _send(self, seeds: npt.NDArray[np.uint64], kind: int, ants: slice) -> int:
         from antdrive.planners.colonies import _kernels_colony
 
+        walks = self.walks.rows(ants)
         return int(
             _kernels_colony.walk_ants(
                 self.weights[kind],
@@ -392,18 +433,19 @@ class TourConstruction:
                 self.limit,
                 float(self.planner.revisit),
                 self.planner.backtrack,
-                seeds[first:end],
-                self.walks.cells[first:end],
-                self.walks.sizes[first:end],
-                self.walks.lengths[first:end],
+                seeds,
+                walks.cells,
+                walks.sizes,
+                walks.lengths,
             )
         )
 
-    def shorten(self, walks: Walks) -> Walks:
-        """Return the tours of these walks: without loops and, with `Colony.shortcut`, cut short."""
+    def shorten(self, ants: slice) -> Walks:
+        """Return the tours of some ants: without loops and, with `Colony.shortcut`, cut short."""
+        walks, tours = self.walks.rows(ants), self.shortened.rows(ants)
         if self.planner.shortcut:
-            return cut_short(walks, self.graph, self.tours)
-        return without_loops(walks, self.graph, self.tours) if self.planner.revisit else walks
+            return cut_short(walks, self.graph, tours)
+        return without_loops(walks, self.graph, tours) if self.planner.revisit else walks
 
 
 def without_loops(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:

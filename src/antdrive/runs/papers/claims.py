@@ -180,8 +180,6 @@ def _difference(claim: Claim, runs: RunsByArm) -> Measured:
     difference = np.round(first - second, 9)  # removes rounding errors
     value, interval = _median(difference, world)
     why = f"{_counts(difference)}; Wilcoxon's p {wilcoxon(difference):.2g}"
-    if claim.quantity == ("work",):
-        why += f"; processor time {_slower(claim, runs):+.0f} %"
     ours = f"median difference {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
     return Measured(value, interval, len(difference), ours, why, _never(first, second))
 
@@ -212,6 +210,15 @@ def _balance(claim: Claim, runs: RunsByArm) -> Measured:
     ours = f"below in {less} of {len(signs)} pairs, above in {more}: {points}"
     median = f"median difference {_with_interval(*_median(difference, world), claim, endless=ENDLESS_TEXT)}"
     return Measured(value, interval, len(signs), ours, median, _never(first, second))
+
+
+def _ratio(claim: Claim, runs: RunsByArm) -> Measured:
+    """Return the median of the paired ratios of the first value to the second."""
+    first, second, world = _paired(claim, runs)
+    value, interval = _median(first / second, world)
+    ours = f"median ratio {value:.2f} [{_written(interval.low, 2)}, {_written(interval.high, 2)}]"
+    medians = f"medians {np.median(first):.0f} and {np.median(second):.0f}"
+    return Measured(value, interval, len(first), ours, medians, _never(first, second))
 
 
 def _scatter(claim: Claim, runs: RunsByArm) -> Measured:
@@ -335,6 +342,7 @@ STATISTICS: Mapping[str, Callable[[Claim, RunsByArm], Measured]] = MappingProxyT
         # Two planners, paired by map and seed; `gain` compares two pairs.
         "difference": _difference,
         "balance": _balance,
+        "ratio": _ratio,
         "scatter": _scatter,
         "gain": _gain,
         # Two planners, map by map.
@@ -370,12 +378,6 @@ def _never(first: Floats, second: Floats) -> str:
     return NEVER if min(first.min(), second.min()) >= NO_PATH else ""
 
 
-def _slower(claim: Claim, runs: RunsByArm) -> float:
-    """Return how much slower the first planner is, by median processor time [%]; negative if faster."""
-    first, second, _ = _paired(claim, runs, quantity=(TIMED,))
-    return 100 * (float(np.median(first)) / max(float(np.median(second)), 1e-9) - 1)
-
-
 def _value(run: PaperRun, quantity: str) -> float:
     value = float(getattr(run, quantity))
     return NO_PATH if math.isnan(value) else min(value, NO_PATH)
@@ -398,15 +400,13 @@ def _paired(
     claim: Claim,
     runs: RunsByArm,
     cases: Sequence[tuple[Arm, ...]] | None = None,
-    quantity: tuple[str, ...] | None = None,
 ) -> tuple[Floats, Floats, Numbers]:
     """Return the paired values of both planners with the same map and seed, (N,) each, and the index of the map, (N,)."""
-    quantity = quantity or claim.quantity
     rows = []
     for one, other in claim.cases if cases is None else cases:
         second = {run.seed: run for run in runs[other]}
         rows += [(run, second[run.seed], (one.map, run.world)) for run in runs[one] if run.seed in second]
-    values = np.array([[_value(a, quantity[0]), _value(b, quantity[-1])] for a, b, _ in rows]).reshape(-1, 2)
+    values = np.array([[_value(a, claim.quantity[0]), _value(b, claim.quantity[-1])] for a, b, _ in rows]).reshape(-1, 2)
     return values[:, 0], values[:, 1], _numbered([place for *_, place in rows])
 
 
@@ -444,6 +444,7 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "work": (0, " steps"),
     "settled": (0, " iterations"),
     "near": (0, " iterations"),
+    "reached": (0, " iterations"),
     "effort": (0, " steps"),
 }
 

@@ -214,11 +214,14 @@ def candidate(
     largest: int = 1,
     thin: bool = False,
     walls: int = 0,
+    margin: int = 1,
+    obstacles: int | None = None,
 ) -> Query:
     """Return a random map whose shortest path has the given straight and diagonal moves.
 
     It begins with random obstacles. Further ones are put onto the shortest path until it has, but never exceeds, the
-    wanted length.
+    wanted length. Obstacles keep `margin` free cells from start and goal. With `obstacles`, the map has exactly this
+    number of separate ones, as `separate_obstacles` counts them.
     """
     rng = np.random.default_rng(seed)
     for _ in range(MAPS):
@@ -229,9 +232,9 @@ def candidate(
             free[row, opening : opening + 2] = True
         for _ in range(blocks):
             _put(rng, free, rng.integers(0, shape), largest, thin)
-        _clear_ends(free, start, goal)
-        query = _lengthened(rng, free, start, goal, moves.length, largest, thin)
-        if query is not None:
+        _clear_ends(free, start, goal, margin=margin)
+        query = _lengthened(rng, free, start, goal, moves.length, largest, thin, margin)
+        if query is not None and obstacles in (None, separate_obstacles(query.grid.free)):
             return query
     raise FieldError("moves", f"no map of {shape[0]} x {shape[1]} cells found whose shortest path has {moves}")
 
@@ -303,6 +306,7 @@ def _lengthened(
     length: float,
     largest: int,
     thin: bool,
+    margin: int,
 ) -> Query | None:
     """Add obstacles until the shortest path has this length; None if that fails."""
     query, cells, shortest = _solved(free, start, goal)
@@ -314,7 +318,7 @@ def _lengthened(
         changed = free.copy()
         near = length - shortest < 2.0  # a large obstacle would overshoot
         _put(rng, changed, cells[rng.integers(len(cells))], 1 if near else largest, thin)
-        _clear_ends(changed, start, goal)
+        _clear_ends(changed, start, goal, margin=margin)
         tried = _solved(changed, start, goal)
         if tried[2] <= length + EQUAL:
             free, (query, cells, shortest) = changed, tried
@@ -337,7 +341,19 @@ def _put(rng: np.random.Generator, free: Picture, cell: npt.NDArray[np.integer],
     free[max(0, row) : row + height, max(0, col) : col + width] = False
 
 
-def _clear_ends(free: Picture, *ends: tuple[int, int]) -> None:
-    """Free the cells around both ends."""
+def _clear_ends(free: Picture, *ends: tuple[int, int], margin: int) -> None:
+    """Free the cells around both ends, up to `margin` cells away."""
     for row, col in ends:
-        free[max(0, row - 1) : row + 2, max(0, col - 1) : col + 2] = True
+        free[max(0, row - margin) : row + margin + 1, max(0, col - margin) : col + margin + 1] = True
+
+
+def separate_obstacles(free: Picture) -> int:
+    """Return the number of obstacles of a map: groups of blocked cells that touch by a side or a corner."""
+    left, count = {(int(row), int(col)) for row, col in np.argwhere(~free)}, 0
+    while left:
+        count, group = count + 1, [left.pop()]
+        for row, col in group:
+            near = {(row + dr, col + dc) for dr, dc in DIRECTIONS} & left
+            left -= near
+            group += near
+    return count

@@ -87,6 +87,7 @@ def total_cost(query: Query, result: PlanResult) -> float:
 
 ENDLESS = 1_000_000  # iterations; the limit of ant steps ends a plan much earlier
 CLOSE = 0.25  # relative excess length of a path close to the shortest
+EXACT = 1e-6  # excess length of a shortest path [%]
 NEAR = 0.05  # relative excess length of a path near the shortest
 LAST = 10  # iterations over which `unrest` is measured
 
@@ -135,6 +136,11 @@ class PaperRun:
         """The iteration, from 1, that found the path; inf without a path."""
         best = self.result.history.best
         return float(np.argmax(best <= best[-1] * (1 + 1e-9)) + 1) if self.result.solved and len(best) else math.inf
+
+    @property
+    def reached(self) -> float:
+        """The iteration, from 1, that found a shortest path; inf if none did."""
+        return self.settled if self.gap < EXACT else math.inf
 
     @property
     def near(self) -> float:
