@@ -406,6 +406,7 @@ def _quartile_range(values: Floats, counts: Numbers) -> float:
 #: Digits and unit of a quantity.
 UNITS: Mapping[str, tuple[int, str]] = {
     "gap": (1, " %"),
+    "even_gap": (1, " %"),
     "length": (2, ""),
     "last": (2, ""),
     "unrest": (2, ""),
