@@ -37,15 +37,14 @@ class PotentialFieldAnts(IterativePlanner):
     Converged pheromone is rebuilt from the list (section IV-B). An iteration here ends when `ants` walks have
     ended.
 
-    The paper leaves three points open, each an option here: the definition of U_ij (`form`), whether an ant may
-    return to a cell (`memory`), and the constants from `attraction` on. docs/papers/lee2008.md compares the
-    interpretations. Only those in which U_ij depends on differences of the potential reach the paper's claims on
-    100 x 100 cells. With U_ij = U_j, two neighbours far from the start differ by a few per cent, and ants walk
-    almost at random.
+    The paper leaves these points open, each an option here: the definition of U_ij (`form`), whether an ant may
+    return to a cell (`memory`), dead ends (`backtrack`), and the constants from `attraction` to `convergence`.
+    docs/papers/lee2008.md compares the interpretations. With U_ij = U_j, two neighbours far from the start differ
+    by a few per cent, and ants walk almost at random. The step limit `max_steps` is an addition.
 
     Known weaknesses, measured on the same page. The potential has no maximum at the goal: unless the goal is the
     cell farthest from the start, ants are drawn past it, and paths may be three times as long as the shortest;
-    `field="goal"` fixes that. Ants restart in dead ends: 9 of 10 runs cross 100 x 100 cells with 25 per cent
+    `field="goal"` prevents it. Ants restart in dead ends: 9 of 10 runs cross 100 x 100 cells with 25 per cent
     blocked, and 18 of 50 the winding maps of 25 x 25 cells that represent lee2008's map 1; with `backtrack` all
     do. The ranking list soon holds copies of one path, and the colony stops improving.
 
