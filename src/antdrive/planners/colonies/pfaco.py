@@ -46,7 +46,7 @@ class PotentialFieldAnts(IterativePlanner):
     cell farthest from the start, ants are drawn past it, and paths may be three times as long as the shortest;
     `field="goal"` prevents it. Ants restart in dead ends: 9 of 10 runs cross 100 x 100 cells with 25 per cent
     blocked, and 18 of 50 the winding maps of 25 x 25 cells that represent lee2008's map 1; with `backtrack` all
-    do. The ranking list soon holds copies of one path, and the colony stops improving.
+    do.
 
     Attributes:
         ants: ants, and walks per iteration
