@@ -3,7 +3,7 @@ Ants in a potential field (Lee 2008)
 ====================================
 
 A potential field attracts the robot to the goal and repels it from obstacles. Gradient descent is fast, but ends in the
-first local minimum. Lee, Kim, Choi and Lee (2008) use the field as the ants' heuristic.
+first local minimum. The ants of Lee, Kim, Choi and Lee (2008) climb a field that rises away from the start.
 """
 
 from antdrive import Scenario, film, plan, run
@@ -23,8 +23,8 @@ valley = plan_figure(descent.task, grid, stuck, descent.robot)
 # %%
 # Ants escape
 # -----------
-# Ants choose at random by pheromone and field, so some climb out. Behind the U the field is nearly flat, and ants wander. The
-# contours show their pheromone.
+# Ants choose at random by pheromone and field, so some leave the U. The field rises on past the goal, so ants wander there.
+# The contours show their pheromone.
 
 colony = Scenario.of("u-trap", "pfaco", options={"ants": 200}, seed=1)
 grid, found = plan(colony)
@@ -34,7 +34,7 @@ pheromone = contours_figure(colony.task, grid, found, colony.robot)
 # %%
 # The drive
 # ---------
-# The option `shortcut`, an addition to the paper, removes the loops of each tour.
+# The option `shortcut`, an addition to the paper, cuts a tour short where it passes next to an earlier part of itself.
 
 result = run(
     Scenario.of("u-trap", "pfaco", options={"ants": 200, "shortcut": True}, seed=1)

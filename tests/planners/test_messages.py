@@ -34,7 +34,7 @@ OPTIONS = {
     ),
     AntSystem: (
         "alpha -1.0", "beta -1.0", "initial 0.0", "threads 0", "heuristic smell", "ranks 0",
-        "update_every 0", "restart_every 0",
+        "update_every 0", "restart_every 0", "mix 2.0",
     ),
     AgeingAnts: ("q_min 0.0", "q_max 0.01"),
     ExploringAnts: ("depositors few", "explorers -1", "elite -1.0", "ties few"),
@@ -43,7 +43,7 @@ OPTIONS = {
     MaxMinDStar: ("alpha 0.0", "beta -1.0", "alpha_max 0.5", "evaporation 1.0"),
     PotentialFieldAnts: (
         "ants 0", "ranks 0", "evaporation 1.5", "mix -0.1", "beta_2 -1.0", "influence 0.0", "min_pheromone 0.0", "form steep",
-        "field end", "memory some",
+        "field end", "memory some", "repulsion nan",
     ),
     PotentialField: ("k_att 0.0", "k_rep -1.0", "influence 0.0", "k_att nan"),
     GaHan: ("via_points 0", "population 1", "crossover 1.5", "tries 0"),

@@ -80,6 +80,13 @@ def test_the_ranking_list_of_lee2008s_conventional_colony():
     assert many[0, EAST] == pytest.approx(0.99 + 0.9 / 2)
 
 
+def test_the_initial_pheromone_of_lee2008s_conventional_colony_is_random():
+    trail = AntSystem(initial=4.0, mix=0.25).initial_trail(SQUARE, np.random.default_rng(0))
+    assert trail.shape == (4, 8)
+    assert 3.0 < trail.min() < trail.max() <= 4.0  # a quarter is chance
+    assert (AntSystem(initial=4.0).initial_trail(SQUARE, np.random.default_rng(0)) == 4.0).all()
+
+
 @pytest.mark.parametrize(("form", "east"), [("letter", 5.0), ("local", 5.0), ("rise", 3.0)])
 def test_lee2008_13(form, east):
     # At cell 1 of a row, with U = 1, 2, 5, U_ij to the west is 1 in each form (the least, attraction / 2); to the east
@@ -97,7 +104,9 @@ def test_lee2008_rank_determines_the_deposit():
     empty = np.zeros((4, 3), dtype=np.int32), np.zeros(4, dtype=np.int64), np.zeros(4), np.zeros(4, dtype=np.int64)
     ranking = _kernels_pfaco.Ranking(*empty, np.zeros(2, dtype=np.int64))
     walk, trail = np.arange(3, dtype=np.int32), np.zeros(3)
-    _kernels_pfaco.reward(walk, 3, 5.0, trail, ranking, 2.0)
+    _kernels_pfaco.reward(walk, 3, 5.0, trail, ranking, 2.0, True)
     assert trail == pytest.approx([2.0] * 3)  # the first rank of four
-    _kernels_pfaco.reward(walk, 3, 6.0, trail, ranking, 2.0)
+    _kernels_pfaco.reward(walk, 3, 6.0, trail, ranking, 2.0, True)
     assert trail == pytest.approx([3.5] * 3)  # the second: 2 (1 - 1/4) more
+    _kernels_pfaco.reward(walk, 3, 7.0, trail, ranking, 2.0, False)
+    assert trail == pytest.approx([5.5] * 3)  # without grades the third deposits as much as the first

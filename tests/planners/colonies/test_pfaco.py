@@ -32,6 +32,14 @@ def test_the_potential_matches_a_hand_calculation():
     assert field[0, 4] == 0
 
 
+def test_obstacles_attract_where_eq_7_is_taken_literally():
+    free = np.ones((4, 5))
+    free[0, 4] = 0
+    planner = PotentialFieldAnts(attraction=2.0, repulsion=-8.0, influence=2.0)
+    field = planner.potential(Query(Grid.from_free(free), (0, 0), (3, 4))).reshape(4, 5)
+    assert field[0, 3] - field[0, 0] == pytest.approx(9.0 + 4.0 * (1 - 0.5) ** 2)  # U_att + U_rep
+
+
 def test_a_potential_measured_from_the_goal_is_highest_there():
     field = PotentialFieldAnts(attraction=2.0, repulsion=0.0, field="goal").potential(OPEN).reshape(4, 5)
     assert field[0, 0] == pytest.approx(1.0)  # the farthest cell, 5 from the goal
@@ -46,6 +54,11 @@ def test_a_potential_measured_from_the_goal_is_highest_there():
         ("letter", {"east": 5.0, "west": 1.0, "north": 3.0, "north east": 6.0, "north west": 2.0}),
         ("rise", {"east": 3.0, "west": 1.0, "north": 1.0, "north east": 4.0, "north west": 1.0}),
         ("local", {"east": 5.0, "west": 1.0, "north": 3.0, "north east": 6.0, "north west": 2.0}),
+        # The distances of these cells from the goal (1, 2).
+        (
+            "distance",
+            {"east": 1.0, "west": 1 / math.sqrt(5), "north": 1.0, "north east": 100.0, "north west": 0.5},
+        ),
     ],
 )
 def test_attractions_match_a_hand_calculation(form, expected):
@@ -167,6 +180,23 @@ def test_pheromone_decays_every_tick_but_not_below_its_minimum():
     arrivals, steps = pool.run(trail, np.ones((9, 8)), 1.0)
     np.testing.assert_allclose(trail, [1, 0, 0.5, 0, 0, 0.3, 1, 0.5, 0.5])
     assert (len(arrivals), steps) == (0, 4)
+
+
+def test_ants_with_generations_wait_for_the_last_before_pheromone_changes():
+    query = Query(Grid.from_free(np.ones((1, 4))), (0, 0), (0, 3))  # a corridor, so all walks take three ticks
+    planner = PotentialFieldAnts(ants=2, ranks=4, evaporation=0.5, deposit=8.0, generations=True, convergence=1e-9)
+    graph = ColonyGraph.of(query)
+    pool = AntPool.of(planner, graph, np.random.default_rng(0))
+    trail = np.ones(4)
+    arrivals, steps = pool.run(trail, np.ones((4, 8)), 1.0)
+    assert (arrivals.tolist(), steps) == ([3.0, 3.0], 6)
+    assert trail == pytest.approx([0.5 + 8.0 + 6.0] * 4)  # evaporated once, then the first rank and the second of four
+    assert pool.ants.sizes.tolist() == [1, 1]  # back at the start
+    pool = AntPool.of(
+        PotentialFieldAnts(ants=2, ranks=4, evaporation=0.5, deposit=8.0), graph, np.random.default_rng(0)
+    )
+    pool.run(trail := np.ones(4), np.ones((4, 8)), 1.0)
+    assert trail == pytest.approx([(0.25 + 8.0 + 6.0) / 2] * 4)  # evaporates every tick, also after the deposits
 
 
 def test_the_history_records_every_iteration():

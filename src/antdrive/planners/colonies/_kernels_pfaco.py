@@ -37,6 +37,8 @@ class Rules(NamedTuple):
         evaporation: the fraction of pheromone lost per tick
         min_pheromone: the lower bound of the pheromone
         deposit: the deposit of a first-rank walk on each of its cells
+        graded: whether the deposit falls with the rank
+        generations: whether ants wait for each other
         limit: step limit of a walk
         tabu: whether an ant avoids visited cells
         backtrack: whether an ant in a dead end steps back
@@ -48,6 +50,8 @@ class Rules(NamedTuple):
     evaporation: float
     min_pheromone: float
     deposit: float
+    graded: bool
+    generations: bool
     limit: int
     tabu: bool
     backtrack: bool
@@ -227,15 +231,14 @@ def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
 
 
 @kernel
-def reward(walk: Array, size: int, length: float, trail: Array, ranking: Ranking, deposit: float) -> bool:
-    """Enter a walk into the ranking and deposit by rank on each of its cells; returns whether it has a rank."""
+def reward(walk: Array, size: int, length: float, trail: Array, ranking: Ranking, deposit: float, graded: bool) -> bool:
+    """Enter a walk into the ranking and deposit on each of its cells, by rank if `graded`; returns whether it has a rank."""
     rank = enter(walk, size, length, ranking)
-    if rank < 0:
-        return False
-    amount = deposit * (1.0 - rank / len(ranking.order))
+    if graded:
+        deposit *= 1.0 - rank / len(ranking.order) if rank >= 0 else 0.0
     for s in range(size):
-        trail[walk[s]] += amount
-    return True
+        trail[walk[s]] += deposit
+    return rank >= 0
 
 
 @kernel
@@ -261,8 +264,9 @@ def run_colony(
     """Move every ant by one cell per tick until `rules.quota` walks have ended.
 
     A walk ends at the goal, in a dead end, after `rules.limit` steps, or when it is longer than every walk of
-    the full ranking; the ant then restarts. `best` receives the cells of the best walk if it is shorter than
-    `shortest`, `arrivals` the lengths of the walks that arrived.
+    the full ranking; the ant then restarts. With `rules.generations` no walk ends for its length, and ants wait
+    until all walks have ended; then they deposit, and pheromone evaporates once. `best` receives the cells of the
+    best walk if it is shorter than `shortest`, `arrivals` the lengths of the walks that arrived.
 
     Returns the size of the new best walk (0: none), the length of the best walk, the number of steps, and the
     number of arrivals.
@@ -279,8 +283,11 @@ def run_colony(
     ended, steps, arrived, new = 0, 0, 0, 0
     worst = np.inf  # the longest walk of a full ranking
     stale = True  # whether the ranking has changed since `worst` was computed
+    waiting, home = np.zeros(len(states), dtype=np.bool_), np.zeros(len(states), dtype=np.bool_)
     while ended < rules.quota:
         for ant in range(len(states)):
+            if waiting[ant]:
+                continue
             size = sizes[ant]
             i: Any = np.int64(walks[ant, size - 1])
             total = cumulate(i, ant, trail, heuristic, mask, to, visited, tabu, alpha, cumulated)
@@ -308,7 +315,7 @@ def run_colony(
                         if length < shortest - 1e-9:
                             shortest, new = length, size
                             best[:size] = tour[:size]
-                    stale |= reward(walks[ant], sizes[ant], lengths[ant], trail, ranking, rules.deposit)
+                    home[ant] = True
                 elif taken[ant] < limit and lengths[ant] <= worst:
                     continue
             elif rules.backtrack and size > 1 and taken[ant] < limit:
@@ -316,10 +323,24 @@ def run_colony(
                 back: Any = np.int64(walks[ant, size - 2])
                 lengths[ant] -= step_length(to, back, i)
                 continue
-            leave(ant, graph.start, ants)
             ended += 1
+            if rules.generations:
+                waiting[ant] = True
+                continue
+            if home[ant]:
+                home[ant] = False
+                size = sizes[ant]
+                stale |= reward(walks[ant], size, lengths[ant], trail, ranking, rules.deposit, rules.graded)
+            leave(ant, graph.start, ants)
+        if rules.generations and ended < rules.quota:
+            continue
         decay(trail, mask, rules.min_pheromone, rules.evaporation)
-        if stale and ranking.counts[LISTED] == len(ranking.order):
+        if rules.generations:
+            for ant in range(len(states)):
+                if home[ant]:
+                    reward(walks[ant], sizes[ant], lengths[ant], trail, ranking, rules.deposit, rules.graded)
+                leave(ant, graph.start, ants)
+        elif stale and ranking.counts[LISTED] == len(ranking.order):
             stale = False
             worst = longest_listed(ranking)
     return new, shortest, steps, arrived

@@ -51,6 +51,8 @@ class AntSystem(Colony):
         evaporation: rho, the fraction of pheromone lost per iteration; rho of lee2008 is the fraction retained
         deposit: Q; an ant deposits Q / length on each of its arcs
         initial: the initial pheromone on every arc
+        mix: the fraction of chance in the initial pheromone; lee2008 draws all of that of the conventional colony
+            (l. 127)
         heuristic: "goal": eta = 1 / distance from the next cell to the goal (ibraheem2016 eq. 6, lee2008);
             "step": eta = 1 / length of the move (suganthi2019 eq. 6)
         ranks: number of ants that deposit per iteration: the best deposits the full amount of eq. 4, each later
@@ -66,6 +68,7 @@ class AntSystem(Colony):
     evaporation: float = 0.3
     deposit: float = 1.0
     initial: float = 1.0
+    mix: float = 0.0
     heuristic: Literal["goal", "step"] = "goal"
     ranks: int | None = None
 
@@ -77,14 +80,16 @@ class AntSystem(Colony):
         require("evaporation", self.evaporation, at_least=0, at_most=1)
         require("deposit", self.deposit, above=0)
         require("initial", self.initial, above=0)
+        require("mix", self.mix, at_least=0, at_most=1)
         if self.ranks is not None:
             require("ranks", self.ranks, at_least=1, at_most=1_000_000)
         if self.heuristic not in ("goal", "step"):
             raise FieldError("heuristic", f"must be 'goal' or 'step', got {self.heuristic!r}")
 
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
-        """Return tau(0) = `initial` on every arc of `graph`."""
-        return np.full((len(graph.mask), 8), self.initial)
+        """Return tau(0) = `initial` (1 - `mix` + `mix` chance) on every arc of `graph`; chance is uniform in (0, 1]."""
+        trail = np.full((len(graph.mask), 8), self.initial)
+        return trail * (1.0 - self.mix * rng.random(trail.shape)) if self.mix else trail
 
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
         """Return eta^beta for each move of `graph`, relative to the largest value in its cell."""

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError, require
+from antdrive.base.errors import FieldError, require, require_finite
 from antdrive.planners.colonies.colony import ColonyGraph
 from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Query
@@ -23,7 +23,7 @@ from antdrive.planners.plan import Capabilities, Query
 if TYPE_CHECKING:  # importing kernels loads the compiler
     from antdrive.planners.colonies._kernels_pfaco import Ants, Ranking
 
-FORMS, FIELDS, MEMORIES = ("local", "rise", "letter"), ("start", "goal"), ("tabu", "none")
+FORMS, FIELDS, MEMORIES = ("local", "rise", "letter", "distance"), ("start", "goal"), ("tabu", "none")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,17 +37,16 @@ class PotentialFieldAnts(IterativePlanner):
     Converged pheromone is rebuilt from the list (section IV-B). An iteration here ends when `ants` walks have
     ended.
 
-    The paper leaves three points open, each an option here: the definition of U_ij (`form`), whether an ant may
-    return to a cell (`memory`), and the constants from `attraction` on. docs/papers/lee2008.md compares the
-    interpretations. Only those in which U_ij depends on differences of the potential reach the paper's claims on
-    100 x 100 cells. With U_ij = U_j, two neighbours far from the start differ by a few per cent, and ants walk
-    almost at random.
+    The paper leaves these points open, each an option here: the definition of U_ij (`form`), whether an ant may
+    return to a cell (`memory`), dead ends (`backtrack`), and the constants from `attraction` to `convergence`.
+    docs/papers/lee2008.md compares the interpretations. With U_ij = U_j, two neighbours far from the start differ
+    by a few per cent, and ants walk almost at random. The step limit `max_steps` is an addition.
 
     Known weaknesses, measured on the same page. The potential has no maximum at the goal: unless the goal is the
     cell farthest from the start, ants are drawn past it, and paths may be three times as long as the shortest;
-    `field="goal"` fixes that. Ants restart in dead ends: 9 of 10 runs cross 100 x 100 cells with 25 per cent
+    `field="goal"` prevents it. Ants restart in dead ends: 9 of 10 runs cross 100 x 100 cells with 25 per cent
     blocked, and 18 of 50 the winding maps of 25 x 25 cells that represent lee2008's map 1; with `backtrack` all
-    do. The ranking list soon holds copies of one path, and the colony stops improving.
+    do.
 
     Attributes:
         ants: ants, and walks per iteration
@@ -61,21 +60,25 @@ class PotentialFieldAnts(IterativePlanner):
         alpha_3: the exponent of the pheromone in stage 3
         beta_3: the exponent of the potential in stage 3
         attraction: k_att of eq. 9
-        repulsion: k_rep of eq. 11
+        repulsion: k_rep of eq. 11; U = U_att - U_rep, as ants climb. If negative, obstacles attract: the sum of eq. 7 by
+            the letter
         influence: d0 of eq. 11, the range of the repulsion [cells]
         deposit: the deposit on each cell of a first-rank path; it falls linearly with the rank
+        graded: whether the deposit depends on the rank; otherwise every ant that arrives deposits the full amount
         min_pheromone: the lower bound of a free cell's pheromone
         convergence: the pheromone has converged when its sum changes by less than this fraction in an iteration
         max_steps: step limit of a walk; None: one step per cell, but at least 100 and at most 20 000
         form: U_ij of eq. 13; eq. 9 and 11 define only U at a cell. "local": U_j minus the lowest U of cell i and
-            its neighbours, plus attraction / 2; "rise": U_j - U_i, at least attraction / 2; "letter": U_j. All
-            moves attract
+            its neighbours, plus attraction / 2; "rise": U_j - U_i, at least attraction / 2; "letter": U_j; "distance":
+            eta of eq. 1, the reciprocal of the distance from cell j to the goal. All moves attract
         field: the origin of eq. 9. "start": the start, as in section IV-A; "goal": the same parabola with its
             maximum at the goal
         memory: allowed_k of eq. 13. "tabu": the neighbours that the ant has not visited, as in eq. 1; "none":
             all neighbours, taken literally; loops then count in the ranking, and are cut out of the path
         backtrack: whether an ant in a dead end steps back until it finds another path; otherwise it restarts
         shortcut: whether paths are cut short where they pass next to an earlier part of themselves
+        generations: whether ants wait at the goal or in a dead end until all walks have ended, then deposit, as in the
+            conventional colony; pheromone then evaporates once per iteration
 
     Raises:
         FieldError: an option is out of range; names it and the valid range.
@@ -95,14 +98,16 @@ class PotentialFieldAnts(IterativePlanner):
     repulsion: float = 10.0
     influence: float = 2.0
     deposit: float = 2.0
+    graded: bool = True
     min_pheromone: float = 0.001
     convergence: float = 0.02
     max_steps: int | None = None
-    form: Literal["local", "rise", "letter"] = "local"
+    form: Literal["local", "rise", "letter", "distance"] = "local"
     field: Literal["start", "goal"] = "start"
     memory: Literal["tabu", "none"] = "tabu"
     backtrack: bool = False
     shortcut: bool = False
+    generations: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -110,8 +115,9 @@ class PotentialFieldAnts(IterativePlanner):
         require("ranks", self.ranks, at_least=1, at_most=1_000_000)
         require("evaporation", self.evaporation, at_least=0, at_most=1)
         require("mix", self.mix, at_least=0, at_most=1)
-        for key in ("alpha_1", "beta_1", "alpha_2", "beta_2", "alpha_3", "beta_3", "repulsion"):
+        for key in ("alpha_1", "beta_1", "alpha_2", "beta_2", "alpha_3", "beta_3"):
             require(key, getattr(self, key), at_least=0)
+        require_finite("repulsion", self.repulsion)
         for key in ("attraction", "influence", "deposit", "min_pheromone", "convergence"):
             require(key, getattr(self, key), above=0)
         if self.max_steps is not None:
@@ -160,6 +166,8 @@ class PotentialFieldAnts(IterativePlanner):
             there = np.where(allowed, there, 0.0) - lowest + least
         elif self.form == "rise":
             there = np.maximum(there - here, least)
+        elif self.form == "distance":
+            there = graph.at_neighbours(1.0 / np.maximum(graph.distance_to(graph.goal), 0.01))
         return np.where(allowed, there, 0.0)
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
@@ -275,6 +283,8 @@ class AntPool:
             evaporation=float(planner.evaporation),
             min_pheromone=float(planner.min_pheromone),
             deposit=float(planner.deposit),
+            graded=planner.graded,
+            generations=planner.generations,
             limit=self.limit,
             tabu=planner.memory == "tabu",
             backtrack=planner.backtrack,

@@ -434,6 +434,7 @@ def _quartile_range(values: Floats, counts: Numbers) -> float:
 UNITS: Mapping[str, tuple[int, str]] = {
     "gap": (1, " %"),
     "missing": (0, ""),
+    "even_gap": (1, " %"),
     "length": (2, ""),
     "last": (2, ""),
     "unrest": (2, ""),

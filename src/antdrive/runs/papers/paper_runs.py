@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.planners import (
     Cell,
@@ -104,6 +105,8 @@ class PaperRun:
     total: float  # hasan's total cost of the path; inf without a path
     concentration: float = math.nan  # fraction of the planner's field on the path; nan without a path or a field
     ants: float = math.nan  # ants per iteration; nan for other planners
+    even: float = math.nan  # length of the best path at exactly the limit of work; nan without a limit
+    close: float = math.nan  # work until the path was within `CLOSE` of the shortest, inf if never; nan without a limit
 
     @property
     def length(self) -> float:
@@ -114,6 +117,11 @@ class PaperRun:
     def gap(self) -> float:
         """The relative excess of the path over the shortest [%]; inf without a path."""
         return 100.0 * (self.length / self.optimum - 1.0)
+
+    @property
+    def even_gap(self) -> float:
+        """The gap at exactly the limit of work, as the iteration that reaches the limit exceeds it [%]."""
+        return 100.0 * (self.even / self.optimum - 1.0)
 
     @property
     def steps(self) -> float:
@@ -152,8 +160,10 @@ class PaperRun:
     def effort(self) -> float:
         """The work until the path was within `CLOSE` of the shortest; inf if never.
 
-        Every iteration counts as an equal fraction of the work.
+        Without a limit of work every iteration counts as an equal fraction.
         """
+        if not math.isnan(self.close):
+            return self.close
         near = np.flatnonzero(self.result.history.best <= (1 + CLOSE) * self.optimum + 1e-9)
         return self.result.work * (near[0] + 1) / len(self.result.history) if len(near) else math.inf
 
@@ -191,20 +201,38 @@ def solve(
 ) -> PaperRun:
     """Plan once."""
     chosen = load_planner(planner, **options) if isinstance(planner, str) else planner
-    rng = np.random.default_rng(seed)
+    rng, spent_work = np.random.default_rng(seed), [0]
     started = time.process_time()
     if math.isfinite(work):
         ants = as_iterative(chosen)
         if ants is None:
             raise FieldError("work", f"{type(chosen).__name__} plans at once; its work cannot be limited")
         endless = dataclasses.replace(ants, iterations=ENDLESS)
-        result = endless.answer(query, _until(endless.iterate(query, rng), work))
+        result = endless.answer(query, _until(endless.iterate(query, rng), work, spent_work))
     else:
         result = chosen.plan(query, rng)
     spent = time.process_time() - started
-    colony = float(getattr(chosen, "ants", math.nan))
-    total, shortest = total_cost(query, result), maps.optimum(query)
-    return PaperRun(seed, seed, result, shortest, spent, total, concentration(result), colony)
+    optimum, total, concentrated = maps.optimum(query), total_cost(query, result), concentration(result)
+    limited = limits(work, np.array(spent_work[1:]), result.history.best, optimum) if math.isfinite(work) else ()
+    ants = float(getattr(chosen, "ants", math.nan))
+    return PaperRun(seed, seed, result, optimum, spent, total, concentrated, ants, *limited)
+
+
+def limits(work: float, spent: npt.NDArray[np.int64], best: Floats, optimum: float) -> tuple[float, float]:
+    """Return `PaperRun.even` and `PaperRun.close`.
+
+    Between the last two iterations the length falls linearly with the work. A first path counts in full, although the limit
+    may cut its iteration.
+
+    Args:
+        work: the limit of work
+        spent: the work after each iteration (I,), the last at or above the limit
+        best: the length of the best path after each iteration (I,), inf before the first
+        optimum: the length of the shortest path
+    """
+    even = float(np.interp(work, spent[-2:], best[-2:])) if np.isfinite(best[-2:]).all() else float(best[-1])
+    near = np.flatnonzero(best <= (1 + CLOSE) * optimum + 1e-9)
+    return even, float(min(spent[near[0]], work)) if len(near) else math.inf
 
 
 def concentration(result: PlanResult) -> float:
@@ -216,13 +244,12 @@ def concentration(result: PlanResult) -> float:
     return float(result.field[on_path].sum() / result.field.sum())
 
 
-def _until(states: Iterator[Iteration], work: float) -> Iterator[Iteration]:
-    """Yield iterations until their work adds up to `work`."""
-    done = 0
+def _until(states: Iterator[Iteration], work: float, spent: list[int]) -> Iterator[Iteration]:
+    """Yield iterations until their work adds up to `work`, and append the work after each to `spent`."""
     for state in states:
+        spent.append(spent[-1] + state.work)
         yield state
-        done += state.work
-        if done >= work:
+        if spent[-1] >= work:
             return
 
 

@@ -51,7 +51,7 @@ from antdrive.runs.pool import Pool, call_now, processes_for
 from antdrive.runs.statistics.intervals import medians_by_world
 
 HISTORY = ("best", "iteration_best", "iteration_mean", "arrived")
-NUMBERS = ("optimum", "cpu_s", "total", "concentration", "ants")  # in the order of `PaperRun`
+NUMBERS = ("optimum", "cpu_s", "total", "concentration", "ants", "even", "close")  # in the order of `PaperRun`
 NONE = -1  # size of missing waypoints
 
 
