@@ -164,7 +164,7 @@ def runs_needed(claim: Claim) -> int:
         return next(
             n for n in range(1, MANY) if RELATIONS[claim.relation](wilson(n if above else 0, n), claim.bound)[0]
         )
-    return 1 if "wins" in claim.statistic and TIMED not in claim.quantity else FEWEST
+    return 1 if claim.statistic == "wins" else FEWEST
 
 
 def runs_available(claim: Claim, sizes: Mapping[Arm, int]) -> int:
@@ -286,15 +286,48 @@ def _failed(claim: Claim, runs: RunsByArm) -> Measured:
 
 
 def _wins(claim: Claim, runs: RunsByArm) -> Measured:
-    """Count the cases in which the first planner's median, or best run, is below the second's."""
-    stands = np.min if claim.statistic == "wins of best runs" else np.median
-    pairs = [[float(stands([_value(t, claim.quantity[0]) for t in runs[arm]])) for arm in case] for case in claim.cases]
+    """Count the cases in which the first planner's median is below the second's."""
+    pairs = [
+        [float(np.median([_value(t, claim.quantity[0]) for t in runs[arm]])) for arm in case] for case in claim.cases
+    ]
     less = sum(a < b - 1e-9 for a, b in pairs)
-    digits = 2 if TIMED in claim.quantity else 0
-    why = ", ".join(f"{a:.{digits}f} : {b:.{digits}f}" for a, b in pairs)
+    why = ", ".join(f"{a:.0f} : {b:.0f}" for a, b in pairs)
     count = min(len(runs[one]) for one, _ in claim.cases)
-    few = f"{count} runs, but times need at least {FEWEST}"
-    return Measured(float(less), Interval(less, less), count, f"less in {less} of {len(pairs)}", why, few=few)
+    return Measured(float(less), Interval(less, less), count, f"less in {less} of {len(pairs)}", why)
+
+
+def _ratio_wins(claim: Claim, runs: RunsByArm) -> Measured:
+    """Count the cases whose median paired ratio of first to second is below 1, by its interval.
+
+    The interval of the count ends at the number of cases that are not refuted, as each undecided one may be below 1. A ratio
+    without both paths is 1, without one 0 or infinite. Times must be those of one group of experiments.
+    """
+    ratios, counts = [], []
+    for case in claim.cases:
+        first, second, world = _paired(claim, runs, [case])
+        known = np.maximum(np.stack([first, second]), 1e-9)
+        ratio = np.round(known[0] / known[1], 9)
+        ratios.append(_median(ratio, world))
+        counts.append(len(ratio))
+    below = sum(interval.high < 1.0 for _, interval in ratios)
+    open_cases = sum(interval.low < 1.0 <= interval.high for _, interval in ratios)
+    above = sum(interval.low > 1.0 for _, interval in ratios)
+    interval = Interval(below, below + open_cases)
+    undecided = f"{open_cases} undecided, which could decide either way"
+    tips = not any(RELATIONS[claim.relation](interval, claim.bound))
+
+    def number(value: float) -> str:
+        return ENDLESS_TEXT if value > MANY else f"{value:.2f}"
+
+    return Measured(
+        value=float(below),
+        interval=interval,
+        runs=min(counts),
+        ours=f"less in {below} of {len(ratios)}, more in {above}",
+        why="median ratios " + ", ".join(f"{number(v)} [{number(i.low)}, {number(i.high)}]" for v, i in ratios),
+        unknown=undecided if tips else "",
+        few=f"{min(counts)} runs, but times need at least {FEWEST}" if TIMED in claim.quantity else "",
+    )
 
 
 #: Statistics of a claim's runs, by name in the table of claims.
@@ -312,7 +345,7 @@ STATISTICS: Mapping[str, Callable[[Claim, RunsByArm], Measured]] = MappingProxyT
         "gain": _gain,
         # Two planners, map by map.
         "wins": _wins,
-        "wins of best runs": _wins,
+        "wins of ratios": _ratio_wins,
     }
 )
 
@@ -415,6 +448,8 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "settled": (0, " iterations"),
     "near": (0, " iterations"),
     "effort": (0, " steps"),
+    "steps": (0, " steps"),
+    "total": (1, ""),
 }
 
 
