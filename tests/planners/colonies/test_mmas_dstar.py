@@ -128,7 +128,9 @@ def test_evaporation_changes_no_path():
 
 def test_a_cell_that_keeps_its_first_cost_may_have_a_higher_one():
     query = environments()["4d concentric circles"]
-    (_, lowest, *_), (_, first, *_) = (MaxMinDStar(gates=False, lowers=lowers).spread(query) for lowers in (True, False))
+    (_, lowest, *_), (_, first, *_) = (
+        MaxMinDStar(gates=False, lowers=lowers).spread(query) for lowers in (True, False)
+    )
     final = lowest < lowest[query.start_node]
     assert (first[final] >= lowest[final] - 1e-9).all()
     assert (first[final] > lowest[final] + 1e-9).any()

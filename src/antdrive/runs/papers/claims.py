@@ -299,22 +299,20 @@ def _wins(claim: Claim, runs: RunsByArm) -> Measured:
 def _ratio_wins(claim: Claim, runs: RunsByArm) -> Measured:
     """Count the cases whose median paired ratio of first to second is below 1, by its interval.
 
-    The interval of the count ends at the number of cases that are not refuted, as each undecided one may be below 1. A ratio
-    without both paths is 1, without one 0 or infinite. Times must be those of one group of experiments.
+    The interval of the count ends where every undecided case is below 1, too: those whose interval contains or touches 1. An
+    interval of exactly 1 is equal. A ratio with no path is infinite or 0, without both paths 1. Times must be those of one
+    group of experiments.
     """
     ratios, counts = [], []
     for case in claim.cases:
         first, second, world = _paired(claim, runs, [case])
-        known = np.maximum(np.stack([first, second]), 1e-9)
-        ratio = np.round(known[0] / known[1], 9)
+        ratio = np.round(np.maximum(first, 1e-9) / np.maximum(second, 1e-9), 9)
         ratios.append(_median(ratio, world))
         counts.append(len(ratio))
-    below = sum(interval.high < 1.0 for _, interval in ratios)
-    open_cases = sum(interval.low < 1.0 <= interval.high for _, interval in ratios)
-    above = sum(interval.low > 1.0 for _, interval in ratios)
-    interval = Interval(below, below + open_cases)
-    undecided = f"{open_cases} undecided, which could decide either way"
-    tips = not any(RELATIONS[claim.relation](interval, claim.bound))
+    below, above = (sum(test) for test in zip(*((i.high < 1.0, i.low > 1.0) for _, i in ratios), strict=True))
+    equal = sum(i.low == i.high == 1.0 for _, i in ratios)
+    undecided = len(ratios) - below - above - equal
+    interval = Interval(below, below + undecided)
 
     def number(value: float) -> str:
         return ENDLESS_TEXT if value > MANY else f"{value:.2f}"
@@ -323,10 +321,11 @@ def _ratio_wins(claim: Claim, runs: RunsByArm) -> Measured:
         value=float(below),
         interval=interval,
         runs=min(counts),
-        ours=f"less in {below} of {len(ratios)}, more in {above}",
+        ours=f"less in {below} of {len(ratios)}, equal in {equal}, more in {above}",
         why="median ratios " + ", ".join(f"{number(v)} [{number(i.low)}, {number(i.high)}]" for v, i in ratios),
-        unknown=undecided if tips else "",
-        few=f"{min(counts)} runs, but times need at least {FEWEST}" if TIMED in claim.quantity else "",
+        unknown=""
+        if any(RELATIONS[claim.relation](interval, claim.bound))
+        else f"{undecided} undecided, which could tip it",
     )
 
 

@@ -185,25 +185,34 @@ def solve(
     return PaperRun(seed, seed, result, maps.optimum(query), spent, total_cost(query, result), concentration(result))
 
 
-#: How often arms that are timed together run with each seed: A B B A A B B A.
-TURNS = 4
+#: How often arms that are timed together take turns with each seed, A B B A A B B A, and the least processor time of a turn [s].
+TURNS, TURN = 4, 0.003
 
 
 def interleaved(calls: Sequence[Callable[[], PaperRun]]) -> list[PaperRun]:
-    """Return one run of each call; `cpu_s` is the median of `TURNS` runs that alternate with those of the other calls.
+    """Return one run of each call; `cpu_s` is the median of `TURNS` turns that alternate with those of the other calls.
 
-    Every other round goes backwards, so that a steady drift of the machine's speed changes all times alike.
+    A call repeats within its turn for at least `TURN`, and the turn counts with its least time: a single plan of 0.1 ms takes
+    two or three times as long while the processor's caches hold the data of the other calls. Every other round of turns
+    goes backwards, so that a steady drift of the machine's speed changes all times alike.
     """
     if len(calls) == 1:
         return [calls[0]()]
     rounds: list[list[PaperRun]] = []
-    for turn in range(TURNS):
-        done = [call() for call in calls[:: -1 if turn & 1 else 1]]
-        rounds.append(done[:: -1 if turn & 1 else 1])
+    for number in range(TURNS):
+        way = slice(None, None, -1 if number & 1 else 1)
+        rounds.append([_turn(call) for call in calls[way]][way])
     return [
         dataclasses.replace(turns[0], cpu_s=statistics.median(run.cpu_s for run in turns))
         for turns in zip(*rounds, strict=True)
     ]
+
+
+def _turn(call: Callable[[], PaperRun]) -> PaperRun:
+    runs = [call()]
+    while sum(run.cpu_s for run in runs) < TURN:
+        runs.append(call())
+    return min(runs, key=lambda run: run.cpu_s)
 
 
 def concentration(result: PlanResult) -> float:
