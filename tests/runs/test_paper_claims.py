@@ -439,6 +439,10 @@ def test_the_arms_of_a_group_are_kept_in_one_file_and_run_again_together(tmp_pat
     assert sorted(path.name for path in (tmp_path / "trials").iterdir()) == ["hasan-m-alone.npz", "hasan-m-g.npz"]
     again = reproduction.reproduce(["hasan"], tmp_path, seeds=3)
     assert again.kept == 3
+    works = [solve(e.planner, {}, query, 0).work for e, _ in first.measured]
+    assert works[0] != works[2]
+    for one in (first, again):  # each arm has its own runs
+        assert [runs[-1].work for _, runs in one.measured] == works
     times = [[[run.cpu_s for run in runs] for _, runs in one.measured] for one in (first, again)]
     assert times[0] == times[1]
     arms[1] = dataclasses.replace(arms[1], options={"alpha": 2.0})  # the other arm is timed again, too
