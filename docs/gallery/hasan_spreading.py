@@ -2,9 +2,9 @@
 Pheromone that spreads from the goal (Hasan)
 ============================================
 
-In Hasan's planner, pheromone spreads from the goal over all free cells, and a single ant follows it cell by cell. A blocked
-cell triggers a local repair, much as in D*. This world recreates the paper's curved walls with its mover, which steps to
-a random neighbouring cell every 0.8 s.
+In Hasan's planner, pheromone spreads from the goal until it reaches the robot, and a single ant follows it cell by cell. The
+ant skips the mover's cell; nothing is repaired. This world has curved walls as the paper describes them, and one mover, which
+steps to a random neighbouring cell every 0.8 s.
 """
 
 from antdrive import Scenario, film, plan, run

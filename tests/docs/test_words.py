@@ -8,7 +8,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-GENERATED = re.compile(r"^<!-- (?:generated: .+?|claims|counts|arms|findings) -->$.*?^<!-- end -->$", re.MULTILINE | re.DOTALL)
+GENERATED = re.compile(
+    r"^<!-- (?:generated: .+?|claims|counts|arms|findings) -->$.*?^<!-- end -->$", re.MULTILINE | re.DOTALL
+)
 PAGES = {
     page.relative_to(ROOT).as_posix(): GENERATED.sub("", page.read_text())
     for page in [*ROOT.glob("*.md"), *DOCS.rglob("*.md"), *(ROOT / "examples").rglob("*.md")]

@@ -1,8 +1,10 @@
 """Claims and their verdicts, on synthetic runs with a known answer."""
 
 import dataclasses
+import heapq
 import itertools
 import math
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,13 +12,15 @@ import pytest
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import PLANNERS, History, PlannerError, Query
-from antdrive.runs.papers import maps
+from antdrive.planners.colonies.mmas_dstar import closed_gates
+from antdrive.runs.papers import maps, reproduction
 from antdrive.runs.papers.claims import (
     CLAIMS,
     FEWEST,
     RELATIONS,
     SMALL_EFFECT,
     STATISTICS,
+    TIMED,
     Arm,
     Claim,
     Decision,
@@ -25,12 +29,16 @@ from antdrive.runs.papers.claims import (
     runs_needed,
     verdict_facts,
 )
+from antdrive.runs.papers.experiment import Experiment
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.lee2008 import placement
 from antdrive.runs.papers.maps import (
+    HASAN,
     TWO_WALLS,
     MoveCount,
     candidate,
+    closing_gates,
+    environment,
     environments,
     move_counts,
     optimum,
@@ -38,18 +46,20 @@ from antdrive.runs.papers.maps import (
     winding_candidate,
 )
 from antdrive.runs.papers.paper_runs import (
+    TURNS,
     FirstTouchDStar,
     PaperRun,
     Strollers,
     concentration,
     drive,
     drive_among,
+    interleaved,
     limits,
     solve,
     total_cost,
 )
 from antdrive.runs.papers.reproduction import load_runs, runs_key, save_runs, too_few_seeds
-from antdrive.worlds import Grid
+from antdrive.worlds import DIRECTIONS, Grid
 
 ONE, TWO = Arm("m", "one"), Arm("m", "two")
 
@@ -93,9 +103,11 @@ def test_every_claim_names_experiments_of_its_paper():
             quantities = {*dir(PaperRun), *PaperRun.__dataclass_fields__, ""}
             assert quantities >= {*one.quantity}
         for experiment in experiments():
-            assert len(experiment.seeds(7)) == 7 * experiment.rounds
-            assert len(experiment.seeds(50)) == min(50 * experiment.rounds, experiment.most_seeds)
-            assert len(experiment.seeds(50)) >= 10
+            assert len(experiment.seeds(7)) == min(7 * experiment.rounds, experiment.most_seeds)
+        for one in claims:
+            if TIMED in one.quantity:  # times are compared within a group only
+                groups = {Arm(e.map, e.name): e.group for e in experiments()}
+                assert all(groups[first] == groups[second] != "" for first, second in one.cases), one.reading
         texts = [(one.sentence, one.reading) for one in claims]
         assert len(set(texts)) == len(texts)
         names = [(e.map, e.name) for e in experiments()]
@@ -338,12 +350,66 @@ def test_cases_are_counted():
     assert verdict(claim("wins", ">=", 2, maps=2), [1.0], [2.0]).decision is Decision.HOLDS
     assert verdict(claim("wins", ">=", 2, maps=2), [2.0], [2.0]).decision is Decision.REFUTED
     assert verdict_facts(verdict(claim("wins", ">=", 2, maps=2), [2.0], [2.0]))["verdict"] == "does not hold"
-    middle, least = claim("wins", ">=", 2, maps=2), claim("wins of best runs", ">=", 2, maps=2)
-    assert verdict(middle, [0.0, 3.0, 3.0], [2.0, 2.0, 2.0]).decision is Decision.REFUTED
-    assert verdict(least, [0.0, 3.0, 3.0], [2.0, 2.0, 2.0]).decision is Decision.HOLDS
-    timed = claim("wins", ">=", 2, maps=2, quantity=("cpu_ms",))
-    assert verdict(timed, [1.0] * 5, [1.0] * 5).decision is Decision.OPEN  # times of five runs tell nothing
-    assert verdict(timed, [1.0] * 6, [1.0] * 6).decision is Decision.REFUTED
+
+
+def timed(*times):
+    """Runs with these processor times [s]."""
+    return [PaperRun(seed, seed, SimpleNamespace(solved=True), 100.0, cpu, 0.0) for seed, cpu in enumerate(times)]
+
+
+@pytest.mark.parametrize(
+    ("factors", "decision", "ours"),
+    [
+        ((0.8, 0.9, 0.7), Decision.HOLDS, "less in 3 of 3, equal in 0, more in 0"),
+        ((0.8, 0.9, 1.0), Decision.OPEN, "less in 2 of 3, equal in 0, more in 0"),  # the third could tip it
+        ((0.8, 0.9, 1.2), Decision.REFUTED, "less in 2 of 3, equal in 0, more in 1"),
+        ((0.8, 1.0, 1.2), Decision.REFUTED, "less in 1 of 3, equal in 0, more in 1"),  # the second could not
+    ],
+)
+def test_times_are_decided_case_by_case_by_the_interval_of_paired_ratios(factors, decision, ours):
+    """Times of seeds differ tenfold, times of a pair by the factor and 5 % of noise: unpaired medians would tell nothing."""
+    rng, arms, cases = np.random.default_rng(4), {}, []
+    for k, factor in enumerate(factors):
+        second = rng.uniform(0.1, 1.0, 40)
+        noise = 1 + np.resize([-0.05, 0.05], 40) * rng.uniform(0.1, 1.0, 40)
+        case = Arm(str(k), "one"), Arm(str(k), "two")
+        arms |= dict(zip(case, (timed(*(second * factor * noise)), timed(*second)), strict=True))
+        cases.append(case)
+    faster = claim("wins of ratios", ">=", 3, quantity=("cpu_ms",), cases=tuple(cases))
+    found = evaluate(faster, arms)
+    assert (found.decision, found.ours) == (decision, ours)
+    few = evaluate(faster, {arm: times[:5] for arm, times in arms.items()})
+    assert few.decision is Decision.OPEN
+
+
+def test_a_ratio_counts_a_missing_path_as_infinitely_long():
+    none, all_of = np.full(20, math.nan), np.full(20, 5.0)
+    shorter = claim("wins of ratios", ">=", 1, quantity=("length",))
+    assert verdict(shorter, all_of, none).decision is Decision.HOLDS
+    assert verdict(shorter, none, all_of).decision is Decision.REFUTED
+    assert "∞" in verdict(shorter, none, all_of).why
+    assert verdict(shorter, none, none).decision is Decision.REFUTED  # no case is below
+    equal = verdict(shorter, all_of, all_of)
+    assert (equal.decision, equal.ours) == (Decision.REFUTED, "less in 0 of 1, equal in 1, more in 0")
+    touching = verdict(shorter, all_of + np.resize([0.0, 1.0, 0.0], 20), all_of)  # its interval begins at 1
+    assert (touching.decision, touching.low, touching.high) == (Decision.OPEN, 0, 1)
+
+
+def test_arms_that_are_timed_together_bear_a_drift_alike():
+    """A machine that gets slower from call to call: equal work takes equal times, although each call takes longer."""
+    for arms in (2, 3):
+        clock, order = itertools.count(1), []
+
+        def call(name, clock=clock, order=order):
+            order.append(name)
+            return PaperRun(name, 0, None, 1.0, float(next(clock)), 0.0)
+
+        found = interleaved([partial(call, name) for name in range(arms)])
+        assert [run.seed for run in found] == list(range(arms))
+        assert order[: 2 * arms] == [*range(arms), *reversed(range(arms))]
+        assert len({run.cpu_s for run in found}) == 1
+        assert len(order) == arms * TURNS
+    assert interleaved([lambda: PaperRun(7, 0, None, 1.0, 3.0, 0.0)])[0].cpu_s == 3.0
 
 
 @pytest.mark.parametrize(
@@ -417,6 +483,28 @@ def test_a_winding_candidate_has_the_moves_asked_for_and_turns_back_in_rows_and_
         assert (same.start, same.goal) == (query.start, query.goal)
 
 
+def test_the_arms_of_a_group_are_kept_in_one_file_and_run_again_together(tmp_path, monkeypatch):
+    """Else times of different calls could be compared, where one was interrupted between two arms."""
+    query = Query(Grid.from_free(np.ones((4, 4))), (0, 0), (3, 3))
+    common = {"paper": "hasan", "map": "m", "query": lambda seed: query, "printed": None}
+    alone = Experiment(**common, planner="astar", label="alone")
+    arms = [Experiment(**common, planner=name, group="g") for name in ("dstar", "mmas-dstar")]
+    monkeypatch.setattr(reproduction, "PAPERS", {"hasan": lambda: [arms[0], alone, arms[1]]})
+    first = reproduction.reproduce(["hasan"], tmp_path, seeds=3)
+    assert [(e.name, len(runs)) for e, runs in first.measured] == [("dstar", 3), ("alone", 3), ("mmas-dstar", 3)]
+    assert sorted(path.name for path in (tmp_path / "trials").iterdir()) == ["hasan-m-alone.npz", "hasan-m-g.npz"]
+    again = reproduction.reproduce(["hasan"], tmp_path, seeds=3)
+    assert again.kept == 3
+    works = [solve(e.planner, {}, query, 0).work for e, _ in first.measured]
+    assert works[0] != works[2]
+    for one in (first, again):  # each arm has its own runs
+        assert [runs[-1].work for _, runs in one.measured] == works
+    times = [[[run.cpu_s for run in runs] for _, runs in one.measured] for one in (first, again)]
+    assert times[0] == times[1]
+    arms[1] = dataclasses.replace(arms[1], options={"alpha": 2.0})  # the other arm is timed again, too
+    assert reproduction.reproduce(["hasan"], tmp_path, seeds=3).kept == 1
+
+
 def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
     kinds = (("14 obstacles", "10 ants"), ("one obstacle of radius 5", "3 via points"))
     one, other = (e for e in PAPERS["han2007"]() if (e.map, e.name) in kinds)
@@ -441,7 +529,8 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
         np.testing.assert_array_equal(after.result.line, before.result.line)
         assert after.result.status is before.result.status
     assert load_runs(path, runs_key(one, 5)) is None
-    assert load_runs(path, runs_key(dataclasses.replace(one, options={"ants": 11}), 4)) is None
+    for changed in ({"options": {"ants": 11}}, {"movers": 1}, {"enter": True}, {"on_path": True}):
+        assert load_runs(path, runs_key(dataclasses.replace(one, **changed), 4)) is None
     path.write_bytes(path.read_bytes()[:-200])
     assert load_runs(path, key) is None
     assert load_runs(tmp_path / "none.npz", key) is None
@@ -512,17 +601,56 @@ def test_the_total_cost_is_that_of_hasans_straight_row():
     assert total_cost(diagonal, PLANNERS["astar"].plan(diagonal, np.random.default_rng(0))) == pytest.approx(1.4 + 2.8)
 
 
-def test_a_dstar_that_lowers_no_cost_finds_longer_paths_where_walls_are_concave():
+@pytest.mark.parametrize("order", ["distance", "cost"])
+def test_a_dstar_that_keeps_first_costs_is_a_search_with_its_order_of_the_open_list(order):
+    queries = [environment(name, 0) for name in list(HASAN)[1:]]
     longer = 0
-    for query in environments().values():
-        plan = FirstTouchDStar().plan(query, np.random.default_rng(0))
-        assert plan.solved
-        assert plan.cost >= optimum(query) - 1e-9
+    for query in queries:
+        (goal, start), onward, cost = (query.goal, query.start), {query.goal: query.goal}, {query.goal: 0}
+        queue = [(0, goal)]
+        while start not in onward:
+            _, (row, col) = heapq.heappop(queue)
+            for k, (dr, dc) in enumerate(DIRECTIONS):
+                near = (row + dr, col + dc)
+                if int(query.grid.moves[row, col]) >> k & 1 and near not in onward:
+                    onward[near], cost[near] = (row, col), cost[row, col] + (7 if dr and dc else 5)
+                    key = cost[near] if order == "cost" else (near[0] - start[0]) ** 2 + (near[1] - start[1]) ** 2
+                    heapq.heappush(queue, (key, near))
+        cells = [start]
+        while cells[-1] != goal:
+            cells.append(onward[cells[-1]])
+        plan = FirstTouchDStar(order=order).plan(query, np.random.default_rng(0))
+        assert plan.cells.tolist() == [list(cell) for cell in cells]
+        assert plan.work == len(onward)
         longer += plan.cost > 1.05 * optimum(query)
-    assert longer >= 3
+    assert (longer >= 3) == (order == "distance")
     shut = np.ones((3, 3))
     shut[1] = 0
     assert not FirstTouchDStar().plan(Query(Grid.from_free(shut), (0, 0), (2, 2)), np.random.default_rng(0)).solved
+
+
+@pytest.mark.parametrize("name", list(HASAN)[1:])
+def test_a_candidate_for_hasans_environment_has_the_printed_steps_and_no_more_gates(name):
+    query, printed = environment(name, 1), HASAN[name]
+    assert (query.start, query.goal) == printed.ends
+    assert closed_gates(query)[1] <= printed.gates
+    steps = len(PLANNERS["astar"].plan(closing_gates(query), np.random.default_rng(0)).cells) - 1
+    assert abs(steps - printed.steps) <= 0.1 * printed.steps
+    assert (environment(name, 2).grid.free != query.grid.free).any()
+
+
+def test_hasans_gates_are_closed_for_every_planner():
+    query = environments()["5f the same, across the wall"]
+    moves, closed = closed_gates(query)
+    gated = closing_gates(query)
+    np.testing.assert_array_equal(gated.grid.moves, moves)
+    assert closed == 28
+    assert optimum(gated) > optimum(query)
+    ant = {"alpha": 1.0, "beta": 0.0}
+    same = [
+        solve("mmas-dstar", {**ant, "gates": gates}, one, 0).total for gates, one in ((True, query), (False, gated))
+    ]
+    assert same[0] == same[1]
 
 
 def test_the_concentration_is_the_share_of_the_field_on_the_path():
@@ -531,14 +659,6 @@ def test_the_concentration_is_the_share_of_the_field_on_the_path():
     plan = SimpleNamespace(solved=True, field=field, cells=cells)
     assert concentration(plan) == pytest.approx(6 / 8)
     assert math.isnan(concentration(SimpleNamespace(solved=True, field=None, cells=cells)))
-
-
-def test_hasans_ant_with_the_papers_exponents_goes_in_no_circle():
-    for experiment in PAPERS["hasan"]():
-        if experiment.name == "mmas-dstar":
-            assert solve("mmas-dstar", experiment.options, experiment.query(0), 0).result.reason == ""
-        if experiment.name == "mmas-dstar, our rule" and experiment.map[:2] != "3c":
-            assert "circles" in solve("mmas-dstar", {}, experiment.query(0), 0).result.reason
 
 
 def test_a_drive_among_movers_depends_on_its_seed_alone():
@@ -553,6 +673,14 @@ def test_a_drive_among_movers_depends_on_its_seed_alone():
     shut[:, 4] = 0
     never = drive_among("dstar", {}, Query(Grid.from_free(shut), (0, 0), (2, 8)), 0, 1)
     assert (never.result.solved, never.total) == (False, math.inf)
+    # A mover on the robot's path that may enter its cell ends some drives, and no other does.
+    met = [
+        drive_among("dstar", {}, query, seed, 5, on_path=True, enter=enter)
+        for enter in (True, False)
+        for seed in range(6)
+    ]
+    assert not all(run.result.solved for run in met[:6])
+    assert all(run.result.solved for run in met[6:])
 
 
 def test_a_robot_that_goes_into_a_mover_is_blamed():

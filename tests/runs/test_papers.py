@@ -16,8 +16,8 @@ from antdrive.runs.papers.claims import CLAIMS, Decision
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.reproduction import reproduce as measure_again
 from antdrive.views import papers as pictures
-from tools.paper_tables import arms_table, claims_table, counts_table, missing, replaced
 from antdrive.worlds import DIRECTIONS
+from tools.paper_tables import arms_table, claims_table, counts_table, missing, replaced
 from tools.shared_data import data_folder
 
 
@@ -192,6 +192,9 @@ PRINTED = {
     },
     "hasan": {
         "Table 1, improved MMSA": "65 43 49 64 91 66 2491.8 1052.4 1238.6 2281.2 5086.4 2477.8 2.96 5.64",
+        "Table 1, alpha": "7 5 1 3",
+        "§ An improved MMSA algorithm implemented, and Fig. 4": "13 99 98.2 14 118.6 98.6",
+        "§ Experiment results, Fig. 5f": "26",
         "Table 1, basic D*": "3318.4 2559.8 1238.6 5857.8 5380.6 3249.2 3.49 32.89",
     },
 }

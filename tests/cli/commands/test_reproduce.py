@@ -10,5 +10,5 @@ def test_the_default_folder_is_never_that_of_another_repetition(antdrive):
     for seeds, kept in (("1", False), ("2", False), ("1", True)):
         code, shown, _ = antdrive("reproduce", "hasan", "--seeds", seeds)
         assert code == 0
-        assert ("48 of 48 experiments reused" in shown) == kept
+        assert ("experiments reused" in shown) == kept
     assert sorted(path.name for path in Path("out").iterdir()) == ["reproduce-hasan", "reproduce-hasan-2-seeds"]

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from antdrive.planners import MaxMinDStar, Query
+from antdrive.runs.papers.maps import environments
 from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query
 
@@ -115,3 +116,39 @@ def test_closing_cells_leaves_the_moves_of_a_grid_with_these_cells_blocked():
         close_cells(moves, cells)
         free[tuple(cells.T)] = False
         np.testing.assert_array_equal(moves, Grid.from_free(free).moves)
+
+
+def test_evaporation_changes_no_path():
+    rng = np.random.default_rng(10)
+    for _ in range(10):
+        query = random_query(rng)
+        one, other = (solve(MaxMinDStar(evaporation=lost), query).cells.tolist() for lost in (0.02, 0.6))
+        assert one == other
+
+
+def test_a_cell_that_keeps_its_first_cost_may_have_a_higher_one():
+    query = environments()["4d concentric circles"]
+    (_, lowest, *_), (_, first, *_) = (
+        MaxMinDStar(gates=False, lowers=lowers).spread(query) for lowers in (True, False)
+    )
+    final = lowest < lowest[query.start_node]
+    assert (first[final] >= lowest[final] - 1e-9).all()
+    assert (first[final] > lowest[final] + 1e-9).any()
+    assert solve(MaxMinDStar(beta=0.0, lowers=False), query).solved
+
+
+def test_with_fixed_exponents_an_ant_that_circles_has_no_path():
+    query = environment_5f()
+    result = solve(MaxMinDStar(alpha_max=None), query)
+    assert not result.solved
+    assert result.reason == "the ant went in circles with alpha 1 and beta 1"
+    assert solve(MaxMinDStar(alpha_max=None), catalogue()["empty"]).solved
+    robot = MaxMinDStar(alpha_max=None).agent(query, np.random.default_rng(0))
+    for _ in range(200):
+        robot.step([])
+    assert not robot.arrived
+    assert robot.stats.cycles
+    raised = MaxMinDStar().agent(query, np.random.default_rng(0))
+    for _ in range(200):
+        raised.step([])
+    assert raised.arrived

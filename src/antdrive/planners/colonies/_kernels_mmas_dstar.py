@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.planners.colonies._kernels_colony import after, offsets
+from antdrive.planners.graph._kernels_incremental import put, take
 from antdrive.worlds._kernels import DCOL, DROW, Array, kernel
 from antdrive.worlds._kernels_turns import MoveGraph, behind
 
@@ -38,12 +39,12 @@ def close_gates(free: Array, moves: Array, start_row: int, start_col: int, goal_
 
 
 @kernel
-def propagate(graph: MoveGraph, start: int, goal: int, retained: float, pheromone: Array) -> int:
+def propagate(graph: MoveGraph, start: int, goal: int, retained: float, lowers: bool, pheromone: Array) -> int:
     """Spread pheromone, `retained` times the cost of the path to the goal cell, until the start node's is final.
 
     Returns the number of nodes that received some; the others have inf, 10000 in the paper. Cells leave the open list
-    in the order of cost, as in D*. Costs are multiples of 1/5, so the list is a ring of eight buckets, each a
-    linked list.
+    in the order of cost, as in D*. Unless it `lowers` costs, a node keeps its first. Costs are multiples of 1/5, so the
+    list is a ring of eight buckets, each a linked list.
     """
     mask, cell, label, cols = graph.mask, graph.cell, graph.label, graph.cols
     offset, turning = offsets(cols), len(cell) > 0
@@ -84,7 +85,7 @@ def propagate(graph: MoveGraph, start: int, goal: int, retained: float, pheromon
             else:
                 continue
             price = cost[i] + FIFTHS[k]
-            if cost[j] >= 0 and cost[j] <= price:
+            if cost[j] >= 0 and (cost[j] <= price or not lowers):
                 continue
             reached += cost[j] < 0
             cost[j], pheromone[j] = price, retained * price / 5.0
@@ -93,6 +94,36 @@ def propagate(graph: MoveGraph, start: int, goal: int, retained: float, pheromon
             entries += 1
             waiting += 1
     return reached
+
+
+@kernel
+def touch(mask: Array, cols: int, start: int, goal: int, nearest: bool, onward: Array) -> int:
+    """Spread from the goal until the start is touched; `onward` (cells,) gets each cell's next one, -1 if it was not touched.
+
+    Returns the number of touched cells. Cells leave the open list `nearest` to the start first, or by their cost.
+    """
+    offset = offsets(cols)
+    size: Any = np.int64(0)  # the compiler would treat a literal 0 as a separate type
+    none: Any = np.int64(0)
+    heap, place = np.empty((len(mask), 3), dtype=np.int64), np.full(len(mask), -1, dtype=np.int32)
+    cost = np.zeros(len(mask), dtype=np.int64)  # in fifths
+    onward[:] = -1
+    onward[goal] = goal
+    touched = 1
+    size = put(heap, place, size, goal, none, none)
+    while size > 0 and onward[start] < 0:
+        i: Any = heap[0, 2]
+        size = take(heap, place, size, i)
+        for k in range(8):
+            j = i + offset[k]
+            if not mask[i] & (1 << k) or onward[j] >= 0:
+                continue
+            onward[j], cost[j] = i, cost[i] + FIFTHS[k]
+            touched += 1
+            rows_off, cols_off = j // cols - start // cols, j % cols - start % cols
+            key = rows_off * rows_off + cols_off * cols_off if nearest else cost[j]
+            size = put(heap, place, size, j, key, j)
+    return touched
 
 
 @kernel

@@ -31,34 +31,45 @@ class MaxMinDStar(GridPlanner):
     """One ant follows pheromone spread from the goal like D*'s costs.
 
     hasan's improved max-min algorithm: the ant always takes the neighbour with the smallest `pheromone^alpha *
-    distance^beta` (eq. 1, as in the paper's program). Because of the straight distance to the goal, the ant may
-    cycle in front of a wall. The author chose other exponents for such maps; here the rule `exponents` serves all
-    maps, and the ant always arrives. The result's `reason` reports the changes.
+    distance^beta`, the numerator of eq. 1. The paper's listing (l. 193-195) divides this product by itself, for blocked
+    cells only; the text (l. 161) has the minimum, for free ones. Because of the straight distance to the goal, the ant
+    may cycle in front of a wall. The author chose other exponents for such maps; here the rule `exponents` serves all
+    maps, and the ant always arrives. The result's `reason` reports the changes. Max-min ants' bounds, deposits of the
+    best ant and random choices (l. 60-82) are not in the paper's procedures, nor here: see `MaxMinAnts`.
 
-    Known weaknesses, measured (docs/papers/hasan.md): with alpha 1 and beta 1, alpha must be raised in five of
-    the paper's six environments; with the paper's exponents, in none of them. Paths are up to 11 per cent longer than the
-    shortest. With a quarter of 50 x 50 cells blocked they are 1.8 per cent longer in the median and 44 per cent at
-    worst.
+    Known weaknesses, measured (docs/papers/hasan.md): with alpha 1 and beta 1 the ant cycles on all candidates for five
+    of the paper's six environments; with the paper's exponents it cycles on 40 of 50 candidates for one. Paths are up to
+    13 per cent longer than the shortest. With a quarter of 50 x 50 cells blocked they are 1.8 per cent longer in the
+    median and 44 per cent at worst.
 
     Attributes:
         alpha: initial exponent of the pheromone; in the paper 1 to 26, depending on the environment
         beta: initial exponent of the distance; in the paper 0 to 3
-        alpha_max: maximum alpha before beta becomes 0
-        evaporation: fraction of pheromone lost; the paper's rho, 0.98, is the fraction retained
+        alpha_max: maximum alpha before beta becomes 0; None: the exponents are fixed as in the paper, and a plan
+            whose ant cycles ends without a path
+        evaporation: fraction of pheromone lost; the paper's rho, 0.98, is the fraction retained. It scales all pheromone
+            alike, so it changes no path
         gates: whether to close cells between two diagonally opposite blocked cells (the paper's
             "gate raise state"); if that leaves no path, they are reopened
+        lowers: whether a cheaper way lowers a cell's cost, as in D*; False: the first cost stays, as in the paper's
+            listing, which gives costs to new cells only (l. 136)
+
+    Raises:
+        FieldError: an option is out of range; names it and the valid range.
     """
 
     alpha: float = 1.0
     beta: float = 1.0
-    alpha_max: float = 26.0
+    alpha_max: float | None = 26.0
     evaporation: float = 0.02
     gates: bool = True
+    lowers: bool = True
 
     def __post_init__(self) -> None:
         require("alpha", self.alpha, above=0)
         require("beta", self.beta, at_least=0)
-        require("alpha_max", self.alpha_max, at_least=self.alpha)
+        if self.alpha_max is not None:
+            require("alpha_max", self.alpha_max, at_least=self.alpha)
         require("evaporation", self.evaporation, at_least=0, below=1)
 
     @property
@@ -79,6 +90,8 @@ class MaxMinDStar(GridPlanner):
             here = np.array([query.start], dtype=np.int32)
             return PlanResult(status=PlanStatus.SOLVED, cells=here, cost=0.0, work=work, work_unit=unit)
         walk, note = self.walk(graph, pheromone)
+        if not len(walk):
+            return PlanResult(status=PlanStatus.STOPPED, reason=note, work=work, work_unit=unit)
         cells = graph.cells(walk)
         return PlanResult(
             status=PlanStatus.SOLVED,
@@ -99,20 +112,19 @@ class MaxMinDStar(GridPlanner):
         pheromone = np.empty(len(graph.mask))
         retained = 1.0 - self.evaporation
         if self.gates:
-            moves = query.grid.moves.copy()
-            closed = kernels.close_gates(query.grid.free, moves, *query.start, *query.goal)
+            moves, closed = closed_gates(query)
             mask = graph.mask & graph.of_nodes(moves)
             mask.setflags(write=False)  # as a grid's
             gated = dataclasses.replace(graph, mask=mask)
-            work = kernels.propagate(gated.moves, graph.start, graph.goal, retained, pheromone)
+            work = kernels.propagate(gated.moves, graph.start, graph.goal, retained, self.lowers, pheromone)
             if math.isfinite(pheromone[graph.start]):
                 return gated, pheromone, work, notes
             notes.append(f"reopened {closed} gate cells; without them there is no path")
-        work += kernels.propagate(graph.moves, graph.start, graph.goal, retained, pheromone)
+        work += kernels.propagate(graph.moves, graph.start, graph.goal, retained, self.lowers, pheromone)
         return graph, pheromone, work, notes
 
     def walk(self, graph: ColonyGraph, pheromone: Floats) -> tuple[Flat, str]:
-        """Return the nodes of the path to the goal, and a remark on changes of the exponents.
+        """Return the nodes of the path to the goal, none if the ant cycles to the end, and a remark on the exponents.
 
         Args:
             graph: the ant's graph
@@ -138,14 +150,15 @@ class MaxMinDStar(GridPlanner):
             if circles:
                 note = f"the ant went in circles {circles} times: {self.describe_exponents(alpha, beta)}"
             if size > 0:
-                break
-        return walk[:size], note
+                return walk[:size], note
+        return walk[:0], f"the ant went in circles with alpha {self.alpha:g} and beta {self.beta:g}"
 
     def exponents(self, *, factor: float = 1.0, increment: float = 1.0) -> Iterator[tuple[float, float]]:
         """Yield alpha and beta in the order of attempts; each cycle of the ant triggers the next attempt.
 
         alpha rises up to `alpha_max`, which reduces the influence of the straight distance; finally beta is 0.
-        With beta 0 the ant always arrives, since pheromone decreases at every step.
+        With beta 0 the ant always arrives, since pheromone decreases at every step. Without `alpha_max` there is one
+        attempt.
 
         Args:
             factor: factor on alpha per cycle
@@ -153,6 +166,9 @@ class MaxMinDStar(GridPlanner):
                 cheap; an agent doubles it (`ONLINE_FACTOR`), as its robot drives the cycle.
         """
         alpha, beta = float(self.alpha), float(self.beta)
+        if self.alpha_max is None:
+            yield alpha, beta
+            return
         while alpha <= self.alpha_max:
             yield alpha, beta
             alpha = factor * alpha + increment
@@ -170,8 +186,8 @@ class PheromoneAgent(SteppingAgent):
 
     The robot moves to the allowed neighbour with the smallest `pheromone^alpha * distance^beta`. Before it returns
     to a cell visited with the current exponents, it detects a cycle and takes the next exponents of
-    `MaxMinDStar.exponents`. If blocked cells still stop it, it respreads pheromone around them. It knows cells, not
-    headings, so it moves for the disc around the robot.
+    `MaxMinDStar.exponents`: alpha doubles. If movers keep it waiting, it respreads pheromone around them. The paper's robot
+    has neither rule. It knows cells, not headings, so it moves for the disc around the robot.
     """
 
     def __init__(self, planner: MaxMinDStar, query: Query) -> None:
@@ -242,7 +258,7 @@ class PheromoneAgent(SteppingAgent):
 
     def _raise_alpha(self, here: int) -> None:
         self.stats.cycles += 1
-        self._alpha, self._beta = next(self._exponents)
+        self._alpha, self._beta = next(self._exponents, (self._alpha, self._beta))
         self._forget_visits(here)
 
     def _respread(self, blocked: npt.NDArray[np.int64], here: int) -> None:
@@ -251,7 +267,9 @@ class PheromoneAgent(SteppingAgent):
         for graph in (self._graph, ColonyGraph.of(self._query)):
             pheromone, mask = np.empty_like(self._pheromone), self._open_moves(graph, blocked)
             moves = graph.moves._replace(mask=mask)
-            self.stats.propagated += int(self._kernels.propagate(moves, here, graph.goal, retained, pheromone))
+            self.stats.propagated += int(
+                self._kernels.propagate(moves, here, graph.goal, retained, self._planner.lowers, pheromone)
+            )
             if math.isfinite(pheromone[here]):
                 self._graph, self._pheromone = graph, pheromone
                 self._forget_visits(here)
@@ -268,6 +286,14 @@ class PheromoneAgent(SteppingAgent):
     def _forget_visits(self, here: int) -> None:
         self._visits.fill(0)
         self._visits[here] = 1
+
+
+def closed_gates(query: Query) -> tuple[npt.NDArray[np.uint8], int]:
+    """Return the moves of each cell (rows, cols) of a query's grid with gate cells closed, and their number."""
+    from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
+
+    moves = query.grid.moves.copy()
+    return moves, int(kernels.close_gates(query.grid.free, moves, *query.start, *query.goal))
 
 
 def _finite(pheromone: Floats) -> Floats:

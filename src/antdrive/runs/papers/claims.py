@@ -165,7 +165,7 @@ def runs_needed(claim: Claim) -> int:
         return next(
             n for n in range(1, MANY) if RELATIONS[claim.relation](wilson(n if above else 0, n), claim.bound)[0]
         )
-    return 1 if "wins" in claim.statistic and TIMED not in claim.quantity else FEWEST
+    return 1 if claim.statistic == "wins" else FEWEST
 
 
 def runs_available(claim: Claim, sizes: Mapping[Arm, int]) -> int:
@@ -319,15 +319,47 @@ def _failed(claim: Claim, runs: RunsByArm) -> Measured:
 
 
 def _wins(claim: Claim, runs: RunsByArm) -> Measured:
-    """Count the cases in which the first planner's median, or best run, is below the second's."""
-    stands = np.min if claim.statistic == "wins of best runs" else np.median
-    pairs = [[float(stands([_value(t, claim.quantity[0]) for t in runs[arm]])) for arm in case] for case in claim.cases]
+    """Count the cases in which the first planner's median is below the second's."""
+    pairs = [
+        [float(np.median([_value(t, claim.quantity[0]) for t in runs[arm]])) for arm in case] for case in claim.cases
+    ]
     less = sum(a < b - 1e-9 for a, b in pairs)
-    digits = 2 if TIMED in claim.quantity else 0
-    why = ", ".join(f"{a:.{digits}f} : {b:.{digits}f}" for a, b in pairs)
+    why = ", ".join(f"{a:.0f} : {b:.0f}" for a, b in pairs)
     count = min(len(runs[one]) for one, _ in claim.cases)
-    few = f"{count} runs, but times need at least {FEWEST}"
-    return Measured(float(less), Interval(less, less), count, f"less in {less} of {len(pairs)}", why, few=few)
+    return Measured(float(less), Interval(less, less), count, f"less in {less} of {len(pairs)}", why)
+
+
+def _ratio_wins(claim: Claim, runs: RunsByArm) -> Measured:
+    """Count the cases whose median paired ratio of first to second is below 1, by its interval.
+
+    The interval of the count ends where every undecided case is below 1, too: those whose interval contains or touches 1. An
+    interval of exactly 1 is equal. A ratio with no path is infinite or 0, without both paths 1. Times must be those of one
+    group of experiments.
+    """
+    ratios, counts = [], []
+    for case in claim.cases:
+        first, second, world = _paired(claim, runs, [case])
+        ratio = np.round(np.maximum(first, 1e-9) / np.maximum(second, 1e-9), 9)
+        ratios.append(_median(ratio, world))
+        counts.append(len(ratio))
+    below, above = (sum(test) for test in zip(*((i.high < 1.0, i.low > 1.0) for _, i in ratios), strict=True))
+    equal = sum(i.low == i.high == 1.0 for _, i in ratios)
+    undecided = len(ratios) - below - above - equal
+    interval = Interval(below, below + undecided)
+
+    def number(value: float) -> str:
+        return ENDLESS_TEXT if value > MANY else f"{value:.2f}"
+
+    return Measured(
+        value=float(below),
+        interval=interval,
+        runs=min(counts),
+        ours=f"less in {below} of {len(ratios)}, equal in {equal}, more in {above}",
+        why="median ratios " + ", ".join(f"{number(v)} [{number(i.low)}, {number(i.high)}]" for v, i in ratios),
+        unknown=""
+        if any(RELATIONS[claim.relation](interval, claim.bound))
+        else f"{undecided} undecided, which could tip it",
+    )
 
 
 #: Statistics of a claim's runs, by name in the table of claims.
@@ -347,7 +379,7 @@ STATISTICS: Mapping[str, Callable[[Claim, RunsByArm], Measured]] = MappingProxyT
         "gain": _gain,
         # Two planners, map by map.
         "wins": _wins,
-        "wins of best runs": _wins,
+        "wins of ratios": _ratio_wins,
     }
 )
 
@@ -406,7 +438,9 @@ def _paired(
     for one, other in claim.cases if cases is None else cases:
         second = {run.seed: run for run in runs[other]}
         rows += [(run, second[run.seed], (one.map, run.world)) for run in runs[one] if run.seed in second]
-    values = np.array([[_value(a, claim.quantity[0]), _value(b, claim.quantity[-1])] for a, b, _ in rows]).reshape(-1, 2)
+    values = np.array([[_value(a, claim.quantity[0]), _value(b, claim.quantity[-1])] for a, b, _ in rows]).reshape(
+        -1, 2
+    )
     return values[:, 0], values[:, 1], _numbered([place for *_, place in rows])
 
 
@@ -447,6 +481,8 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "near": (0, " iterations"),
     "reached": (0, " iterations"),
     "effort": (0, " steps"),
+    "steps": (0, " steps"),
+    "total": (1, ""),
 }
 
 

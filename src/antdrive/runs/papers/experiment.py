@@ -34,6 +34,9 @@ class Experiment:
     slow: bool = False  # takes seconds; omitted from a quick run
     made: Planner | None = None  # the planner itself, if it is not registered
     movers: int = 0  # number of moving obstacles while the robot decides cell by cell; 0: plan once
+    on_path: bool = False  # movers start on cells of the planner's own plan, not on any free cell
+    enter: bool = False  # movers may enter the robot's cell, which ends the drive
+    group: str = ""  # experiments of one group on one map are timed together: they alternate on every seed
 
     @property
     def name(self) -> str:

@@ -9,16 +9,19 @@ is exactly as long as the paper's best. That length is an upper bound of the opt
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from types import MappingProxyType
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import PLANNERS, Query
+from antdrive.planners.colonies.mmas_dstar import closed_gates
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 
 Circle: TypeAlias = tuple[float, float, float]  # x, y, radius
@@ -50,6 +53,13 @@ def cutting_corners(query: Query) -> Query:
         to, at = np.s_[max(0, -row) : free.shape[0] - max(0, row)], np.s_[max(0, -col) : free.shape[1] - max(0, col)]
         ahead[to, at] = np.roll(free, (-row, -col), axis=(0, 1))[to, at]
         moves |= np.where(free & ahead, np.uint8(1 << bit), np.uint8(0))
+    moves.setflags(write=False)
+    return dataclasses.replace(query, grid=dataclasses.replace(query.grid, moves=moves))
+
+
+def closing_gates(query: Query) -> Query:
+    """Return a query whose gate cells, between two diagonally opposite blocked ones, no move enters, as hasan closes them."""
+    moves, _ = closed_gates(query)
     moves.setflags(write=False)
     return dataclasses.replace(query, grid=dataclasses.replace(query.grid, moves=moves))
 
@@ -114,19 +124,7 @@ def blocks(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
 
 
 def environments() -> dict[str, Query]:
-    """Recreate hasan's six environments of 50 x 50 cells from the paper's text, with its starts and goals."""
-    row, col = np.mgrid[:50, :50]
-
-    def arc(r: float, c: float, radius: float, opening: float, wide: float) -> Picture:
-        angle = np.degrees(np.arctan2(row - r, col - c)) - opening
-        shut = np.abs((angle + 180) % 360 - 180) > wide / 2
-        return np.asarray((np.abs(np.hypot(row - r, col - c) - radius) < 0.8) & shut)
-
-    def query(blocked: Picture, start: tuple[int, int], goal: tuple[int, int]) -> Query:
-        free = ~blocked
-        free[start] = free[goal] = True
-        return Query(Grid.from_free(free), start, goal)
-
+    """Draw hasan's six environments of 50 x 50 cells by hand from the paper's text, with its starts and goals."""
     vertical = np.zeros((50, 50), dtype=np.bool_)
     vertical[6:44, 8:48:8] = True
     vertical[20:26] = False
@@ -138,17 +136,116 @@ def environments() -> dict[str, Query]:
         shapes[r : r + height, c : c + width] = True
     shapes[23:26] = False
     shapes[24, :47] = True
-    curved = arc(5, 8, 18.6, 185, 170) | arc(38, 30, 7, 90, 90) | arc(36, 8, 6, 270, 90) | arc(14, 40, 6, 0, 90)
-    overlapping = arc(2, 26, 11, 270, 220) | arc(34, 26, 16, 90, 220) | arc(36, 40, 6, 90, 90)
-    circles = arc(24, 24, 6, 0, 40) | arc(24, 24, 12, 180, 30) | arc(24, 24, 18, 0, 25)
-    return {
-        "1a curved walls": query(curved, (13, 21), (17, 27)),
-        "2b overlapping curved walls": query(overlapping, (8, 26), (24, 25)),
-        "3c vertical rows": query(vertical, (49, 3), (0, 3)),
-        "4d concentric circles": query(circles, (24, 24), (45, 38)),
-        "5e many shapes": query(shapes, (4, 1), (48, 2)),
-        "5f the same, across the wall": query(shapes, (23, 16), (25, 15)),
+    curved = _arc(5, 8, 18.6, 185, 170) | _arc(38, 30, 7, 90, 90) | _arc(36, 8, 6, 270, 90) | _arc(14, 40, 6, 0, 90)
+    overlapping = _arc(2, 26, 11, 270, 220) | _arc(34, 26, 16, 90, 220) | _arc(36, 40, 6, 90, 90)
+    circles = _arc(24, 24, 6, 0, 40) | _arc(24, 24, 12, 180, 30) | _arc(24, 24, 18, 0, 25)
+    pictures = (curved, overlapping, vertical, circles, shapes, shapes)
+    return {name: _between(picture, *HASAN[name].ends) for name, picture in zip(HASAN, pictures, strict=True)}
+
+
+class Printed(NamedTuple):
+    """What hasan's Table 1 prints of an environment that determines its walls."""
+
+    ends: tuple[tuple[int, int], tuple[int, int]]  # start and goal
+    steps: int  # of the ant's path
+    gates: int  # closed cells
+
+
+#: Hasan's environments. Table 1 prints column.row without trailing zeros: 26.80 is row 8 of 50, and 1.40 row 4, as the start
+#: lies in the "upper left corner" (l. 231).
+HASAN: Mapping[str, Printed] = MappingProxyType(
+    {
+        "1a curved walls": Printed(((13, 21), (17, 27)), 65, 1),
+        "2b overlapping curved walls": Printed(((8, 26), (24, 25)), 43, 2),
+        "3c vertical rows": Printed(((49, 3), (0, 3)), 49, 0),
+        "4d concentric circles": Printed(((24, 24), (45, 38)), 64, 2),
+        "5e many shapes": Printed(((4, 1), (48, 2)), 91, 3),
+        "5f the same, across the wall": Printed(((23, 16), (25, 15)), 66, 3),
     }
+)
+ROWS, COLS = np.ogrid[:50, :50]
+STEPS_NEAR = 0.1  # relative deviation of a candidate's shortest path from the printed steps
+
+
+@functools.cache
+def environment(name: str, seed: int) -> Query:
+    """Return a random candidate for one of hasan's environments, its gates open.
+
+    Walls are drawn by the sentence on the environment (l. 227-231) until no more gate cells than the printed ones are closed
+    and the shortest path has the printed steps within `STEPS_NEAR`. 5e and 5f are the same environment, so both must.
+    """
+    rng = np.random.default_rng([ord(name[0]), seed])
+    alike = [one for one in HASAN if one[0] == name[0]]
+    for _ in range(DRAWS):
+        picture = DRAWN[name[0]](rng)
+        queries = {one: _between(picture, *HASAN[one].ends) for one in alike}
+        if all(_as_printed(query, HASAN[one]) for one, query in queries.items()):
+            return queries[name]
+    raise FieldError("name", f"no candidate found for {name}")
+
+
+def _as_printed(query: Query, printed: Printed) -> bool:
+    if closed_gates(query)[1] > printed.gates:
+        return False
+    steps = len(PLANNERS["astar"].plan(closing_gates(query), np.random.default_rng(0)).cells) - 1
+    return abs(steps - printed.steps) <= STEPS_NEAR * printed.steps
+
+
+def _between(blocked: Picture, start: tuple[int, int], goal: tuple[int, int]) -> Query:
+    free = ~blocked
+    free[start] = free[goal] = True
+    return Query(Grid.from_free(free), start, goal)
+
+
+def _arc(r: float, c: float, radius: float, opening: float, wide: float) -> Picture:
+    """Return a wall of 50 x 50 cells along a circle with an opening of `wide` degrees in the direction `opening`."""
+    blocked = np.zeros((50, 50), dtype=np.bool_)
+    # Within 0.8 of the circle, without roots.
+    row, col = np.nonzero(np.abs((ROWS - r) ** 2 + (COLS - c) ** 2 - radius**2 - 0.64) < 1.6 * radius)
+    angle = np.degrees(np.arctan2(row - r, col - c)) - opening
+    blocked[row, col] = np.abs((angle + 180) % 360 - 180) > wide / 2
+    return blocked
+
+
+def _curves(rng: np.random.Generator) -> Picture:
+    """Draw two to six arcs: "curve shapes", some "open from different directions"."""
+    drawn = rng.uniform((0, 0, 5, 0, 60), (50, 50, 20, 360, 200), (rng.integers(2, 7), 5))
+    return np.asarray(np.any([_arc(*arc) for arc in drawn.tolist()], axis=0))
+
+
+def _circles(rng: np.random.Generator) -> Picture:
+    """Draw three to six circles around the start: "circular sequence shapes", some "open from different positions"."""
+    gaps, openings, widths = rng.uniform((3, 0, 10), (8, 360, 60), (rng.integers(3, 7), 3)).T
+    circles = [_arc(24, 24, *one) for one in zip(np.cumsum(gaps), openings, widths, strict=True)]
+    return np.asarray(np.any(circles, axis=0))
+
+
+def _rows(rng: np.random.Generator) -> Picture:
+    """Draw upright walls with openings: a "vertical sequence of obstacles" and a "big area of free space"."""
+    blocked = np.zeros((50, 50), dtype=np.bool_)
+    for col in range(int(rng.integers(1, 6)), 50, int(rng.integers(5, 10))):
+        top, bottom = np.sort(rng.integers(2, 48, 2))
+        blocked[top:bottom, col] = True
+        opening = int(rng.integers(2, 44))
+        blocked[opening : opening + 6, col] = False
+    return blocked
+
+
+def _shapes(rng: np.random.Generator) -> Picture:
+    """Draw rectangles and a wall across the middle, closed on the left and open on the right."""
+    blocked = np.zeros((50, 50), dtype=np.bool_)
+    for _ in range(30):
+        (r, c), (height, width) = rng.integers(1, 45, 2), rng.integers(1, 5, 2)
+        if not blocked[max(0, r - 1) : r + height + 1, max(0, c - 1) : c + width + 1].any():
+            blocked[r : r + height, c : c + width] = True
+    blocked[23:26] = False
+    blocked[24, : 50 - int(rng.integers(2, 9))] = True
+    return blocked
+
+
+#: How the walls of hasan's environments 1 to 5 are drawn, and how often at most.
+DRAWN = MappingProxyType({"1": _curves, "2": _curves, "3": _rows, "4": _circles, "5": _shapes})
+DRAWS = 100_000
 
 
 def _crossable(draw: Callable[[np.random.Generator], Picture], seed: int) -> Query:

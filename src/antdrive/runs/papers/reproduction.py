@@ -46,7 +46,7 @@ from antdrive.runs.papers.claims import (
 )
 from antdrive.runs.papers.experiment import Experiment
 from antdrive.runs.papers.experiments import PAPERS
-from antdrive.runs.papers.paper_runs import PaperRun, drive_among, solve
+from antdrive.runs.papers.paper_runs import PaperRun, drive_among, interleaved, solve
 from antdrive.runs.pool import Pool, call_now, processes_for
 from antdrive.runs.statistics.intervals import medians_by_world
 
@@ -56,7 +56,10 @@ NONE = -1  # size of missing waypoints
 
 
 def runs_key(experiment: Experiment, seeds: int) -> str:
-    """Return the key of an experiment's runs, including the source code; files with another key are ignored."""
+    """Return the key of an experiment's runs, including the source code; files with another key are ignored.
+
+    A group's key has a line for each of its experiments.
+    """
     facts = {
         "map": experiment.map,
         "name": experiment.name,
@@ -64,7 +67,7 @@ def runs_key(experiment: Experiment, seeds: int) -> str:
         "options": dict(experiment.options),
         "worlds": experiment.worlds,
         "work": experiment.work,
-        "movers": experiment.movers,
+        "movers": [experiment.movers, experiment.on_path, experiment.enter],
         "seeds": seeds,
         "code": code_hash(),
     }
@@ -270,39 +273,58 @@ def _all_runs(
     jobs: int | None,
     progress: Callable[[float], None] | None,
 ) -> tuple[Measurements, int]:
-    """Run or load all experiments; return their runs, and the number of experiments loaded."""
+    """Run or load all experiments; return their runs, and the number of experiments loaded.
+
+    The runs of a group are in one file, so that times of different calls are never compared.
+    """
     total, done, kept = sum(len(experiment.seeds(seeds)) for experiment in experiments), 0, 0
-    measured: Measurements = []
+    found: dict[tuple[str, str, str], list[PaperRun]] = {}
     with Pool(processes_for(jobs)) as pool:
-        for experiment in experiments:
-            words = f"{experiment.paper} {experiment.map} {experiment.name}"
-            path, key = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz", runs_key(experiment, seeds)
+        for group in _groups(experiments):
+            first, count = group[0], len(group[0].seeds(seeds))
+            words = f"{first.paper} {first.map} {first.group or first.name}"
+            path = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz"
+            key = "\n".join(runs_key(experiment, seeds) for experiment in group)
             runs = load_runs(path, key)
             if runs is None:
-                runs = []
-                for run in pool.results(call_now, _planned(experiment, seeds)):
-                    runs.append(dataclasses.replace(run, world=experiment.world(run.seed)))
+                rows = []
+                for row in pool.results(call_now, _planned(group, seeds)):
+                    rows.append([dataclasses.replace(run, world=first.world(run.seed)) for run in row])
                     if progress is not None:
-                        progress((done + len(runs)) / total)
+                        progress((done + len(rows) * len(group)) / total)
+                runs = [run for column in zip(*rows, strict=True) for run in column]
                 save_runs(runs, path, key)
             else:
-                kept += 1
+                kept += len(group)
             done += len(runs)
-            measured.append((experiment, runs))
+            for k, experiment in enumerate(group):
+                found[experiment.paper, experiment.map, experiment.name] = runs[k * count : (k + 1) * count]
     if progress is not None:
         progress(1.0)
-    return measured, kept
+    return [(e, found[e.paper, e.map, e.name]) for e in experiments], kept
 
 
-def _planned(experiment: Experiment, seeds: int) -> Iterator[Callable[[], PaperRun]]:
-    """Yield the calls that plan an experiment."""
-    planner = experiment.made or experiment.planner
-    for seed in experiment.seeds(seeds):
-        query = experiment.query(experiment.world(seed))
-        if experiment.movers:
-            yield partial(drive_among, planner, experiment.options, query, seed, experiment.movers)
-        else:
-            yield partial(solve, planner, experiment.options, query, seed, experiment.work)
+def _groups(experiments: Sequence[Experiment]) -> list[list[Experiment]]:
+    """Return the experiments that are timed together, most of them alone."""
+    groups: dict[tuple[str, ...], list[Experiment]] = {}
+    for e in experiments:
+        groups.setdefault((e.paper, e.map, e.group, "" if e.group else e.name), []).append(e)
+    return list(groups.values())
+
+
+def _planned(group: Sequence[Experiment], seeds: int) -> Iterator[Callable[[], list[PaperRun]]]:
+    """Yield, seed by seed, the calls that plan a group's experiments."""
+    for seed in group[0].seeds(seeds):
+        yield partial(interleaved, [_call(experiment, seed) for experiment in group])
+
+
+def _call(experiment: Experiment, seed: int) -> Callable[[], PaperRun]:
+    """Return the call that plans an experiment with one seed."""
+    planner, query = experiment.made or experiment.planner, experiment.query(experiment.world(seed))
+    if not experiment.movers:
+        return partial(solve, planner, experiment.options, query, seed, experiment.work)
+    where = {"on_path": experiment.on_path, "enter": experiment.enter}
+    return partial(drive_among, planner, experiment.options, query, seed, experiment.movers, **where)
 
 
 def _measured_claims(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[Claim, dict[Arm, T]]]:
