@@ -42,7 +42,7 @@ def test_walks_deposits_and_budgets_are_those_of_the_planner():
     found = facts("as", options={"backtrack": True, "deposit": 1000.0, "initial": 2.0, "ants": 7}, work=3e6)
     assert "backtrack yes" in found["walk"]
     assert "deposit 1000" in found["deposit"]
-    assert found["first pheromone"] == "2 on arcs"
+    assert found["first pheromone"] == "mix 0, 2 on arcs"
     assert found["ants"] == "ants 7"
     assert found["iterations"] == "until the budget is spent"
     assert found["budget"] == "3,000,000 ant steps"

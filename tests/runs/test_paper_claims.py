@@ -560,7 +560,7 @@ def test_the_length_at_the_limit_of_work_lies_between_those_of_two_iterations():
     assert limits(80.0, spent, best, 110.0) == (120.0, 40.0)
     assert limits(30.0, spent[:2], best[:2], 100.0) == (130.0, math.inf)  # the first path counts in full
     assert limits(9.0, spent[:1], best[:1], 100.0) == (math.inf, math.inf)
-    run = PaperRun(0, 0, SimpleNamespace(), 100.0, 0.1, 0.0, math.nan, 125.0, 60.0)
+    run = PaperRun(0, 0, SimpleNamespace(), 100.0, 0.1, 0.0, even=125.0, close=60.0)
     assert (run.even_gap, run.effort) == (pytest.approx(25.0), 60.0)
 
 

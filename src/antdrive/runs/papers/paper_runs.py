@@ -211,8 +211,8 @@ def solve(
     spent = time.process_time() - started
     optimum, total, concentrated = maps.optimum(query), total_cost(query, result), concentration(result)
     limited = limits(work, np.array(spent_work[1:]), result.history.best, optimum) if math.isfinite(work) else ()
-    ants = float(getattr(chosen, "ants", math.nan))
-    return PaperRun(seed, seed, result, optimum, spent, total, concentrated, ants, *limited)
+    colony = float(getattr(chosen, "ants", math.nan))
+    return PaperRun(seed, seed, result, optimum, spent, total, concentrated, colony, *limited)
 
 
 def limits(work: float, spent: npt.NDArray[np.int64], best: Floats, optimum: float) -> tuple[float, float]:
