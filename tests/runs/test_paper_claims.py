@@ -565,12 +565,12 @@ def test_the_length_at_the_limit_of_work_lies_between_those_of_two_iterations():
 
 
 def test_placements_are_those_of_monotone_paths_with_the_printed_moves():
-    shape, moves = (50, 44), MoveCount(16, 34)
+    shape, moves = (20, 30), MoveCount(2, 10)
     drawn = [placement(shape, moves, np.random.default_rng(seed)) for seed in range(300)]
     for ends in drawn:
         for row, col in ends:
-            assert 0 <= row < 50
-            assert 0 <= col < 44
+            assert 0 <= row < 20
+            assert 0 <= col < 30
         assert moves.monotone(*(abs(a - b) for a, b in zip(*ends, strict=True)))
     assert {(b[0] > a[0], b[1] > a[1]) for a, b in drawn} == {(x, y) for x in (False, True) for y in (False, True)}
     assert len({start for start, _ in drawn}) > 100

@@ -51,8 +51,7 @@ class AntSystem(Colony):
         evaporation: rho, the fraction of pheromone lost per iteration; rho of lee2008 is the fraction retained
         deposit: Q; an ant deposits Q / length on each of its arcs
         initial: the initial pheromone on every arc
-        mix: the fraction of chance in the initial pheromone; lee2008 draws all of that of the conventional colony
-            (l. 127)
+        mix: the fraction of chance in the initial pheromone; the conventional colony of lee2008 has 1 (l. 127)
         heuristic: "goal": eta = 1 / distance from the next cell to the goal (ibraheem2016 eq. 6, lee2008);
             "step": eta = 1 / length of the move (suganthi2019 eq. 6)
         ranks: number of ants that deposit per iteration: the best deposits the full amount of eq. 4, each later
