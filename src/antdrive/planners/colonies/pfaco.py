@@ -175,8 +175,7 @@ class PotentialFieldAnts(IterativePlanner):
         field = self.potential(query)
         graph = ColonyGraph.of(query)
         free = graph.of_nodes(query.grid.free)
-        trail = self.mix * rng.random(len(field)) + (1 - self.mix) * field / field.max()  # eq. 14
-        trail = np.where(free, np.maximum(trail, self.min_pheromone), 0.0)
+        trail = self.initial_trail(field, free, rng)
         drawn, pool = self.attractions(graph, field), AntPool.of(self, graph, rng)
         total = math.inf
         while True:
@@ -189,6 +188,15 @@ class PotentialFieldAnts(IterativePlanner):
                 self.rebuild(trail, free, stage, pool, rng)
                 total = math.inf
             yield pool.report(query.grid.cell, trail, arrivals, steps)
+
+    def initial_trail(self, field: Floats, free: npt.NDArray[np.bool_], rng: np.random.Generator) -> Floats:
+        """Return the pheromone before the first iteration (nodes,) from `potential` and whether nodes are free (eq. 14)."""
+        trail = self.mix * rng.random(len(field)) + (1 - self.mix) * field / field.max()
+        return np.where(free, np.maximum(trail, self.min_pheromone), 0.0)
+
+    def default_steps(self, nodes: int) -> int:
+        """Return the step limit of a walk on a graph of some nodes if `max_steps` is None."""
+        return 2 * nodes if self.backtrack else min(max(100, nodes), 20_000)
 
     def stage(self, entries: int) -> int:
         """Return the stage, 1 to 3, after `entries` paths have entered the ranking list (section IV-B)."""
@@ -237,7 +245,7 @@ class AntPool:
         from antdrive.planners.colonies import _kernels_pfaco
 
         cells, count, ranks = len(graph.mask), planner.ants, planner.ranks
-        limit = planner.max_steps or (2 * cells if planner.backtrack else min(max(100, cells), 20_000))
+        limit = planner.max_steps or planner.default_steps(cells)
         room = 1 + (min(limit, cells) if planner.memory == "tabu" else limit)
         ants = _kernels_pfaco.Ants(
             states=rng.bit_generator.random_raw(count).astype(np.uint64) | np.uint64(1),

@@ -12,6 +12,7 @@ import numpy as np
 
 from antdrive.planners import Planner, Query, load_planner
 from antdrive.planners.colonies.colony import Colony, ColonyGraph
+from antdrive.planners.colonies.pfaco import PotentialFieldAnts
 from antdrive.planners.iterative import as_iterative
 from antdrive.runs.papers.experiment import Experiment
 from antdrive.worlds import Grid
@@ -77,12 +78,16 @@ def _number(value: Any) -> str:
 
 def _first_trail(planner: Planner, query: Query) -> str:
     """Return the range of a colony's pheromone before its first iteration; empty for other planners."""
-    if not isinstance(planner, Colony):
+    graph, rng = ColonyGraph.of(query), np.random.default_rng(0)
+    free = graph.of_nodes(query.grid.free)
+    if isinstance(planner, PotentialFieldAnts):
+        trail = planner.initial_trail(planner.potential(query), free, rng)[free]
+    elif isinstance(planner, Colony):
+        trail = planner.initial_trail(graph, rng)
+    else:
         return ""
-    graph = ColonyGraph.of(query)
-    trail = planner.initial_trail(graph, np.random.default_rng(0))
     low, high = float(trail.min()), float(trail.max())
-    return f"{low:g}{'' if low == high else f' to {high:.3g}'} on {'cells' if trail.ndim == 1 else 'arcs'}"
+    return f"{low:.3g}{'' if low == high else f' to {high:.3g}'} on {'cells' if trail.ndim == 1 else 'arcs'}"
 
 
 def _step_limit(planner: Planner, query: Query) -> str:
