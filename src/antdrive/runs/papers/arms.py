@@ -20,10 +20,11 @@ from antdrive.worlds import Grid
 #: By heading, the options of planners that it shows.
 OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "walk": ("backtrack", "shortcut", "revisit", "memory", "min_weight", "tries"),
+        "walk": ("backtrack", "shortcut", "revisit", "memory", "min_weight", "tries", "gates"),
         "first pheromone": ("mix",),
         "deposit": (
-            *("deposit", "ranks", "evaporation", "min_pheromone", "q_max", "q_min", "elite", "depositors", "elitism"),
+            *("deposit", "ranks", "graded", "evaporation", "min_pheromone", "q_max", "q_min", "elite", "ties", "depositors"),
+            *("elitism", "elite_of", "update_every", "restart_every"),
         ),
         "ants": ("ants", "explorers", "population"),
         "iterations": ("iterations",),

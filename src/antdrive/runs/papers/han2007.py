@@ -34,7 +34,7 @@ ON_SINGLE: Mapping[str, Mapping[str, Any]] = {
 }
 #: Arms whose times are compared, by map.
 TIMED = {
-    *(("14 obstacles", name) for name in ("500 ants", "4 via points")),
+    *(("14 obstacles", name) for name in ("100 ants", "500 ants", "4 via points")),
     *(("one obstacle of radius 1", name) for name in ("500 ants", "3 via points")),
 }
 #: Settings of experiments 4 and 5 that are also measured on cells instead of circles.
