@@ -171,13 +171,16 @@ STEPS_NEAR = 0.1  # relative deviation of a candidate's shortest path from the p
 def environment(name: str, seed: int) -> Query:
     """Return a random candidate for one of hasan's environments, its gates open.
 
-    Walls are drawn by the sentence on the environment (l. 227-231) until no more gate cells than the printed ones are closed
-    and the shortest path has the printed steps within `STEPS_NEAR`. 5e and 5f are the same environment, so both must.
+    Walls are drawn by the sentence on the environment (l. 227-231) until start and goal are free, no more gate cells than the
+    printed ones are closed, and the shortest path has the printed steps within `STEPS_NEAR`. 5e and 5f are the same
+    environment, so both must.
     """
     rng = np.random.default_rng([ord(name[0]), seed])
     alike = [one for one in HASAN if one[0] == name[0]]
     for _ in range(DRAWS):
         picture = DRAWN[name[0]](rng)
+        if any(picture[end] for one in alike for end in HASAN[one].ends):
+            continue
         queries = {one: _between(picture, *HASAN[one].ends) for one in alike}
         if all(_as_printed(query, HASAN[one]) for one, query in queries.items()):
             return queries[name]
