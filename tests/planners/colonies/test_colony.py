@@ -450,12 +450,6 @@ def test_by_the_letter_of_equation_8_each_arc_of_two_best_tours_receives_the_ful
         )
 
 
-def test_without_an_arrival_the_elite_deposits_nothing():
-    trail = np.ones((12, 8))
-    ExploringAnts(evaporation=0.3).update(trail, state(walks([], [])))
-    assert trail == pytest.approx(0.7)
-
-
 @pytest.mark.parametrize("mix", [0.0, 0.3, 1.0])
 def test_the_first_pheromone_is_chance_by_the_given_share(mix, monkeypatch):
     """Eq. 14 of lee2008: mix x chance + (1 - mix) x potential / its largest value."""

@@ -258,7 +258,7 @@ class ExploringAnts(AntSystem):
 
         super().update(trail, state)
         tours, best = state.tours, elite_ants(state.tours)
-        if self.ties == "arc" and best.any():
+        if self.ties == "arc":
             moves = np.zeros((len(trail), 1), dtype=np.uint8)
             _kernels_colony.union_moves(tours.cells[best], tours.sizes[best], state.graph.to, moves[:, 0])
             trail += self.elite * self.deposit / tours.lengths.min() * np.unpackbits(moves, axis=1, bitorder="little")
@@ -267,14 +267,14 @@ class ExploringAnts(AntSystem):
         """Return Q / L_k for depositors plus, for the best ants of `state`, elite Q / L_best by `ties`."""
         lengths, best = state.tours.lengths, elite_ants(state.tours)
         usual = 1.0 if self.depositors == "all" else state.first + np.arange(len(lengths)) < self.ants
-        elite = {"arc": 0.0, "ant": self.elite, "share": self.elite / max(1, best.sum())}[self.ties]
+        elite = {"arc": 0.0, "ant": self.elite, "share": self.elite / best.sum()}[self.ties]
         return np.where(best, usual + elite, usual) * self.deposit / lengths  # eq. 4, 7 and 8
 
 
 def elite_ants(tours: Walks) -> npt.NDArray[np.bool_]:
-    """Return for each ant whether its tour is the shortest of all that arrived (ants,)."""
+    """Return for each ant whether its tour is the shortest of the iteration (ants,); all if none arrived."""
     best: npt.NDArray[np.bool_] = tours.lengths <= tours.lengths.min() + 1e-9
-    return best & np.isfinite(tours.lengths)
+    return best
 
 
 def ranked(lengths: Floats, ranks: int) -> Floats:
