@@ -380,7 +380,9 @@ def _paired(
     for one, other in claim.cases if cases is None else cases:
         second = {run.seed: run for run in runs[other]}
         rows += [(run, second[run.seed], (one.map, run.world)) for run in runs[one] if run.seed in second]
-    values = np.array([[_value(a, claim.quantity[0]), _value(b, claim.quantity[-1])] for a, b, _ in rows]).reshape(-1, 2)
+    values = np.array([[_value(a, claim.quantity[0]), _value(b, claim.quantity[-1])] for a, b, _ in rows]).reshape(
+        -1, 2
+    )
     return values[:, 0], values[:, 1], _numbered([place for *_, place in rows])
 
 
