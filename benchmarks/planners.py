@@ -160,7 +160,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         queries = [blocks(size, size, count, size // 4, seed) for seed in seeds]
         options = {"ants": 50, "iterations": 100, "evaporation": 0.3}
         for name, length, wall in (("as", *figures[:2]), ("maco", *figures[2:])):
-            yield "ibraheem2016", f"{size}×{size}, {count} rectangles", name, options, queries, f"{length:g}, {wall:g} s"
+            yield "ibraheem2016", f"{size}×{size}, {count} blocks", name, options, queries, f"{length:g}, {wall:g} s"
     # lee2008, Tables I and II.
     for number, (rows, cols), figures in (
         (1, (25, 25), (72.0833, 13326, 59.2548, 602)), (2, (50, 44), (83.3970, 3926, 64.0833, 274)),

@@ -477,6 +477,7 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "share": (2, " %"),
     "cpu_ms": (0, " ms"),
     "work": (0, " steps"),
+    "rated": (0, " chromosomes"),
     "settled": (0, " iterations"),
     "near": (0, " iterations"),
     "reached": (0, " iterations"),

@@ -58,7 +58,8 @@ def _settings(size: int, planner: str) -> Iterator[tuple[str, dict[str, Any], in
             yield "Q_min 0.5", {"q_min": 0.5}, SOME
         return
     yield "alpha 0", {"alpha": 0.0}, FEW
-    yield "stepping back, alpha 0", {**STEPPING_BACK, "alpha": 0.0}, FEW
+    if size > 10:  # where ants without pheromone find the shortest path
+        yield "stepping back, alpha 0", {**STEPPING_BACK, "alpha": 0.0}, FEW
     for rho in (0.0, 0.1, 0.7, 0.9):
         yield f"rho {rho:g}", {"evaporation": rho}, SOME
     if size in (20, 40):

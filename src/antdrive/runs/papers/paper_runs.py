@@ -189,7 +189,12 @@ class PaperRun:
 
     @property
     def work(self) -> float:
-        """The planner's measure of work: ant steps, propagated cells, chromosomes."""
+        """The planner's measure of work: ant steps or propagated cells."""
+        return float(self.result.work)
+
+    @property
+    def rated(self) -> float:
+        """The chromosomes that a genetic algorithm rated."""
         return float(self.result.work)
 
 
