@@ -42,8 +42,8 @@ def ibraheem2016() -> list[Experiment]:
 def _settings(size: int, planner: str) -> Iterator[tuple[str, dict[str, Any], int]]:
     """Yield name, options and rounds of each setting of a planner on the map of a size."""
     yield "each ant", EACH_ANT, FEW
-    yield "anew", ANEW, FEW
-    yield "anew, Q 100", {**ANEW, **_deposit(planner, 100.0)}, FEW
+    yield "again", ANEW, FEW
+    yield "again, Q 100", {**ANEW, **_deposit(planner, 100.0)}, FEW
     yield "stepping back", STEPPING_BACK, SOME
     if size in SECTION_7_1:
         yield "§7.1", SECTION_7_1[size], SOME
