@@ -142,7 +142,7 @@ def repair(
     size, turning = state[0], len(graph.cell) > 0
     for n in range(len(changed)):  # MODIFY-COST
         x = changed[n]
-        if turning:  # a move out of x may lead nowhere or to another state, so x starts again as a RAISE state
+        if turning:  # a move out of x may lead nowhere or to another state, so x starts anew as a RAISE state
             for k in range(8):
                 if may_lower(x, k, -1, graph, h, place):
                     y = after_move(graph, x, k)

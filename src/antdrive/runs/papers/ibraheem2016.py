@@ -21,7 +21,7 @@ SECTION_7_1 = {10: {"ants": 20, "iterations": 80}, 20: {"ants": 40, "iterations"
 STEPPING_BACK: dict[str, Any] = {"backtrack": True, "shortcut": True}
 #: The flow chart: an update after each ant that arrives, the second also with the initial pheromone in each iteration.
 EACH_ANT: dict[str, Any] = {"update_every": 1}
-ANEW: dict[str, Any] = {"update_every": 1, "restart_every": 1}
+RESET: dict[str, Any] = {"update_every": 1, "restart_every": 1}
 #: Rounds of fifty runs: for Table 2, for other settings, and for arms that cost ten times as much or differ by far more.
 MANY, SOME, FEW = 4, 2, 1
 
@@ -42,8 +42,8 @@ def ibraheem2016() -> list[Experiment]:
 def _settings(size: int, planner: str) -> Iterator[tuple[str, dict[str, Any], int]]:
     """Yield name, options and rounds of each setting of a planner on the map of a size."""
     yield "each ant", EACH_ANT, FEW
-    yield "again", ANEW, FEW
-    yield "again, Q 100", {**ANEW, **_deposit(planner, 100.0)}, FEW
+    yield "reset", RESET, FEW
+    yield "reset, Q 100", {**RESET, **_deposit(planner, 100.0)}, FEW
     yield "stepping back", STEPPING_BACK, SOME
     if size in SECTION_7_1:
         yield "§7.1", SECTION_7_1[size], SOME
