@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from antdrive.base.atomic import atomic_write
 from antdrive.runs.papers.arms import HEADS as ARM_HEADS
+from antdrive.runs.papers.arms import arm_facts, merged
 from antdrive.runs.papers.claims import CLAIMS, Claim
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.paragraphs import paragraphs
@@ -46,19 +46,13 @@ def claims_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
     return [_line(HEADS), _line(["---"] * len(HEADS)), *map(_line, cells)]
 
 
-def arms_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
-    """Return the settings of a paper's arms as lines of Markdown, one bullet an arm."""
-    settings: dict[str, dict[str, list[str]]] = {}
-    for row in rows:
-        for name, facts in json.loads(row["arms"]).items():
-            for head, value in facts.items():
-                settings.setdefault(name, {}).setdefault(head, []).extend(value.split(" / "))
-    facts = {name: [" / ".join(dict.fromkeys(one)) for one in arm.values()] for name, arm in settings.items()}
-    return [
-        _line(["arm", *ARM_HEADS]),
-        _line(["---"] * (1 + len(ARM_HEADS))),
-        *(_line([n, *f]) for n, f in facts.items()),
-    ]
+def arms_table(paper: str) -> list[str]:
+    """Return the settings of a paper's arms as lines of Markdown."""
+    settings: dict[str, dict[str, dict[str, str]]] = {}
+    for experiment in PAPERS[paper]():
+        settings.setdefault(experiment.name, {})[experiment.map] = arm_facts(experiment)
+    lines = [[name, *merged(facts).values()] for name, facts in settings.items()]
+    return [_line(["arm", *ARM_HEADS]), _line(["---"] * (1 + len(ARM_HEADS))), *map(_line, lines)]
 
 
 def findings(pages: Mapping[str, str]) -> list[str]:
@@ -123,7 +117,7 @@ def _write(folder: Path) -> None:
     for paper in dict.fromkeys(row["paper"] for row in rows):
         mine = [row for row in rows if row["paper"] == paper]
         _replace(PAGES / f"{paper}.md", "claims", claims_table(mine))
-        _replace(PAGES / f"{paper}.md", "arms", arms_table(mine))
+        _replace(PAGES / f"{paper}.md", "arms", arms_table(paper))
     _replace(PAGES / "README.md", "counts", counts_table(rows))
     pages = {paper: (PAGES / f"{paper}.md").read_text(encoding="utf-8") for paper in PAPERS}
     _replace(PAGES / "findings.md", "findings", findings(pages))

@@ -1,7 +1,6 @@
 """Experiments of papers are run and written to files; every figure that is called printed stands in its paper."""
 
 import csv
-import json
 import math
 import re
 from pathlib import Path
@@ -11,7 +10,6 @@ import pytest
 
 from antdrive.base import InputError
 from antdrive.runs.papers import maps, reproduction
-from antdrive.runs.papers.arms import HEADS as ARM_HEADS
 from antdrive.runs.papers.claims import CLAIMS, Decision
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.reproduction import reproduce as measure_again
@@ -244,8 +242,6 @@ def test_the_papers_pages_show_every_claim_with_its_printed_figures():
 
 def test_the_pages_tables_are_written_from_the_verdicts():
     row = {"paper": "hasan", "row": "H1", "kind": "claim", "claim": "c", "reading": "r", "printed": "1", "ours": "2"}
-    facts = dict.fromkeys(ARM_HEADS, "x")
-    arms = json.dumps({"one": facts, "two": facts | {"budget": "5"}}), json.dumps({"one": facts | {"budget": "6"}})
     row |= {"verdict": "holds", "arms": "one : two", "why": "w", "source": "s"}
     rows = [row, row | {"verdict": "does not hold"}, row | {"row": "H2", "kind": "check"}]
     assert claims_table(rows)[2] == "| H1 | c | r | 1 | 2 | **holds** | one : two | w | s |"
@@ -253,9 +249,9 @@ def test_the_pages_tables_are_written_from_the_verdicts():
         "| [hasan](hasan.md) | 1 | 2 | 1 | 1 | 0 | 1 |",
         "| all | 1 | 2 | 1 | 1 | 0 | 1 |",
     ]
-    written = arms_table([row | {"arms": one} for one in arms])
-    assert len(written) == 4
-    assert "| x / 6 |" in written[2]
+    arms = arms_table("lee2008")
+    assert arms[0].startswith("| arm | planner | moves |")
+    assert {line.split(" | ")[0][2:] for line in arms[2:]} == {e.name for e in PAPERS["lee2008"]()}
     page = "a\n<!-- claims -->\nold\n<!-- end -->\nb\n"
     assert replaced(page, "claims", ["new"]) == "a\n<!-- claims -->\n\nnew\n\n<!-- end -->\nb\n"
 
@@ -265,3 +261,9 @@ def test_compared_ants_of_suganthi2019_walk_by_equal_rules():
     claims = [claim for claim in CLAIMS if claim.paper == "suganthi2019"]
     unequal = {claim.reading for claim in claims if len({rules[arm] for arm in claim.arms}) > 1}
     assert unequal == {"only PFACO's ants die, loops stay"}
+
+
+def test_the_code_of_a_run_is_without_comments_and_docstrings():
+    plain = reproduction.code_of(b"def f(x):\n    return x\n")
+    assert reproduction.code_of(b'"""A."""\n\n\ndef f(x):\n    """B."""\n    return x  # C\n') == plain
+    assert reproduction.code_of(b"def f(x):\n    return -x\n") != plain

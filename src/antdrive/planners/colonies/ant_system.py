@@ -346,7 +346,8 @@ class MaxMinAnts(AntSystem):
             return  # without a best tour there are no bounds
         tau_min, tau_max = self.bounds(state.graph, state.best)
         if state.since and state.since % self.patience == 0:
-            trail.fill(tau_max)  # section 3.4
+            if state.first == 0:
+                trail.fill(tau_max)  # section 3.4
             return
         _kernels_colony.evaporate(trail.ravel(), self.evaporation)
         one = self.depositor(state)

@@ -75,7 +75,7 @@ class MaxMinDStar(GridPlanner):
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
-        return Capabilities(cell_by_cell=True, deterministic=True, turns=True)
+        return Capabilities(cell_by_cell=True, complete=self.alpha_max is not None, deterministic=True, turns=True)
 
     def agent(self, query: Query, rng: np.random.Generator) -> PheromoneAgent:
         """Return hasan's robot at the query's start; it does not use `rng`."""

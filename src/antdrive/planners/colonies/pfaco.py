@@ -222,7 +222,9 @@ class PotentialFieldAnts(IterativePlanner):
         ranking, listed = pool.ranking, pool.listed
         for rank in range(math.ceil(listed / 10) if stage == 2 else listed):
             row = ranking.order[rank]
-            trail[ranking.walks[row, : ranking.sizes[row]]] += self.deposit * (1 - rank / self.ranks)
+            trail[ranking.walks[row, : ranking.sizes[row]]] += self.deposit * (
+                1 - rank / self.ranks if self.graded else 1
+            )
 
 
 @dataclass(eq=False)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.planners import Planner, Query, load_planner
+from antdrive.planners.colonies.ant_system import ibraheem_beta
 from antdrive.planners.colonies.colony import Colony, ColonyGraph
 from antdrive.planners.colonies.pfaco import PotentialFieldAnts
 from antdrive.planners.iterative import as_iterative
@@ -42,9 +43,10 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 UNSHOWN = ("time_budget", "threads", "max_steps", "initial")  # without effect here, or shown by other words
+MAPS = 10  # maps whose moves are counted
 WORDS = MappingProxyType({"True": "yes", "False": "no", "None": "none"})
 REST = "further options"
-HEADS = ("moves", *OPTIONS, "step limit of an ant", "budget", "counted as work", REST)
+HEADS = ("planner", "moves", "movers", *OPTIONS, "step limit of an ant", "budget", "counted as work", REST)
 
 
 def arm_facts(experiment: Experiment) -> dict[str, str]:
@@ -52,7 +54,9 @@ def arm_facts(experiment: Experiment) -> dict[str, str]:
     planner = experiment.made or load_planner(experiment.planner, **experiment.options)
     query = experiment.query(experiment.world(0))
     values = {field.name: getattr(planner, field.name) for field in dataclasses.fields(planner)}  # type: ignore[arg-type]
-    facts = {"moves": moves_in_words(query)}
+    if "beta" in values and values["beta"] is None:
+        values["beta"] = ibraheem_beta(max(query.grid.shape))
+    facts = {"planner": type(planner).__name__, "moves": _moves(experiment), "movers": _movers(experiment)}
     for head, names in OPTIONS.items():
         facts[head] = _listed({name: values[name] for name in names if name in values})
     shown = {*UNSHOWN, *(name for names in OPTIONS.values() for name in names)}
@@ -62,22 +66,49 @@ def arm_facts(experiment: Experiment) -> dict[str, str]:
     facts["first pheromone"] = ", ".join(filter(None, (facts["first pheromone"], _first_trail(planner, query))))
     facts["step limit of an ant"] = _step_limit(planner, query)
     facts["budget"] = f"{experiment.work:,.0f} {ants.work_unit}" if ants and math.isfinite(experiment.work) else "–"
-    facts["counted as work"] = _work_unit(planner, query)
+    facts["counted as work"] = "cells propagated" if experiment.movers else _work_unit(planner, query)
     facts[REST] = _listed({name: value for name, value in values.items() if name not in shown})
     return {head: facts[head] or "–" for head in HEADS}
 
 
-def moves_in_words(query: Query) -> str:
-    """Return which moves a query's grid allows beyond or short of those that cut no corner."""
+def moves_in_words(queries: Sequence[Query]) -> str:
+    """Return which moves the grids of queries allow beyond or short of those that cut no corner."""
+    more, fewer = zip(*map(_changed_moves, queries), strict=True)
+    words = "eight, corners may be cut" if any(more) else "eight, none cuts a corner"
+    closed = " to ".join(str(one) for one in sorted({min(fewer), max(fewer)}))
+    return f"{words}; {closed} closed" if any(fewer) else words
+
+
+def merged(facts: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """Return the facts of one arm on several maps, by map: where maps differ, each value with its maps."""
+    found: dict[str, str] = {}
+    for head in HEADS:
+        values: dict[str, list[str]] = {}
+        for where, one in facts.items():
+            values.setdefault(one[head], []).append(where)
+        alone = len(values) == 1
+        found[head] = "; ".join(value if alone else f"{value} ({', '.join(maps)})" for value, maps in values.items())
+    return found
+
+
+def _moves(experiment: Experiment) -> str:
+    return moves_in_words([experiment.query(world) for world in {*map(experiment.world, experiment.seeds(MAPS))}])
+
+
+def _changed_moves(query: Query) -> tuple[int, int]:
+    """Return the number of moves that a grid has beyond those that cut no corner, and that it lacks."""
     usual, moves = Grid.from_free(query.grid.free).moves, query.grid.moves
     more, fewer = (int(np.unpackbits(one & ~other).sum()) // 2 for one, other in ((moves, usual), (usual, moves)))
-    words = "eight, corners may be cut" if more else "eight, none cuts a corner"
-    return f"{words}; {fewer} closed" if fewer else words
+    return more, fewer
 
 
-def merged(facts: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """Return the facts of one arm on several maps: where maps differ, all values in their order."""
-    return {head: " / ".join(dict.fromkeys(one[head] for one in facts)) for head in HEADS}
+def _movers(experiment: Experiment) -> str:
+    parts = (
+        f"{experiment.movers}",
+        "on the path" * experiment.on_path,
+        "may enter the robot's cell" * experiment.enter,
+    )
+    return ", ".join(filter(None, parts)) if experiment.movers else ""
 
 
 def _listed(values: Mapping[str, Any]) -> str:

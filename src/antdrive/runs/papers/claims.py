@@ -260,7 +260,7 @@ def _mean_of_one(claim: Claim, runs: RunsByArm) -> Measured:
     interval = means_by_world(known[:, None], np.arange(len(known)))[0]
     why = f"{100 * (value / claim.bound - 1):+.1f} % from the printed mean"
     if len(known) < len(values):
-        why += f"; {len(values) - len(known)} of {len(values)} had no path"
+        why += f"; {len(values) - len(known)} of {len(values)} lacked a value"
     return Measured(value, interval, len(known), f"mean {_with_interval(value, interval, claim)}", why)
 
 
@@ -285,8 +285,10 @@ def _means_of_several(claim: Claim, runs: RunsByArm) -> Measured:
         f"{100 * known.mean() - 100:+.1f} [{100 * low - 100:+.1f}, {100 * high - 100:+.1f}] %"
         for known, (low, high) in zip(fractions, intervals, strict=True)
     )
-    why = f"from the printed means: {', '.join(off)}" + (f"; {lost} runs had no path" if lost else "")
-    return Measured(float(fractions[k].mean()), intervals[k], min(map(len, values)), ours, why)
+    why = f"from the printed means: {', '.join(off)}" + (f"; {lost} runs lacked a value" if lost else "")
+    refuted = RELATIONS["about"](intervals[k], 1.0)[1]
+    unknown = "" if refuted or not lost else "runs without a value cannot be averaged"
+    return Measured(float(fractions[k].mean()), intervals[k], min(map(len, values)), ours, why, unknown)
 
 
 def _arrived(claim: Claim, runs: RunsByArm) -> Measured:

@@ -49,10 +49,14 @@ class FirstTouchDStar(GridPlanner):
 
     order: Literal["distance", "cost"] = "distance"
 
+    def __post_init__(self) -> None:
+        if self.order not in ("distance", "cost"):
+            raise FieldError("order", f"must be 'distance' or 'cost', got {self.order!r}")
+
     @property
     def capabilities(self) -> Capabilities:
         """What this planner can do and needs."""
-        return Capabilities()
+        return Capabilities(deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
@@ -100,7 +104,7 @@ class PaperRun:
     optimum: float  # length of the shortest path with the same moves
     cpu_s: float  # processor time of the plan [s]
     total: float  # hasan's total cost of the path; inf without a path
-    concentration: float = math.nan  # fraction of the planner's field on the path; nan without a path or a field
+    concentration: float = math.nan  # fraction of the planner's field on the path; nan without a field
     ants: float = math.nan  # ants per iteration; nan for other planners
     even: float = math.nan  # length of the best path at exactly the limit of work; nan without a limit
     close: float = math.nan  # work until the path was within `CLOSE` of the shortest, inf if never; nan without a limit
@@ -166,9 +170,10 @@ class PaperRun:
 
     @property
     def unrest(self) -> float:
-        """The standard deviation of the best paths of the last `LAST` iterations; inf if any lacks a path."""
-        known = self.result.history.iteration_best[-LAST:]
-        return float(known.std()) if len(known) and np.isfinite(known).all() else math.inf
+        """The standard deviation of the best paths of the last `LAST` iterations in which an ant arrived; inf without any."""
+        known = self.result.history.iteration_best
+        known = known[np.isfinite(known)][-LAST:]
+        return float(known.std()) if len(known) else math.inf
 
     @property
     def early_unrest(self) -> float:
@@ -244,9 +249,9 @@ TURNS, TURN = 4, 0.003
 def interleaved(calls: Sequence[Callable[[], PaperRun]]) -> list[PaperRun]:
     """Return one run of each call; `cpu_s` is the median of `TURNS` turns that alternate with those of the other calls.
 
-    A call repeats within its turn for at least `TURN`, and the turn counts with its least time: a single plan of 0.1 ms takes
-    two or three times as long while the processor's caches hold the data of the other calls. Every other round of turns
-    goes backwards, so that a steady drift of the machine's speed changes all times alike.
+    A first call shorter than `TURN` is not counted: a plan of 0.1 ms takes two or three times as long while the processor's
+    caches hold the data of the other calls. The median of the calls in the next `TURN` seconds is. Every other round of turns goes
+    backwards, so that a steady drift of the machine's speed changes all times alike.
     """
     if len(calls) == 1:
         return [calls[0]()]
@@ -261,16 +266,19 @@ def interleaved(calls: Sequence[Callable[[], PaperRun]]) -> list[PaperRun]:
 
 
 def _turn(call: Callable[[], PaperRun]) -> PaperRun:
-    runs = [call()]
+    first = call()
+    runs = [first if first.cpu_s >= TURN else call()]
     while sum(run.cpu_s for run in runs) < TURN:
         runs.append(call())
-    return min(runs, key=lambda run: run.cpu_s)
+    return sorted(runs, key=lambda run: run.cpu_s)[len(runs) // 2]
 
 
 def concentration(result: PlanResult) -> float:
-    """Return the fraction of a plan's field on the cells of its path; nan without a path or a field."""
-    if not result.solved or result.field is None:
+    """Return the fraction of a plan's field on the cells of its path, 0 without a path; nan without a field."""
+    if result.field is None:
         return math.nan
+    if not result.solved:
+        return 0.0
     on_path = np.zeros(result.field.shape, dtype=np.bool_)
     on_path[tuple(result.cells.T)] = True
     return float(result.field[on_path].sum() / result.field.sum())

@@ -5,6 +5,7 @@ Runs are kept in files, so an interrupted reproduction can resume.
 
 from __future__ import annotations
 
+import ast
 import csv
 import dataclasses
 import functools
@@ -68,27 +69,37 @@ def runs_key(experiment: Experiment, seeds: int) -> str:
         "worlds": experiment.worlds,
         "work": experiment.work,
         "movers": [experiment.movers, experiment.on_path, experiment.enter],
-        "seeds": seeds,
+        "seeds": len(experiment.seeds(seeds)),
         "code": code_hash(),
     }
     return json.dumps(facts, sort_keys=True)
 
 
+EVALUATING = ("claims", "paragraphs", "arms")  # modules on which no run depends
+
+
 @functools.cache
 def code_hash() -> str:
-    """Return the hash of the source files of worlds, planners and experiments, except those that only evaluate."""
+    """Return the hash of the code of worlds, planners and experiments, without comments, docstrings and `EVALUATING`."""
     digest = hashlib.sha256()
     for package in (antdrive.worlds, antdrive.planners, antdrive.runs.papers):
         for folder in package.__path__:
             for path in sorted(Path(folder).rglob("*.py")):
-                if package is antdrive.runs.papers and path.stem in (
-                    "claims",
-                    "paragraphs",
-                    "arms",
-                ):  # runs do not depend on it
+                if package is antdrive.runs.papers and path.stem in EVALUATING:
                     continue
-                digest.update(path.read_bytes())
+                digest.update(code_of(path.read_bytes()))
     return digest.hexdigest()
+
+
+def code_of(source: bytes) -> bytes:
+    """Return what Python executes of a module: its syntax tree without statements that are only a string."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            node.body = [  # type: ignore[attr-defined]
+                one for one in body if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))
+            ]
+    return ast.dump(tree).encode()
 
 
 def save_runs(runs: Sequence[PaperRun], path: Path, key: str) -> None:
@@ -217,12 +228,14 @@ def reproduce(
     arms = {(e.paper, e.map, e.name): runs for e, runs in measured if e.name != "steps"}
     verdicts = [evaluate(claim, runs) for claim, runs in _measured_claims(arms)]
     settings = _settings(experiments)
-    claims = [verdict_facts(one) | {"arms": _arms_of(one.claim, settings)} for one in verdicts]
+    claims = [verdict_facts(one) | {"settings": _arms_of(one.claim, settings)} for one in verdicts]
     files = {
         "table": _write_table(HEADS, map(row_cells, rows), folder / "table.md", NOTE),
         "csv": _write_csv([vars(row) for row in rows], folder / "table.csv"),
         "claims": _write_table(VERDICT_HEADS, map(verdict_cells, verdicts), folder / "claims.md"),
-        "claims csv": _write_csv([row | {"arms": json.dumps(row["arms"])} for row in claims], folder / "claims.csv"),
+        "claims csv": _write_csv(
+            [row | {"settings": json.dumps(row["settings"])} for row in claims], folder / "claims.csv"
+        ),
         "arms": _write_table(("paper", "arm", *ARM_HEADS), _arm_rows(settings), folder / "arms.md"),
     }
     return Reproduction(measured, rows, verdicts, claims, files, kept)
@@ -244,13 +257,15 @@ def _arms_of(claim: Claim, settings: Settings) -> dict[str, dict[str, str]]:
     for case in claim.cases:
         for arm in case:
             maps.setdefault(arm.name, []).append(arm.map)
-    return {name: merged([settings[claim.paper][name][where] for where in places]) for name, places in maps.items()}
+    return {
+        name: merged({where: settings[claim.paper][name][where] for where in places}) for name, places in maps.items()
+    }
 
 
 def _arm_rows(settings: Settings) -> Iterator[list[str]]:
     for paper, arms in settings.items():
         for name, places in arms.items():
-            yield [paper, name, *merged(list(places.values())).values()]
+            yield [paper, name, *merged(places).values()]
 
 
 def _experiments(papers: Sequence[str], quick: bool) -> list[Experiment]:
