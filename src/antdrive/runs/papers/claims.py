@@ -187,8 +187,10 @@ def _difference(claim: Claim, runs: RunsByArm) -> Measured:
 def _gain(claim: Claim, runs: RunsByArm) -> Measured:
     """Return the median difference of two gains: from the first planner to the second, from the third to the fourth."""
     (case,) = claim.cases
-    before, after, world = _paired(claim, runs, [case[:2]])
-    earlier, later, _ = _paired(claim, runs, [case[2:]])
+    common = set.intersection(*({run.seed for run in runs[arm]} for arm in case))
+    kept = {arm: [run for run in runs[arm] if run.seed in common] for arm in case}
+    before, after, world = _paired(claim, kept, [case[:2]])
+    earlier, later, _ = _paired(claim, kept, [case[2:]])
     value, interval = _median(np.round((before - after) - (earlier - later), 9), world)
     gains = f"median gains {np.median(before - after):.2f} and {np.median(earlier - later):.2f}"
     ours = f"median difference of the gains {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"

@@ -250,7 +250,7 @@ def interleaved(calls: Sequence[Callable[[], PaperRun]]) -> list[PaperRun]:
     """Return one run of each call; `cpu_s` is the median of `TURNS` turns that alternate with those of the other calls.
 
     A first call shorter than `TURN` is not counted: a plan of 0.1 ms takes two or three times as long while the processor's
-    caches hold the data of the other calls. The median of the calls in the next `TURN` seconds is. Every other round of turns goes
+    caches hold the data of the other calls. The median of the calls in the next `TURN` seconds is. Every other round goes
     backwards, so that a steady drift of the machine's speed changes all times alike.
     """
     if len(calls) == 1:
