@@ -136,7 +136,7 @@ class PaperRun:
 
     @property
     def last(self) -> float:
-        """The best path of the last iteration in which an ant arrived; inf if none did."""
+        """The best path of the last iteration; inf if no ant arrived in it."""
         known = self.result.history.iteration_best
         return float(known[-1]) if len(known) else math.inf
 
