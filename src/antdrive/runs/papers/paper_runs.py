@@ -106,7 +106,7 @@ class PaperRun:
     total: float  # hasan's total cost of the path; inf without a path
     concentration: float = math.nan  # fraction of the planner's field on the path; nan without a field
     ants: float = math.nan  # ants per iteration; nan for other planners
-    even: float = math.nan  # length of the best path at exactly the limit of work; nan without a limit
+    even: float = math.nan  # length of the best path at the limit of work, see `limits`; nan without a limit
     close: float = math.nan  # work until the path was within `CLOSE` of the shortest, inf if never; nan without a limit
 
     @property
@@ -121,7 +121,7 @@ class PaperRun:
 
     @property
     def even_gap(self) -> float:
-        """The gap at exactly the limit of work, as the iteration that reaches the limit exceeds it [%]."""
+        """The gap at exactly the limit of work [%]; a first path counts in full, although its iteration may exceed it."""
         return 100.0 * (self.even / self.optimum - 1.0)
 
     @property
