@@ -41,7 +41,7 @@ class FirstTouchDStar(GridPlanner):
 
     The paper describes no D*. Its listing sorts the open list (`SortQueue`, l. 115) without the key. With the cost as key
     few paths are longer than the shortest. With the distance to the start, which no text names, paths around concave
-    obstacles are.
+    obstacles are. The search stops when it touches the start; the listing (l. 117) when it expands it.
 
     Attributes:
         order: the key of the open list: the distance to the start, or the cost
@@ -76,7 +76,7 @@ class FirstTouchDStar(GridPlanner):
 
 
 def total_cost(query: Query, result: PlanResult) -> float:
-    """Return hasan's total path cost: the sum over all entered cells of the remaining cost; inf without a path.
+    """Return hasan's total path cost: the sum over all cells of the path of the remaining cost; inf without a path.
 
     A straight move costs 1 and a diagonal one 1.4, as in the paper; the remaining cost is along the path.
     """
