@@ -140,7 +140,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
     seeds = SEEDS[:3] if quick else SEEDS
     # suganthi2019, Table 2: sizes; the blocked share is not stated.
     common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
-    dying = {"backtrack": False, "shortcut": False, "elite": 1.0}  # not the planner's defaults
+    dying = {"backtrack": False, "shortcut": False, "depositors": "all", "ties": "share"}  # not the planner's defaults
     printed = {
         10: (13.899, 13.899, 13.899), 20: (28.627, 38.627, 28.627), 30: (46.527, 59.355, 42.184), 50: (96.125, 109.761, 94.326),
     }  # fmt: skip

@@ -2,8 +2,8 @@
 Ants with a sense of direction (Han 2007)
 =========================================
 
-Han's ants choose the next cell by pheromone and by the direction of the goal (Han 2007, §4.2). Here 100 ants search the
-thesis' map of 14 obstacles, and a robot drives their path.
+Han's ants choose the next cell by pheromone and by the direction of the goal (Han 2007, §4.2). Here 100 ants and
+an elite search the thesis' map of 14 obstacles, and a robot drives their path.
 """
 
 from antdrive import Scenario, film, plan, run
@@ -16,8 +16,8 @@ scenario = Scenario.of(
 # %%
 # The plan
 # --------
-# Colours show the pheromone, the chart path lengths by iteration: walks grow. Ants walk from cell to cell, so the path is a
-# staircase.
+# Colours show the pheromone, the chart path lengths by iteration: walks grow. The colony does not learn: without pheromone the
+# same ants find shorter paths. Ants walk from cell to cell, so the path is a staircase.
 
 grid, found = plan(scenario)
 print(f"{found.cost:.2f} m over {len(found.cells)} cells")

@@ -3,8 +3,8 @@ Pheromone that spreads from the goal (Hasan)
 ============================================
 
 In Hasan's planner, pheromone spreads from the goal until it reaches the robot, and a single ant follows it cell by cell. The
-ant skips the mover's cell; nothing is repaired. This world has curved walls as the paper describes them, and one mover, which
-steps to a random neighbouring cell every 0.8 s.
+ant skips the mover's cell; after four waits pheromone spreads again, a rule of ours. This world is drawn by hand from the
+paper's text: curved walls, and one mover, which steps to a random neighbouring cell every 0.8 s.
 """
 
 from antdrive import Scenario, film, plan, run
@@ -15,8 +15,8 @@ scenario = Scenario.of("hasan-1a-moving", "mmas-dstar", seed=0)
 # %%
 # The field
 # ---------
-# The ant moves to the neighbour with the least pheromone, weighted with the straight-line distance to the goal. The field
-# grows along the paths around walls, so the ant needs no search.
+# The ant moves to the neighbour with the least pheromone, weighted with the straight-line distance to the goal. Pheromone
+# grows along the paths around walls, so the ant only compares neighbours.
 
 grid, found = plan(scenario)
 print(f"{found.status.value}: {found.cost:.2f} m")

@@ -4,7 +4,8 @@ Ants that explore (Suganthi 2019)
 
 Suganthi and Subha (2019) use two kinds of ants: common ants follow pheromone, exploratory ants prefer moves with little of
 it. Here their colony, the ant system and Lee's ants search a random map of 20 × 20 cells whose shortest path is as long as
-the paper's. All have the paper's parameters, step back out of dead ends and cut loops short.
+the paper's. All step back out of dead ends and cut loops short. Parameters are the paper's; where it prints none for Lee's
+ants, they are those of Lee et al. (2008) or ours.
 """
 
 import numpy as np

@@ -30,6 +30,8 @@ def test_every_option_that_an_experiment_may_set_is_shown(planner):
     plain = facts(planner)
     assert tuple(plain) == HEADS
     for option in dataclasses.fields(load_planner(planner)):
+        if (planner, option.name) == ("maco", "deposit"):  # its bounds replace it
+            continue
         if isinstance(option.default, bool):
             changed = facts(planner, options={option.name: not option.default})
         elif isinstance(option.default, float) and option.name != "q_min":

@@ -96,8 +96,9 @@ class GaHan(ViaPointPlanner):
 
     Han 2007, section 4.1: a chromosome is a sequence of via points on free cells. Each generation selects by
     1 / length, crosses, mutates, eliminates chromosomes that touch an obstacle and refills the population at
-    random. The thesis' program also eliminates and refills before it mutates. The defaults are those of the
-    thesis. `field` counts the chromosomes of the last population that pass each cell.
+    random. The thesis' program also eliminates and refills before it mutates. The defaults are those of its
+    first experiments; the elite also breeds, unlike in its program. `field` counts the chromosomes of the last
+    population that pass each cell.
 
     Known weakness, measured (docs/notebook/planner-quality.md): the first feasible line must be found by chance.
     Among many obstacles no line over so few via points may exist, or none is drawn: the status is then `STOPPED`.

@@ -27,9 +27,9 @@ class AcoHan(Colony):
 
     Han 2007, section 4.2: the weight of a move is the next cell's fraction of the pheromone plus alpha times
     its pull to the goal (eq. 4.2.1). Pheromone evaporates (eq. 4.2.2), every ant that arrives deposits on its
-    cells (eq. 4.2.3), and an elite deposits more (eq. 4.2.4). The pull of eq. 4.2.1 is a plain dot product with
-    the vector to the goal. It is up to 38 on the thesis' map, where a fraction is at most 1. The default is the
-    cosine, at least 0. The thesis' program has a third pull; `form` selects one of them.
+    cells (eq. 4.2.3), and an elite deposits more (eq. 4.2.4). The pull is a dot product with the vector to the
+    goal, up to 38 on the thesis' map, where a fraction is at most 1, or with its direction: the text has both. The
+    default is the latter, the cosine, at least 0. The thesis' program has a third pull; `form` selects one.
 
     By the default pull alone a move away from the goal weighs 0, less than a step back, and no ant leaves a dead
     end. A comment in the program lets ants turn back only after visiting every neighbour; `min_weight` gives

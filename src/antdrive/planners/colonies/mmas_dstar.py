@@ -38,9 +38,9 @@ class MaxMinDStar(GridPlanner):
     best ant and random choices (l. 60-82) are not in the paper's procedures, nor here: see `MaxMinAnts`.
 
     Known weaknesses, measured (docs/papers/hasan.md): with alpha 1 and beta 1 the ant cycles on all candidates for five
-    of the paper's six environments; with the paper's exponents it cycles on 40 of 50 candidates for one. Paths are up to
-    13 per cent longer than the shortest. With a quarter of 50 x 50 cells blocked they are 1.8 per cent longer in the
-    median and 44 per cent at worst.
+    of the paper's six environments; with the paper's exponents it cycles on 40, 2 and 1 of 50 candidates for three. With
+    the default exponents paths are up to 13 per cent longer than the shortest. With a quarter of 50 x 50 cells blocked
+    they are 1.8 per cent longer in the median and 44 per cent at worst.
 
     Attributes:
         alpha: initial exponent of the pheromone; in the paper 1 to 26, depending on the environment

@@ -34,19 +34,19 @@ class PotentialFieldAnts(IterativePlanner):
     U_ij^beta (eq. 13). The potential rises away from the start (eq. 9) and falls near obstacles (eq. 11); the
     initial pheromone mixes potential and chance (eq. 14). All ants move by one cell per tick. An ant that arrives
     enters its path into a ranking list by length times number of cells (eq. 15), deposits by rank and restarts.
-    Converged pheromone is rebuilt from the list (section IV-B). An iteration here ends when `ants` walks have
-    ended.
+    Converged pheromone is rebuilt from the list (section IV-B). It evaporates each tick; the paper names no time.
+    An iteration here ends when `ants` walks have ended.
 
     The paper leaves these points open, each an option here: the definition of U_ij (`form`), whether an ant may
     return to a cell (`memory`), dead ends (`backtrack`), and the constants from `attraction` to `convergence`.
     docs/papers/lee2008.md compares the interpretations. With U_ij = U_j, two neighbours far from the start differ
     by a few per cent, and ants walk almost at random. The step limit `max_steps` is an addition.
 
-    Known weaknesses, measured on the same page. The potential has no maximum at the goal: unless the goal is the
-    cell farthest from the start, ants are drawn past it, and paths may be three times as long as the shortest;
-    `field="goal"` prevents it. Ants restart in dead ends: 9 of 10 runs cross 100 x 100 cells with 25 per cent
-    blocked, and 18 of 50 the winding maps of 25 x 25 cells that represent lee2008's map 1; with `backtrack` all
-    do.
+    Known weaknesses, measured on the same page and in docs/notebook/planner-quality.md. The potential has no maximum
+    at the goal: unless the goal is the cell farthest from the start, ants are drawn past it, and paths may be
+    three times as long as the shortest; `field="goal"` prevents it. Ants restart in dead ends: 9 of 10 runs cross
+    100 x 100 cells with 25 per cent blocked, and 18 of 50 the winding maps of 25 x 25 cells that represent
+    lee2008's map 1; with `backtrack` all do.
 
     Attributes:
         ants: ants, and walks per iteration

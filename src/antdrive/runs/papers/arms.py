@@ -54,6 +54,8 @@ def arm_facts(experiment: Experiment) -> dict[str, str]:
     planner = experiment.made or load_planner(experiment.planner, **experiment.options)
     query = experiment.query(experiment.world(0))
     values = {field.name: getattr(planner, field.name) for field in dataclasses.fields(planner)}  # type: ignore[arg-type]
+    if "q_max" in values:
+        del values["deposit"]  # an ageing ant's amount lies between its bounds
     if "beta" in values and values["beta"] is None:
         values["beta"] = ibraheem_beta(max(query.grid.shape))
     facts = {"planner": type(planner).__name__, "moves": _moves(experiment), "movers": _movers(experiment)}

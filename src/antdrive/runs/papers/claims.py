@@ -477,7 +477,7 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "last": (2, ""),
     "unrest": (2, ""),
     "early_unrest": (2, ""),
-    "concentration": (3, ""),
+    "concentration": (4, ""),
     "share": (2, " %"),
     "cpu_ms": (0, " ms"),
     "work": (0, " steps"),

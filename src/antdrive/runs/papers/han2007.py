@@ -64,6 +64,7 @@ def _ants() -> Iterator[Experiment]:
     hundred: Mapping[str, Mapping[str, Any]] = {
         "elite of the iteration": {**ELITE, **GROUP},
         "no pheromone": BLIND,
+        "dot product, no pheromone": {"form": "letter", **BLIND},
         "alpha 0.1": {"attraction": 0.1},
         "alpha 10": {"attraction": 10.0},
         "no attraction": {"attraction": 0.0},

@@ -22,6 +22,8 @@ STEPPING_BACK: dict[str, Any] = {"backtrack": True, "shortcut": True}
 #: The flow chart: an update after each ant that arrives, the second also with the initial pheromone in each iteration.
 EACH_ANT: dict[str, Any] = {"update_every": 1}
 RESET: dict[str, Any] = {"update_every": 1, "restart_every": 1}
+#: Mean of Q_m over 50 ants of MACO (eq. 5, clipped): an ACO that deposits as much on average, but without ageing.
+MEAN_AGED = 0.356
 #: Rounds of fifty runs: for Table 2, for other settings, and for arms that cost ten times as much or differ by far more.
 MANY, SOME, FEW = 4, 2, 1
 
@@ -53,6 +55,10 @@ def _settings(size: int, planner: str) -> Iterator[tuple[str, dict[str, Any], in
             yield f"{ants} ants", {"ants": ants}, SOME
     else:
         yield "Q 100", _deposit(planner, 100.0), SOME
+        if planner == "as":
+            yield "mean Q of MACO", {"deposit": MEAN_AGED}, SOME
+    if size == 30:
+        yield "reset, Q 10", {**RESET, **_deposit(planner, 10.0)}, FEW
     if planner == "maco":
         if size not in SECTION_7_1:
             yield "Q_min 0.5", {"q_min": 0.5}, SOME

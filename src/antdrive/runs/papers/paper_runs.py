@@ -41,7 +41,7 @@ class FirstTouchDStar(GridPlanner):
 
     The paper describes no D*. Its listing sorts the open list (`SortQueue`, l. 115) without the key. With the cost as key
     few paths are longer than the shortest. With the distance to the start, which no text names, paths around concave
-    obstacles are.
+    obstacles are. The search stops when it touches the start; the listing (l. 117) when it expands it.
 
     Attributes:
         order: the key of the open list: the distance to the start, or the cost
@@ -76,7 +76,7 @@ class FirstTouchDStar(GridPlanner):
 
 
 def total_cost(query: Query, result: PlanResult) -> float:
-    """Return hasan's total path cost: the sum over all entered cells of the remaining cost; inf without a path.
+    """Return hasan's total path cost: the sum over all cells of the path of the remaining cost; inf without a path.
 
     A straight move costs 1 and a diagonal one 1.4, as in the paper; the remaining cost is along the path.
     """
@@ -106,7 +106,7 @@ class PaperRun:
     total: float  # hasan's total cost of the path; inf without a path
     concentration: float = math.nan  # fraction of the planner's field on the path; nan without a field
     ants: float = math.nan  # ants per iteration; nan for other planners
-    even: float = math.nan  # length of the best path at exactly the limit of work; nan without a limit
+    even: float = math.nan  # length of the best path at the limit of work, see `limits`; nan without a limit
     close: float = math.nan  # work until the path was within `CLOSE` of the shortest, inf if never; nan without a limit
 
     @property
@@ -121,7 +121,7 @@ class PaperRun:
 
     @property
     def even_gap(self) -> float:
-        """The gap at exactly the limit of work, as the iteration that reaches the limit exceeds it [%]."""
+        """The gap at exactly the limit of work [%]; a first path counts in full, although its iteration may exceed it."""
         return 100.0 * (self.even / self.optimum - 1.0)
 
     @property
@@ -136,7 +136,7 @@ class PaperRun:
 
     @property
     def last(self) -> float:
-        """The best path of the last iteration in which an ant arrived; inf if none did."""
+        """The best path of the last iteration; inf if no ant arrived in it."""
         known = self.result.history.iteration_best
         return float(known[-1]) if len(known) else math.inf
 

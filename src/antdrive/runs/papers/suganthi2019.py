@@ -35,8 +35,9 @@ CHECKS, SLOW = ("alpha = 0", "C = 0.01", "C = 100"), ("all deposit", "ants share
 def suganthi2019() -> list[Experiment]:
     """Return Table 2, ablations of the exploratory ants and of the elite, and the readings of open points.
 
-    Ants of all planners step back out of dead ends and cut loops short; where "ants die", they do neither. The constants of
-    `pfaco` are those of Table 1, whose first value is missing in the text.
+    Ants of all planners step back out of dead ends and cut loops short; where "ants die", they do neither. Of
+    `pfaco`'s constants, repulsion and influence are those of Table 1, whose first value is missing in the text; the others
+    are lee2008's or ours.
     """
     common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step"}
     walk = {"iterations": 100, "backtrack": True, "shortcut": True}
@@ -92,7 +93,7 @@ def suganthi2019() -> list[Experiment]:
         for planner in (label.partition(",")[0],)
         if size in sizes
     ]
-    # On maps with as many moves as printed no ant crosses 50×50 cells if ants die; on these some do.
+    # On maps with as many moves as printed no ant of `as` or `iaco` crosses 50×50 cells if ants die; on these some do.
     crossed = [
         Experiment(
             paper="suganthi2019",
