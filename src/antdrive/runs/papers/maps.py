@@ -151,8 +151,8 @@ class Printed(NamedTuple):
     gates: int  # closed cells
 
 
-#: Hasan's environments. Table 1 prints column.row; a one-digit row may carry a zero: 26.80 is row 8 of 50, and 1.40 row 4, as the start
-#: lies in the "upper left corner" (l. 231).
+#: Hasan's environments. Table 1 prints column.row; a one-digit row may carry a zero: 26.80 is row 8 of 50. So 1.40 is row
+#: 4, as the start lies in the "upper left corner" (l. 231).
 HASAN: Mapping[str, Printed] = MappingProxyType(
     {
         "1a curved walls": Printed(((13, 21), (17, 27)), 65, 1),
