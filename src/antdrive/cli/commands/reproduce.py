@@ -1,7 +1,7 @@
 """`antdrive reproduce`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from antdrive.base.files import write_json
 from antdrive.cli import options
@@ -9,6 +9,10 @@ from antdrive.cli.console import bar, file_lines, print_error, show, table
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import results_folder
 from antdrive.views.run_folder import suffixes
+
+if TYPE_CHECKING:
+    from antdrive.runs.papers.claims import Verdict
+    from antdrive.runs.papers.reproduction import ResultRow
 
 MARKER = "reproduce.json"
 QUICK_SEEDS = 6
@@ -29,13 +33,12 @@ def reproduce(
 ) -> None:
     """Repeat a paper's experiments and test its claims.
 
-    Prints published beside measured figures, then each claim with our figure, its interval, verdict and reason. Draws the
-    paper's figures. 50 seeds decide every claim; with fewer, a line counts the undecidable ones. Repeat the command to resume
-    it.
+    Prints published beside measured figures, then each claim with our figure, its interval and verdict; reasons and settings
+    are in the files. Draws the paper's figures. 50 seeds decide every claim; with fewer, a line counts the undecidable ones.
+    Repeat the command to resume it.
     """
-    from antdrive.runs.papers.claims import VERDICT_HEADS, verdict_cells
     from antdrive.runs.papers.experiments import PAPERS
-    from antdrive.runs.papers.reproduction import HEADS, RUNS_FOLDER, row_cells, too_few_seeds
+    from antdrive.runs.papers.reproduction import RUNS_FOLDER, too_few_seeds
     from antdrive.runs.papers.reproduction import reproduce as repeat
     from antdrive.views.papers import draw_figures
 
@@ -64,11 +67,27 @@ def reproduce(
         }
         write_json(folder / MARKER, {**facts, **result})
     lines = [
-        *table(HEADS, map(row_cells, reproduction.rows), columns=COLUMNS),
-        *table(VERDICT_HEADS, map(verdict_cells, reproduction.verdicts), columns=COLUMNS),
+        *table(("solved", "planner on map, printed and ours"), map(_row, reproduction.rows), columns=COLUMNS),
+        *table(("verdict", "row", "claim"), map(_claim, reproduction.verdicts), columns=COLUMNS),
     ]
     lines += file_lines(files)
     if reproduction.kept:
         count = f"{reproduction.kept} of {len(reproduction.rows)}"
         lines.append(f"{count} experiments reused from {folder / RUNS_FOLDER}")
     show(json, result, lines)
+
+
+def _row(row: "ResultRow") -> tuple[str, str]:
+    """Return how many runs were solved, and the experiment with the printed and our values; the files have all columns."""
+    from antdrive.runs.papers.reproduction import HEADS, row_cells
+
+    cells = dict(zip(HEADS, row_cells(row), strict=True))
+    told = ", ".join(f"{head} {cells[head]}" for head in ("printed", "mean", "gap") if cells[head] != "–")
+    return cells["solved"], f"{row.planner} on {cells['map']}: {row.quantity} {told}"
+
+
+def _claim(verdict: "Verdict") -> tuple[str, str, str]:
+    """Return a claim's verdict, number and sentence with our value; the files have all columns."""
+    claim = verdict.claim
+    reading = "" if claim.reading == "ours" else f" ({claim.reading})"
+    return verdict.decision.value, claim.id, f"{claim.sentence}{reading}: {verdict.ours}"
