@@ -71,7 +71,10 @@ def paragraphs_page() -> str:
     for paper in PAPERS:
         lines = [["lines", "place", "text", "rows", "why none, or not all of it"], ["---"] * 5]
         lines += [[p.lines, p.place, f"“{p.quote}”", ", ".join(p.rows), p.reason] for p in paragraphs(paper)]
-        parts.append(f"## {paper}\n\n" + "\n".join(_line([one.replace("|", "\\|") for one in line]) for line in lines))
+        parts.append(
+            f"## {paper}\n\n`antdrive reproduce {paper} --seeds 50` tests the rows.\n\n"
+            + "\n".join(_line([one.replace("|", "\\|") for one in line]) for line in lines)
+        )
     return "\n\n".join(parts) + "\n"
 
 
