@@ -32,9 +32,9 @@ VERDICT = HEADS.index("verdict")
 END = "<!-- end -->"
 
 
-PARAGRAPHS_HEAD = """# Paragraphs of the five papers that claim something
+PARAGRAPHS_HEAD = """# Paragraphs of the papers
 
-Each paragraph, figure and table, with the rows of its page that test it. Lines count those of the papers' plain text.
+Each paragraph, figure and table that claims something, with the rows of its page that test it. Lines count those of the papers' plain text.
 `python -m tools.paper_tables` writes this page from `runs/papers/paragraphs/PAPER.csv`."""
 
 
