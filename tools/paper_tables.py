@@ -34,8 +34,8 @@ END = "<!-- end -->"
 
 PARAGRAPHS_HEAD = """# Paragraphs of the papers
 
-Each paragraph, figure and table that claims something, with the rows of its page that test it. Lines count those of the papers' plain text.
-`python -m tools.paper_tables` writes this page from `runs/papers/paragraphs/PAPER.csv`."""
+Each paragraph, figure and table that claims something, with the rows of its page that test it. Lines count those of the papers'
+plain text. `python -m tools.paper_tables` writes this page from `runs/papers/paragraphs/PAPER.csv`."""
 
 
 def claims_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
