@@ -255,7 +255,7 @@ class ExploringAnts(AntSystem):
         _kernels_colony.arc_weights(trail, heuristic, self.alpha if context.kind == 0 else -self.alpha, weights)
 
     def update(self, trail: Floats, state: IterationState) -> None:
-        """Update `trail` as `AntSystem` does; with `ties` "arc", add elite Q / L_best once to each arc of the best tours."""
+        """Update `trail` by `state` as `AntSystem`; with `ties` "arc", add elite Q / L_best once to each arc of best tours."""
         from antdrive.planners.colonies import _kernels_colony
 
         super().update(trail, state)

@@ -190,7 +190,13 @@ class PotentialFieldAnts(IterativePlanner):
             yield pool.report(query.grid.cell, trail, arrivals, steps)
 
     def initial_trail(self, field: Floats, free: npt.NDArray[np.bool_], rng: np.random.Generator) -> Floats:
-        """Return the pheromone before the first iteration (nodes,) from `potential` and whether nodes are free (eq. 14)."""
+        """Return the pheromone before the first iteration (nodes,) by eq. 14.
+
+        Args:
+            field: the potential (nodes,)
+            free: whether each cell is free (nodes,)
+            rng: the source of chance
+        """
         trail = self.mix * rng.random(len(field)) + (1 - self.mix) * field / field.max()
         return np.where(free, np.maximum(trail, self.min_pheromone), 0.0)
 
