@@ -93,8 +93,7 @@ class AntSystem(Colony):
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
         """Return eta^beta for each move of `graph`, relative to the largest value in its cell."""
         if self.heuristic == "goal":
-            # The goal's distance is 0; the bound makes every ant beside the goal step onto it.
-            eta = graph.at_neighbours(1.0 / np.maximum(graph.distance_to(graph.goal), 0.01))  # ibraheem2016 eq. 6
+            eta = graph.nearness()  # ibraheem2016 eq. 6
         else:
             eta = np.where(
                 np.isfinite(graph.at_neighbours(np.ones(len(graph.mask)))), 1.0 / STEP, -np.inf

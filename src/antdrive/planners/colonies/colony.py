@@ -97,6 +97,11 @@ class ColonyGraph:
         """Return the value of each node's cell (nodes,), from those of the cells (R, C)."""
         return values.ravel()[self.turns.cell] if self.turns else values.ravel()
 
+    def nearness(self) -> Floats:
+        """Return 1 / distance from the target of each move to the goal (nodes, 8) [1/cells]; -inf where it is not allowed."""
+        # The goal's distance is 0; the bound makes every ant beside the goal step onto it.
+        return self.at_neighbours(1.0 / np.maximum(self.distance_to(self.goal), 0.01))
+
     def at_neighbours(self, values: Floats) -> Floats:
         """Return `values` (nodes,) at the target of each move, (nodes, 8); -inf where the move is not allowed."""
         out = np.full((len(self.mask), 8), -np.inf)

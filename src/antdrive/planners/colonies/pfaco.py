@@ -167,7 +167,7 @@ class PotentialFieldAnts(IterativePlanner):
         elif self.form == "rise":
             there = np.maximum(there - here, least)
         elif self.form == "distance":
-            there = graph.at_neighbours(1.0 / np.maximum(graph.distance_to(graph.goal), 0.01))
+            there = graph.nearness()
         return np.where(allowed, there, 0.0)
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:

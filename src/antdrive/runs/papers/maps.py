@@ -46,20 +46,20 @@ def optimum(query: Query) -> float:
 
 def cutting_corners(query: Query) -> Query:
     """Return a query with moves to every free neighbour of eight, also diagonally past blocked cells."""
-    free = query.grid.free
+    free, padded = query.grid.free, np.pad(query.grid.free, 1)
     moves = np.zeros(free.shape, dtype=np.uint8)
     for bit, (row, col) in enumerate(DIRECTIONS):
-        ahead = np.zeros(free.shape, dtype=np.bool_)
-        to, at = np.s_[max(0, -row) : free.shape[0] - max(0, row)], np.s_[max(0, -col) : free.shape[1] - max(0, col)]
-        ahead[to, at] = np.roll(free, (-row, -col), axis=(0, 1))[to, at]
-        moves |= np.where(free & ahead, np.uint8(1 << bit), np.uint8(0))
-    moves.setflags(write=False)
-    return dataclasses.replace(query, grid=dataclasses.replace(query.grid, moves=moves))
+        ahead = padded[1 + row : 1 + row + free.shape[0], 1 + col : 1 + col + free.shape[1]]
+        moves |= (free & ahead).astype(np.uint8) << np.uint8(bit)
+    return _with_moves(query, moves)
 
 
 def closing_gates(query: Query) -> Query:
     """Return a query whose gate cells, between two diagonally opposite blocked ones, no move enters, as hasan closes them."""
-    moves, _ = closed_gates(query)
+    return _with_moves(query, closed_gates(query)[0])
+
+
+def _with_moves(query: Query, moves: npt.NDArray[np.uint8]) -> Query:
     moves.setflags(write=False)
     return dataclasses.replace(query, grid=dataclasses.replace(query.grid, moves=moves))
 

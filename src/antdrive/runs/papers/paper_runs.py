@@ -200,7 +200,7 @@ class PaperRun:
     @property
     def rated(self) -> float:
         """The chromosomes that a genetic algorithm rated."""
-        return float(self.result.work)
+        return self.work
 
 
 def solve(
