@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -35,10 +36,10 @@ def lines_of(words: Sequence[str]) -> Iterator[str] | None:
 
 
 def version_line() -> str:
-    """Return the name and version of this program."""
-    from antdrive.base.version import __version__
+    """Return the name and version of this program, those of its physics and of Python."""
+    from antdrive.base.version import __version__, physics_version
 
-    return f"antdrive {__version__}"
+    return f"antdrive {__version__} (pybullet {physics_version()}, python {platform.python_version()})"
 
 
 def planner_lines(rows: Rows) -> Iterator[str]:

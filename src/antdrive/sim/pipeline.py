@@ -8,6 +8,7 @@ from typing import Any
 
 from antdrive.base.errors import FieldError
 from antdrive.base.progress import progress_bar
+from antdrive.base.version import require_physics
 from antdrive.planners import PlanResult, PlanStatus
 from antdrive.sim.compose import compose, warm_up_replanning
 from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
@@ -20,7 +21,6 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import passed
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import rollout_of
-from antdrive.sim.recording import versions as versions
 from antdrive.sim.scenario import Scenario, picture_of, usual_time_limit
 from antdrive.worlds import Grid
 from antdrive.worlds.svg import LINE, card
@@ -172,6 +172,7 @@ def driven(
     s: Scenario, planned: tuple[Grid, PlanResult] | None = None, progress: Progress = ignore_progress
 ) -> tuple[Grid, PlanResult, Rollout | None]:
     """Plan and drive as `run` does; return the grid, the plan, and the log if there is a path."""
+    require_physics()
     parts = compose(s)
     grid, answer = parts.guide.first() if planned is None else parts.guide.accept(*planned)
     if not answer.solved:

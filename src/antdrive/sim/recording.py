@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import functools
-import platform
-from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from antdrive.base.caches import Keyed, cached
+from antdrive.base.version import versions
 from antdrive.planners import AStar, PlanResult, Query, Tangent, untimed
 from antdrive.sim.driving.plants import Drive
 from antdrive.sim.driving.routes import by_contents, grid_of, outlined_grid_of
@@ -133,14 +131,3 @@ def _among_discs(asked: Keyed[tuple[Grid, Task]]) -> float | None:
     """Return the length of the shortest path among the inflated discs [m]; the search is deterministic."""
     with untimed():
         return finite_or_none(Tangent().plan(Query.between(*asked.value), random_stream(0, "optimum")).line_length)
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that a run depends on."""
-    return dict(_versions())
-
-
-@functools.cache
-def _versions() -> dict[str, str]:
-    packages = ("antdrive", "numpy", "pybullet", "numba")
-    return {"python": platform.python_version(), **{name: metadata.version(name) for name in packages}}

@@ -21,13 +21,13 @@ import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
+from antdrive.base.version import versions
 from antdrive.planners import Planner, PlannerError, PlanResult, TimedPlan, is_built_in
 from antdrive.sim.driving.replay import ROUNDING, ReplayCheck, offsets, replay
 from antdrive.sim.log.record import PROOFS, Proof, plain_value
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS, Rollout
 from antdrive.sim.pipeline import driven, plan
 from antdrive.sim.rebuild import rebuilt
-from antdrive.sim.recording import versions
 from antdrive.sim.scenario import Scenario
 
 LONGER = 1.0  # a rerun may outlast its log by this time [s]

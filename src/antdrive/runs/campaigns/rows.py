@@ -13,10 +13,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.optional import parquet_library
+from antdrive.base.version import versions
 from antdrive.runs.campaigns.job import Job
 from antdrive.runs.comparing import PLANNER_FAULT as PLANNER_FAULT
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
-from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.pipeline import Run
 from antdrive.sim.settings import SETTING_COLUMNS
 
 if TYPE_CHECKING:

@@ -17,6 +17,7 @@ from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.optional import parquet_library
 from antdrive.base.progress import progress_bar
+from antdrive.base.version import versions
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.runs.campaigns.expanding import Expansion, expand
 from antdrive.runs.campaigns.job import Job, SweepCase
@@ -28,7 +29,6 @@ from antdrive.runs.margins.choice import Calibration, choose_margin
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.pool import Done, Pool, cores
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.pipeline import versions
 from antdrive.worlds import save_task
 
 OUTCOMES = (*(one.key for one in Outcome), PLANNER_FAULT, CRASHED, TOO_SLOW)

@@ -15,6 +15,7 @@ from typing import Any
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes
+from antdrive.base.version import versions
 from antdrive.planners import Planner, PlannerError
 from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_planner
@@ -23,7 +24,7 @@ from antdrive.runs.suites.demands import Bound
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
+from antdrive.sim.pipeline import ENDED_BY, Run, plan, run
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.files.world_file import task_to_dict
 from antdrive.worlds.passage import feasible

@@ -7,7 +7,6 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator
-from importlib import metadata
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.base.kernel_cache import sources_stamp
 from antdrive.base.plane import segment_lengths, wrap_angle
+from antdrive.base.version import versions
 from antdrive.planners import PLANNERS, Query, smooth
 from antdrive.robots import RobotSpec, outline_of
 from antdrive.sim.driving.drive import follow
@@ -140,8 +140,8 @@ def calibration_key(conditions: LossFactors) -> str:
         del facts["outlined"]
     for label in ("name", "source"):
         del facts["robot"][label]
-    versions = {name: metadata.version(name) for name in ("antdrive", "pybullet", "numpy")}
-    facts |= {"method": METHOD, "versions": versions, "kernels": sources_stamp()}
+    current = {name: version for name, version in versions().items() if name in ("antdrive", "pybullet", "numpy")}
+    facts |= {"method": METHOD, "versions": current, "kernels": sources_stamp()}
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 

@@ -20,6 +20,7 @@ from antdrive.base.files import parse_json, read_bytes
 from antdrive.base.plane import wrap_angle
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
+from antdrive.base.version import versions
 from antdrive.planners import is_built_in
 from antdrive.planners.user_code import module_hash
 from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
@@ -29,7 +30,7 @@ from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import canonical_hash, hashes_of_configuration
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.pipeline import ENDED_BY, Run, versions
+from antdrive.sim.pipeline import ENDED_BY, Run
 from antdrive.sim.recording import configuration_of
 from antdrive.sim.scenario import Scenario
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from antdrive.base.plane import format_point
 from antdrive.base.types import Floats, Point
+from antdrive.base.version import versions
 from antdrive.planners import is_built_in
 from antdrive.planners.user_code import module_file
 from antdrive.runs.suites.baseline import PLANNER_FILE, Baseline, configuration_hashes
@@ -23,7 +24,7 @@ from antdrive.runs.suites.nearest import cause_of_contact, first_contact, first_
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.pipeline import Run
 from antdrive.sim.rerun import UNSTEADY, fingerprint_of, is_unsteady
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.settings import SMOOTHINGS

@@ -9,13 +9,20 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
+from antdrive.base.version import require_physics
+
 # Collision groups. The chassis collides with obstacles and walls only, so its contacts are exactly the collisions.
 GROUND, WHEELS, CHASSIS, OBSTACLE = 1, 2, 4, 8
 
 
 @functools.cache
 def bullet() -> Any:
-    """Return the PyBullet module, imported without its banner on stderr."""
+    """Return the PyBullet module, imported without its banner on stderr.
+
+    Raises:
+        InputError: PyBullet is not installed, or twice.
+    """
+    require_physics()
     stderr, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)
     try:
