@@ -1,8 +1,8 @@
 """Drift of drives between compiler targets and versions: `python -m benchmarks.drift`.
 
 Other processes drive the same scenarios: with machine code for a generic CPU (`NUMBA_CPU_NAME=generic`), without compilation
-(`NUMBA_DISABLE_JIT=1`, some scenarios only), and with given interpreters NAME=PATH, which may have other versions of Python
-and numpy. The printed table is the source of the default tolerances in `antdrive.sim.log.metrics`.
+(`NUMBA_DISABLE_JIT=1`, some scenarios only), and with given interpreters, which may have other versions of Python and numpy
+and another distribution of PyBullet. The printed table is the source of the default tolerances in `antdrive.sim.log.metrics`.
 """
 
 from __future__ import annotations
@@ -51,6 +51,11 @@ def scenarios(size: str) -> Iterator[tuple[str, str, Any]]:
     for world, planner in worlds if size == "full" else worlds[:1]:
         for seed in range(3 if size == "full" else 2):
             yield "among movers", f"{world} {planner} {seed}", Scenario.of(world, planner, seed=seed)
+    for world in ("forest", "slalom", "plaza-moving") if size == "full" else ("slalom",):
+        for robot in ("turtlebot", "jackal"):
+            for seed in range(2 if size == "full" else 1):
+                s = Scenario.of(world, "dstar-lite", robot, map="none", noise=1.0, seed=seed)
+                yield "without a map, noise 1", f"{world} {robot} {seed}", s
 
 
 def drive_all(size: str) -> dict[str, Any]:
@@ -78,7 +83,7 @@ def drive_all(size: str) -> dict[str, Any]:
 
 
 def other(python: str, size: str, extra: Mapping[str, str]) -> dict[str, Any]:
-    """Return the drives of another process."""
+    """Return the versions and drives of another process."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "drives.json"
         words = [python, "-m", "benchmarks.drift", "--write", str(path), "--size", size]
@@ -86,6 +91,11 @@ def other(python: str, size: str, extra: Mapping[str, str]) -> dict[str, Any]:
         content = json.loads(path.read_text())
         assert isinstance(content, dict)
         return content
+
+
+def words(versions: Mapping[str, str]) -> str:
+    """Return the versions that a drive depends on, in words."""
+    return ", ".join(f"{name} {versions[name]}" for name in ("python", "numpy", "numba", "pybullet"))
 
 
 def rows(name: str, ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator[list[str]]:
@@ -121,29 +131,31 @@ def apart(a: Mapping[str, Any], b: Mapping[str, Any]) -> float:
 def main() -> None:
     arguments = command_line(
         __doc__,
-        python=([], "NAME=PATH of other interpreters"),
+        python=([], "paths of other interpreters"),
         write=(Path, "drive in this process and write what came out as JSON"),
         size=("full", "how many scenarios: tiny, small or full"),
         variants=(3, "how many of: again, generic CPU, not compiled"),
     )
+    from antdrive.base.version import versions
+
     ours = drive_all(arguments.size)
     if arguments.write:
-        arguments.write.write_text(json.dumps(ours))
+        arguments.write.write_text(json.dumps({"versions": versions(), "drives": ours}))
         return
     variants: list[tuple[str, str, str, dict[str, str]]] = [
         ("again", sys.executable, arguments.size, {}),
         ("generic CPU", sys.executable, arguments.size, {"NUMBA_CPU_NAME": "generic"}),
         ("not compiled", sys.executable, "tiny", {"NUMBA_DISABLE_JIT": "1"}),
     ][: arguments.variants]
-    for text in arguments.python:
-        name, _, path = text.partition("=")
-        variants.append((name, path, arguments.size, {}))
+    variants += [("", path, arguments.size, {}) for path in arguments.python]
     heads = "drives | kind | bit-identical | other verdict | line [m] | min_clearance_m | driven_length_m | duration_s"
     found: list[list[str]] = []
     for name, python, size, extra in variants:
-        print(f"driving: {name}", file=sys.stderr)
-        found += rows(name, ours, other(python, size, extra))
+        print(f"driving: {name or python}", file=sys.stderr)
+        answer = other(python, size, extra)
+        found += rows(name or words(answer["versions"]), ours, answer["drives"])
         print(*found[-1], sep=" | ", file=sys.stderr)
+    print(f"Compared with {words(versions())}.\n")
     print_table(f"{heads} | tracking_error_max_m | metrics that changed by more than 1e-6", found)
 
 
