@@ -14,9 +14,17 @@ DEMO := out/demo
 help:
 	@sed -n '1,5s/^# //p' Makefile
 
+# `make PYTHON=...` with another Python than that of $(VENV) sets it up anew; `make VENV=... PYTHON=...` keeps both.
+ifneq ($(PYTHON),)
+ifneq ($(shell $(PYTHON) -V 2>&1),$(shell $(BIN)/python -V 2>&1))
+.PHONY: $(VENV)/.core
+CLEAR := --clear
+endif
+endif
+
 # The core; then, where much runs, the cache of all compiled kernels.
 $(VENV)/.core: pyproject.toml tools/find-python
-	@python=$$(tools/find-python) && echo "Setting up $(VENV) with $$python" && "$$python" -m venv $(VENV)
+	@python=$$(tools/find-python) && echo "Setting up $(VENV) with $$python" && "$$python" -m venv $(CLEAR) $(VENV)
 	@echo "Installing antdrive and what it needs"
 	@$(PIP) install --editable .
 	@touch $@
@@ -94,5 +102,5 @@ mutants: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m tools.mutants
 
 clean:
-	rm -rf $(VENV) .python out docs/_build docs/_gallery .pytest_cache .mypy_cache .ruff_cache
+	rm -rf .venv* .python out docs/_build docs/_gallery .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -220,7 +220,7 @@ esac
 UV = """#!/bin/sh
 echo "$UV_PYTHON_INSTALL_DIR: $*" >> "$LOG"
 case "$*" in
-    "python find --managed-python 3.11") [ -e "$UV_PYTHON_INSTALL_DIR/python" ] && echo "$UV_PYTHON_INSTALL_DIR/python" ;;
+    "python find --managed-python 3.13") [ -e "$UV_PYTHON_INSTALL_DIR/python" ] && echo "$UV_PYTHON_INSTALL_DIR/python" ;;
     "python install"*) {install} ;;
     *) exit 2 ;;
 esac
@@ -272,7 +272,7 @@ def test_uv_is_fetched_from_the_index_and_installs_python_inside_the_checkout(tm
 def test_where_nothing_can_be_fetched_it_says_how_to_get_a_python(tmp_path, pip, install):
     done = find(tmp_path, pip=pip, install=install)
     assert (done.returncode, done.stdout) == (1, "")
-    assert "apt-get install python3.11" in done.stderr
+    assert "apt-get install python3 python3-venv" in done.stderr
 
 
 @pytest.mark.parametrize(
