@@ -605,7 +605,7 @@ def proofs_of(kind: type[Any], prefix: str = "") -> Iterator[tuple[str, Proof]]:
             raise TypeError(f"{kind.__name__}.{field.name} declares no proof")
         else:
             yield key, field.metadata["proof"]
-            if isinstance(hint, type) and issubclass(hint, Task | RobotSpec):
+            if typing.get_origin(hint) is None and isinstance(hint, type) and issubclass(hint, Task | RobotSpec):
                 yield from ((f"{key}.{label}", Proof.CLAIM) for label in LABELS)
 
 
