@@ -9,7 +9,6 @@
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
-DEMO := out/demo
 
 help:
 	@sed -n '1,5s/^# //p' Makefile
@@ -48,7 +47,7 @@ $(VENV)/.docs: $(VENV)/.core
 warm: $(VENV)/.warm
 
 demo: $(VENV)/.core
-	@$(BIN)/antdrive compare forest -p mmas -p astar --out $(DEMO) --film $(DEMO)/film.mp4 --prelude 5 --speed 2
+	@$(BIN)/antdrive demo
 
 test: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/ruff check --quiet .

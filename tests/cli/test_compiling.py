@@ -33,7 +33,9 @@ def test_a_bar_counts_the_kernels(monkeypatch, capsys):
         for name in ("astar", "smooth"):
             kernel_cache.on_compile(name)
         progress(0.5)
-    assert "driving (kernels compiled once: 2)" in capsys.readouterr().err
+    shown = capsys.readouterr().err
+    assert "driving (kernels compiled once: 2)" in shown
+    assert shown.count(COMPILING) == 1
     assert kernel_cache.on_compile is outside
 
 

@@ -9,9 +9,7 @@ import sys
 import xml.etree.ElementTree
 from pathlib import Path
 
-import numba
 import pytest
-import yaml
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "regression_suite"
@@ -70,25 +68,6 @@ def test_a_fault_of_the_planner_fails_its_tests(checkout, variables):
 
 def test_baselines_are_small():
     assert all(path.stat().st_size <= 20_000 for path in (EXAMPLE / "baselines").rglob("*.json"))
-
-
-@pytest.mark.slow
-def test_its_workflow_calls_pytest_with_options_that_exist(checkout, variables):
-    (job,) = yaml.safe_load((EXAMPLE / ".github" / "workflows" / "drives.yml").read_text())["jobs"].values()
-    (words,) = [step["run"].split() for step in job["steps"] if step.get("run", "").startswith("pytest")]
-    assert run([*words, "--collect-only", "-q"], checkout, variables).returncode == 0
-    places = [step["with"]["path"] for step in job["steps"] if "repository" in step.get("with", {})]
-    (installs,) = [step["run"].split() for step in job["steps"] if step.get("run", "").startswith("pip")]
-    assert [f"./{place}" for place in places] == [word for word in installs if "/" in word]
-    assert "antdrive" not in installs, "is on no index"
-    compiler = next(step for step in job["steps"] if step.get("id") == "compiler")
-    (text,) = re.findall(r"^python -c \"(.*)\" >> \"\$GITHUB_OUTPUT\"$", compiler["run"])
-    said = run([sys.executable, "-c", text], checkout, variables).stdout
-    assert re.fullmatch(rf"for={re.escape(numba.__version__)}-\S+\n", said)
-    key = next(step["with"]["key"] for step in job["steps"] if "actions/cache" in step.get("uses", ""))
-    assert "${{ steps.compiler.outputs.for }}" in key
-    kept = next(step["with"]["path"] for step in job["steps"] if "upload-artifact" in step.get("uses", ""))
-    assert words[words.index("--drive-results") + 1] == kept
 
 
 def test_every_file_of_the_page_exists():

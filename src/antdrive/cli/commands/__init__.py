@@ -32,6 +32,10 @@ DEBUG = "--debug"  # accepted anywhere, so it can be appended to a failed comman
 #: Commands by name, in the order of `antdrive --help`.
 COMMANDS: Mapping[str, Command] = MappingProxyType(
     {
+        "demo": Command("demo", "demo", "Film ants beside A*: both plan, drive and are certified."),
+        "init": Command(
+            "init", "init", "Write a suite, a robot, a world, a Python test and a GitHub workflow that pass."
+        ),
         "run": Command("run", "run", "Plan a path, drive it in physics and certify the drive.", plans=True),
         "plan": Command("plan", "plan", "Plan a path without driving it.", plans=True),
         "compare": Command("compare", "compare", "Compare planners on worlds or from campaign results.", plans=True),
