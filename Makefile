@@ -81,6 +81,7 @@ dist: $(VENV)/.core
 	@$(PIP) install --editable '.[dist]'
 	@rm -rf dist
 	@$(BIN)/python -m build --outdir dist . >/dev/null
+	@$(BIN)/python -m twine check --strict dist/*
 	@$(BIN)/python -m tools.dist dist
 
 lint: $(VENV)/.dev

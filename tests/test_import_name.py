@@ -123,6 +123,14 @@ def test_a_wheel_holds_one_name_with_all_it_needs(wheel):
     assert "antdrive/py.typed" in names
 
 
+def test_a_wheel_describes_itself_by_the_readme_without_links_into_the_repository(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        text = archive.read(name).decode()
+    assert "# antdrive\n" in text
+    assert "](docs/" not in text
+
+
 def test_the_source_distribution_holds_each_file_once(tmp_path):
     from hatchling.builders.sdist import SdistBuilder
 
