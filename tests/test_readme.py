@@ -61,6 +61,7 @@ def test_the_python_block_passes_mypy_strict(tmp_path):
 def test_the_commands_work(home, monkeypatch, capsys):
     lines = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
     commands = [(shlex.split(line.split("||")[0]), "||" in line) for line in lines if line.startswith("antdrive")]
+    assert commands[0][0] == ["antdrive", "demo"]
     assert {fails for _, fails in commands} == {True, False}
     printed = ""
     for command, fails in commands:

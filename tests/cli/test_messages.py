@@ -48,6 +48,7 @@ compare kamp
 compare runs
 compare slalon
 compare tight.yaml -p astar -p dijkstra
+demo --out small.yaml
 export run.npz --to csv -o new --force
 export run.npz --to csv -o new --urdf cart.urdf
 export run.npz --to ros1 -o new --force
@@ -62,6 +63,8 @@ find-margin --generate desert
 find-margin empty --generate barn
 find-margin empty --goal 99,1
 find-margin empty --task dock
+init
+init small.yaml
 margin nothing.npz
 margin runs
 plan bad.yaml
@@ -213,6 +216,7 @@ def workplace(small, camp, office, small_run, tmp_path):
         "made.map": "type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n",
         "made.yaml": "",
         "w.yaml": "schema: 1\n",
+        "world.yaml": "",
     }.items():
         (tmp_path / name).write_text(text)
     for name in ("runs", "folder.mp4"):

@@ -82,8 +82,8 @@ def test_every_command_of_the_page_works(checkout, variables):
     assert done.returncode == 0, done.stdout + done.stderr
     assert "failed, as it should" in done.stdout
     assert re.search(r"touched obstacles\[\d+\] at .*; the robot was at .* at t = ", done.stdout)
-    assert done.stdout.count("1 passed in") == 2
-    results = checkout.parent / "my-robot" / "results" / "my" / "forest-0"
+    assert done.stdout.count("2 passed in") == 2
+    results = checkout.parent / "my-robot" / "results" / "my" / "hall-0"
     assert (results / "then-and-now.mp4").stat().st_size > 10_000
     assert (checkout.parent / "my-robot" / "report.html").exists()
     done = run(["bash", "-ec", rest], checkout, variables)
