@@ -339,7 +339,7 @@ def export_sdf(task: Task, path: str | Path) -> None:
         "</world>",
         "</sdf>",
     ]
-    write_text(path, "\n".join(lines) + "\n", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _task_element(task: Task) -> str:
