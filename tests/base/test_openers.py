@@ -23,6 +23,7 @@ OPENERS = {
 MENTION = re.compile(rf"\bopen\(|\.(?:{'|'.join(OPENERS)})\(")
 #: Files of the package, temporary files of this process, and streams that `open_regular` has opened.
 ALLOWED = {
+    "base/version.py": {"importlib.metadata.distribution('antdrive').read_text"},
     "base/files.py": {"open", "os.open", "path.open"},
     "base/atomic.py": {"os.open", "temporary.write_text"},
     "base/kernel_cache.py": {"file.read_bytes", "path.read_bytes", "folder / '.gitignore'.write_text"},

@@ -96,6 +96,13 @@ def test_a_stream_that_takes_nothing_is_one_line(line, code, says):
     assert in_a_shell(line) == (code, "", says)
 
 
+def test_a_stream_in_a_code_page_gets_other_characters_as_escapes(small):
+    small.write_text(small.read_text(encoding="utf-8").replace("name: small", "name: Ж"), encoding="utf-8")
+    code, out, err = in_a_shell(f"PYTHONIOENCODING=cp1252 $A worlds show {small}")
+    assert (code, err) == (0, "")
+    assert r"\u0416" in out
+
+
 @pytest.mark.slow
 def test_a_result_is_not_lost_with_stderr_and_no_file_takes_a_streams_number(small, tmp_path):
     """A compiled library prints to number 1 or 2, whatever file that is."""

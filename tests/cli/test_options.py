@@ -6,6 +6,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from antdrive.cli.campaign_options import _planner
 from antdrive.cli.options import with_settings
 from antdrive.sim.forms import scenario_fields, setting_words
 from antdrive.sim.settings import SETTINGS
@@ -76,3 +77,17 @@ def test_an_option_that_takes_one_value_is_given_once(refused, words, option):
 def test_repeatable_options_and_plain_flags_may_be_repeated(antdrive):
     words = "plan empty -p ants -s planner.ants=3 -s planner.iterations=2 --json --json --seed 2"
     assert antdrive(*words.split())[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "entry"),
+    [
+        ("mine.py:Mine", "mine.py:Mine"),
+        (r"C:\x\mine.py:Mine", r"C:\x\mine.py:Mine"),
+        (r"C:\x\mine.py:Mine:width=4,5", {"name": r"C:\x\mine.py:Mine", "width": ["4", "5"]}),
+        ("mine.planners:Mine:width=4", {"name": "mine.planners:Mine", "width": "4"}),
+        ("as:ants=10", {"name": "as", "ants": "10"}),
+    ],
+)
+def test_a_swept_planner_may_be_in_a_file_on_a_drive(text, entry):
+    assert _planner(text) == entry

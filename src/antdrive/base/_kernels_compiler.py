@@ -31,7 +31,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.targetconfig import ConfigStack
 from numba.core.types import functions
 
-from antdrive.base import kernel_cache
+from antdrive.base import kernel_cache, system
 from antdrive.base._kernels_interpreter import ALLOWANCE, interpret
 from antdrive.base.errors import InputError
 from antdrive.base.files import MAX_BYTES, read_bytes
@@ -204,35 +204,27 @@ def _uncollected() -> Iterator[None]:
 @contextlib.contextmanager
 def _only_here(path: Path) -> Iterator[None]:
     """Wait until no other process compiles an entry, `PATIENCE` at most, and keep others from it. No lock: no waiting."""
-    place = int(hashlib.sha256(path.name.encode()).hexdigest()[:12], 16)
+    place = int(hashlib.sha256(path.name.encode()).hexdigest()[:7], 16)
     try:
-        import fcntl
-
         file = _lock_file(path.parent)
         end = time.monotonic() + PATIENCE
-        while True:
-            try:
-                fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
-                break
-            except BlockingIOError:
-                if time.monotonic() > end:
-                    break
-                time.sleep(0.02)
-    except (ImportError, OSError):
+        while not (locked := system.lock(file, place)) and time.monotonic() < end:
+            time.sleep(0.02)
+    except OSError:
         yield
         return
     try:
         yield
     finally:
         with contextlib.suppress(OSError):
-            fcntl.lockf(file, fcntl.LOCK_UN, 1, place)
+            system.unlock(file, place) if locked else None
 
 
 @functools.cache
 def _lock_file(folder: Path) -> int:
     """Return the open file for a folder's locks. It stays open: closing it would release all locks of this process."""
     folder.mkdir(parents=True, exist_ok=True)
-    return os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    return os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)
 
 
 class _Uncompiled(CPUDispatcher):  # type: ignore[misc]

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from antdrive.base import system
 from antdrive.base.errors import InputError
 
 LOCK = ".antdrive.lock"
@@ -55,10 +56,10 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
         yield temporary
 
 
-def write_text(path: str | Path, text: str, newline: str | None = None) -> Path:
-    """Write a UTF-8 text file atomically and return its path."""
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a UTF-8 text file atomically, with the same line ends on every system, and return its path."""
     with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline=newline)
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     return Path(path)
 
 
@@ -88,6 +89,8 @@ def _replacing(target: Path, make: Callable[[], Path], mode: int) -> Iterator[Pa
         try:
             yield temporary
             temporary.chmod(mode & ~_umask())
+            if temporary.is_dir() and target.is_dir():
+                target.rmdir()  # it is empty; Windows replaces no folder
             temporary.replace(target)
         except OSError as error:
             raise _not_written(target, temporary, error) from None
@@ -115,11 +118,6 @@ def _umask() -> int:
 @contextmanager
 def folder_lock(folder: str | Path) -> Iterator[None]:
     """Lock a folder for this process. The lock ends with the process, even if it is killed."""
-    try:
-        import fcntl
-    except ImportError:  # this system has no file locks
-        yield
-        return
     path = Path(folder) / LOCK
     with ExitStack() as made:
         try:
@@ -129,9 +127,7 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
                 if not stat.S_ISREG(os.fstat(handle).st_mode):
                     os.close(handle)
                     raise InputError(f"{path}: is not a file; remove it")
-                try:
-                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
+                if not system.lock(handle):
                     holder = os.read(handle, 20).decode(errors="replace").strip() or "unknown"
                     os.close(handle)
                     said = f"another run (process {holder}) is writing to this folder"
@@ -147,8 +143,18 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
                 os.write(handle, f"{os.getpid()}\n".encode())
             yield
         finally:
-            path.unlink(missing_ok=True)
-            os.close(handle)
+            _remove(path, handle)
+
+
+def _remove(path: Path, handle: int) -> None:
+    """Remove an open file and close it."""
+    try:
+        path.unlink(missing_ok=True)
+        os.close(handle)
+    except PermissionError:  # Windows removes no open file: neither ours nor one that the next owner has opened
+        os.close(handle)
+        with suppress(OSError):
+            path.unlink()
 
 
 def _is_still(path: Path, handle: int) -> bool:
@@ -169,15 +175,5 @@ def _sweep(target: Path) -> None:
     name = re.compile(re.escape(_prefix(target)) + r"(\d{1,10})-\w+" + re.escape(target.suffix))
     for path in target.parent.iterdir():
         match = name.fullmatch(path.name)
-        if match and not _is_alive(int(match[1])):
+        if match and not system.is_alive(int(match[1])):
             path.unlink(missing_ok=True)
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # another user's process
-        return True
-    return True

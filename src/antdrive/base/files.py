@@ -56,6 +56,14 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return values
 
 
+def relative(path: Path, folder: Path) -> str:
+    """Return a path relative to a folder, with slashes on every system; Windows has none to another drive: the whole path."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return path.as_posix()
+
+
 def write_json(path: Path, value: Any) -> None:
     """Write a value as JSON, atomically."""
     write_text(path, as_json(value) + "\n")

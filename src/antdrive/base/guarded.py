@@ -5,21 +5,19 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from antdrive.base import supervision
+from antdrive.base import supervision, system
 from antdrive.base.errors import InputError, Terminated, input_error
 from antdrive.base.process_state import ProcessState
 
 LIMIT = "ANTDRIVE_PLAN_LIMIT"  # variable of the environment with the limit on planning time, seconds or "off"
 USUAL_LIMIT = "600"  # of the command line
 LONGEST_LIMIT = 1e6  # [s]
-AGAIN = 1.0  # the alarm repeats, in case the code catches the exception [s]
 
 PACKAGE, STANDARD = str(Path(__file__).parents[1]), str(Path(traceback.__file__).parent)  # folders of code
 LONGEST = 200  # characters of a text made by user code
@@ -130,8 +128,7 @@ class UserCode:
         if callable(self._before):
             signal.signal(signal.SIGINT, self._interrupt)
         if self.limit is not None:
-            self._alarm = signal.signal(signal.SIGALRM, self._ring)
-            self._timer, self._since = signal.setitimer(signal.ITIMER_REAL, self.limit, AGAIN), time.perf_counter()
+            self._alarm = system.Alarm(self.limit, self._ring)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -155,11 +152,7 @@ class UserCode:
         """Restore the handlers of signals and the state of the process."""
         UserCode._outermost = None
         if self.limit is not None:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(signal.SIGALRM, self._alarm)
-            left, interval = self._timer
-            if left:  # the caller's own timer goes on
-                signal.setitimer(signal.ITIMER_REAL, max(left - time.perf_counter() + self._since, 1e-3), interval)
+            self._alarm.stop()
         if callable(self._before) and signal.getsignal(signal.SIGINT) == self._interrupt:
             signal.signal(signal.SIGINT, self._before)
         if not self._own:

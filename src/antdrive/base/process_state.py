@@ -7,16 +7,17 @@ import contextlib
 import gc
 import locale
 import os
-import signal
 import sys
 import time
 import warnings
 from typing import Any
 
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM", "SIGPIPE", "SIGCHLD"))
+from antdrive.base import system
+
+SIGNALS = system.signals("SIGINT", "SIGTERM", "SIGBREAK", "SIGHUP", "SIGALRM", "SIGPIPE", "SIGCHLD")
 STREAMS = ("stdin", "stdout", "stderr")
 TIMER_TOLERANCE = 0.05  # [s]
-_ENVIRONMENT = vars(os.environ)["_data"]  # encoded; decoding all variables takes longer than everything else here
+_ENVIRONMENT = vars(os.environ)["_data"]  # mostly encoded; decoding all takes longer than everything else here
 
 
 class _Unclosable:
@@ -63,8 +64,8 @@ class ProcessState:
         self._mask = os.umask(0o077)
         os.umask(self._mask)
         self._handlers = [_signal.getsignal(one) for one in SIGNALS]
-        self._timer, self._since = signal.getitimer(signal.ITIMER_REAL), time.perf_counter()
-        self._blocked = _signal.pthread_sigmask(signal.SIG_BLOCK, ())
+        self._timer, self._since = system.timer(), time.perf_counter()
+        self._blocked = system.signal_mask()
         self._environment = dict(_ENVIRONMENT)
         self._path = list(sys.path)
         self._filters = list(warnings.filters)
@@ -93,9 +94,9 @@ class ProcessState:
             if handler is not None and _signal.getsignal(one) is not handler:
                 _signal.signal(one, handler)
         left = self._timer[0] and max(self._timer[0] - time.perf_counter() + self._since, 1e-3)
-        if abs(signal.getitimer(signal.ITIMER_REAL)[0] - left) > TIMER_TOLERANCE:
-            signal.setitimer(signal.ITIMER_REAL, left, self._timer[1])
-        _signal.pthread_sigmask(signal.SIG_SETMASK, self._blocked)
+        if abs(system.timer()[0] - left) > TIMER_TOLERANCE:
+            system.set_timer(left, self._timer[1])
+        system.set_signal_mask(self._blocked)
         if self._environment != _ENVIRONMENT:
             for key, value in self._environment.items():
                 if _ENVIRONMENT.get(key) != value:

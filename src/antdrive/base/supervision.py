@@ -2,6 +2,8 @@
 
 At the first user code the process forks. The child continues; the parent waits for it. The parent kills a child whose user
 code exceeds its limit although the alarm of `guarded` has fired, as in compiled code, and reports a child that ends early.
+Elsewhere than on Linux a thread takes its place. It ends the process at the limit unless compiled code holds Python's lock,
+and cannot report user code that ends the process.
 """
 
 from __future__ import annotations
@@ -11,9 +13,12 @@ import os
 import signal
 import struct
 import sys
+import threading
 import time
 from collections.abc import Callable
 from typing import NoReturn
+
+from antdrive.base import system
 
 GRACE = 2.0  # time after the limit for the alarm to end the code [s]
 POLL_INTERVAL = 0.2  # of the parent [s]
@@ -22,28 +27,33 @@ HEAD = struct.Struct(
 )  # start of the code and its limit [s], both 0 outside user code; whether the process ends as it should
 LONGEST_NAME = 200  # bytes
 KILLED_WITH_PARENT = 1  # PR_SET_PDEATHSIG
-FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+FORWARDED = system.signals("SIGINT", "SIGTERM", "SIGHUP")
 
 _armed: Callable[[str], NoReturn] | None = None
+_watch: threading.Timer | None = None  # in place of a supervisor
 _page: mmap.mmap | None = None  # shared with the supervisor
 
 
 def arm(report: Callable[[str], NoReturn]) -> None:
-    """Fork at the first user code of this process.
+    """Supervise the user code of this process: fork at the first.
 
     Args:
-        report: ends the supervisor after its child has died in user code; receives a sentence
+        report: ends the supervisor after its child has died in user code, or this process; receives a sentence
     """
     global _armed
-    _armed = report if sys.platform == "linux" else None  # elsewhere a child would outlive its killed parent
+    _armed = report
 
 
 def begin(who: str, limit: float | None) -> None:
     """Note that user code begins."""
-    global _armed
-    if _armed is not None:
+    global _armed, _watch
+    if _armed is not None and system.FORKS:
         report, _armed = _armed, None
         _fork(report)
+    elif _armed is not None and limit is not None:
+        _watch = threading.Timer(limit + GRACE, _armed, (f"{who} {_slow(limit)}",))
+        _watch.daemon = True
+        _watch.start()
     if _page is not None:
         name = who.encode(errors="replace")[:LONGEST_NAME]
         _page[HEAD.size : HEAD.size + len(name) + 1] = name + b"\0"
@@ -52,6 +62,8 @@ def begin(who: str, limit: float | None) -> None:
 
 def end() -> None:
     """Note that user code has ended."""
+    if _watch is not None:
+        _watch.cancel()
     if _page is not None:
         HEAD.pack_into(_page, 0, 0.0, 0.0, False)
 
@@ -60,6 +72,10 @@ def finish() -> None:
     """Note that this process ends as it should."""
     if _page is not None:
         HEAD.pack_into(_page, 0, 0.0, 0.0, True)
+
+
+def _slow(limit: float) -> str:
+    return f"took longer than the limit of {limit:g} s"
 
 
 def _fork(report: Callable[[str], NoReturn]) -> None:
@@ -91,7 +107,7 @@ def _supervise(child: int, page: mmap.mmap, report: Callable[[str], NoReturn]) -
         if done:
             break
         if limit and time.monotonic() - started > limit + GRACE:
-            slow = f"took longer than the limit of {limit:g} s"
+            slow = _slow(limit)
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
             break

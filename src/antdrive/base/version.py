@@ -36,18 +36,22 @@ def physics_version() -> str:
     return ", ".join(v if name == "pybullet" else f"{v} ({name})" for name, v in found.items()) or MISSING
 
 
+def has_physics() -> bool:
+    """Return whether drives are possible: exactly one distribution of PyBullet is installed."""
+    return len(_physics()) == 1
+
+
 def require_physics() -> None:
     """Check that exactly one distribution of PyBullet is installed.
 
     Raises:
         InputError: none is, or both are; the message has the command that helps.
     """
-    found = _physics()
-    if len(found) > 1:
+    if has_physics():
+        return
+    if found := _physics():
         again = f"pip uninstall --yes {' '.join(found)} && pip install {_wanted() or PHYSICS[0]}"
         raise InputError(f"{' and '.join(found)} install the same module, and one has damaged the other: {again}")
-    if found:
-        return
     if wanted := _wanted():
         raise InputError(f"{wanted.partition('=')[0]}: not installed; drives need it: pip install {wanted}")
     here = f"Python {_python()} on {platform.system()} {platform.machine()}"

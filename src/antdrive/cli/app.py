@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import atexit
+import io
 import os
 import signal
 import sys
 import threading
 from typing import NoReturn, TextIO
 
-from antdrive.base import supervision
+from antdrive.base import supervision, system
 from antdrive.base.errors import Terminated
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS
 from antdrive.cli.exits import BROKEN_PIPE, HUNG_UP, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED, TERMINATED
@@ -20,7 +21,8 @@ OPTIONS = """Options:
   -h, --help  Show this message and exit.
 """
 
-ENDS = {signal.SIGTERM: TERMINATED, signal.SIGHUP: HUNG_UP}  # exit codes of the signals that end a command
+#: Exit codes of the signals that end a command.
+ENDS = {signal.SIGTERM: TERMINATED, **dict.fromkeys(system.signals("SIGHUP"), HUNG_UP)}
 
 
 def main() -> None:
@@ -49,7 +51,8 @@ def run_command() -> None:
             code = exit_code_of(words)
     except BrokenPipeError as error:
         code = BROKEN_PIPE
-        if sys.__stdout__ is None or not _is_closed(sys.__stdout__):  # another pipe, such as one to a worker process
+        out = sys.__stdout__
+        if out is None or not system.is_closed(out.fileno()):  # another pipe, such as one to a worker process
             from antdrive.cli.groups import print_exception
 
             print_exception(error)
@@ -90,6 +93,9 @@ def _open_streams() -> None:
             stream = os.fdopen(number, "w" if number else "r", closefd=False)
             setattr(sys, name, stream)
             setattr(sys, f"__{name}__", stream)
+    for one in (sys.stdout, sys.__stdout__):
+        if isinstance(one, io.TextIOWrapper) and one.errors == "strict":
+            one.reconfigure(errors="backslashreplace")  # in a code page, as on Windows
 
 
 def _settle(stream: TextIO) -> None:
@@ -128,12 +134,3 @@ def _show_list(words: list[str]) -> int | None:
     for line in lines:
         print_line(line)
     return SUCCEEDED
-
-
-def _is_closed(stream: TextIO) -> bool:
-    """Return whether a stream is a pipe whose reading end is closed."""
-    import select
-
-    poll = select.poll()
-    poll.register(stream.fileno(), 0)  # errors are always reported
-    return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))

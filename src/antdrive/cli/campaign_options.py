@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -104,8 +105,9 @@ def _planner(text: str) -> Any:
 
     NAME may be FILE.py:CLASS or MODULE:CLASS.
     """
-    name, *options = text.split(":")
-    if options and "=" not in options[0] and (name.endswith(".py") or "." in name):
+    file = re.match(r".+?\.py(?=:|$)", text)  # with a drive's colon on Windows
+    name, *options = [file[0], *text[file.end() :].split(":")[1:]] if file else text.split(":")
+    if options and "=" not in options[0] and (file or "." in name):
         name += f":{options.pop(0)}"
     entry: dict[str, Any] = {"name": name}
     for option in options:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antdrive.base import kernel_cache
+from antdrive.base.version import has_physics, physics_version
 
 if TYPE_CHECKING:
     from antdrive.robots import RobotSpec
@@ -40,12 +41,13 @@ def is_warm() -> bool:
 
 
 def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
-    """Compile every kernel into the cache: plan with every planner, drive and film."""
+    """Compile every kernel into the cache: plan with every planner; with PyBullet, drive and film, too."""
     from antdrive.planners import PLANNERS
     from antdrive.runs.pool import Pool, cores
 
     named = {name for group in TOGETHER for name in group}
-    groups = [TOGETHER[0], None, *TOGETHER[1:], tuple(name for name in PLANNERS if name not in named)]
+    others = tuple(name for name in PLANNERS if name not in named)
+    groups = [TOGETHER[0], *([None] if has_physics() else []), *TOGETHER[1:], others]
     with Pool(jobs or cores()) as pool:
         for done, _ in enumerate(pool.results(_compile, groups, in_order=False), 1):
             if progress is not None:
@@ -154,6 +156,7 @@ def _marker() -> Path | None:
         platform.python_version(),
         platform.machine(),
         numba,
+        physics_version(),
         os.environ.get("NUMBA_CPU_NAME", ""),
     )
     return folder / f"antdrive-warm-{hashlib.sha256('|'.join(facts).encode()).hexdigest()[:16]}"

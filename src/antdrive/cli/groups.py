@@ -17,7 +17,7 @@ from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS
 from antdrive.cli.console import print_error, print_line, print_traceback, report_compiling
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INTERRUPTED, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.listings import version_line
-from antdrive.cli.options import with_plan_limit
+from antdrive.cli.options import with_physics, with_plan_limit
 from antdrive.sim.settings import PANELS
 
 SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
@@ -101,6 +101,7 @@ class _Commands(UserDict[str, Any]):
             module = importlib.import_module(f"antdrive.cli.commands.{command.module}")
             alone = typer.Typer(**SETTINGS)
             function = getattr(module, command.function)
+            function = with_physics(function) if command.drives else function
             alone.command(name, cls=_Panelled)(with_plan_limit(function) if command.plans else function)
             command = self.data[name] = typer.main.get_command(alone)
             for one in command.params:

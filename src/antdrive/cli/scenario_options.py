@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.version import require_physics
 from antdrive.cli.console import bar, print_error
 from antdrive.cli.options import Planner, Robot, option
 from antdrive.cli.parse import numbers, pair
@@ -142,6 +143,7 @@ def with_chosen_margin(scenario: "Scenario") -> "Scenario":
     conditions = scenario.loss_factors
     if known_margin(conditions) is not None:
         return choose(scenario)
+    require_physics()  # before a line says that it drives
     label = f"calibrating {conditions.robot.name}, noise {conditions.noise:g}, smoothing {conditions.smoothing}"
     if not sys.stderr.isatty():
         print_error(f"{label}: about {TYPICAL_MARGINS * DRIVES} short drives, result cached")

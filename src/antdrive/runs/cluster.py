@@ -8,13 +8,13 @@ import logging
 import math
 import os
 import re
-import signal
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from antdrive.base import system
 from antdrive.base.errors import input_error
 from antdrive.base.optional import optional
 from antdrive.runs.pool import ATTEMPTS, Done, Item, Result, Ticket, Waiting
@@ -95,7 +95,7 @@ def _ended_after(limit: float | None) -> Iterator[None]:
     if limit is None:
         yield
         return
-    timer = threading.Timer(limit, os.kill, (os.getpid(), signal.SIGKILL))
+    timer = threading.Timer(limit, system.kill, (os.getpid(),))
     timer.daemon = True
     timer.start()
     try:

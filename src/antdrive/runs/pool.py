@@ -16,12 +16,11 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, NoReturn, TypeVar
 
-from antdrive.base import kernel_cache, supervision
+from antdrive.base import kernel_cache, supervision, system
 from antdrive.base.errors import InputError
 
 Item = TypeVar("Item")
@@ -206,7 +205,7 @@ class Pool:
     """
 
     def __init__(self, processes: int, *, limit: float | None = None, tick: Callable[[], None] = lambda: None) -> None:
-        self._processes, self._limit, self._tick = processes, limit, tick
+        self._processes, self._limit, self._tick = min(processes, system.MOST_WORKERS), limit, tick
         self._workers: list[_Worker] = []
 
     def __enter__(self) -> Pool:
@@ -292,7 +291,7 @@ class Pool:
             process.join(max(0.0, deadline - time.monotonic()))
             if process.is_alive():
                 with contextlib.suppress(OSError):
-                    os.kill(process.pid, signal.SIGKILL)  # loky's processes have no `kill`
+                    system.kill(process.pid)  # loky's processes have no `kill`
                 process.join()
 
     def _staff(self, work: Callable[[Any], Any], waiting: Waiting[Any]) -> None:
@@ -319,7 +318,7 @@ class Pool:
             if self._limit is not None and at_work and time.monotonic() - worker.since > self._limit:
                 worker.slow = True
                 with contextlib.suppress(OSError):
-                    os.kill(worker.process.pid, signal.SIGKILL)
+                    system.kill(worker.process.pid)
 
     def _reap(self, worker: _Worker, waiting: Waiting[Any]) -> Iterator[Done[Any, Any]]:
         """Return a dead worker's runs to the queue; yield its current run if that was the last attempt."""
@@ -392,26 +391,11 @@ def _start(work: Callable[[Any], Any]) -> _Worker:
     context = get_context("loky")
     here, there = context.Pipe()
     process = context.Process(target=serve, args=(there, work), daemon=False)
-    with _undisturbed():
+    # A terminal sends Ctrl-C to every process, but the parent decides when its workers end.
+    with system.blocked(signal.SIGINT):
         process.start()
     there.close()
     return _Worker(process, here, work)
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Shield processes started in this context from Ctrl-C; this process receives it with a delay.
-
-    A terminal sends Ctrl-C to every process, but the parent decides when its workers end.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def serve(pipe: Connection, work: Callable[[Any], Any]) -> None:

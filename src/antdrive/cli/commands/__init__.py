@@ -19,6 +19,7 @@ class Command(NamedTuple):
     summary: str  # first line of the function's docstring
     resumes: bool = False  # whether the same command resumes an interrupted one
     plans: bool = False  # whether it plans, and takes --plan-limit
+    drives: bool = False  # whether it always drives, and refuses to start without PyBullet
 
 
 ABOUT = """Plan paths, drive them in physics, certify the drives and film them.
@@ -32,11 +33,13 @@ DEBUG = "--debug"  # accepted anywhere, so it can be appended to a failed comman
 #: Commands by name, in the order of `antdrive --help`.
 COMMANDS: Mapping[str, Command] = MappingProxyType(
     {
-        "demo": Command("demo", "demo", "Film ants beside A*: both plan, drive and are certified."),
+        "demo": Command("demo", "demo", "Film ants beside A*: both plan, drive and are certified.", drives=True),
         "init": Command(
             "init", "init", "Write a suite, a robot, a world, a Python test and a GitHub workflow that pass."
         ),
-        "run": Command("run", "run", "Plan a path, drive it in physics and certify the drive.", plans=True),
+        "run": Command(
+            "run", "run", "Plan a path, drive it in physics and certify the drive.", plans=True, drives=True
+        ),
         "plan": Command("plan", "plan", "Plan a path without driving it.", plans=True),
         "compare": Command("compare", "compare", "Compare planners on worlds or from campaign results.", plans=True),
         "sweep": Command(
@@ -48,17 +51,33 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "export": Command("export", "export_drive", "Export a drive to Foxglove, RViz or CSV."),
         "verify": Command("verify", "verify", "Re-certify drives from their logs alone."),
         "check": Command(
-            "check", "check", "Run suites or Python tests, and compare the drives with their baselines.", plans=True
+            "check",
+            "check",
+            "Run suites or Python tests, and compare the drives with their baselines.",
+            plans=True,
+            drives=True,
         ),
         "accept": Command(
-            "check", "accept", "Run suites or Python tests, and save the drives as baselines.", plans=True
+            "check",
+            "accept",
+            "Run suites or Python tests, and save the drives as baselines.",
+            plans=True,
+            drives=True,
         ),
         "margin": Command("margin", "margin", "Break down a drive's safety margin by cause."),
         "find-margin": Command(
-            "find_margin", "find_margin", "Find the smallest margin at which all drives are safe.", plans=True
+            "find_margin",
+            "find_margin",
+            "Find the smallest margin at which all drives are safe.",
+            plans=True,
+            drives=True,
         ),
-        "falsify": Command("falsify", "falsify", "Search for worlds in which a configuration fails.", plans=True),
-        "shrink": Command("shrink", "shrink", "Reduce a failure to a minimal reproducer.", resumes=True, plans=True),
+        "falsify": Command(
+            "falsify", "falsify", "Search for worlds in which a configuration fails.", plans=True, drives=True
+        ),
+        "shrink": Command(
+            "shrink", "shrink", "Reduce a failure to a minimal reproducer.", resumes=True, plans=True, drives=True
+        ),
         "reproduce": Command(
             "reproduce", "reproduce", "Repeat a paper's experiments and test its claims.", resumes=True, plans=True
         ),

@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.campaign_options import OPTIONS
 from antdrive.cli.console import bar, campaign_bar, print_error, show, table
@@ -56,6 +57,7 @@ def barn(
         if with_map or films:
             raise InputError("--score: drives nothing; leave out --with-map and --film")
         return _score(source, score, json)
+    require_physics()
     from antdrive.base.optional import parquet_library
     from antdrive.planners import load_planner
     from antdrive.robots import load_robot

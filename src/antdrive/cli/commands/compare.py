@@ -9,6 +9,7 @@ import typer
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
+from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
 from antdrive.cli.console import file_lines, marked, planning, print_error, print_traceback, show, table
@@ -83,6 +84,7 @@ def compare(
     if campaigns := campaign_folders(worlds, context, query):
         compare_campaigns(campaigns, planner or (), query, json)
         return SUCCEEDED
+    require_physics()
     check_worlds(worlds)
     entrants = entrants_of(planner, settings)
     tasks = {world: ends.of(world) for world in worlds}

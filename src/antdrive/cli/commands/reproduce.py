@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from antdrive.base.files import write_json
+from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.console import bar, file_lines, print_error, show, table
 from antdrive.cli.options import argument, flag, option
@@ -42,6 +43,8 @@ def reproduce(
     from antdrive.runs.papers.reproduction import reproduce as repeat
     from antdrive.views.papers import draw_figures
 
+    if films:
+        require_physics()
     papers = list(PAPERS) if paper == "all" else [paper]
     seeds = min(seeds, QUICK_SEEDS) if quick else seeds
     few = too_few_seeds(papers, seeds, quick=quick)

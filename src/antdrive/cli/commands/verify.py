@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.console import marked, print_error, print_json, print_line
 from antdrive.cli.exits import INVALID_INPUT
@@ -33,6 +34,8 @@ def verify(
 
     if planner is not None and not replay:
         raise InputError("--planner: only the replay plans; add --replay")
+    if replay:
+        require_physics()
     task = None if world is None else load_task(world)
     spec = None if robot is None else load_robot(robot)
     about = " and ".join(name for name in (world, robot) if name is not None)

@@ -433,8 +433,7 @@ class _Shapes:
 
     def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
         """Yield the piece of a <collision>; nothing for a missing mesh."""
-        geometry = element.find("geometry")
-        shape = None if geometry is None else next(iter(geometry), None)
+        shape = element.find("geometry/*")
         if shape is None:
             raise input_error(str(self._path), f"link {link}", "a <collision> has no geometry")
         radius = length = None

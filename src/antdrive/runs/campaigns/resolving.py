@@ -6,7 +6,6 @@ import dataclasses
 import glob
 import itertools
 import math
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import numpy.typing as npt
 from antdrive.base.checks import show, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import relative
 from antdrive.planners import PLANNERS, Query, capabilities_of, load_planner, planner_version
 from antdrive.planners.user_code import label_names
 from antdrive.robots import PurePursuit, RobotSpec, outline_of, overlap_at
@@ -86,7 +86,7 @@ def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[Nam
         task = load_task(path)
         yield (
             NamedTask(task.world.name, OWN, task, None, place, load_tasks(path)),
-            os.path.relpath(path, campaign.folder),
+            relative(path, campaign.folder),
         )
 
 
@@ -149,7 +149,7 @@ def _imported(
                 continue
             for task in tasks:
                 name = OWN if problem is None else f"problem-{problem}"
-                second = f"{os.path.relpath(path, campaign.folder)}#{task.world.name}{suffix}"
+                second = f"{relative(path, campaign.folder)}#{task.world.name}{suffix}"
                 yield NamedTask(task.world.name, name, task, None, place, skip=skip), second
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from antdrive.base.errors import FieldError, InputError
-from antdrive.base.files import open_regular
+from antdrive.base.files import open_regular, relative
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, PLANNER_FAULT
 from antdrive.runs.campaigns.store import GRID_FILE, TABLE, joined, read_manifest, read_table
@@ -171,9 +171,9 @@ def _of_one(folder: Path, base: Path) -> tuple[dict[str, list[Any]], dict[str, l
     done = set(columns["key"])
     grid = read_table(folder / GRID_FILE).to_pydict()
     left = [k for k, key in enumerate(grid["key"]) if key not in done]
-    prefix = os.path.relpath(folder.resolve(), base)
+    prefix = relative(folder.resolve(), base)
     if prefix != "." and "rollout" in columns:
-        columns["rollout"] = [log and f"{Path(prefix).as_posix()}/{log}" for log in columns["rollout"]]
+        columns["rollout"] = [log and f"{prefix}/{log}" for log in columns["rollout"]]
     return columns, {name: [values[k] for k in left] for name, values in grid.items()}
 
 

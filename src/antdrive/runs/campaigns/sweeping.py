@@ -17,7 +17,7 @@ from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.optional import parquet_library
 from antdrive.base.progress import progress_bar
-from antdrive.base.version import versions
+from antdrive.base.version import require_physics, versions
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.runs.campaigns.expanding import Expansion, expand
 from antdrive.runs.campaigns.job import Job, SweepCase
@@ -152,6 +152,8 @@ def sweep(
     parquet_library()
     with progress_bar(progress, "campaign") as report, opened(folder) as store:
         missing = missing_runs(expansion.jobs, store.folder, retry_crashed=retry_crashed, again=again)
+        if missing.jobs and work is None:
+            require_physics()
         notes = differences(campaign, expansion.jobs, store.folder)
         if notify is not None:
             for note in (*notes, *expansion.remarks, *expansion.idle_notes()):

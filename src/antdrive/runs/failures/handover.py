@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ import yaml
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import InputError
-from antdrive.base.files import file_name
+from antdrive.base.files import file_name, relative
 from antdrive.planners import list_planners, load_planner
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.robots.robot_file import footprint_to_dict
@@ -119,9 +118,9 @@ def _planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> 
     words = {"name": given} if isinstance(given, str) else dict(given)
     file, mark, word = words["name"].rpartition(":")
     if "file" in words:
-        words["file"] = os.path.relpath(home / words["file"], folder)
+        words["file"] = relative(home / words["file"], folder)
     elif mark and file.endswith(".py"):
-        words["name"] = f"{os.path.relpath(home / file, folder)}:{word}"
+        words["name"] = f"{relative(home / file, folder)}:{word}"
     return words if len(words) > 1 else str(words["name"])
 
 

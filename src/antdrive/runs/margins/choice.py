@@ -22,6 +22,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import read_bytes
 from antdrive.base.kernel_cache import cache_folder
 from antdrive.base.records import STRICT
+from antdrive.base.version import require_physics
 from antdrive.robots.default_margin import RESERVE
 from antdrive.runs.margins.loss import Loss, calibration_key, loss_on_course
 from antdrive.runs.pool import Pool, processes_for
@@ -150,6 +151,7 @@ def choose_margin(
     """
     calibration = known_margin(conditions)
     if calibration is None:
+        require_physics()
         with Pool(processes_for(jobs)) as pool:
             calibration = least_margin(
                 _driving(conditions, pool, progress), calibration_key(conditions), conditions.robot.radius

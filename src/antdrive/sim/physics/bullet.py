@@ -38,16 +38,19 @@ class _CStdout:
     """C's `stdout`, silenced while a client is open: Bullet prints its warnings there.
 
     Python writes to file descriptor 1 itself and is not affected. Redirecting the descriptor would flush C's buffer at
-    every step, and swallow Python's output.
+    every step, and swallow Python's output. Windows has no such variable: its users see the warnings.
     """
 
     def __init__(self) -> None:
         self._clients = 0
-        libc = ctypes.CDLL(None)
-        libc.fopen.restype = ctypes.c_void_p
-        self._nowhere = libc.fopen(os.fsencode(os.devnull), b"w")
         self._real: int | None = None
         self._stream: ctypes.c_void_p | None = None
+        try:
+            libc = ctypes.CDLL(None)
+        except TypeError:  # Windows
+            return
+        libc.fopen.restype = ctypes.c_void_p
+        self._nowhere = libc.fopen(os.fsencode(os.devnull), b"w")
         for name in ("stdout", "__stdoutp"):  # glibc, macOS
             with contextlib.suppress(ValueError):
                 self._stream = ctypes.c_void_p.in_dll(libc, name)

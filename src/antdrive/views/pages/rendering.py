@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
+from antdrive.base.files import relative
 from antdrive.base.version import __version__
 from antdrive.runs.statistics.intervals import Interval
 
@@ -171,7 +171,7 @@ def rendered(template: str, **content: Any) -> str:
 
 def link_to(path: Path, base: Path) -> str:
     """Return a file's path relative to the page's folder, quoted for a URL."""
-    return quote(Path(os.path.relpath(path.resolve(), base.resolve())).as_posix())
+    return quote(relative(path.resolve(), base.resolve()))
 
 
 def markdown_text(value: object) -> str:

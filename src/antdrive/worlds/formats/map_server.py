@@ -269,7 +269,7 @@ def export_map_server(
         )
     with atomic_write(image) as part:
         part.write_bytes(b"P5\n%d %d\n255\n" % (cols, rows) + picture.tobytes())
-    write_text(target, text, newline="\n")
+    write_text(target, text)
     return image
 
 

@@ -267,4 +267,4 @@ def export_movingai_problems(problems: Iterable[MapProblem], shape: tuple[int, i
         (r0, c0), (r1, c1) = p.start, p.goal
         values = (p.bucket, p.map_name, cols, rows, c0, rows - 1 - r0, c1, rows - 1 - r1, p.printed)
         lines.append("\t".join(map(str, values)))
-    write_text(path, "\n".join(lines) + "\n", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")

@@ -112,7 +112,7 @@ def _add_cylinders(
 
 def _shape(collision: ET.Element, pose: Floats, scale: Floats) -> Iterator[Disc]:
     """Yield the cylinder of a collision; nothing for a floor or a cylinder wholly below z = 0."""
-    shape = next(iter(collision.find("geometry") or ()), None)
+    shape = collision.find("geometry/*")
     if shape is None or shape.tag == "empty":
         return
     if shape.tag == "plane":
@@ -339,7 +339,7 @@ def export_sdf(task: Task, path: str | Path) -> None:
         "</world>",
         "</sdf>",
     ]
-    write_text(path, "\n".join(lines) + "\n", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _task_element(task: Task) -> str:
