@@ -32,7 +32,11 @@ def variables(tmp_path):
         script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m {module} "$@"\n')
         script.chmod(0o755)
     env = {key: value for key, value in os.environ.items() if key not in ("PYTEST_ADDOPTS", "GITHUB_STEP_SUMMARY")}
-    return {**env, "PATH": f"{tmp_path / 'bin'}{os.pathsep}{env['PATH']}", "PYTHONPATH": str(ROOT)}
+    return {
+        **env,
+        "PATH": f"{tmp_path / 'bin'}{os.pathsep}{env['PATH']}",
+        "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'src'}",
+    }
 
 
 def run(words, folder, env):
