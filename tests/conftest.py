@@ -5,6 +5,8 @@ from dataclasses import replace
 import hypothesis
 import pytest
 
+from antdrive.base.errors import InputError
+from antdrive.base.version import has_physics
 from antdrive.planners import load_planner
 from antdrive.robots import load_robot
 from antdrive.sim import Scenario, run
@@ -23,6 +25,20 @@ def compiling_is_silent():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("antdrive.cli.groups.report_compiling", lambda: None)
         yield
+
+
+@pytest.hookimpl(wrapper=True)
+def _without_physics(item):
+    """Skip a test that drives where PyBullet has no wheel."""
+    try:
+        return (yield)
+    except InputError as error:
+        if has_physics():
+            raise
+        pytest.skip(str(error))
+
+
+pytest_runtest_setup = pytest_runtest_call = _without_physics
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,8 @@
 import importlib.metadata
 import platform
+import re
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -74,3 +77,24 @@ def test_other_installations_are_refused_with_the_command_that_helps(installed, 
     with pytest.raises(InputError) as raised:
         require_physics()
     assert says in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "arm64", "upstream"),
+    [
+        ("linux", "x86_64", ["3.12", "3.13"], ["3.10", "3.11"]),
+        ("linux", "aarch64", [], []),
+        ("win32", "AMD64", ["3.10", "3.11", "3.12", "3.13"], []),
+        ("darwin", "arm64", ["3.10", "3.11", "3.12", "3.13"], []),
+        ("darwin", "x86_64", ["3.11", "3.12"], []),
+    ],
+)
+def test_a_distribution_is_required_where_it_has_wheels(monkeypatch, system, machine, arm64, upstream):
+    text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    requirements = re.findall(r'^    "(pybullet.*)",', text, re.MULTILINE)
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: requirements)
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    wanted = {one: version._wanted(one) for one in ("3.10", "3.11", "3.12", "3.13", "3.14")}
+    names = {**dict.fromkeys(arm64, "pybullet-arm64==3.2.8"), **dict.fromkeys(upstream, "pybullet==3.2.7")}
+    assert wanted == {one: names.get(one) for one in wanted}

@@ -176,7 +176,7 @@ def test_a_certificate_shows_its_verdict_and_its_problems(small_run):
 
 def test_the_help_of_a_scenario_begins_with_what_it_is():
     text = pydoc.render_doc(Scenario, renderer=pydoc.plaintext)
-    assert text.index("Complete input of a run") < 900
+    assert text.index("Complete input of a run") < 1200  # Python 3.13 puts each parameter on its own line
 
 
 @pytest.mark.parametrize("name", PLANNERS)
