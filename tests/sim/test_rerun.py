@@ -17,7 +17,7 @@ from antdrive.sim.log.record import PROOFS, Proof
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.recording import optima_of
 from antdrive.sim.rerun import mismatches, replayed, rerun
-from tests.records import changed
+from tests.records import COARSE, changed
 
 KINDS = {
     "footprint": {
@@ -39,7 +39,7 @@ AMONG_MOVERS = {
 @pytest.fixture(scope="module")
 def seen():
     """A noisy drive among movers that are seen by lidar, with every array but none of a contact."""
-    settings = {"noise": 1.0, "map": "none", "time_limit": 7.0}
+    settings = {"noise": 1.0, "map": "none", "time_limit": 7.0, **COARSE}
     return run(Scenario.of("plaza-moving", "astar", "jackal", **settings)).rollout
 
 
@@ -79,7 +79,7 @@ def test_a_collided_log_is_driven_again_bit_for_bit(collided_run):
 @pytest.mark.parametrize("name", AMONG_MOVERS)
 def test_a_genuine_log_among_movers_is_driven_again_bit_for_bit(name):
     robot, settings = AMONG_MOVERS[name]
-    check = replayed(run(Scenario.of("plaza-moving", "astar", robot, time_limit=5.0, **settings)).rollout)
+    check = replayed(run(Scenario.of("plaza-moving", "astar", robot, time_limit=5.0, **COARSE, **settings)).rollout)
     assert (check.exact, check.problems) == (True, ())
 
 
@@ -99,11 +99,11 @@ def test_every_array_is_compared(seen, collided_run):
 
 def test_the_first_row_that_differs_is_named(seen):
     estimate, tracks = seen.estimate.copy(), seen.tracks.copy()
-    estimate[481:, 0] += 0.01
+    estimate[161:, 0] += 0.01
     tracks[-1, 4] += 0.1
     problems = replayed(replace(seen, estimate=estimate, tracks=tracks)).problems
-    assert "replay: the rerun differs in estimate, from t = 2.004 s" in problems
-    assert f"replay: the rerun differs in tracks, from t = {tracks[-1, 0] / 240:.3f} s" in problems
+    assert "replay: the rerun differs in estimate, from t = 2.013 s" in problems
+    assert f"replay: the rerun differs in tracks, from t = {tracks[-1, 0] / 80:.3f} s" in problems
     problems = replayed(replace(seen, route=seen.route[:-1])).problems
     assert problems == (f"replay: the rerun differs in route, from point {len(seen.route)}",)
 
