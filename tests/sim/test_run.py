@@ -68,7 +68,8 @@ def test_every_catalogue_world_is_driven(name, robot, planner):
         with pytest.raises(FieldError, match=f"start: jackal at .* {TOO_NARROW_FOR_JACKAL[name]}"):
             Scenario.of(name, planner, robot)
         return
-    result = run(Scenario.of(name, planner, robot))
+    rates = COARSE if robot == "jackal" and name not in LARGE else {}
+    result = run(Scenario.of(name, planner, robot, **rates))
     fits = name != "no-path"
     assert result.outcome is (Outcome.SUCCEEDED if fits else Outcome.NO_PATH)
     assert result.succeeded == fits
@@ -336,10 +337,11 @@ def test_a_copy_of_another_size_drives_a_world_of_that_size(jackal, k):
     copy = Task(
         world, (k * x, k * y, yaw), (k * task.goal[0], k * task.goal[1]), k * task.goal_tolerance, k * task.cell
     )
+    rates = COARSE if k > 1 else {}
     lookaheads = ("preferred_lookahead_min", "lookahead_min", "lookahead_max", "goal_distance")
     usual = PurePursuit()
     controller = replace(usual, **{name: k * getattr(usual, name) for name in lookaheads})
-    done = run(Scenario.of(copy, "astar", small_copy(jackal, k), margin=0.03 * k, controller=controller))
+    done = run(Scenario.of(copy, "astar", small_copy(jackal, k), margin=0.03 * k, controller=controller, **rates))
     assert done.succeeded, done.certificate
 
 
