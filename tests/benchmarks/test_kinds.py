@@ -10,6 +10,7 @@ from antdrive.sim.settings import SETTINGS
 from benchmarks.forged_fields import POOL
 from benchmarks.genuine import accepted, forged, refusals
 from benchmarks.kinds import CROSSED, STILL, axes, crossed, scenario
+from tests.records import COARSE
 
 #: Kinds that have every choice between them.
 FEW = (
@@ -51,12 +52,12 @@ def test_a_choice_that_nothing_drives_is_missed():
             scenario({**crossed()[0], key: "hull"}, np.random.default_rng(0))
 
 
-def check(kind, seed, folder):
-    """Require of a kind's first drive with a log that its folder is accepted, and three forgeries of it are not."""
+def check(kind, seed, folder, forgeries):
+    """Require of a kind's first drive with a log that its folder is accepted, and forgeries of it are not."""
     rngs = (np.random.default_rng([seed, again]) for again in range(20))
     done = next(done for rng in rngs if (done := run(scenario(kind, rng))).rollout is not None)
     POOL[:] = [done.rollout.record.as_dict()]
-    for again in range(3):
+    for again in range(forgeries):
         assert refusals(done, folder) == []
         what, level = forged(done.rollout, folder, np.random.default_rng([seed, again]))
         assert not accepted(done, folder, level), what
@@ -64,10 +65,10 @@ def check(kind, seed, folder):
 
 @pytest.mark.parametrize("kind", FEW, ids=str)
 def test_genuine_drives_are_accepted_and_forged_ones_refused(kind, tmp_path):
-    check(dict(zip(CROSSED, kind, strict=True)), 2, tmp_path)
+    check({**dict(zip(CROSSED, kind, strict=True)), **COARSE}, 2, tmp_path, 2)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", crossed(), ids=str)
 def test_drives_of_every_kind_are_accepted_and_forged_ones_refused(kind, tmp_path):
-    check(kind, 3, tmp_path)
+    check(kind, 3, tmp_path, 3)

@@ -45,7 +45,7 @@ def barn(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("number", WORLDS[::5])
+@pytest.mark.parametrize("number", WORLDS[::10])
 def test_the_jackal_drives_a_barn_world(number, barn, jackal):
     task = import_barn(barn / f"world_{number}.world")
     result = run(Scenario(task=task, planner=load_planner("astar"), robot=jackal))

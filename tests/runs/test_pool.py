@@ -3,7 +3,6 @@
 import contextlib
 import operator
 import os
-import threading
 from collections import Counter
 from functools import partial
 
@@ -19,6 +18,7 @@ from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of
 from antdrive.runs.pool import CHUNK_SECONDS, LONGEST_CHUNK, Pool, Waiting, WorkerDied, call_all, processes_for
 from tests.runs.campaigns.works import Deadly, Endless, Listing, Refusing, Unloadable
+from tests.runs.light_works import compiling, fails, process
 
 
 def jobs(worlds=1, seeds=8):
@@ -31,6 +31,13 @@ def made(work, processes, runs=(), **watched):
     with Pool(processes, **watched) as workers:
         done = workers.each(work, runs or jobs(), group=lambda job: job.case.place.world)
         return [finished_of(one, watched.get("limit")).row for one in done]
+
+
+@pytest.fixture(scope="module")
+def worker():
+    """A pool of one process, which no test here ends."""
+    with Pool(1) as workers:
+        yield workers
 
 
 @pytest.mark.slow
@@ -106,31 +113,16 @@ def test_results_come_in_the_order_of_the_items_from_the_same_processes():
         assert len({*workers.results(process, range(20)), *workers.results(process, range(20, 40))}) <= 2
 
 
-def process(item):
-    """The process that an item is in."""
-    return os.getpid()
+def test_what_the_work_raises_is_raised_here(worker):
+    for workers in (Pool(0), worker):
+        with pytest.raises(ZeroDivisionError, match=r"division by zero|modulo by zero") as found:
+            list(workers.results(partial(operator.truediv, 1), [1, 0]))
+    assert "Traceback" in found.value.__notes__[0], "that of the worker"
 
 
-def fails(item):
-    """Raise something that cannot be sent to another process for the item 3."""
-    if item == 3:
-        raise type("Mine", (Exception,), {"lock": threading.Lock()})("oh")
-    return item
-
-
-@pytest.mark.parametrize("processes", [0, 1])
-def test_what_the_work_raises_is_raised_here(processes):
-    with (
-        Pool(processes) as workers,
-        pytest.raises(ZeroDivisionError, match=r"division by zero|modulo by zero") as found,
-    ):
-        list(workers.results(partial(operator.truediv, 1), [1, 0]))
-    assert processes == 0 or "Traceback" in found.value.__notes__[0], "that of the worker"
-
-
-def test_what_cannot_be_sent_is_named():
-    with Pool(1) as workers, pytest.raises(RuntimeError, match=r"^TypeError: cannot pickle|^Mine: oh$"):
-        list(workers.results(fails, range(5)))
+def test_what_cannot_be_sent_is_named(worker):
+    with pytest.raises(RuntimeError, match=r"^TypeError: cannot pickle|^Mine: oh$"):
+        list(worker.results(fails, range(5)))
 
 
 def test_an_item_without_a_result_is_named():
@@ -201,14 +193,8 @@ def test_a_process_goes_on_with_its_world_then_takes_a_fresh_one_then_helps():
     assert worlds == ["a", "a", "b", "c", "a"]
 
 
-def compiling(number):
-    kernel_cache.on_compile(f"kernel {number}")
-    return number
-
-
-def test_kernels_that_workers_compile_are_reported_here(monkeypatch):
+def test_kernels_that_workers_compile_are_reported_here(monkeypatch, worker):
     reported = []
     monkeypatch.setattr(kernel_cache, "on_compile", reported.append)
-    with Pool(2) as pool:
-        assert sorted(pool.results(compiling, range(3))) == [0, 1, 2]
+    assert sorted(worker.results(compiling, range(3))) == [0, 1, 2]
     assert sorted(reported) == ["kernel 0", "kernel 1", "kernel 2"]

@@ -18,7 +18,7 @@ from antdrive.views.film.meshes import robot_parts
 from antdrive.views.scene import Scene, contact_point
 from antdrive.worlds import Cruising, Disc, Task, World, import_barn, task_to_dict
 from benchmarks.second_audit import least_clearance
-from tests.records import changed
+from tests.records import COARSE, changed
 from tools.shared_data import BARN
 
 NOSE = [[0.62, 0.0], [0.45, 0.25], [-0.25, 0.25], [-0.25, -0.25], [0.45, -0.25]]
@@ -33,7 +33,7 @@ TASK = Task(WORLD, (1.2, 3.0, 0.6), (7.6, 3.0), cell=0.1, goal_tolerance=0.2)
 
 def drive(**settings):
     robot = replace(load_robot("warehouse"), footprint=Footprint.polygon(NOSE), name="nose")
-    return run(Scenario.of(TASK, "astar", robot, **settings))
+    return run(Scenario.of(TASK, "astar", robot, **COARSE, **settings))
 
 
 @pytest.fixture(scope="module")

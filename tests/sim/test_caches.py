@@ -16,6 +16,7 @@ from antdrive.sim.physics import engine as engine_module
 from antdrive.sim.physics.bullet import bullet
 from antdrive.worlds import Disc, World, load_task, rasterise, save_task
 from antdrive.worlds.world import by_geometry
+from tests.records import COARSE
 
 
 def scenarios():
@@ -23,9 +24,9 @@ def scenarios():
     hit = tuple(Disc(3.0 + dx, 3.0 + dy, 0.2) for dx, dy in ((0, 0), (0.3, -0.25), (-0.3, 0.3)))
     return {
         "slalom": Scenario.of("slalom", "astar", "jackal"),
-        "noisy": Scenario.of("slalom", "ants", "jackal", noise=1.0, seed=3),
+        "noisy": Scenario.of("slalom", "ants", "jackal", noise=1.0, seed=3, **COARSE),
         "hit": Scenario.of("empty", "astar", "jackal", unseen=hit),
-        "movers": Scenario.of("plaza-moving", "astar", avoidance=None, replanning=None),
+        "movers": Scenario.of("plaza-moving", "astar", avoidance=None, replanning=None, **COARSE),
     }
 
 
@@ -158,7 +159,7 @@ def test_kept_optima_are_those_of_a_search():
     wide = replace(base.task.world, obstacles=base.task.world.obstacles[:-1])
     tasks.append(replace(base.task, world=wide))
     for task, margin in itertools.product(tasks, (0.03, 0.05)):
-        done = run(replace(base, task=task, margin=margin))
+        done = run(replace(base, task=task, margin=margin, time_limit=0.2))
         query = Query.between(rasterise(task.world, task.cell, base.robot.radius + margin), task)
         searches = [PLANNERS[name].plan(query, np.random.default_rng(9)) for name in ("astar", "tangent")]
         found = done.rollout.record.plan

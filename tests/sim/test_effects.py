@@ -35,7 +35,7 @@ CHANGES = {
     "replanning": [None, ReplanPolicy(around_movers=False)],
     "unseen": [(Disc(2.0, 2.2, 0.1),)],
     "time_limit": [1.5],
-    "physics_hz": [480],
+    "physics_hz": [180],
     "control_hz": [30],
     "seed": [5],
 }
@@ -58,6 +58,7 @@ QUIET = {
 @pytest.fixture(scope="module")
 def kinds(small_scenario, jackal):
     """Scenarios of several kinds."""
+    small_scenario = replace(small_scenario, physics_hz=120)
     movers = (Cruising(radius=0.1, position=(0.5, 2.6), velocity=(0.3, 0.0)),)
     among = replace(small_scenario.task, world=replace(small_scenario.task.world, movers=movers))
     return {

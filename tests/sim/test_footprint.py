@@ -14,6 +14,7 @@ from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.rerun import replayed
 from antdrive.sim.verifying import false_claims
 from antdrive.worlds import Disc, Keyframed, Task, World, generate
+from tests.records import COARSE
 
 #: Width of a door that the footprint passes and the disc around the robot does not [m].
 DOORS = {"jackal": 0.62, "warehouse": 0.84}
@@ -37,7 +38,7 @@ def driven():
 
     def one(robot, noise):
         if (robot, noise) not in runs:
-            runs[robot, noise] = run(Scenario.of(door(DOORS[robot]), "astar", robot, noise=noise, seed=2))
+            runs[robot, noise] = run(Scenario.of(door(DOORS[robot]), "astar", robot, noise=noise, seed=2, **COARSE))
         return runs[robot, noise]
 
     return one
@@ -57,7 +58,9 @@ def test_a_footprint_passes_a_door_that_its_disc_does_not(driven, robot, noise):
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 @pytest.mark.parametrize("robot", [pytest.param("husky", marks=pytest.mark.slow), "warehouse"])
 def test_avoidance_in_a_door_keeps_the_footprint_clear(robot, noise):
-    made = run(Scenario.of(door({**DOORS, "husky": 0.9}[robot], CROSSING), "astar", robot, noise=noise, seed=2))
+    made = run(
+        Scenario.of(door({**DOORS, "husky": 0.9}[robot], CROSSING), "astar", robot, noise=noise, seed=2, **COARSE)
+    )
     assert made.succeeded, (made.outcome, made.reason)
     assert certify(made.rollout).certified
     assert made.rollout.record.footprint_margin > 0
@@ -81,7 +84,9 @@ def test_a_plan_in_time_for_a_footprint_passes_a_door_behind_a_mover_on_schedule
 @pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
 def test_a_robot_that_turns_slower_than_planned_is_late_and_plans_again(noise):
     hasty = load_planner("sipp", speed=1.0, yaw_rate=5.0)
-    made = run(Scenario.of(door(DOORS["jackal"], CROSSING), hasty, "jackal", noise=noise, seed=2, footprint="exact"))
+    made = run(
+        Scenario.of(door(DOORS["jackal"], CROSSING), hasty, "jackal", noise=noise, seed=2, footprint="exact", **COARSE)
+    )
     assert made.succeeded, (made.outcome, made.reason)
     assert certify(made.rollout).certified
     assert {(one.trigger, one.solved) for one in made.rollout.record.replans} == {("late", True)}
@@ -106,7 +111,7 @@ def test_a_result_names_the_cell_that_the_footprint_was_planned_on(driven):
 def test_a_route_that_ends_short_of_a_goal_with_room_for_the_disc_is_genuine():
     """The straight from the last cell to the goal is not clear for the footprint."""
     task = generate("forest", np.random.default_rng(24), {}, name="forest", note="")
-    made = run(Scenario.of(task, "astar", "husky", footprint="exact", noise=1.0))
+    made = run(Scenario.of(task, "astar", "husky", footprint="exact", noise=1.0, **COARSE))
     short = math.dist(made.rollout.route[-1], task.goal)
     assert 1.5 * made.rollout.record.cell < short < task.goal_tolerance
     assert made.succeeded, made.certificate.problems
@@ -115,7 +120,7 @@ def test_a_route_that_ends_short_of_a_goal_with_room_for_the_disc_is_genuine():
 def test_a_plan_for_a_footprint_on_finer_cells_is_made_again_from_its_log(tmp_path):
     """The footprint is planned on cells of 0.05 m, and only because the way of the disc on the asked cells is long."""
     world = World("open", (0.0, 0.0, 6.0, 3.0), (Disc(3.0, 1.5, 0.2),))
-    done = run(Scenario.of(Task(world, (1.0, 1.5, 0.0), (5.0, 1.5), cell=0.5), "astar", "husky"))
+    done = run(Scenario.of(Task(world, (1.0, 1.5, 0.0), (5.0, 1.5), cell=0.5), "astar", "husky", **COARSE))
     record = done.rollout.record
     assert record.cell < record.asked_cell == 0.5
     assert record.footprint_margin is not None
@@ -132,7 +137,9 @@ def test_an_exact_footprint_is_recorded(driven):
 
 
 def test_in_open_ground_auto_takes_the_disc_bit_for_bit(jackal):
-    drives = [run(Scenario.of(door(3.0), "astar", jackal, footprint=shape)).rollout for shape in ("auto", "disc")]
+    drives = [
+        run(Scenario.of(door(3.0), "astar", jackal, footprint=shape, **COARSE)).rollout for shape in ("auto", "disc")
+    ]
     assert drives[0].record.footprint_margin is None
     for name in FORMS:
         assert getattr(drives[0], name).tobytes() == getattr(drives[1], name).tobytes()

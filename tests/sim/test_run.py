@@ -21,6 +21,7 @@ from antdrive.sim.log import certificate
 from antdrive.sim.log.record import SmoothingRecord
 from antdrive.views.figures.plan_figures import plan_figure
 from antdrive.worlds import Disc, Route, Task, World, list_worlds, load_task, save_task
+from tests.records import COARSE
 
 
 def test_a_run_ends_at_the_goal_certified(small_run):
@@ -50,17 +51,25 @@ STATIC = [name for name in list_worlds() if not name.endswith("-moving")]
 LARGE = [name for name in STATIC if name.startswith("hasan") or name == "office"]
 
 
-@pytest.mark.parametrize("planner", ["astar", "aco-han"])
-@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+#: Ants draw the turtlebot's ways and A* the jackal's; in large worlds each draws both.
+WAYS = [("turtlebot", "aco-han"), ("jackal", "astar")]
+ALL_WAYS = [*WAYS, ("jackal", "aco-han"), ("turtlebot", "astar")]
+
+
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name in LARGE else name for name in STATIC]
+    ("name", "robot", "planner"),
+    [
+        *[(name, *way) for name in STATIC if name not in LARGE for way in WAYS],
+        *[pytest.param(name, *way, marks=pytest.mark.slow) for name in LARGE for way in ALL_WAYS],
+    ],
 )
 def test_every_catalogue_world_is_driven(name, robot, planner):
     if robot == "jackal" and name in TOO_NARROW_FOR_JACKAL:
         with pytest.raises(FieldError, match=f"start: jackal at .* {TOO_NARROW_FOR_JACKAL[name]}"):
             Scenario.of(name, planner, robot)
         return
-    result = run(Scenario.of(name, planner, robot))
+    rates = COARSE if robot == "jackal" and name not in LARGE else {}
+    result = run(Scenario.of(name, planner, robot, **rates))
     fits = name != "no-path"
     assert result.outcome is (Outcome.SUCCEEDED if fits else Outcome.NO_PATH)
     assert result.succeeded == fits
@@ -88,16 +97,16 @@ def test_the_outcome_of_every_world_with_movers_is_certain(name, seed):
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 def test_avoidance_and_replanning_cross_a_busy_plaza(robot):
-    result = run(Scenario.of("plaza-moving", "dstar-lite", robot))
+    result = run(Scenario.of("plaza-moving", "dstar-lite", robot, **COARSE))
     assert result.succeeded, (result.outcome, result.reason)
     assert measure(result.rollout)["replans"] > 0
     assert measure(result.rollout)["avoiding_s"] > 0
-    blind = run(Scenario.of("plaza-moving", "dstar-lite", robot, avoidance=None, replanning=None))
+    blind = run(Scenario.of("plaza-moving", "dstar-lite", robot, avoidance=None, replanning=None, **COARSE))
     assert blind.outcome is Outcome.COLLIDED
 
 
 def test_the_seed_decides_where_a_wanderer_goes():
-    logs = [run(Scenario.of("hasan-3c-moving", seed=seed, time_limit=5.0)).rollout for seed in (0, 0, 1)]
+    logs = [run(Scenario.of("hasan-3c-moving", seed=seed, time_limit=5.0, **COARSE)).rollout for seed in (0, 0, 1)]
     one, again, other = (log for log in logs if log is not None)
     assert one.digest == again.digest
     assert (one.movers != other.movers).any()
@@ -328,10 +337,11 @@ def test_a_copy_of_another_size_drives_a_world_of_that_size(jackal, k):
     copy = Task(
         world, (k * x, k * y, yaw), (k * task.goal[0], k * task.goal[1]), k * task.goal_tolerance, k * task.cell
     )
+    rates = COARSE if k > 1 else {}
     lookaheads = ("preferred_lookahead_min", "lookahead_min", "lookahead_max", "goal_distance")
     usual = PurePursuit()
     controller = replace(usual, **{name: k * getattr(usual, name) for name in lookaheads})
-    done = run(Scenario.of(copy, "astar", small_copy(jackal, k), margin=0.03 * k, controller=controller))
+    done = run(Scenario.of(copy, "astar", small_copy(jackal, k), margin=0.03 * k, controller=controller, **rates))
     assert done.succeeded, done.certificate
 
 

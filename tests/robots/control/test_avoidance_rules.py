@@ -234,21 +234,21 @@ def test_a_robot_reverses_slowly_unless_it_would_be_hit(tracked, turtlebot, come
     assert fastest > 0.3 or comes < 1.0
 
 
-def passes(walls, mover, speed):
+def passes(walls, mover, speed, hz=20):
     """Whether a robot of 0.9 x 0.6 m passes a mover that comes, without contact, in 20 s."""
     robot, route = load_robot("warehouse"), Route(np.array([(1.0, 0.0), (7.0, 0.0)]))
-    tracked = PurePursuit().prepare(route, World("passage", (-9, -3, 15, 3), walls), robot, 0.03, 1 / 60)
+    tracked = PurePursuit().prepare(route, World("passage", (-9, -3, 15, 3), walls), robot, 0.03, 1 / hz)
     avoidance = Avoidance()
     pose, last, pursuit, state = np.array([1.0, 0.0, 0.0]), Twist(0.0, 0.0), PursuitState(), AvoidanceState()
-    for k in range(20 * 60):
-        x = mover[0] - speed * (k / 60 + avoidance.prediction_times)
+    for k in range(20 * hz):
+        x = mover[0] - speed * (k / hz + avoidance.prediction_times)
         places, here = np.stack([x, np.full(len(x), mover[1])], axis=1)[:, None], tuple(pose)
         wanted, after = PurePursuit().step(tracked, here, last, pursuit)
         last, _, state = avoidance.avoid(
             tracked, robot, here, last, pursuit, wanted, state, places, np.array([0.1])
         )  # fmt: skip
         pursuit = after
-        pose += np.array((last.speed * math.cos(pose[2]), last.speed * math.sin(pose[2]), last.yaw_rate)) / 60
+        pose += np.array((last.speed * math.cos(pose[2]), last.speed * math.sin(pose[2]), last.yaw_rate)) / hz
         world = World("with the mover", (-9, -3, 15, 3), (*walls, Disc(*places[0, 0].tolist(), 0.1)))
         if footprint_clearance(world, robot.footprint, pose[None])[0] <= 0:
             return False

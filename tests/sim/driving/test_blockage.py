@@ -8,7 +8,7 @@ import pytest
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Scenario, certify, run
 from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.worlds import Disc, Keyframed, Task, World
-from tests.records import changed
+from tests.records import COARSE, changed
 
 LANE = World("lane", (0.0, 0.0, 8.0, 1.2))
 TASK = Task(LANE, (0.6, 0.6, 0.0), (7.2, 0.6), cell=0.1)
@@ -17,7 +17,7 @@ PLUG = Keyframed(radius=0.3, keyframes=((0.0, 5.0, 0.6), (9.0, 5.0, 0.6)))
 
 def among(*movers, robot, planner="dstar-lite", **settings):
     task = changed(TASK, "world", movers=movers)
-    return run(Scenario.of(task, planner, robot, **settings))
+    return run(Scenario.of(task, planner, robot, **COARSE, **settings))
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def test_each_search_waits_twice_as_long_as_the_one_before(blocked):
         "movers[0] stands still at (5.00, 0.60) and closes the way; no route to the goal for 30 s, in 6 attempts"
     )
     times = [replan.t for replan in blocked.record.replans]
-    assert np.diff(times) == pytest.approx([1, 2, 4, 8, 15], abs=0.02)  # to a control period
+    assert np.diff(times) == pytest.approx([1, 2, 4, 8, 15], abs=0.06)  # to a control period
     assert not any(replan.solved for replan in blocked.record.replans)
     assert blocked.t[-1] == pytest.approx(times[-1])
     assert certify(blocked).certified
@@ -92,7 +92,7 @@ def test_a_way_that_only_movers_on_the_move_close_is_open(turtlebot):
     ):
         task = Task(replace(hall, movers=(stands, second)), (1.0, 3.0, 0.0), (7.0, 3.0), cell=0.25)
         policy = ReplanPolicy(patience=5.0)
-        done = run(Scenario.of(task, "dstar-lite", turtlebot, replanning=policy, time_limit=25.0))
+        done = run(Scenario.of(task, "dstar-lite", turtlebot, replanning=policy, time_limit=25.0, **COARSE))
         assert done.outcome is outcome, done.reason
 
 
@@ -136,7 +136,7 @@ def past(gap, *others, mover=None, robot, planner="dstar-lite", **settings):
     posts = tuple(Disc(5.0, 0.1 + 0.2 * k, 0.1) for k in range(9) if 0.1 + 0.2 * k < y)
     world = World("gap", (0.0, 0.0, 8.0, WIDTH), posts, movers=(mover or standing(gap), *others))
     task = Task(world, (0.6, 1.0, 0.0), (7.2, 1.0), cell=0.05)
-    return run(Scenario.of(task, planner, robot, **settings))
+    return run(Scenario.of(task, planner, robot, **COARSE, **settings))
 
 
 @pytest.mark.parametrize("planner", ["dstar-lite", "tangent", "astar"])
@@ -176,7 +176,7 @@ def test_a_wider_way_is_taken_instead(turtlebot):
     mover = Keyframed(radius=0.3, keyframes=((0.0, 5.0, 4.7), (9.0, 5.0, 4.7)))
     world = World("two ways", (0.0, 0.0, 9.0, 5.5), wall, movers=(mover,))  # gaps of 0.5 m and 1.6 m
     task = Task(world, (2.0, 4.7, 0.0), (8.0, 4.7), cell=0.1)
-    done = run(Scenario.of(task, "dstar-lite", turtlebot))
+    done = run(Scenario.of(task, "dstar-lite", turtlebot, **COARSE))
     assert done.succeeded, done.reason
     assert done.rollout.pose[:, 1].min() < 1.5
 

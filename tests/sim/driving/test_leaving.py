@@ -14,7 +14,7 @@ from antdrive.sim import Engine, Outcome, Scenario, plan, run
 from antdrive.sim.driving.drive import follow
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
 from antdrive.worlds import Disc, Route, Task, World
-from tests.records import changed
+from tests.records import COARSE, changed
 from tests.sim.driving.test_driver import driver
 
 
@@ -63,7 +63,7 @@ def test_the_rehearsal_and_physics_agree(cart, monkeypatch):
         world = World("random", (0, 0, 8, 6), (Disc(*at, 0.3),))
         assert not overlap_at(world, cart, (3.0, 3.0, yaw))
         task = Task(world, (3.0, 3.0, float(yaw)), (6.5, 3.0), cell=0.1)
-        s = Scenario.of(task, "astar", cart)
+        s = Scenario.of(task, "astar", cart, **COARSE)
         planned = plan(s)
         with monkeypatch.context() as patch:
             patch.setattr("antdrive.sim.driving.routes.cannot_leave", lambda *_: "")
@@ -101,7 +101,7 @@ def test_a_robot_that_is_not_centred_turns_the_longer_way_where_the_shorter_is_b
     robot, start = load_robot("warehouse"), (4.0, 4.0, 0.0)
     post = Disc(4.3, 4.0 + 0.46 * side, 0.05)
     task = Task(World("nose", (0, 0, 8, 8), (post,)), start, (2.0, 4.0 + 3.0 * side), cell=0.1)
-    done = run(Scenario.of(task, "astar", robot))
+    done = run(Scenario.of(task, "astar", robot, **COARSE))
     assert done.succeeded, (done.reason, done.certificate)
     turned = np.unwrap(done.rollout.pose[:, 2])
     assert side * turned[np.abs(turned).argmax()] < 0, "away from the post"

@@ -28,7 +28,7 @@ from antdrive.sim.driving.rules import MAX_LAG, KeepToSchedule, Schedule, slow_d
 from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from antdrive.worlds.world import by_geometry
-from tests.records import changed
+from tests.records import COARSE, changed
 
 # A wall with two gates; the path through the nearer gate is shorter.
 POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
@@ -39,7 +39,7 @@ PLUG = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (100.0, 4.0, 3.01)), l
 
 def among(*movers, robot, planner="dstar-lite", **settings):
     task = changed(TASK, "world", movers=movers)
-    return run(Scenario.of(task, planner, robot, **settings))
+    return run(Scenario.of(task, planner, robot, **COARSE, **settings))
 
 
 def test_only_replanning_gets_around_a_closed_gate(turtlebot):
@@ -114,7 +114,7 @@ def test_mmas_dstar_decides_cell_by_cell_and_waits_if_there_is_no_path(turtlebot
 def test_a_robot_that_left_its_cell_returns_around_obstacles(turtlebot):
     """Avoiding movers has taken the robot to the other side of the wall; its own cell lies behind a post."""
     task = changed(TASK, "world", movers=(GATEKEEPER,))
-    scenario = Scenario.of(task, "mmas-dstar", turtlebot)
+    scenario = Scenario.of(task, "mmas-dstar", turtlebot, **COARSE)
     monitor = compose(scenario).guide
     assert isinstance(monitor, CellByCell)
     grid, answer = monitor.first()
@@ -136,7 +136,7 @@ def test_mmas_dstar_stays_at_the_start_while_there_is_no_path(turtlebot):
     task = changed(task, "world", movers=(lid,))
     # Without avoidance, nothing but its decisions can stop the robot.
     planner = load_planner("mmas-dstar")
-    log = run(Scenario(task=task, planner=planner, robot=turtlebot, avoidance=None)).rollout
+    log = run(Scenario(task=task, planner=planner, robot=turtlebot, avoidance=None, **COARSE)).rollout
     assert np.ptp(log.pose[log.t < 4.0, 0]) < 0.01
     decisions = log.record.replans
     assert {d.trigger for d in decisions} == {"decision"}
@@ -152,7 +152,7 @@ def test_mmas_dstar_stays_at_the_start_while_there_is_no_path(turtlebot):
 def test_mmas_dstar_keeps_the_inflation_from_obstacles(post, start, goal, turtlebot):
     far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
     task = Task(World("hall", (0.0, 0.0, 9.0, 6.0), (post,), movers=(far,)), (*start, 0.0), goal, cell=0.25)
-    done = run(Scenario.of(task, "mmas-dstar", turtlebot))
+    done = run(Scenario.of(task, "mmas-dstar", turtlebot, **COARSE))
     assert done.succeeded, (done.outcome, done.reason)
     for decision in done.rollout.record.replans[:-1]:
         assert polyline_clearance(task.world, np.array(decision.route)) > 0.21 - 2e-4, decision
@@ -356,7 +356,7 @@ def ends_as_wrong(result, words):
 
 def test_a_wrong_plan_on_the_way_ends_the_drive():
     planner = WrongLater(raises=False)
-    result = run(Scenario.of(MOVING, planner, time_limit=10.0))
+    result = run(Scenario.of(MOVING, planner, time_limit=10.0, **COARSE))
     assert planner.calls == 2
     assert ends_as_wrong(result, "on the way, at t = ")
     assert "cells: step 1 from" in result.reason

@@ -27,7 +27,7 @@ from antdrive.sim.driving.perceived_movers import GroundTruth, Tracked
 from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, import_dynabarn, rasterise
-from tests.records import changed
+from tests.records import COARSE, changed
 from tools.shared_data import DYNABARN
 
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))
@@ -54,7 +54,7 @@ def traffic_of(*movers, kind="velocities", reach=math.inf):
 
 def among(*movers, robot, **settings):
     task = changed(TASK, "world", movers=movers)
-    scenario = Scenario.of(task, "dstar-lite", robot, **settings)
+    scenario = Scenario.of(task, "dstar-lite", robot, **COARSE, **settings)
     return run(scenario)
 
 

@@ -106,19 +106,18 @@ def mean_clearance_m(log):
 
 def off_route(log):
     """The tracking error of each row."""
-    followed = [log.route] * len(log.t)
-    for replan in log.record["replans"]:
-        if replan["solved"]:
-            since = [k for k, t in enumerate(log.t.tolist()) if t >= replan["t"] - 1e-9]
-            for k in since:
-                followed[k] = np.array(replan["route"])
-    errors = np.empty(len(log.t))
-    for k, route in enumerate(followed):
-        here, a, b = log.pose[k, :2], route[:-1], route[1:]
-        leg2 = np.square(b - a).sum(axis=1)
-        share = np.where(leg2 > 0, ((here - a) * (b - a)).sum(axis=1) / np.where(leg2 > 0, leg2, 1), 0).clip(0, 1)
-        errors[k] = np.linalg.norm(a + share[:, None] * (b - a) - here, axis=1).min()
-    return errors
+    if not hasattr(log, "errors"):
+        log.errors = np.empty(len(log.t))
+        routes = [(-1.0, log.route)] + [
+            (one["t"], np.array(one["route"])) for one in log.record["replans"] if one["solved"]
+        ]
+        for since, route in routes:
+            rows = log.t >= since - 1e-9
+            here, a, b = log.pose[rows, None, :2], route[:-1], route[1:]
+            leg2 = np.square(b - a).sum(axis=1)
+            share = np.where(leg2 > 0, ((here - a) * (b - a)).sum(axis=2) / np.where(leg2 > 0, leg2, 1), 0).clip(0, 1)
+            log.errors[rows] = np.linalg.norm(a + share[..., None] * (b - a) - here, axis=2).min(axis=1)
+    return log.errors
 
 
 @oracle

@@ -12,7 +12,7 @@ from antdrive.sim.log import ending
 from antdrive.sim.log.ending import arrived, false_endings, outcome_at, stopped
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, World
-from tests.records import changed, made_up_log, made_up_record
+from tests.records import COARSE, changed, made_up_log, made_up_record
 
 POSTS = World("posts", (0.0, 0.0, 4.0, 3.5), (Disc(1.6, 1.5, 0.3), Disc(2.6, 2.6, 0.25)))
 TASK = Task(POSTS, (0.6, 1.4, 0.0), (3.4, 1.9), cell=0.2)
@@ -23,9 +23,9 @@ MAPLESS = {"map": "none", "localisation": "matching"}
 DRIVES = {
     "perfect": ("succeeded", TASK, "jackal", {}),
     "noise": ("succeeded", TASK, "turtlebot", {"noise": 1.0}),
-    "movers, noise": ("succeeded", AMONG, "jackal", {"noise": 1.0, "seed": 1}),
-    "movers by lidar": ("succeeded", AMONG, "jackal", {"perception": Perception(kind="lidar"), "seed": 1}),
-    "mapless, matching": ("succeeded", TASK, "jackal", {"noise": 1.0, **MAPLESS}),
+    "movers, noise": ("succeeded", AMONG, "jackal", {"noise": 1.0, "seed": 1, **COARSE}),
+    "movers by lidar": ("succeeded", AMONG, "jackal", {"perception": Perception(kind="lidar"), "seed": 1, **COARSE}),
+    "mapless, matching": ("succeeded", TASK, "jackal", {"noise": 1.0, **MAPLESS, **COARSE}),
     "footprint off the axle": ("succeeded", replace(TASK, start=(0.6, 1.4, 3.0)), "pioneer3dx", {"noise": 1.0}),
     "narrow goal": ("succeeded", replace(TASK, goal=(3.4, 0.25)), "turtlebot", {"noise": 1.0, "margin": 0.1}),
     "collided": ("collided", TASK, "jackal", {"unseen": (Disc(2.33, 1.12, 0.1),)}),

@@ -111,9 +111,10 @@ def test_genuine_drives_pass_every_check_and_have_the_digest_that_a_forger_compu
 
 @pytest.mark.parametrize("turn", range(len(KINDS)), ids=list(KINDS))
 def test_each_kind_is_found_in_one_of_the_drives(turn, drives, tmp_path):
-    """The drives take turns; `slow` tests check all of them."""
+    """The drives take turns, those without movers first, which are soon driven again; `slow` tests check all of them."""
     kind = list(KINDS.values())[turn]
-    names = ["turtlebot"] if kind.breaks else [*list(drives)[turn % len(drives) :], *drives]
+    alone = [name for name in drives if "movers" not in name]
+    names = ["turtlebot"] if kind.breaks else [*alone[turn % len(alone) :], *drives]
     path = tmp_path / "forged.npz"
     name = next(name for name in names if forged(kind, drives[name], path))
     level, why = found(path, drives[name])

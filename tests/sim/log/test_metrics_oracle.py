@@ -13,7 +13,7 @@ from antdrive.sim.log import metrics, sights
 from antdrive.sim.log.record import PlanRecord, ReplanRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
 from tests.made_up_drive import scanned
-from tests.records import changed
+from tests.records import COARSE, changed
 from tests.sim.log.metrics_oracle import ORACLES, metrics_of
 
 WITHIN = 1e-9  # relative
@@ -46,11 +46,11 @@ def drives():
     yield "map, noise", done, Scenario.of(TASK, "astar", jackal, noise=1.0, seed=5)
     yield "any angle", done, Scenario.of(TASK, "tangent", jackal)
     yield "25 Hz", done, Scenario.of(TASK, "astar", turtlebot, physics_hz=250, control_hz=50)
-    yield "movers", done, Scenario.of(AMONG, "dstar-lite", turtlebot, seed=1)
-    yield "movers, noise", done, Scenario.of(AMONG, "dstar-lite", jackal, noise=1.0, seed=2)
-    yield "lidar", done, Scenario.of(AMONG, "dstar-lite", jackal, seed=1, perception=Perception(kind="lidar"))
-    yield "mapless", done, Scenario.of(TASK, "astar", jackal, **MAPLESS)
-    yield "mapless, movers", done, Scenario.of(AMONG, "dstar-lite", turtlebot, **MAPLESS)
+    yield "movers", done, Scenario.of(AMONG, "dstar-lite", turtlebot, seed=1, **COARSE)
+    yield "movers, noise", done, Scenario.of(AMONG, "dstar-lite", jackal, noise=1.0, seed=2, **COARSE)
+    yield "lidar", done, Scenario.of(AMONG, "dstar-lite", jackal, seed=1, perception=Perception(kind="lidar"), **COARSE)
+    yield "mapless", done, Scenario.of(TASK, "astar", jackal, **MAPLESS, **COARSE)
+    yield "mapless, movers", done, Scenario.of(AMONG, "dstar-lite", turtlebot, **MAPLESS, **COARSE)
     yield "narrow", done, Scenario.of(BY_WALL, "astar", turtlebot, margin=0.2)
     yield "polygon", Outcome.COLLIDED, Scenario.of(ROOM, "astar", nose, unseen=(Disc(3.0, 2.0, 0.2),))
     yield "collided", Outcome.COLLIDED, Scenario.of(TASK, "astar", turtlebot, unseen=(Disc(3.0, 1.8, 0.4),))
