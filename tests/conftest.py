@@ -1,5 +1,6 @@
 """Robots, tasks and runs that many tests share."""
 
+import signal
 from dataclasses import replace
 
 import hypothesis
@@ -23,6 +24,16 @@ def compiling_is_silent():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("antdrive.cli.groups.report_compiling", lambda: None)
         yield
+
+
+@pytest.fixture
+def signals():
+    """Signals act as in a terminal, even where nohup or a background shell has them ignored; children inherit that."""
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL, signal.SIGHUP: signal.SIG_DFL}
+    before = {one: signal.signal(one, action) for one, action in usual.items()}
+    yield
+    for one, action in before.items():
+        signal.signal(one, action)
 
 
 @pytest.fixture(scope="session")

@@ -198,7 +198,7 @@ def test_suites_name_it_and_go_on(folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_a_supervised_command_as_any_other(folder, number, code):
+def test_a_signal_ends_a_supervised_command_as_any_other(signals, folder, number, code):
     words = [ANTDRIVE, "run", "empty", "--planner", "mine.py:Endless", "--no-figures", "--plan-limit", "off"]
     started = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     try:
