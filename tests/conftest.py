@@ -13,7 +13,11 @@ from antdrive.worlds import Disc, Task, World
 from tests.made_up_drive import made_up_drive as made_up_drive
 
 hypothesis.settings.register_profile(
-    "repeatable", max_examples=40, derandomize=True, deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+    "repeatable",
+    max_examples=40,
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
 hypothesis.settings.load_profile("repeatable")
 
