@@ -50,7 +50,7 @@ def test_a_collision_is_exit_code_1_and_verify_refuses_the_log(antdrive, small, 
 
 
 def test_no_path_is_exit_code_1_with_a_reason(antdrive):
-    code, out, _ = antdrive("run", "no-path", "--json")
+    code, out, _ = antdrive("run", "no-path", "--no-figures", "--json")
     facts = json.loads(out)
     assert (code, facts["outcome"]) == (1, "no_path")
     assert facts["reason"]
