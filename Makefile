@@ -50,13 +50,11 @@ demo: $(VENV)/.core
 	@$(BIN)/antdrive demo
 
 test: $(VENV)/.dev $(VENV)/.warm
-	@$(BIN)/ruff check --quiet .
-	@$(BIN)/ruff format --quiet --check .
-	@$(BIN)/mypy --no-error-summary
-	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup
+	@$(BIN)/python -m tools.loop $(BIN)/ruff check --quiet . -- $(BIN)/ruff format --quiet --check . -- \
+		$(BIN)/mypy --no-error-summary -- $(BIN)/python -m pytest --numprocesses 2 --dist loadgroup
 
 test-slow: $(VENV)/.dev $(VENV)/.warm
-	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m slow
+	@$(BIN)/python -m tools.loop $(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m slow
 
 # What pages show runs again when they or the packages change. Both halves use a process for each core, four at most.
 DEPTHS := * */* */*/* */*/*/*

@@ -1,5 +1,6 @@
 """Robots, tasks and runs that many tests share."""
 
+import signal
 from dataclasses import replace
 
 import hypothesis
@@ -14,7 +15,11 @@ from antdrive.worlds import Disc, Task, World
 from tests.made_up_drive import made_up_drive as made_up_drive
 
 hypothesis.settings.register_profile(
-    "repeatable", derandomize=True, deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+    "repeatable",
+    max_examples=40,
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
 hypothesis.settings.load_profile("repeatable")
 
@@ -39,6 +44,16 @@ def _without_physics(item):
 
 
 pytest_runtest_setup = pytest_runtest_call = _without_physics
+
+
+@pytest.fixture
+def signals():
+    """Signals act as in a terminal, even where nohup or a background shell has them ignored; children inherit that."""
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL, signal.SIGHUP: signal.SIG_DFL}
+    before = {one: signal.signal(one, action) for one, action in usual.items()}
+    yield
+    for one, action in before.items():
+        signal.signal(one, action)
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,7 @@ import yaml
 
 import antdrive
 from antdrive.worlds import load_task, save_task
+from tools import loop
 from tools.dist import built, version_of
 
 ROOT = Path(__file__).parent.parent
@@ -285,18 +286,30 @@ def test_where_nothing_can_be_fetched_it_says_how_to_get_a_python(tmp_path, pip,
 
 
 @pytest.mark.parametrize(
-    ("fits", "made"), [(True, ["test", "test-slow", "docs"]), (False, ["test", "test-slow"])], ids=["3.11", "3.10"]
+    ("fits", "last"),
+    [(True, "make docs"), (False, ".venv/bin/python -m tools.pages --all --jobs 2")],
+    ids=["3.11", "3.10"],
 )
-def test_integration_builds_the_site_where_python_is_new_enough_and_else_runs_its_pages(tmp_path, fits, made):
-    """A stand-in for the Python of .venv ends as 3.11 or 3.10 would on the question of the version."""
-    (tmp_path / "bin").mkdir()
-    script(tmp_path / "bin" / "make", '#!/bin/sh\necho "make $*"\n')
-    (tmp_path / ".venv" / "bin").mkdir(parents=True)
-    script(tmp_path / ".venv" / "bin" / "python", f'#!/bin/sh\necho "python $2"\nexit {int(fits)}\n')
-    (tmp_path / ".ci").mkdir()
-    shutil.copy(SCRIPT.parent.parent / ".ci" / "run", tmp_path / ".ci" / "run")
-    environment = {"PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}"}
+def test_integration_builds_the_site_where_python_is_new_enough_and_else_runs_its_pages(tmp_path, fits, last):
+    """A stand-in for Python ends as 3.11 or 3.10 would on the question of the version, and prints what it is to time."""
+    for folder in (".ci", "tools"):
+        (tmp_path / folder).mkdir()
+    for name in (".ci/run", "tools/find-python"):
+        shutil.copy(SCRIPT.parent.parent / name, tmp_path / name)
+    answers = f'*">= (3, 11)"*) exit {int(fits)} ;; tools.loop) shift 2; echo "$*" ;;'
+    script(tmp_path / "python", f'#!/bin/sh\ncase "$2" in {answers} esac\n')
+    environment = {**os.environ, "PYTHON": str(tmp_path / "python")}
     done = subprocess.run([tmp_path / ".ci" / "run"], env=environment, capture_output=True, text=True, check=True)
-    assert [line.removeprefix("make ") for line in done.stdout.splitlines() if line.startswith("make ")] == made
+    assert done.stdout.splitlines()[-1].split(" -- ")[2:] == ["make test", "make test-slow", last]
     assert ("needs Python 3.11" in done.stdout) is not fits
-    assert ("python tools.pages" in done.stdout) is not fits
+
+
+def test_commands_are_timed_in_loops_until_one_fails(monkeypatch, capsys):
+    monkeypatch.setattr(loop, "ADDITIONS", 1000)
+    monkeypatch.setattr(
+        subprocess, "run", lambda words, check: subprocess.CompletedProcess(words, int(words[-1] == "b"))
+    )
+    assert loop.main(["a", "1", "--", "/c/a", "b", "--", "d"]) == 1
+    *_, first, second = capsys.readouterr().out.splitlines()
+    assert first.endswith(" s  a 1")
+    assert second.endswith(" s  a b (exit code 1)")

@@ -1,6 +1,7 @@
 """Who imports whom, and what the rooms offer."""
 
 import ast
+import functools
 import importlib
 import pkgutil
 import subprocess
@@ -24,24 +25,31 @@ def name_of(path):
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
-def nodes(tree, *, types):
-    """All nodes, inside functions too; `types`: also those for type checking alone."""
-    if types or not (isinstance(tree, ast.If) and ast.unparse(tree.test) == "TYPE_CHECKING"):
-        yield tree
-        for child in ast.iter_child_nodes(tree):
-            yield from nodes(child, types=types)
+def statements(tree):
+    """All statements, inside functions too, each with whether it is for type checking alone."""
+    found = [(tree, False)]
+    for node, types in found:
+        types = types or (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+        blocks = (ast.stmt, ast.excepthandler, ast.match_case)
+        found += [(child, types) for child in ast.iter_child_nodes(node) if isinstance(child, blocks)]
+    return found
 
 
-def imported(path, *, types=True):
-    """The modules and names that a module imports."""
-    names = set()
-    for node in nodes(ast.parse(path.read_text()), types=types):
+@functools.cache
+def imports(path):
+    """The modules and names that a module imports, by whether for type checking alone."""
+    names = {True: set(), False: set()}
+    for node, types in statements(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
+            names[types] |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: imports are written in full"
-            names |= {str(node.module)} | {f"{node.module}.{alias.name}" for alias in node.names}
+            names[types] |= {str(node.module)} | {f"{node.module}.{alias.name}" for alias in node.names}
     return names
+
+
+def imported(path):
+    return set().union(*imports(path).values())
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
@@ -62,7 +70,7 @@ def test_imports_have_no_circles():
     modules = {}
     folders = {}
     for module, path in known.items():
-        modules[module] = imported(path, types=False) & (set(known) - {module})
+        modules[module] = imports(path)[False] & (set(known) - {module})
         for other in (known[one] for one in modules[module]):
             a, b = path.parent, other.parent
             if other.name != "__init__.py" and not (a.is_relative_to(b) or b.is_relative_to(a)):

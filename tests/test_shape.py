@@ -23,10 +23,7 @@ PLAIN = {
 
 def test_a_class_name_has_one_meaning():
     names = collections.Counter(
-        node.name
-        for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.ClassDef)
+        name for path in MODULES for name in re.findall(r"^ *class (\w+)[(:]", path.read_text(), re.MULTILINE)
     )
     assert [name for name, count in names.items() if count > 1] == []
 

@@ -34,7 +34,7 @@ def read_by_pyyaml(text, monkeypatch):
         return read(text)
 
 
-@settings(max_examples=800)
+@settings(max_examples=250)
 @given(st.lists(st.sampled_from(PIECES), max_size=14).map("".join))
 def test_both_parsers_read_the_same(text):
     with pytest.MonkeyPatch.context() as patch:
@@ -80,7 +80,7 @@ BEFORE = ("", "a: 1\n", "a: {b: 1,\n", "a: 'b\n", "a: b\n  c\n", "posts: []\n", 
 AFTER = ("", "a: 1\n", "  b: 1\n", "}\n", "'\n", "c: [1, 2]\n", "# end\n", "posts:\n  - {x: 1.0, y: 2.0}\n", "...\n")
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(
     st.sampled_from(BEFORE),
     st.lists(
@@ -117,8 +117,9 @@ def test_too_many_values_are_refused_before_they_are_parsed(row, monkeypatch):
         parse_document(text, "w.yaml")
 
 
-def test_too_many_values_are_blamed_on_aliases_only_where_there_are_some():
+def test_too_many_values_are_blamed_on_aliases_only_where_there_are_some(monkeypatch):
+    monkeypatch.setattr(document, "MAX_VALUES", 2000)
     with pytest.raises(InputError, match="has more than 200000 values"):
-        parse_document(f"a: [{'1,' * 200_001}]", "w.yaml")
+        parse_document(f"a: [{'1,' * 2001}]", "w.yaml")
     with pytest.raises(InputError, match="its aliases expand to too many values"):
-        parse_document(f"a: &a [{'1,' * 2000}]\nb: &b [{'*a,' * 20}]\nc: [{'*b,' * 20}]", "w.yaml")
+        parse_document(f"a: &a [{'1,' * 20}]\nb: &b [{'*a,' * 20}]\nc: [{'*b,' * 20}]", "w.yaml")

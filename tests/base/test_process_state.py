@@ -55,7 +55,7 @@ CHANGES = {
 
 @pytest.mark.parametrize("name", CHANGES)
 @pytest.mark.parametrize("raises", [False, True])
-def test_a_change_of_user_code_ends_with_it(name, raises, monkeypatch, capfd):
+def test_a_change_of_user_code_ends_with_it(signals, name, raises, monkeypatch, capfd):
     before = state()
 
     def change():

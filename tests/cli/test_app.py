@@ -128,7 +128,7 @@ def test_another_closed_pipe_is_a_fault(antdrive, monkeypatch):
     ("number", "code", "says"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated"), (signal.SIGHUP, 129, "terminated")],
 )
-def test_a_signal_is_one_line_that_says_how_to_resume(antdrive, monkeypatch, number, code, says):
+def test_a_signal_is_one_line_that_says_how_to_resume(signals, antdrive, monkeypatch, number, code, says):
     def interrupt(*_, **__):
         signal.raise_signal(number)
 

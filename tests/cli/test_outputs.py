@@ -122,8 +122,11 @@ def test_an_output_that_cannot_be_made_is_named(refused, inputs, line):
 
 
 def limited(blocks, *words):
-    """Exit code, stdout and stderr of a command in a process whose files hold at most so many blocks of 1 kB."""
-    command = ["bash", "-c", f'ulimit -f {blocks}; exec "$@"', "-", sys.executable, "-m", "antdrive", *map(str, words)]
+    """Exit code, stdout and stderr of a command in a process whose files hold at most so many blocks of 1 kB.
+
+    It writes no bytecode, which the limit would cut short, for all later processes: Python 3.11 does not notice.
+    """
+    command = ["bash", "-c", f'ulimit -f {blocks}; exec "$@"', "-", sys.executable, "-Bm", "antdrive", *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     return done.returncode, done.stdout, done.stderr
 

@@ -169,12 +169,12 @@ def test_a_sweep_records_each_of_them_and_goes_on(folder, antdrive, monkeypatch,
 def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypatch):
     monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
     planners = "-p", "a=mine.py:Endless", "-p", "b=mine.py:Right"
-    code, out, err = antdrive("compare", "empty", *planners, "--no-figures", "--json", "-o", "out", "--plan-limit", "3")
+    code, out, err = antdrive("compare", "empty", *planners, "--no-figures", "--json", "-o", "out", "--plan-limit", "1")
     assert code == 3
-    assert err.startswith(f"antdrive: planner Endless {ENDS['Endless'].replace('0.3', '3')} (1 run)\n")
+    assert err.startswith(f"antdrive: planner Endless {ENDS['Endless'].replace('0.3', '1')} (1 run)\n")
     runs = json.loads(out)["runs"]
     assert runs["a"]["outcome"] == "planner_fault"
-    assert "limit of 3 s" in runs["a"]["reason"]
+    assert "limit of 1 s" in runs["a"]["reason"]
     assert runs["b"]["succeeded"]
 
 
@@ -198,7 +198,7 @@ def test_suites_name_it_and_go_on(folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_a_supervised_command_as_any_other(folder, number, code):
+def test_a_signal_ends_a_supervised_command_as_any_other(signals, folder, number, code):
     words = [ANTDRIVE, "run", "empty", "--planner", "mine.py:Endless", "--no-figures", "--plan-limit", "off"]
     started = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     try:

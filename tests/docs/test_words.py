@@ -1,6 +1,7 @@
 """Size and words of the documents: one term for each thing, no page beyond its limit."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -45,12 +46,22 @@ def test_documents_keep_their_limits_of_words(start):
     assert sum(words.values()) <= LIMITS[start], sorted(words.items(), key=lambda item: -item[1])[:12]
 
 
+MODULES = sorted((ROOT / "src" / "antdrive").rglob("*.py"))
+
+
+@functools.cache
+def strings(path):
+    """The docstring of a module, and all its strings with those of what it defines."""
+    tree = ast.parse(path.read_text())
+    values = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
+    return ast.get_docstring(tree) or "", "\n".join(text for text in values if isinstance(text, str))
+
+
 def texts():
     """Every page, and the strings and docstrings of every module."""
     yield from PAGES.items()
-    for path in sorted((ROOT / "src" / "antdrive").rglob("*.py")):
-        strings = [n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant)]
-        yield path.relative_to(ROOT).as_posix(), "\n".join(text for text in strings if isinstance(text, str))
+    for path in MODULES:
+        yield path.relative_to(ROOT).as_posix(), strings(path)[1]
 
 
 @pytest.mark.parametrize("term", REPLACED)
@@ -59,12 +70,9 @@ def test_a_thing_has_the_glossarys_term(term):
     assert [f"{where}: {hit[0]}" for where, text in texts() for hit in pattern.finditer(text)] == []
 
 
-MODULES = sorted((ROOT / "src" / "antdrive").rglob("*.py"))
-
-
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ROOT / "src" / "antdrive").as_posix())
 def test_a_module_begins_with_what_it_is(path):
-    first = (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n\n")[0].partition("\n")[0]
+    first = strings(path)[0].partition("\n\n")[0].partition("\n")[0]
     assert first, "has no docstring"
     assert not re.match(r"(What|How|Whatever|Whoever|Where|When|Which|That|All|Everything|Who)\b", first), first
     assert len(first.split()) <= 25, first

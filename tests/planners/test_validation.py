@@ -403,7 +403,7 @@ def test_a_planner_error_can_be_pickled():
     assert (str(copy), copy.planner, copy.problem) == (str(error.value), "mine", error.value.problem)
 
 
-def test_input_errors_sigterm_and_ctrl_c_pass_through():
+def test_input_errors_sigterm_and_ctrl_c_pass_through(signals):
     for error in (InputError("query: has no task"), Terminated(143)):
         with pytest.raises(type(error)):
             request_plan(Broken(error), QUERY, RNG(0))

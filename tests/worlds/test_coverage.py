@@ -118,7 +118,7 @@ def doors_driven(world, cell, inflate, doors):
     return driven
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     st.lists(st.floats(0.5, 1.1), min_size=3, max_size=3),
     st.lists(st.floats(0.9, 1.1), min_size=3, max_size=3),
@@ -163,7 +163,7 @@ def test_crossing_corridors_are_one_room():
     assert covered(world, 0.3, (4.0, 4.0)).room_count == 1
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.integers(0, 100), st.floats(0.05, 0.6), st.floats(0.01, 0.5))
 def test_a_larger_robot_never_reaches_more(seed, inflate, more):
     task = forest(np.random.default_rng(seed))

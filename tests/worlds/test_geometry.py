@@ -36,13 +36,13 @@ def test_point_clearance_is_the_distance_to_the_nearest_surface(world, p):
     assert point_clearance(world, [p])[0] == pytest.approx(clearance_of_point(world, *p), abs=1e-12)
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(worlds(max_discs=4), points, points)
 def test_segment_clearance_is_the_least_along_the_segment(world, a, b):
     assert segment_clearance(world, [a], [b])[0] == pytest.approx(clearance_of_segment(world, a, b), abs=1e-7)
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(worlds(), st.lists(st.tuples(points, points), min_size=2, max_size=6))
 def test_clearances_in_a_batch_equal_single_ones(world, ends):
     """Bit for bit: each search starts from the previous result."""

@@ -54,7 +54,7 @@ def test_moves_are_as_defined_in_a_crowd(seed, cell, inflate):
     assert (bits(grid)[sure] == expected[sure].astype(bool)).all()
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(worlds(), st.floats(0.4, 1.5), st.floats(0.0, 0.6))
 def test_moves_are_as_defined(world, cell, inflate):
     grid = rasterise(world, cell, inflate)
@@ -92,7 +92,7 @@ def test_moves_are_as_defined_where_discs_are_much_larger_than_cells(cell, radiu
         assert (bits(grid)[..., bit] == moves)[sure].all()
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(worlds(), st.floats(0.4, 1.5), st.floats(0.0, 0.6))
 def test_a_cell_is_free_when_the_robot_fits_at_its_centre(world, cell, inflate):
     grid = rasterise(world, cell, inflate)

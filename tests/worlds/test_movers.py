@@ -316,7 +316,7 @@ def test_each_motion_has_the_radius_and_the_places_of_its_mover():
 # Files
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(st.lists(keyframed() | keyframed(interpolation="catmull-rom"), max_size=3))
 def test_keyframes_survive_files_and_json(tmp_path_factory, movers):
     world = World("w", (-100.0, -100.0, 100.0, 100.0), movers=(*movers, *KINDS[5:]))

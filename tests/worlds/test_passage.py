@@ -80,7 +80,7 @@ def test_worlds_without_a_bottleneck():
     assert widest_passage(Task(closed, (0.6, 0.6, 0.0), (3.4, 0.6))) is None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.tuples(st.integers(-2, 42), st.integers(-2, 32), st.integers(1, 9)), max_size=30),
     st.tuples(st.integers(1, 39), st.integers(1, 29)),

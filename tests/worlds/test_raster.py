@@ -28,7 +28,7 @@ def changed_at_random(rng, discs, cell, *, snapped):
     return discs
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
     st.sampled_from([0.05, 0.1, 0.25, 0.31]),
@@ -73,7 +73,7 @@ def test_a_raster_s_grid_cannot_be_written():
     assert not rasterise(World("empty", BOUNDS), 0.5, 0.2).free.flags.writeable
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.lists(st.integers(0, 6), max_size=20), st.lists(st.integers(0, 6), max_size=20))
 def test_differences_leave_equal_lists(old, new):
     """The rows outside the pairs are the same in both lists, in the same order."""

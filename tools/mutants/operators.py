@@ -6,7 +6,7 @@ import ast
 import bisect
 import contextlib
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 
 COMPARISONS = {
@@ -79,12 +79,13 @@ class Edit:
     text: str
 
 
-def mutants_of(file: str, source: str) -> list[Mutant]:
+def mutants_of(file: str, source: str, functions: Container[str] | None = None) -> list[Mutant]:
     """Return every distinct mutant of a file, in text order.
 
     Args:
         file: the file, relative to the root of the project
         source: its text
+        functions: the functions whose mutants are wanted, by default all
     """
     tree = ast.parse(source)
     finder = _Finder(source)
@@ -94,6 +95,8 @@ def mutants_of(file: str, source: str) -> list[Mutant]:
     begins = [0, *ends]
     found: dict[str, Mutant] = {}
     for function, edit in finder.found:
+        if functions is not None and function not in functions:
+            continue
         text = (data[: edit.start] + edit.text.encode() + data[edit.end :]).decode()
         if text == source or text in found:
             continue

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import functools
 import json
 import math
 import os
@@ -226,11 +227,7 @@ class Server:
 def dependents(root: Path, file: str) -> set[str]:
     """Return a file and all files that import it, directly or indirectly, relative to `SOURCE`."""
     source = root / SOURCE
-    lazy = _lazy_names(source)
-    imported: dict[str, set[str]] = {}
-    for path in (path for room in ROOMS for path in (source / room).rglob("*.py")):
-        names = _imports(path)
-        imported[str(path.relative_to(source))] = names | {lazy[name] for name in names if name in lazy}
+    imported = _imported(source)
     found = {file}
     while True:
         modules = {_module(name) for name in found}
@@ -238,6 +235,17 @@ def dependents(root: Path, file: str) -> set[str]:
         if not more:
             return found
         found |= more
+
+
+@functools.cache
+def _imported(source: Path) -> dict[str, set[str]]:
+    """Return what each file imports; no mutant changes that."""
+    lazy = _lazy_names(source)
+    imported = {}
+    for path in (path for room in ROOMS for path in (source / room).rglob("*.py")):
+        names = _imports(path)
+        imported[str(path.relative_to(source))] = names | {lazy[name] for name in names if name in lazy}
+    return imported
 
 
 def _module(file: str) -> str:

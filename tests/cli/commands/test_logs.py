@@ -47,7 +47,7 @@ def test_the_margin_of_a_noisy_drive_is_broken_down_by_cause(antdrive, small):
 
 
 def test_a_drive_that_kept_the_margin_is_said_to_have_used_nothing(antdrive):
-    assert antdrive("run", "empty", "--out", "r")[0] == 0
+    assert antdrive("run", "empty", "--no-figures", "--out", "r")[0] == 0
     _, out, _ = antdrive("margin", "r")
     assert "no loss: the robot never came closer to an obstacle than the margin" in out
     assert "largest loss: " not in out

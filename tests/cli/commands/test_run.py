@@ -27,7 +27,9 @@ def test_a_run_writes_the_files_it_lists_and_verify_agrees(antdrive, small, tmp_
 
 
 def test_a_run_reports_its_outcome_and_certificate(antdrive, small):
-    code, out, _ = antdrive("run", small, "--planner", "aco-han", "--set", "planner.ants=50", "--seed", "3")
+    code, out, _ = antdrive(
+        "run", small, "--planner", "aco-han", "--set", "planner.ants=50", "--seed", "3", "--no-figures"
+    )
     assert code == 0
     assert "stopped at the goal without contact" in out
     assert "certified collision-free" in out
@@ -37,7 +39,7 @@ def test_a_run_reports_its_outcome_and_certificate(antdrive, small):
 def test_a_collision_is_exit_code_1_and_verify_refuses_the_log(antdrive, small, collided_run):
     disc = collided_run.scenario.unseen[0]
     hidden = f"{disc.x},{disc.y},{disc.radius}"
-    code, out, _ = antdrive("run", small, "-p", "astar", "--unseen", hidden, "--json", "--out", "r")
+    code, out, _ = antdrive("run", small, "-p", "astar", "--unseen", hidden, "--json", "--no-figures", "--out", "r")
     facts = json.loads(out)
     assert code == 1
     assert facts["outcome"] == "collided"
@@ -48,7 +50,7 @@ def test_a_collision_is_exit_code_1_and_verify_refuses_the_log(antdrive, small, 
 
 
 def test_no_path_is_exit_code_1_with_a_reason(antdrive):
-    code, out, _ = antdrive("run", "no-path", "--json")
+    code, out, _ = antdrive("run", "no-path", "--no-figures", "--json")
     facts = json.loads(out)
     assert (code, facts["outcome"]) == (1, "no_path")
     assert facts["reason"]

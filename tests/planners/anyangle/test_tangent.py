@@ -65,7 +65,7 @@ def random_discs(rng, count):
 def test_the_length_lies_between_those_among_inner_and_outer_polygons():
     rng = np.random.default_rng(7)
     solved = sealed = 0
-    for count in (1, 2, 3, 4, 5, 6, 8, 10, 12, 14) * 3:
+    for count in (1, 2, 3, 4, 5, 6, 8, 10, 12, 14) * 2:
         discs, ends, box = random_discs(rng, count), ((0.5, 0.5), (9.5, 9.5)), (0.0, 0.0, 10.0, 10.0)
         path = shortest(discs, box, 0.0, *ends)
         low, high = (polygon_bound(discs, box, ends, inside=inside) for inside in (True, False))
@@ -75,8 +75,8 @@ def test_the_length_lies_between_those_among_inner_and_outer_polygons():
         else:
             solved += 1
             assert low - 1e-6 <= path.length <= high + 1e-6
-    assert solved >= 15
-    assert sealed >= 2
+    assert solved >= 10
+    assert sealed >= 1
 
 
 # -- hand calculations
@@ -222,7 +222,7 @@ def length(discs, start=START, goal=GOAL):
     return math.inf if path is None else path.length
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(some_discs)
 def test_the_length_does_not_change_when_ends_are_swapped_or_the_world_is_turned(discs):
     expected = pytest.approx(length(discs), abs=1e-7)
@@ -236,7 +236,7 @@ def test_the_length_does_not_change_when_ends_are_swapped_or_the_world_is_turned
         assert length([(*turn(x, y), r) for x, y, r in discs], turn(*START), turn(*GOAL)) == expected
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(some_discs, st.floats(0, math.tau), st.floats(-50, 50), st.floats(-50, 50))
 def test_the_length_does_not_change_under_a_rigid_motion_far_from_walls(discs, angle, dx, dy):
     assume(not nearly_touching(discs, 0.1))
@@ -257,14 +257,14 @@ def nearly_touching(discs, inflate):
     )
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(some_discs, st.tuples(coordinate, coordinate, st.sampled_from([0.2, 1.0])))
 def test_another_disc_never_shortens_the_path(discs, more):
     assume(all(math.dist(more[:2], end) > more[2] + 0.11 for end in (START, GOAL)))
     assert length([*discs, more]) >= length(discs) - 1e-7
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(some_discs, st.sampled_from([1e-1, 1e-3, 1e-5]))
 def test_the_polyline_keeps_the_clearance_and_stays_close(discs, bulge):
     path = shortest(discs, WALLS, 0.1, START, GOAL)
@@ -283,7 +283,7 @@ def test_the_polyline_keeps_the_clearance_and_stays_close(discs, bulge):
         assert min(polyline_clearance(world, point[None]) for point in rim) >= 0.1 - 1e-9
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(some_discs, st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=3))
 def test_no_clear_polyline_is_shorter(discs, via):
     line = np.array([START, *via, GOAL])
@@ -391,7 +391,7 @@ def test_a_lattice_of_discs_that_all_touch_is_solved():
 # -- shortcuts of the search
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(some_discs, st.sampled_from([0.3, 0.999, 1.0, 1.05, 2.0]))
 def test_an_expected_length_changes_no_path(discs, fraction):
     path = shortest(discs, WALLS, 0.1, START, GOAL)
@@ -413,7 +413,7 @@ def test_among_many_discs_a_path_on_the_grid_bounds_the_search(monkeypatch):
     assert bounded.work < free.work
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(some_discs, st.floats(-12, 12), st.floats(-12, 12), st.floats(0, 1.7), st.sampled_from([-1, 1]), st.data())
 def test_every_tangent_to_a_free_arc_is_checked(discs, dx, dy, radius, turn, data):
     assume(discs)

@@ -28,7 +28,7 @@ def test_a_search_is_a_replanner(planner):
 @BOTH
 def test_plans_equal_the_oracle(planner):
     rng = np.random.default_rng(1)
-    for _ in range(200):
+    for _ in range(80):
         for query in (random_query(rng), random_discs(rng)):
             floor = World(query.grid).optimum(query.start, query.goal)
             result = planner.plan(query, RNG)
@@ -41,10 +41,10 @@ def test_repairs_equal_the_oracle(planner):
     rng = np.random.default_rng(2)
     solved = sum(
         change_at_random(lambda q: planner.replanner(q, RNG), make(rng), rng, 8)
-        for _ in range(100)
+        for _ in range(40)
         for make in (random_query, random_discs)
     )
-    assert solved > 600  # most must have a path for the test to be meaningful
+    assert solved > 240  # most must have a path for the test to be meaningful
 
 
 @pytest.mark.slow
@@ -69,7 +69,7 @@ changes = st.lists(
 
 
 @BOTH
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(bits=st.lists(st.booleans(), min_size=42, max_size=42), edits=changes)
 def test_repairs_equal_the_oracle_after_any_sequence_of_changes(planner, bits, edits):
     free = np.array(bits).reshape(6, 7)
@@ -87,7 +87,7 @@ def test_repairs_equal_the_oracle_after_any_sequence_of_changes(planner, bits, e
 
 
 @BOTH
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_drive_through_an_unknown_map(planner, seed):
     """The robot detects cells within three cells, treats all others as free, and replans at every step."""
     rng = np.random.default_rng(seed)

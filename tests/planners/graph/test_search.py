@@ -132,7 +132,7 @@ def cost(free, start, goal):
     return AStar().plan(Query(Grid.from_free(free), start, goal), RNG).cost
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(pictures, st.data())
 def test_the_cost_is_the_same_in_a_turned_or_mirrored_world(free, data):
     cells = [tuple(map(int, c)) for c in np.argwhere(free)]
@@ -148,7 +148,7 @@ def test_the_cost_is_the_same_in_a_turned_or_mirrored_world(free, data):
     assert cost(moved, (start[0] + 2, start[1] + 3), (goal[0] + 2, goal[1] + 3)) == expected  # translated
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(pictures, st.data())
 def test_freeing_a_cell_never_lengthens_a_path(free, data):
     cells = [tuple(map(int, c)) for c in np.argwhere(free)]

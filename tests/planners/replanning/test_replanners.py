@@ -68,7 +68,7 @@ def test_an_unreachable_end_is_forgotten_after_an_edit_or_a_move():
 def test_after_any_change_the_answer_fits_the_grid_as_it_is(name):
     rng = np.random.default_rng(4)
     solved = 0
-    for turn in range(14):
+    for turn in range(8):
         query = (random_query, random_discs)[turn % 2](rng)
         replanner, world = made(name, query, turn), World(query.grid)
         assert isinstance(replanner, Replanner)
@@ -98,7 +98,7 @@ def test_after_any_change_the_answer_fits_the_grid_as_it_is(name):
                 replanner.move(tuple(map(int, result.cells[1])))
             elif rng.random() < 0.3:
                 replanner.move(tuple(map(int, rng.integers(0, query.grid.shape))))
-    assert solved > 20
+    assert solved > 12
 
 
 @pytest.mark.parametrize("name", ON_CELLS)
@@ -177,7 +177,7 @@ def cylinders(seed):
 
 def test_a_warm_started_colony_takes_a_fraction_of_the_work_and_stays_near_the_optimum():
     fractions, gaps = [], []
-    for seed in range(6):
+    for seed in range(3):
         query, rng = cylinders(seed), np.random.default_rng(seed)
         ants = WarmStartedColony(MergingAnts(), query, rng)
         for _ in range(3):
@@ -192,7 +192,7 @@ def test_a_warm_started_colony_takes_a_fraction_of_the_work_and_stays_near_the_o
             cold = MergingAnts().plan(ants.query, rng)
             fractions.append(warm.work / cold.work)
             gaps.append(warm.cost / optimum(ants.query) - 1)
-    assert len(fractions) > 8
+    assert len(fractions) > 4
     assert np.median(fractions) < 0.5
     assert np.median(gaps) < 0.01
     assert max(gaps) < 0.1
@@ -233,7 +233,7 @@ def alone(robot, limit=3000):
 @pytest.mark.parametrize("case", CASES)
 def test_one_rule_arrives_in_all_six_of_hasans_cases(case, name, count):
     query = CASES[case]
-    for seed in range(3):
+    for seed in range(2 if count else 1):
         movers = Strollers(query.grid, count, np.random.default_rng(seed), (query.start, query.goal))
         robot = robot_by(name, query)
         assert drive(robot, query, movers)[-1] == query.goal  # raises if a move is not allowed or a cell is occupied

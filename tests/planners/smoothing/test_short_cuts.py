@@ -67,7 +67,7 @@ def test_a_gap_that_the_line_passes_is_split_evenly(seed):
     np.testing.assert_allclose(room, expected, rtol=0, atol=1e-12)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seeds, st.floats(0.0, 4.0), st.sampled_from([1.0, -1.0]))
 def test_every_direction_of_an_arc_is_covered(seed, sweep, turn):
     rng = np.random.default_rng(seed)

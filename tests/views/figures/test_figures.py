@@ -259,12 +259,11 @@ def test_ant_steps_take_the_place_of_iterations():
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
 def test_the_same_run_gives_the_same_file(made_up_drive, tmp_path, suffix):
     drive = made_up_drive()
-    files = [tmp_path / f"{name}{suffix}" for name in ("one", "other", "saved")]
-    for path in files[:2]:
-        overview(drive, path, dpi=60)
-    save_figure(overview(drive, dpi=60), files[2])
-    one, other, saved = (path.read_bytes() for path in files)
-    assert one == other == saved
+    files = [tmp_path / f"{name}{suffix}" for name in ("drawn", "saved")]
+    overview(drive, files[0], dpi=60)
+    save_figure(overview(drive, dpi=60), files[1])
+    one, other = (path.read_bytes() for path in files)
+    assert one == other
     assert one[:5] in (b"\x89PNG\r", b"%PDF-", b"<?xml")
 
 
@@ -274,13 +273,10 @@ def test_an_overview_shows_obstacles_trail_and_contact(made_up_drive, tmp_path):
     world = drive.record.task.world
     world = replace(world, obstacles=world.obstacles[-1:])
     record = changed(drive.record, "task", world=world)
-    bare = replace(drive, contacts=drive.contacts * [1, 0, 1, 1], record=record)
-    few = pixels(overview(bare, tmp_path / "few.png", dpi=80))
+    clean = replace(drive, contacts=np.empty((0, 4)), record=replace(record, outcome=Outcome.STUCK))
+    few = pixels(overview(clean, tmp_path / "few.png", dpi=80))
     assert near(full, (121, 136, 160)) > 3 * near(few, (121, 136, 160))
-    stuck = replace(drive.record, outcome=Outcome.STUCK)
-    clean = replace(drive, contacts=np.empty((0, 4)), record=stuck)
-    untouched = pixels(overview(clean, tmp_path / "clean.png", dpi=80))
-    assert near(full, (204, 32, 42)) > near(untouched, (204, 32, 42)) + 50
+    assert near(full, (204, 32, 42)) > near(few, (204, 32, 42)) + 50
 
 
 def test_unseen_obstacles_have_their_own_colour(made_up_drive, tmp_path):

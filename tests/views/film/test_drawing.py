@@ -178,7 +178,7 @@ def assert_alike(bodies, camera, fine, least=200):
     assert (away > 1e-5).sum() <= 3
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     st.sampled_from(["oblique", "top"]),
     st.integers(1, 3),

@@ -171,9 +171,17 @@ def test_the_data_come_back_as_they_are(columns):
     assert data["shown"][:3] == ["world", "planner", "option.ants"]
 
 
-def test_charts_are_svg_with_a_curve_for_each_planner(summary):
-    styles = label_styles(summary.paired.planners, ["ants", "ants", "astar"])
-    charts = campaign_charts(summary, styles)
+@pytest.fixture(scope="module")
+def styles(summary):
+    return label_styles(summary.paired.planners, ["ants", "ants", "astar"])
+
+
+@pytest.fixture(scope="module")
+def charts(summary, styles):
+    return campaign_charts(summary, styles)
+
+
+def test_charts_are_svg_with_a_curve_for_each_planner(summary, styles, charts):
     assert [chart.title for chart in charts] == [
         "Performance profile: driven length", "Performance profile: planning time", "Distribution: duration",
         "Distribution: planning time", "By world size: planning time", "By world size: gap to grid optimum",
@@ -242,9 +250,8 @@ def test_styles_of_labels_differ_and_are_readable_on_their_ground():
         assert dark > 0.21
 
 
-def test_charts_for_a_thesis_have_truetype_fonts_names_and_one_width(summary, tmp_path):
-    styles = label_styles(summary.paired.planners)
-    files = write_charts(campaign_charts(summary, styles)[:3], summary.paired.planners, tmp_path)
+def test_charts_for_a_thesis_have_truetype_fonts_names_and_one_width(summary, styles, charts, tmp_path):
+    files = write_charts(charts[:3], summary.paired.planners, tmp_path)
     assert [path.suffix for path in files] == [".pdf", ".svg"] * 3
     assert files[0].name == "performance-profile-driven-length.pdf"
     for path in files:

@@ -74,7 +74,7 @@ def test_a_hostile_file_is_refused_quickly(case, tmp_path):
 @example("\ud800")
 @example("a: &a [*a]")
 @example("? ? ?")
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_any_text_is_a_document_or_an_input_error(text):
     message = refusal(lambda: parse_document(text, "text"))
     assert message is None or (message.startswith("text") and message.isprintable())
@@ -175,7 +175,7 @@ def tasks(draw):
     return Task(world, start, goal, draw(sizes), draw(st.floats(401.0, 1e6)))
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(tasks())
 def test_a_written_task_reads_back_exactly(tmp_path_factory, task):
     path = tmp_path_factory.mktemp("w") / "task.yaml"
@@ -183,7 +183,7 @@ def test_a_written_task_reads_back_exactly(tmp_path_factory, task):
     assert load_task(path) == task
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(tasks())
 def test_a_task_survives_json(task):
     assert task_from_dict(json.loads(json.dumps(task_to_dict(task)))) == task

@@ -70,7 +70,7 @@ def beyond_blocked(cells, points):
 
 
 @given(maps(), st.sampled_from([None, 0.25, 0.6, 1.3]))
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_cells_are_fully_covered_and_discs_reach_no_farther_than_the_overhang(cells, wanted):
     side = cells.resolution
     found = cover(cells, None if wanted is None else wanted * side)
@@ -104,7 +104,7 @@ def test_solid_ground_takes_fewer_discs_than_cells_and_a_larger_overhang_fewer_s
 
 
 @given(maps(), st.data())
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_planners_use_the_exact_cells_of_the_map(cells, data):
     """The robot fits through a passage one cell wide between discs."""
     spots = [tuple(spot) for spot in np.argwhere(cells.free).tolist()]
@@ -142,7 +142,7 @@ MAP = CellMap(np.array([[True, True, True, False], [True, True, True, True]]), 0
 
 
 @given(worlds(), st.sampled_from([0.25, 0.3, 0.7, 1.1, 30.0]))
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_a_cell_is_free_when_no_disc_and_no_wall_reaches_into_it(world, resolution):
     cells = cell_map(world, resolution)
     xmin, ymin, xmax, ymax = world.bounds
@@ -169,7 +169,7 @@ def test_a_disc_that_only_touches_a_cell_does_not_block_it():
 
 
 @given(worlds())
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_a_world_made_from_a_worlds_cells_blocks_all_that_the_world_does(world):
     cells = cell_map(world, 0.5)
     spots = np.argwhere(cells.free)

@@ -46,7 +46,7 @@ def tasks(draw):
 
 
 @given(tasks())
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_sdf_out_and_in_is_the_same_task_to_the_last_bit(tmp_path_factory, task):
     path = tmp_path_factory.mktemp("sdf") / "w.sdf"
     export_sdf(task, path)

@@ -33,11 +33,11 @@ def places(seed, count=40, size=6.0):
 
 
 @EVERY
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_free_headings_are_those_of_samples(outline, seed):
     discs, bounds = crowd(seed)
-    yaws = np.linspace(0, TURN, 500, endpoint=False)
-    for x, y in places(seed):
+    yaws = np.linspace(0, TURN, 250, endpoint=False)
+    for x, y in places(seed, 30):
         gaps = gap(outline, x, y, yaws, discs, bounds)
         sure = np.abs(gaps) > BAND
         found = in_any(free_headings(x, y, outline, discs, bounds), yaws)
@@ -47,7 +47,7 @@ def test_free_headings_are_those_of_samples(outline, seed):
 @EVERY
 def test_ends_of_intervals_touch_and_starts_are_sorted(outline):
     discs, bounds = crowd(3)
-    for x, y in places(3, 100):
+    for x, y in places(3, 50):
         intervals = free_headings(x, y, outline, discs, bounds)
         assert (np.diff(intervals[:, 0]) > 0).all()
         assert ((intervals[:, 0] >= 0) & (intervals[:, 0] < TURN) & (intervals[:, 0] < intervals[:, 1])).all()
@@ -61,7 +61,7 @@ def test_ends_of_intervals_touch_and_starts_are_sorted(outline):
 def test_turns_are_clear_where_samples_are(outline, seed):
     discs, bounds = crowd(seed + 10)
     rng = np.random.default_rng(seed)
-    for x, y in places(seed + 10, 60):
+    for x, y in places(seed + 10, 30):
         yaw, turn = rng.uniform(-7, 7), rng.choice([0.0, 0.3, math.pi / 4, 2.0, TURN, 9.0]) * rng.choice([-1, 1])
         least, slack = sampled(outline, x, y, yaw, yaw + turn, discs, bounds)
         clear = turn_clear(x, y, yaw, turn, outline, discs, bounds)
@@ -77,7 +77,7 @@ def test_swept_distances_are_those_of_another_library(outline):
     shapely = pytest.importorskip("shapely")
     discs, bounds = crowd(5, count=12)
     rng = np.random.default_rng(5)
-    for x, y in places(5, 60):
+    for x, y in places(5, 40):
         yaw, (tx, ty) = rng.uniform(0, TURN), rng.uniform(-0.5, 0.5, 2) * rng.choice([0, 0.1, 1, 3])
         cos, sin = math.cos(yaw), math.sin(yaw)
         at = outline.corners @ np.array([(cos, sin), (-sin, cos)]) + (x, y)
@@ -177,7 +177,7 @@ def test_a_wall_stops_a_turn_between_two_free_headings(x, y, turns):
 
 
 @given(outlines(), st.floats(-3, 3), st.integers(0, 30))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_rotating_everything_rotates_the_intervals(outline, angle, seed):
     discs, _ = crowd(seed, count=6, size=2.0)
     discs[:, :2] -= 1.0
@@ -191,7 +191,7 @@ def test_rotating_everything_rotates_the_intervals(outline, angle, seed):
 
 
 @given(outlines(), st.floats(0.001, 0.3), st.integers(0, 30))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_growing_reach_only_shrinks_the_intervals(outline, more, seed):
     discs, bounds = crowd(seed, count=10, size=3.0)
     wider = Outline(outline.corners, outline.reach + more)
@@ -204,7 +204,7 @@ def test_growing_reach_only_shrinks_the_intervals(outline, more, seed):
 
 
 @given(st.floats(0.05, 0.6), st.integers(0, 30))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_a_disc_has_all_headings_or_none(radius, seed):
     discs, bounds = crowd(seed, count=10, size=3.0)
     bits, _ = of_cells(Outline(np.zeros((1, 2)), radius), discs, bounds)
@@ -213,7 +213,7 @@ def test_a_disc_has_all_headings_or_none(radius, seed):
 
 
 @given(outlines(), st.integers(0, 30))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_bits_of_any_outline_are_those_of_samples(outline, seed):
     discs, bounds = crowd(seed, count=8, size=3.0)
     bits, moves = of_cells(outline, discs, bounds, 0.3)

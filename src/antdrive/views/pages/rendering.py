@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 from antdrive.base.files import relative
 from antdrive.base.version import __version__
 from antdrive.runs.statistics.intervals import Interval
+
+if TYPE_CHECKING:
+    import jinja2
 
 NONE = "–"
 LONGEST = 200  # characters per text
@@ -157,6 +161,13 @@ NO_PARTS: Mapping[str, Any] = MappingProxyType(
 
 def rendered(template: str, **content: Any) -> str:
     """Fill a template: `page.html.j2` or `page.md.j2`."""
+    text = _environment().get_template(template).render(**{**NO_PARTS, **content}, version=__version__)
+    return ACTING.sub(" ", text)
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    """Return the environment that keeps compiled templates."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -165,8 +176,7 @@ def rendered(template: str, **content: Any) -> str:
         autoescape=jinja2.select_autoescape(["html.j2"]),
     )
     environment.filters |= {"md": markdown_text, "fence": fence_for}
-    text = environment.get_template(template).render(**{**NO_PARTS, **content}, version=__version__)
-    return ACTING.sub(" ", text)
+    return environment
 
 
 def link_to(path: Path, base: Path) -> str:
