@@ -108,9 +108,7 @@ def said_in_one_line(done, name, words):
     return done.stderr.startswith(f"antdrive: planner {name}") and words in done.stderr
 
 
-@pytest.mark.parametrize(
-    "name", ["Compiled", *(pytest.param(name, marks=pytest.mark.slow) for name in ("Endless", "Exits", *SLOW))]
-)
+@pytest.mark.parametrize("name", ["Compiled", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_a_planner_that_ends_its_process_or_never_ends_is_named(folder, name):
     world = "moving.yaml" if name.endswith("Later") else "empty"
     done = process("run", world, "--planner", f"mine.py:{name}", "--no-figures", "-o", "out")
