@@ -97,7 +97,7 @@ def flooded(task: Any, robot: str, search: str) -> Flood:
 @cache
 def crossed(source: Path, worlds: int, jobs: int, robot: str, search: str) -> dict[str, bool]:
     """Return by world whether the lattice crosses it."""
-    tasks = dict(list(barn_tasks(source).items())[: worlds or None])
+    tasks = barn_tasks(source, worlds)
     floods = call_all((partial(flooded, task, robot, search) for task in tasks.values()), jobs)
     return {name: one.crossed for name, one in zip(tasks, floods, strict=True)}
 
@@ -272,7 +272,7 @@ def robot_of(name: str, *, mapped: bool = True) -> RobotSpec:
 
 def driven(given: argparse.Namespace, name: str, among: Collection[str] = (), **settings: Any) -> list[Result]:
     """Drive a robot through the worlds, or those among the given ones, in their order."""
-    tasks = dict(list(barn_tasks(given.barn).items())[: given.worlds or None])
+    tasks = barn_tasks(given.barn, given.worlds)
     robot = robot_of(name, mapped=settings["map"] == "given")
     picked = {world: task for world, task in tasks.items() if not among or world in among}
     calls = (partial(drive, world, task, "astar", robot, seed=SEED, **settings) for world, task in picked.items())
