@@ -145,7 +145,7 @@ def no_avoidance() -> None:
 DESK = "x: 4.0, y: 2.3,"
 NOISE = r"((?:pose_xy|pose_yaw|encoder|slip|delay): )([\d.]+)"
 ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "TZ": "Asia/Kolkata"}
-SMALLEST = ("desk",)
+SMALLEST = ("desk verbose",)
 HEADS = {
     "Planted": ["planted", "tests that fail", "right place", "the most telling line"],
     "Harmless": ["harmless", "tests that pass", "bit-identical"],
