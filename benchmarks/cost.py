@@ -36,12 +36,12 @@ PLANNER, ROBOT = "astar", "jackal"
 MAPLESS = (PLANNER, "dstar-lite")
 
 
-def write_barn(source: Path, folder: Path) -> None:
-    """Write BARN's worlds to a folder as world files."""
+def write_barn(source: Path, folder: Path, count: int) -> None:
+    """Write BARN's first worlds, in the order of their names, to a folder as world files."""
     from antdrive.worlds import save_task
     from benchmarks.drives import barn_tasks
 
-    for name, task in barn_tasks(source).items():
+    for name, task in sorted(barn_tasks(source).items())[:count]:
         save_task(task, folder / f"{name}.yaml")
 
 
@@ -226,7 +226,7 @@ def main() -> None:
     with contextlib.ExitStack() as stack:
         folder = options.worlds or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         if options.worlds is None:
-            write_barn(barn, folder)
+            write_barn(barn, folder, options.count)
         worlds = sorted(folder.glob("*.yaml"))[: options.count]
         if options.count and not worlds:
             raise SystemExit(f"no worlds in {options.worlds or barn}; give --worlds or --barn")

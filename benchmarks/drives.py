@@ -15,8 +15,8 @@ import math
 import statistics
 import tarfile
 import tempfile
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -83,8 +83,9 @@ def failures(results: Sequence[Result]) -> str:
     return ", ".join(wrong) or "none"
 
 
-def barn_tasks(source: Path) -> dict[str, Task]:
-    """Load BARN's worlds by name, in the order of their numbers."""
+@cache
+def barn_tasks(source: Path, most: int = 0) -> Mapping[str, Task]:
+    """Load BARN's worlds by name, in the order of their numbers; at most so many, 0: all."""
     if not source.exists():
         missing(f"no worlds at {source}; docs/how-to/data.md says where BARN's are")
     with tempfile.TemporaryDirectory() as folder:
@@ -93,12 +94,12 @@ def barn_tasks(source: Path) -> dict[str, Task]:
                 archive.extractall(folder, filter="data")
             source = Path(folder)
         files = sorted(source.rglob("world_*.world"), key=lambda p: int(p.stem.split("_")[1]))
-        return {path.stem: import_barn(path) for path in files}
+        return {path.stem: import_barn(path) for path in files[: most or None]}
 
 
 def barn(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
     """Drive BARN's worlds with the jackal."""
-    tasks, rows = dict(list(barn_tasks(source).items())[:worlds]), []
+    tasks, rows = barn_tasks(source, worlds), []
     for planner, smoothing, noise in (
         ("astar", "clearance", 0.0), ("astar", "taut", 0.0), ("astar", "none", 0.0), ("ants", "clearance", 0.0),
         ("aco-han", "clearance", 0.0),

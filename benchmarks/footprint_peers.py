@@ -199,7 +199,7 @@ def filled(poses: Floats) -> Floats:
 
 def rows(worlds: int, source: Any) -> Iterator[list[str]]:
     """Yield the row of each robot and solver."""
-    tasks = list(barn_tasks(source).values())[: worlds or None]
+    tasks = list(barn_tasks(source, worlds).values())
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
     ou.RNG.setSeed(1)
     for robot in map(load_robot, ROBOTS):

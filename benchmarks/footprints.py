@@ -52,7 +52,7 @@ SMALLEST = (
     "plans --random 1",
     "repair --rounds 1",
     "office --office_tasks 1 --jobs 1",
-    "ants --seeds 1",
+    "ants --seeds 1 --worlds 1",
     "lines --courses 1 --jobs 1",
 )
 ANTS = (
@@ -97,7 +97,7 @@ def flooded(task: Any, robot: str, search: str) -> Flood:
 @cache
 def crossed(source: Path, worlds: int, jobs: int, robot: str, search: str) -> dict[str, bool]:
     """Return by world whether the lattice crosses it."""
-    tasks = dict(list(barn_tasks(source).items())[: worlds or None])
+    tasks = barn_tasks(source, worlds)
     floods = call_all((partial(flooded, task, robot, search) for task in tasks.values()), jobs)
     return {name: one.crossed for name, one in zip(tasks, floods, strict=True)}
 
@@ -272,7 +272,7 @@ def robot_of(name: str, *, mapped: bool = True) -> RobotSpec:
 
 def driven(given: argparse.Namespace, name: str, among: Collection[str] = (), **settings: Any) -> list[Result]:
     """Drive a robot through the worlds, or those among the given ones, in their order."""
-    tasks = dict(list(barn_tasks(given.barn).items())[: given.worlds or None])
+    tasks = barn_tasks(given.barn, given.worlds)
     robot = robot_of(name, mapped=settings["map"] == "given")
     picked = {world: task for world, task in tasks.items() if not among or world in among}
     calls = (partial(drive, world, task, "astar", robot, seed=SEED, **settings) for world, task in picked.items())
@@ -364,7 +364,7 @@ def ants(given: argparse.Namespace) -> Iterator[str]:
         name for name in PLANNERS if capabilities_of(PLANNERS[name]).iterative and capabilities_of(PLANNERS[name]).turns
     ]
     rows = []
-    for robot, world in ANTS:
+    for robot, world in ANTS[: given.worlds or None]:
         routes = route_planner(Scenario.of(world, planner=colonies[0], robot=robot))
         disc = grid_of(by_geometry(routes.task.world), routes.cell, routes.inflate)
         for shape, grid in (("disc", disc), ("footprint", routes.chosen_grid())):
@@ -396,7 +396,7 @@ def main() -> None:
         __doc__,
         tables=([], "tables to print; default: all"),
         barn=(BARN, "folder or archive of BARN's world_*.world files"),
-        worlds=(0, "how many of BARN's worlds; 0: all"),
+        worlds=(0, "how many of BARN's worlds, or of those of `ants`; 0: all"),
         jobs=(2, "processes; 0: this one"),
         only=("", "rows of `drives` with these values, such as 'husky none 1 auto'; default: all"),
         rounds=(20, "repair: drives of each kind"),

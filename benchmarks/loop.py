@@ -203,7 +203,7 @@ def main() -> None:
     options = command_line(
         __doc__,
         rounds=(9, "of each measurement"),
-        most=(20_000, "most cylinders of the third table"),
+        most=(20_000, "most cylinders of the first and third table"),
         against=("", "root of another checkout"),
     )
     rounds = options.rounds
@@ -211,7 +211,7 @@ def main() -> None:
     p = bullet()
     print("discs   bare us/step   loop us/step   loop / bare   limit / bare   x real time   step / step among 10")
     engines, stack = {}, contextlib.ExitStack()
-    for count in (10, 100, 400):
+    for count in (one for one in (10, 100, 400) if one <= options.most):
         task = task_among(count)
         route = winding(task)
         tracked = controller.prepare(route, task.world, robot, 0.05, 1 / 60)

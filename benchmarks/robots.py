@@ -100,7 +100,7 @@ def main() -> None:
         return
     reasons: dict[str, list[str]] = {}
     heads = "robot | radius m | noise 0 | time s | minimum clearance m | noise 1 | time s | minimum clearance m"
-    print_table(heads, drive_rows(barn_tasks(given.barn)["world_0"], names, reasons))
+    print_table(heads, drive_rows(barn_tasks(given.barn, 1)["world_0"], names, reasons))
     for reason, names in reasons.items():
         print(f"- {' and '.join(names)}: {reason}")
 

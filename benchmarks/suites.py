@@ -30,7 +30,7 @@ from benchmarks.markdown import command_line, print_table
 from benchmarks.resuming import append_line, current_commit, read_lines
 from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, rounds_with_pytest, with_check
 
-SMALLEST = ("--scenarios 10 --jobs 1", "--repeats 1 --within 1")
+SMALLEST = ("--scenarios 2 --jobs 1", "--repeats 1 --within 1")
 
 
 def suite(scenarios: int) -> str:

@@ -226,10 +226,10 @@ def twice(self, *args):
     name = self.py_func.__name__
     calls[name] = calls.get(name, 0) + 1
     left = 0
-    if calls[name] <= 60:
+    if calls[name] <= 25:
         blocks, kernel_cache.blocks = kernel_cache.blocks, 0
         copies = copied(args)
-        left, found = interpret(self.py_func, copies, {}, 100_000)
+        left, found = interpret(self.py_func, copies, {}, 50_000)
         kernel_cache.blocks = blocks
     result = CPUDispatcher.__call__(self, *args)
     if left:

@@ -1,6 +1,7 @@
 """Every benchmark runs in its smallest size: `SMALLEST` of its module has the words of each call."""
 
 import ast
+import json
 import os
 import shlex
 import subprocess
@@ -31,13 +32,41 @@ def test_every_benchmark_has_a_smallest_size():
     assert len([name for name, calls in CALLS.items() if calls]) > 20
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "words"), [(name, words) for name, calls in CALLS.items() for words in calls or ()])
-def test_a_benchmark_runs_in_its_smallest_size(name, words, tmp_path):
-    command = [sys.executable, "-m", f"benchmarks.{name}", *shlex.split(words)]
+#: Runs each command that it reads in a copy of itself, which has imported and loaded what most of them need.
+COPIES = """
+import json, os, runpy, sys
+from antdrive.sim import Scenario, run
+run(Scenario.of("empty", "astar", noise=1.0))
+for line in sys.stdin:
+    folder, module, *words = json.loads(line)
+    child = os.fork()
+    if not child:
+        os.chdir(folder)
+        for number, name in ((0, os.devnull), (1, "stdout"), (2, "stderr")):
+            os.dup2(os.open(name, os.O_CREAT | os.O_RDWR), number)
+        sys.argv = [module, *words]
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+        sys.exit()
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def copies():
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
-    if done.returncode == MISSING:
-        pytest.skip(done.stderr.strip())
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip()
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "env": env}
+    with subprocess.Popen([sys.executable, "-c", COPIES], **pipes) as process:
+        yield process
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that begin as copies")
+@pytest.mark.parametrize(("name", "words"), [(name, words) for name, calls in CALLS.items() for words in calls or ()])
+def test_a_benchmark_runs_in_its_smallest_size(name, words, tmp_path, copies):
+    copies.stdin.write(json.dumps([str(tmp_path), f"benchmarks.{name}", *shlex.split(words)]) + "\n")
+    copies.stdin.flush()
+    code, said = int(copies.stdout.readline()), (tmp_path / "stderr").read_text()
+    if code == MISSING:
+        pytest.skip(said.strip())
+    assert code == 0, said
+    assert (tmp_path / "stdout").read_text().strip()

@@ -200,7 +200,7 @@ def test_a_planner_that_depends_on_the_order_of_a_set_is_named(folder, monkeypat
     monkeypatch.delenv("PYTHONHASHSEED", raising=False)
     for words in (
         "accept s.drive.yaml",
-        "check s.drive.yaml",
+        "check s.drive.yaml --film never",
         "run w.yaml -r r.yaml -p mine.py:Mine -o out --no-figures",
     ):
         done = subprocess.run([ANTDRIVE, *words.split()], capture_output=True, text=True, timeout=100)

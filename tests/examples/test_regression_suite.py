@@ -90,5 +90,7 @@ def test_every_command_of_the_page_works(checkout, variables):
     results = checkout.parent / "my-robot" / "results" / "my" / "hall-0"
     assert (results / "then-and-now.mp4").stat().st_size > 10_000
     assert (checkout.parent / "my-robot" / "report.html").exists()
+    everything, _, rest = rest.partition("\n")
+    assert everything == "pytest --drive-strict", "which the first test here runs"
     done = run(["bash", "-ec", rest], checkout, variables)
     assert done.returncode == 0, done.stdout + done.stderr

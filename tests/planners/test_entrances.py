@@ -153,9 +153,9 @@ def test_ends_are_those_of_the_search_in_plain_python():
 
 @pytest.mark.slow
 def test_ends_of_many_tasks_are_those_of_the_search_in_plain_python():
-    kinds, wrong = answers(range(1000, 1300))
+    kinds, wrong = answers(range(1000, 1100))
     assert not wrong
-    assert min(kinds[True, True], kinds[False, True], kinds[True, False]) >= 10
+    assert min(kinds[True, True], kinds[False, True], kinds[True, False]) >= 3
 
 
 def test_leads_and_turns_are_clear_where_samples_are():

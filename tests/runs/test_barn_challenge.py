@@ -62,7 +62,7 @@ def test_the_jackal_drives_a_barn_world(number, barn, jackal):
     [
         (*setup, number)
         for setup in (("ants", 0.0, "clearance"), ("aco-han", 0.0, "taut"), ("astar", 1.0, "clearance"))
-        for number in sorted(SPREAD.sample(WORLDS, 12))
+        for number in sorted(SPREAD.sample(WORLDS, 12))[::2]
     ],
 )
 def test_every_planners_path_is_safe_to_follow(planner, noise, smoothing, number, barn, jackal):

@@ -165,7 +165,7 @@ def test_whatever_a_reason_says_holds(first):
 @pytest.mark.slow
 def test_whatever_a_reason_says_holds_in_many_worlds():
     counts = Counter()
-    for seed in range(1000, 1600):
+    for seed in range(1000, 1300):
         checked(seed, counts)
-    assert counts["does not fit"] > 10
-    assert counts["widest"] > 100
+    assert counts["does not fit"] > 5
+    assert counts["widest"] > 50

@@ -131,9 +131,9 @@ def test_routes_of_footprints_keep_the_margin():
 
 
 @pytest.mark.slow
-def test_a_thousand_routes_of_footprints_keep_the_margin():
-    count, faults = surveyed(range(1000, 1700))
-    assert count >= 1000
+def test_hundreds_of_routes_of_footprints_keep_the_margin():
+    count, faults = surveyed(range(1000, 1250))
+    assert count >= 350
     assert not faults
 
 

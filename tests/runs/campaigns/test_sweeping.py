@@ -125,10 +125,8 @@ def test_plain_data_may_be_numpys_tuples_ranges_and_paths(worlds):
 @pytest.mark.slow
 def test_processes_and_order_do_not_show_in_the_table(worlds):
     sweep(TWO_BY_TWO, "here", jobs=0)
-    sweep(TWO_BY_TWO, "two", jobs=2)
-    assert canonical_bytes("here") == canonical_bytes("two")
     back = {"worlds": TWO_BY_TWO["worlds"][::-1], "planners": TWO_BY_TWO["planners"][::-1]}
-    sweep(back, "back", jobs=1)
+    sweep(back, "back", jobs=2)
     assert canonical_bytes("here") == canonical_bytes("back")
 
 

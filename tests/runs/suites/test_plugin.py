@@ -247,7 +247,7 @@ def test_it_works_with_xdist_and_in_any_order(accepted):
     spread.stdout.fnmatch_lines(["2 of 3 drives passed", "results: *cache/antdrive/results/*/a/hit-0"])
     accepted.runpytest(*PLUGIN, "-x").assert_outcomes(failed=1)
     (accepted.path / "baselines" / "a" / "gone-0.json").write_text("{}")
-    strict = accepted.runpytest(*PLUGIN, "-k", "clear", "--drive-strict", "-p", "xdist", "-n", "2")
+    strict = accepted.runpytest(*PLUGIN, "-k", "clear", "--drive-strict", "-p", "xdist", "-n", "1")
     assert strict.ret == 1, "the processes tell the first one of unused baselines"
 
 

@@ -189,12 +189,12 @@ def test_a_robot_that_knows_the_motions_or_may_not_go_far_round_goes_through(tur
 def test_nearly_all_drives_in_the_hard_worlds_of_dynabarn_arrive(jackal):
     """Moments that benchmarks.dynamic does not use. Movers jump onto a robot, or past it closer than a certificate allows."""
     hard = [task for task in import_dynabarn(DYNABARN) if int(task.world.name.split("-")[1]) >= 40]
-    moments = [replace(task, world=task.world.later(t)) for task in hard for t in (3.1, 7.4, 16.0, 20.3)]
+    moments = [replace(task, world=task.world.later(t)) for task in hard for t in (7.4, 16.0)]
     planner = load_planner("dstar-lite")
     done = [run(Scenario(task=task, planner=planner, planner_name="dstar-lite", robot=jackal)) for task in moments]
     outcomes = [each.outcome for each in done]
-    assert len(done) == 12
-    assert sum(each.succeeded for each in done) >= 10, outcomes
+    assert len(done) == 6
+    assert sum(each.succeeded for each in done) >= 5, outcomes
     assert Outcome.COLLIDED not in outcomes
 
 

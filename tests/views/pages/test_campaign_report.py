@@ -228,7 +228,8 @@ def test_long_names_of_planners_stay_whole_and_apart(tmp_path):
     boxes = [title.get_window_extent() for title in titles]
     assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
     page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0].read_text()
-    assert re.findall(r"([^{}]*){[^{}]*text-overflow", page) == [" #runs td, #runs th "]
+    styles = "".join(re.findall(r"<style>(.*?)</style>", page, flags=re.DOTALL))
+    assert re.findall(r"([^{}]*){[^{}]*text-overflow", styles) == [" #runs td, #runs th "]
 
 
 def test_charts_need_no_optional_columns():
