@@ -179,7 +179,7 @@ def test_the_version_is_read_from_the_project_and_nowhere_else():
 
 
 def test_the_workflow_runs_what_everybody_runs():
-    (job,) = parsed(ROOT / ".github" / "workflows" / "ci.yml")["jobs"].values()
+    job = parsed(ROOT / ".github" / "workflows" / "ci.yml")["jobs"]["test"]
     assert [step["run"] for step in job["steps"] if "run" in step] == [".ci/run"]
     assert (ROOT / ".ci" / "run").stat().st_mode & 0o111
 
@@ -305,7 +305,7 @@ def test_integration_builds_the_site_where_python_is_new_enough_and_else_runs_it
 
 
 def test_commands_are_timed_in_loops_until_one_fails(monkeypatch, capsys):
-    monkeypatch.setattr(loop, "ADDITIONS", 1000)
+    monkeypatch.setattr(loop, "LOOP", "")
     monkeypatch.setattr(
         subprocess, "run", lambda words, check: subprocess.CompletedProcess(words, int(words[-1] == "b"))
     )

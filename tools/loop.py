@@ -13,14 +13,14 @@ import sys
 import time
 from pathlib import Path
 
-ADDITIONS = 10_000_000
+LOOP = "total = 0\nfor number in range(10_000_000):\n    total += number\n"
 
 
 def loop() -> float:
-    """Return the seconds of ten million additions."""
-    start, total = time.perf_counter(), 0
-    for _ in range(ADDITIONS):
-        total = total + 1
+    """Return the seconds of ten million additions at the top level of a module, where variables are slow."""
+    code = compile(LOOP, "loop", "exec")
+    start = time.perf_counter()
+    exec(code, {})  # noqa: S102 - a function's local variables are twice as fast
     return time.perf_counter() - start
 
 

@@ -30,6 +30,7 @@ ALLOWED = {
     "base/_kernels_compiler.py": {"os.open"},
     "base/process_state.py": {"os.fdopen"},
     "cli/app.py": {"open", "os.open", "os.fdopen"},
+    "cli/commands/init.py": {"source.read_text"},
     "cli/commands/robots.py": {"known[name].read_text"},
     "cli/listings.py": {"LISTED.read_text"},
     "cli/testing/session_summary.py": {"open"},

@@ -65,6 +65,8 @@ NO_FILES = {
     "controller",
     "schema",
     "warm",
+    "demo",
+    "init",
     "reproduce",
     "worlds list",
     "worlds generate",

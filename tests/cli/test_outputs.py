@@ -35,6 +35,8 @@ INVALID = [
     "barn worlds.tar.gz -p nosuch -o OUT",
     "barn worlds.tar.gz -r nosuch -o OUT",
     "falsify --method wise",
+    "demo --out OUT --jobs 1",
+    "init OUT/robot.yaml --wise",
     "falsify -p nosuch -o OUT",
     "shrink nowhere -o OUT",
     "reproduce nosuch -o OUT",

@@ -22,6 +22,7 @@ URDF = Path(__file__).parents[1] / "robots" / "importing" / "urdf" / "pioneer3dx
 MISSING = "drives need "  # followed by it, or by PyBullet where it has no wheel
 
 WORKS = {
+    "init": ("mine",),
     "plan": ("small.yaml", "small.yaml --planner dijkstra -o plan.png"),
     "compare": ("camp",),
     "sweep": ("-w small.yaml -p astar --dry-run",),
@@ -46,6 +47,7 @@ WORKS = {
     "robots import": ("pioneer.urdf -o mine.yaml",),
 }
 REFUSES = {
+    "demo": "",
     "run": "small.yaml --film film.mp4",
     "compare": "small.yaml -p astar -p dijkstra",
     "sweep": "-w small.yaml -p astar -o new",
