@@ -290,7 +290,7 @@ def test_where_nothing_can_be_fetched_it_says_how_to_get_a_python(tmp_path, pip,
     [(True, "make docs"), (False, ".venv/bin/python -m tools.pages --all --jobs 2")],
     ids=["3.11", "3.10"],
 )
-def test_integration_builds_the_site_where_python_is_new_enough_and_else_runs_its_pages(tmp_path, fits, last):
+def test_integration_builds_the_site_where_python_is_new_enough_and_tests_another_python(tmp_path, fits, last):
     """A stand-in for Python ends as 3.11 or 3.10 would on the question of the version, and prints what it is to time."""
     for folder in (".ci", "tools"):
         (tmp_path / folder).mkdir()
@@ -298,9 +298,13 @@ def test_integration_builds_the_site_where_python_is_new_enough_and_else_runs_it
         shutil.copy(SCRIPT.parent.parent / name, tmp_path / name)
     answers = f'*">= (3, 11)"*) exit {int(fits)} ;; tools.loop) shift 2; echo "$*" ;;'
     script(tmp_path / "python", f'#!/bin/sh\ncase "$2" in {answers} esac\n')
-    environment = {**os.environ, "PYTHON": str(tmp_path / "python")}
+    other = tmp_path / "versions" / "3.13.9" / "bin" / "python"
+    other.parent.mkdir(parents=True)
+    script(other, "#!/bin/sh\necho 3.13\n")
+    environment = {**os.environ, "PYTHON": str(tmp_path / "python"), "PYENV_ROOT": str(tmp_path)}
     done = subprocess.run([tmp_path / ".ci" / "run"], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1].split(" -- ")[2:] == ["make test", "make test-slow", last]
+    again = f"make VENV=.venv-3.13 PYTHON={other} test"
+    assert done.stdout.splitlines()[-1].split(" -- ")[2:] == ["make test", "make test-slow", last, again]
     assert ("needs Python 3.11" in done.stdout) is not fits
 
 
