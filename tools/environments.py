@@ -1,7 +1,7 @@
-"""Commands in fresh environments: `python -m tools.environments dist --python python3.10 python3.13`.
+"""Commands in fresh environments: `python -m tools.environments dist python3.10 python3.11=pybullet-arm64 python3.13=none`.
 
-For each interpreter, the wheel in the folder is installed into a fresh environment: with the distribution of PyBullet that
-the wheel requires there, with the other one if it has a wheel, and without any. There, in an empty folder and without the
+For each interpreter, the wheel in the folder is installed into a fresh environment, with the distribution of PyBullet that it
+requires there, with the named one, or without any. There, in an empty folder and without the
 checkout, commands run. Those that need PyBullet must refuse in one line where it is missing. The printed table is part of
 `docs/how-to/install.md`; an exit code of 1 means that a command did something else than it must.
 """
@@ -15,13 +15,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from antdrive.base.version import PHYSICS
+from antdrive.base.version import MISSING, PHYSICS
 from benchmarks.markdown import print_table
 from tools.dist import ROOT, built, version_of
+from tools.loop import loop
 
 #: Heads of the table's columns, each with the commands tried for it. `kept` is a drive from the environment of this script.
 COMMANDS = {
@@ -39,24 +39,29 @@ INVALID_INPUT = 2
 
 
 class Environment(NamedTuple):
-    """One row: an interpreter, and the distribution of PyBullet to replace the required one by; None: none."""
+    """One row: an interpreter, and what replaces the required distribution of PyBullet; empty: nothing does."""
 
-    python: Path
-    physics: str | None
-
-
-def environments(pythons: list[str]) -> Iterator[Environment]:
-    """Yield each interpreter with each distribution of PyBullet, and without."""
-    for python in pythons:
-        path = shutil.which(python)
-        if path is None:
-            raise SystemExit(f"{python}: no such interpreter")
-        for physics in (*PHYSICS, None):
-            yield Environment(Path(path), physics)
+    python: str
+    physics: str
 
 
-def row_of(one: Environment, wheel: Path, kept: Path, home: Path) -> tuple[list[str], list[str]] | None:
-    """Return the row of an environment and its problems; None if the distribution has no wheel for the interpreter."""
+def environment(text: str) -> Environment:
+    """Return the environment that a word of the command line names.
+
+    Raises:
+        argparse.ArgumentTypeError: there is no such interpreter or distribution.
+    """
+    python, _, physics = text.partition("=")
+    path = shutil.which(python)
+    if path is None or physics not in (*PHYSICS, "none", ""):
+        raise argparse.ArgumentTypeError(
+            f"{text}: must be an interpreter, alone or with ={'|'.join((*PHYSICS, 'none'))}"
+        )
+    return Environment(path, physics)
+
+
+def row_of(one: Environment, wheel: Path, kept: Path, home: Path) -> tuple[list[str], list[str]]:
+    """Return the row of an environment and its problems."""
     clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "VIRTUAL_ENV"))}
     clean["XDG_CACHE_HOME"] = str(home / "cache")  # of compiled kernels
     python, antdrive = home / "env" / "bin" / "python", home / "env" / "bin" / "antdrive"
@@ -65,24 +70,21 @@ def row_of(one: Environment, wheel: Path, kept: Path, home: Path) -> tuple[list[
         done = subprocess.run(list(map(str, words)), cwd=home, env=clean, capture_output=True, text=True, check=False)  # noqa: S603
         return done.returncode, done.stdout, done.stderr
 
-    def pip(*words: str | Path) -> bool:
+    def pip(*words: str | Path) -> None:
         code, _, err = said(python, "-m", "pip", "--quiet", "--disable-pip-version-check", *words)
-        if code and "No matching distribution" not in err:
+        if code:
             raise SystemExit(err)
-        return not code
 
     said(one.python, "-m", "venv", home / "env")
     started = time.perf_counter()
-    if not pip("install", "--only-binary", ":all:", wheel.resolve()):
-        raise SystemExit(f"{wheel.name}: does not install with {one.python}")
+    pip("install", "--only-binary", ":all:", wheel.resolve())
     seconds = time.perf_counter() - started
-    _, text, _ = said(antdrive, "--version")
-    required = next((name for name in reversed(PHYSICS) if name in text), None)
-    if one.physics != required:
+    if one.physics:
         pip("uninstall", "--yes", *PHYSICS)
-        if one.physics and not pip("install", "--only-binary", ":all:", one.physics):
-            return None
-        _, text, _ = said(antdrive, "--version")
+    if one.physics in PHYSICS:
+        pip("install", "--only-binary", ":all:", one.physics)
+    _, text, _ = said(antdrive, "--version")
+    drives = MISSING not in text
     size = sum(path.lstat().st_size for path in (home / "env").rglob("*")) / 1e6
     shutil.copytree(kept, home / "kept")
     version, _, physics = text.strip().removesuffix(")").partition(" (")
@@ -91,12 +93,12 @@ def row_of(one: Environment, wheel: Path, kept: Path, home: Path) -> tuple[list[
         started, wrong = time.perf_counter(), []
         for line in commands:
             code, out, err = said(antdrive, *line.split())
-            refused = head in DRIVES and not one.physics
+            refused = head in DRIVES and not drives
             fits = code == INVALID_INPUT and REFUSAL in err and err.count("\n") == 1 if refused else not code
             if not fits and not (refused and line.startswith("verify")):
                 wrong.append(f"{version}, {physics}: antdrive {line}: exit code {code}\n{out[-500:]}{err[-1500:]}")
         took = f"{time.perf_counter() - started:.0f} s"
-        row.append("fails" if wrong else "refused in a line" if head in DRIVES and not one.physics else took)
+        row.append("fails" if wrong else "refused in a line" if head in DRIVES and not drives else took)
         problems += wrong
     return row, problems
 
@@ -105,7 +107,9 @@ def main() -> int:
     """Print the table and the problems. Return 1 if there are problems."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="folder with the wheel, as `make dist` builds it")
-    parser.add_argument("--python", nargs="+", default=[sys.executable], help="interpreters")
+    parser.add_argument(
+        "environments", type=environment, nargs="+", help="interpreters, each alone or with =DISTRIBUTION"
+    )
     arguments = parser.parse_args()
     wheel = built(arguments.folder, version_of((ROOT / "pyproject.toml").read_text()))
     rows, problems = [], []
@@ -113,14 +117,15 @@ def main() -> int:
         kept = Path(folder) / "kept"
         drive = [sys.executable, "-m", "antdrive", "run", "slalom", "--planner", "ants", "--out", str(kept)]
         subprocess.run(drive, check=True, stdout=subprocess.DEVNULL)  # noqa: S603
-        for number, one in enumerate(environments(arguments.python)):
+        for number, one in enumerate(arguments.environments):
             home = Path(folder) / str(number)
             home.mkdir()
-            sys.stderr.write(f"{one.python}, {one.physics or 'no physics'}\n")
-            if found := row_of(one, wheel, kept, home):
-                rows.append(found[0])
-                problems += found[1]
+            sys.stderr.write(f"{one.python} {one.physics}\n")
+            row, wrong = row_of(one, wheel, kept, home)
+            rows.append(row)
+            problems += wrong
             shutil.rmtree(home)
+    sys.stdout.write(f"A loop of ten million additions takes {loop():.2f} s.\n\n")
     print_table(f"environment | MB | installed in [s] | {' | '.join(COMMANDS)}", rows)
     sys.stdout.write("\n".join(problems))
     return int(bool(problems))
