@@ -25,15 +25,15 @@ from tools.loop import loop
 
 #: Heads of the table's columns, each with the commands tried for it. `kept` is a drive from the environment of this script.
 COMMANDS = {
-    "plan": ("plan forest --planner mmas --out plan.npz",),
-    "worlds, robots": ("worlds show slalom --robot jackal --figure world.png", "robots show jackal --figure robot.png"),
-    "verify, report, film of a kept log": (
-        "verify kept", "report kept --out report", "render kept --out kept.mp4", "export kept --to csv --out kept.csv",
+    "plan": ("plan forest --planner mmas -o plan.png",),
+    "worlds, robots": ("worlds show slalom --robot jackal -o world.png", "robots show jackal -o robot.png"),
+    "verify, report, film": (
+        *("verify kept", "report kept -o report.html", "render kept -o kept.mp4", "export kept --to csv -o csv"),
     ),
-    "run, film": ("run slalom --planner ants --out drive --film film.mp4", "verify drive", "verify --replay drive"),
+    "run, film, replay": ("run slalom --planner ants --out drive --film film.mp4", "verify --replay drive"),
     "demo": ("demo --out demo",),
 }  # fmt: skip
-DRIVES = ("run, film", "demo")  # need PyBullet
+DRIVES = ("run, film, replay", "demo")  # need PyBullet
 REFUSAL = "drives need"
 INVALID_INPUT = 2
 
