@@ -181,7 +181,7 @@ def test_a_string_around_a_disc_more_than_once_keeps_its_windings():
 # -- properties
 
 
-@settings(max_examples=40)
+@settings(max_examples=120)
 @given(st.integers(0, 10**6))
 def test_any_plan_in_any_forest_is_smoothed(seed):
     task, grid, plan = wander(seed)
@@ -208,7 +208,7 @@ def test_any_plan_in_any_forest_is_smoothed(seed):
         assert there.length == pytest.approx(optimum.length, abs=1e-7)
 
 
-@settings(max_examples=20)
+@settings(max_examples=40)
 @given(st.integers(0, 10**6), st.floats(0, math.tau), st.booleans(), st.sampled_from(SMOOTHED))
 def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(seed, angle, mirror, kind):
     task, grid, plan = wander(seed)
@@ -235,7 +235,7 @@ PLANNERS = (
 )  # fmt: skip
 
 
-@settings(max_examples=20)
+@settings(max_examples=40)
 @given(
     st.integers(0, 10**6), st.sampled_from([0.0, 0.03]), st.sampled_from([0.2, 0.5]), st.sampled_from([0.0, 0.03, 0.4])
 )
@@ -313,7 +313,7 @@ def _barn():
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder, tarfile.open(BARN) as archive:
-        for n in range(0, 300, 48):
+        for n in range(0, 300, 18):
             (member,) = (one for one in archive.getmembers() if Path(one.name).name == f"world_{n}.world")
             archive.extract(member, folder, filter="data")
             yield import_barn(Path(folder) / member.name)
@@ -340,7 +340,7 @@ def test_barn_in_the_best_corridor_is_the_optimum(cell):
             same = word(route.xy, task.world.discs[:, :2]) == word(sampled(best), task.world.discs[:, :2])
             assert gap <= (1.5e-4 if same else 0.02)
             gaps.append((gap, same))
-    assert sum(same for _, same in gaps) >= 0.8 * len(gaps)
+    assert sum(same for _, same in gaps) >= 0.9 * len(gaps)
 
 
 # -- lines that cannot be smoothed, and misuse
