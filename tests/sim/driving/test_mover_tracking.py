@@ -231,7 +231,9 @@ OFFICE = Task(World("office", (0.0, 0.0, 12.0, 3.6), WALL, movers=(PERSON,)), (0
 
 def test_a_robot_slows_down_for_ground_that_its_lidar_does_not_see(jackal):
     """Not with ground-truth positions, which it knows behind walls."""
-    seen, known = (run(Scenario.of(OFFICE, "astar", jackal, **given, **COARSE)) for given in ({"perception": LIDAR}, {}))
+    seen, known = (
+        run(Scenario.of(OFFICE, "astar", jackal, **given, **COARSE)) for given in ({"perception": LIDAR}, {})
+    )
     assert seen.succeeded
     assert known.succeeded
     speeds = [done.rollout.twist[np.abs(done.rollout.pose[:, 0] - 5.7) < 0.1, 0].max() for done in (seen, known)]
