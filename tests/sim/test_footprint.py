@@ -66,10 +66,9 @@ def test_avoidance_in_a_door_keeps_the_footprint_clear(robot, noise):
     assert made.rollout.record.footprint_margin > 0
 
 
-@pytest.mark.parametrize("noise", [0.0, 1.0])
-@pytest.mark.parametrize("robot", DOORS)
+@pytest.mark.parametrize(("robot", "noise"), [("jackal", 1.0), ("warehouse", 0.0)])
 def test_a_plan_in_time_for_a_footprint_passes_a_door_behind_a_mover_on_schedule(robot, noise):
-    made = run(Scenario.of(door(DOORS[robot], SLOW), "sipp", robot, noise=noise, seed=2, footprint="exact"))
+    made = run(Scenario.of(door(DOORS[robot], SLOW), "sipp", robot, noise=noise, seed=2, footprint="exact", **COARSE))
     plan, rate = made.plan, made.plan.options["yaw_rate"]
     assert made.succeeded, (made.outcome, made.reason)
     assert certify(made.rollout).certified

@@ -153,10 +153,9 @@ def checked(seed, counts):
         )
 
 
-@pytest.mark.parametrize("first", range(0, 40, 20))
-def test_whatever_a_reason_says_holds(first):
+def test_whatever_a_reason_says_holds():
     counts = Counter()
-    for seed in range(first, first + 20):
+    for seed in range(22):
         checked(seed, counts)
     assert counts["no path"] > 5
     assert counts["no remedy"] < counts["no path"]

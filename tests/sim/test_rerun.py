@@ -19,6 +19,8 @@ from antdrive.sim.recording import optima_of
 from antdrive.sim.rerun import mismatches, replayed, rerun
 from tests.records import COARSE, changed
 
+pytestmark = pytest.mark.xdist_group("reruns")
+
 KINDS = {
     "footprint": {
         "footprint": "exact",

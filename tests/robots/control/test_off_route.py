@@ -41,7 +41,7 @@ def driven(robot, pose, movers, margin=5 * KEPT):
 
 
 @pytest.mark.parametrize("name", ["warehouse", "turtlebot4"])
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(
     place=st.tuples(st.floats(-1.0, 3.0), st.floats(-0.35, 0.35), st.floats(-math.pi, math.pi)),
     movers=st.lists(

@@ -378,7 +378,7 @@ def test_pose_fixes_drive_no_slower_than_scan_matching_alone(jackal):
 
 def test_a_drive_that_reset_its_map_can_be_replayed(jackal, monkeypatch):
     """A row of posts closes a corridor, 1 m beyond the view from the start."""
-    short = replace(jackal.lidar, field_of_view=2 * math.pi, max_range=3.0)
+    short = replace(jackal.lidar, field_of_view=2 * math.pi, max_range=3.0, rate=20.0)
     row = tuple(Disc(5.0, 0.15 * k, 0.075) for k in range(12))
     task = Task(World("corridor", (0.0, 0.0, 7.0, 1.6), row), (1.0, 0.8, 0.0), (6.4, 0.8), cell=0.1)
     done = run(scenario(replace(jackal, lidar=short), task, time_limit=4.0))
@@ -530,7 +530,7 @@ def triggers(done):
 def test_a_robot_with_a_narrow_lidar_makes_a_scan_turn_first(spec):
     """It sees 57 degrees, and has to go round a post to a goal behind it."""
     task = Task(World("hall", OPEN, (Disc(2.6, 4.2, 0.3),)), HERE, (1.2, 4.6), goal_tolerance=0.25, cell=0.1)
-    done = searching(changed(spec, "lidar", field_of_view=1.0), task)
+    done = searching(changed(spec, "lidar", field_of_view=1.0, rate=10.0), task)
     assert done.succeeded, (done.outcome, done.reason, triggers(done))
     assert triggers(done)[0] == SCANNED
     first = done.rollout.pose[done.rollout.t < done.rollout.record.replans[0].t - 0.1]
@@ -561,7 +561,7 @@ def test_a_mover_in_the_circle_of_the_first_turn_is_given(jackal):
 def test_a_boxed_in_robot_makes_a_scan_turn_before_it_gives_up(jackal):
     ring = tuple(Disc(4 + math.cos(a), 4 + math.sin(a), 0.12) for a in np.arange(0.0, 2 * math.pi, 0.18))
     task = Task(World("pen", OPEN, ring), HERE, (7.0, 4.0), goal_tolerance=0.25, cell=0.1)
-    done = searching(jackal, task, time_limit=5.0)
+    done = searching(changed(jackal, "lidar", rate=15.0), task, time_limit=5.0)
     assert not len(done.rollout.contacts)
     assert done.outcome is Outcome.TIMED_OUT
     assert done.reason.startswith("no way through what was seen")

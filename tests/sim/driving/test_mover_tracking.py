@@ -25,7 +25,9 @@ from antdrive.sim.log.sights import passed
 from antdrive.sim.rebuild import rebuilt
 from antdrive.sim.sensing import KnownGround, Scanner
 from antdrive.worlds import Disc, Keyframed, Route, Task, World
-from tests.records import changed
+from tests.records import COARSE, changed
+
+pytestmark = pytest.mark.xdist_group("tracking by lidar")
 
 # A closet of touching posts in the lower right corner, into which no beam gets.
 CLOSET = tuple(Disc(5.0 + 0.14 * k, 1.2, 0.075) for k in range(22)) + tuple(
@@ -229,7 +231,9 @@ OFFICE = Task(World("office", (0.0, 0.0, 12.0, 3.6), WALL, movers=(PERSON,)), (0
 
 def test_a_robot_slows_down_for_ground_that_its_lidar_does_not_see(jackal):
     """Not with ground-truth positions, which it knows behind walls."""
-    seen, known = (run(Scenario.of(OFFICE, "astar", jackal, **given)) for given in ({"perception": LIDAR}, {}))
+    seen, known = (
+        run(Scenario.of(OFFICE, "astar", jackal, **given, **COARSE)) for given in ({"perception": LIDAR}, {})
+    )
     assert seen.succeeded
     assert known.succeeded
     speeds = [done.rollout.twist[np.abs(done.rollout.pose[:, 0] - 5.7) < 0.1, 0].max() for done in (seen, known)]

@@ -43,7 +43,7 @@ def among(*movers, robot, planner="dstar-lite", **settings):
 
 
 def test_only_replanning_gets_around_a_closed_gate(turtlebot):
-    waiting = among(PLUG, robot=turtlebot, replanning=None, time_limit=30.0)
+    waiting = among(PLUG, robot=turtlebot, replanning=None, time_limit=15.0)
     assert waiting.outcome is Outcome.TIMED_OUT
     done = among(PLUG, robot=turtlebot)
     assert done.succeeded, (done.outcome, done.reason)
@@ -58,10 +58,10 @@ def test_only_replanning_gets_around_a_closed_gate(turtlebot):
 
 
 def test_replans_are_repeatable_and_saved_with_the_log(turtlebot, tmp_path):
-    first, again = (among(PLUG, robot=turtlebot, planner="ants", seed=2).rollout for _ in range(2))
+    first, again = (among(PLUG, robot=turtlebot, planner="ants", seed=2, time_limit=3.0).rollout for _ in range(2))
     assert first.digest == again.digest
     loaded = Rollout.load(first.save(f"{tmp_path}/run.npz"))
-    assert loaded.record.replans == first.record.replans
+    assert loaded.record.replans == first.record.replans != ()
     assert certify(loaded).certified == certify(first).certified
 
 

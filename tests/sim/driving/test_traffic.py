@@ -180,7 +180,7 @@ def test_without_traffic_above_the_limit_nothing_changes(turtlebot, quiet):
     "settings", [{"perception": Perception(kind="motions")}, {"replanning": ReplanPolicy(max_detour=1.0)}]
 )
 def test_a_robot_that_knows_the_motions_or_may_not_go_far_round_goes_through(turtlebot, settings):
-    done = among(*SHUTTLES, robot=turtlebot, time_limit=20.0, **settings)
+    done = among(*SHUTTLES, robot=turtlebot, time_limit=14.0, **settings)
     assert np.abs(done.rollout.pose[:, 1] - 6).max() < 3.5
 
 

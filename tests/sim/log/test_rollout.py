@@ -146,7 +146,7 @@ def inner_keys(values, place=()):
             yield from inner_keys(value, (*place, key))
 
 
-def test_every_key_that_is_left_out_is_missed_also_one_with_a_default(saved, tmp_path):
+def test_every_key_that_is_left_out_is_missed_also_one_with_a_default(saved):
     # Records of worlds may have no source, and robots no lidar.
     optional = {("task", "source"), ("robot", "lidar")}
     record = json.loads(str(np.load(saved)["record"]))
@@ -155,12 +155,10 @@ def test_every_key_that_is_left_out_is_missed_also_one_with_a_default(saved, tmp
     assert ("robot", "wheel_friction") in places
     assert ("robot", "noise", "slip") in places
     for place in places:
-
-        def remove(record, place=place):
-            put(record, ".".join(place), None)
-
-        with pytest.raises(InputError) as refused:
-            Rollout.load(rewritten(saved, tmp_path, remove))
+        without = json.loads(json.dumps(record))
+        put(without, ".".join(place), None)
+        with pytest.raises(FieldError) as refused:
+            DriveRecord.from_json(json.dumps(without))
         assert ".".join(place[:-1] or place) in str(refused.value)
         assert "\n" not in str(refused.value)
 
@@ -293,7 +291,7 @@ def test_no_log_whatever_ends_in_anything_but_one_line(saved, tmp_path):
     rng = np.random.default_rng(11)
     raw, content = saved.read_bytes(), members(saved)
     read, refusals = 0, []
-    for case in range(240):
+    for case in range(100):
         path = tmp_path / "odd.npz"
         if case % 3 == 0:
             path.write_bytes(_flipped(raw, rng))
@@ -317,7 +315,7 @@ def test_no_log_whatever_ends_in_anything_but_one_line(saved, tmp_path):
         except (InputError, FieldError) as error:
             refusals.append(str(error))
     assert not any("\n" in refusal for refusal in refusals)
-    assert read > 20, "some are read"
+    assert read > 8, "some are read"
 
 
 def _flipped(content, rng):

@@ -49,7 +49,7 @@ def crowded(spec, hz, steps):
 @pytest.mark.parametrize("hz", [60, 240])
 def test_bodies_that_come_and_go_change_no_bit(turtlebot, hz, monkeypatch):
     """Every body is where it is when all movers always have one, so contacts and the robot's way are the same."""
-    steps = 12 * hz
+    steps = 8 * hz
     bodies, states, contacts = crowded(turtlebot, hz, steps)
     monkeypatch.setattr(bodies_of_movers, "MARGIN", math.inf)
     always, same_states, same_contacts = crowded(turtlebot, hz, steps)
