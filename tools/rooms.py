@@ -21,9 +21,11 @@ def imports() -> dict[str, set[str]]:
     for room, others in found.items():
         for path in (SOURCE / room).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-                names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-                others |= {*re.findall(r"^antdrive\.(\w+)", "\n".join(names), re.MULTILINE)} & {*found} - {room}
+                if isinstance(node, ast.ImportFrom | ast.Import):
+                    names = (
+                        [node.module or ""] if isinstance(node, ast.ImportFrom) else [one.name for one in node.names]
+                    )
+                    others |= {*re.findall(r"^antdrive\.(\w+)", "\n".join(names), re.MULTILINE)} & {*found} - {room}
     return found
 
 

@@ -17,8 +17,8 @@ from antdrive.base._kernels_compiler import _SETTINGS, _Entries, kernel
 
 MEASURE = (
     "from antdrive.base.kernel_cache import compiled\n"
-    "from antdrive.worlds import Disc, World, point_clearance\n"
-    "with compiled(): print(point_clearance(World('w', (0, 0, 4, 4), (Disc(2, 2, 0.5),)), [[1, 2]]))"
+    "from antdrive.worlds._kernels import segment_distance2\n"
+    "with compiled(): print(segment_distance2(1.0, 2.0, 0.0, 0.0, 4.0, 0.5))"
 )
 
 

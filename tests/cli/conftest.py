@@ -58,10 +58,10 @@ def refused(antdrive):
 
 
 @pytest.fixture
-def small(small_run, tmp_path):
+def small(small_task, tmp_path):
     """The file of a small world that is quick to drive."""
     path = tmp_path / "small.yaml"
-    save_task(small_run.scenario.task, path)
+    save_task(small_task, path)
     return path
 
 

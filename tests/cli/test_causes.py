@@ -25,7 +25,7 @@ SUITE = """schema: 1
 scenarios:
   a: {world: w.yaml, robot: r.yaml, planner: "mine.py:Mine", trajectory: exact}
 """
-WORLD = "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.4, 1], cell: 0.2}\n"
+WORLD = "{schema: 1, bounds: [0, 0, 4, 2], start: [1.2, 1, 0], goal: [2.8, 1], cell: 0.1}\n"
 PLANNER = """
 import random, time
 from dataclasses import dataclass
@@ -85,7 +85,7 @@ def other_antdrive(folder, monkeypatch):
 
 #: What is planted; what all reports say of it.
 CAUSES = {
-    "world": (edit("w.yaml", "[3.4, 1]", "[3.0, 1]"), "changed since the baseline: world"),
+    "world": (edit("w.yaml", "[2.8, 1]", "[2.4, 1]"), "changed since the baseline: world"),
     "robot": (edit("r.yaml", "max_speed: 0.7", "max_speed: 0.6"), "changed since the baseline: robot"),
     "settings": (edit("s.drive.yaml", "exact", "exact, noise: 1"), "changed since the baseline: settings"),
     "smoothing": (
@@ -127,6 +127,7 @@ def folder(antdrive, pytester, monkeypatch):
     monkeypatch.chdir(pytester.path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(pytester.path / "cache"))
     monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "0.2")
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.setattr(kernel_cache, "on_compile", kernel_cache.ignore)  # the plugin sets its own
     monkeypatch.setattr(evaluation, "in_new_process", lambda call: None)
     monkeypatch.setattr(evaluation, "write_artefacts", lambda *given, **named: {})

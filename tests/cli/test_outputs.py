@@ -3,7 +3,7 @@
 import errno
 import json
 import os
-import subprocess
+import shutil
 import sys
 import tarfile
 from pathlib import Path
@@ -12,6 +12,7 @@ import pytest
 
 from antdrive.base import InputError
 from antdrive.cli.commands import COMMANDS, ROBOTS, WORLDS
+from antdrive.cli.groups import exit_code_of
 from antdrive.runs.failures import hunt
 from antdrive.views.film import video
 from antdrive.views.run_folder import write_run
@@ -91,15 +92,23 @@ def test_every_command_that_takes_an_output_is_called():
     assert {word for word in COMMANDS if word not in first} == takes_none
 
 
+@pytest.fixture(scope="module")
+def made(small_run, tmp_path_factory):
+    """A folder with a drive, an archive of worlds and a broken map."""
+    folder = tmp_path_factory.mktemp("made")
+    write_run(small_run, folder / "drive", "antdrive run", figures=False)
+    (folder / "wrong.map").write_text("type octile\n")
+    assert exit_code_of(["worlds", "export", "empty", "-o", str(folder / "world.sdf")]) == 0
+    (folder / "world_0.world").write_bytes((folder / "world.sdf").read_bytes())
+    with tarfile.open(folder / "worlds.tar.gz", "w:gz") as archive:
+        archive.add(folder / "world_0.world", "world_0.world")
+    return folder
+
+
 @pytest.fixture
-def inputs(antdrive, small_run, tmp_path):
-    """A drive, an archive of worlds and a broken map in the folder of a test."""
-    write_run(small_run, tmp_path / "drive", "antdrive run", figures=False)
-    (tmp_path / "wrong.map").write_text("type octile\n")
-    antdrive("worlds", "export", "empty", "-o", "world.sdf")
-    (tmp_path / "world_0.world").write_bytes((tmp_path / "world.sdf").read_bytes())
-    with tarfile.open(tmp_path / "worlds.tar.gz", "w:gz") as archive:
-        archive.add(tmp_path / "world_0.world", "world_0.world")
+def inputs(made, tmp_path):
+    """The same in the folder of a test."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     return tmp_path
 
 
@@ -123,27 +132,34 @@ def test_an_output_that_cannot_be_made_is_named(refused, inputs, line):
     assert files_in(inputs) == before
 
 
-def limited(blocks, *words):
-    """Exit code, stdout and stderr of a command in a process whose files hold at most so many blocks of 1 kB.
+@pytest.fixture
+def limited(antdrive, monkeypatch):
+    """Call `antdrive` while files hold at most 8 kB. It writes no bytecode, which the limit would cut short."""
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
-    It writes no bytecode, which the limit would cut short, for all later processes: Python 3.11 does not notice.
-    """
-    command = ["bash", "-c", f'ulimit -f {blocks}; exec "$@"', "-", sys.executable, "-Bm", "antdrive", *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return done.returncode, done.stdout, done.stderr
+    def call(*words):
+        _, most = before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (8192, most))
+        try:
+            return antdrive(*words)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+    return call
 
 
-def test_a_log_that_does_not_fit_leaves_no_folder(small, tmp_path):
+def test_a_log_that_does_not_fit_leaves_no_folder(limited, small, tmp_path):
     out = tmp_path / "new" / "r"
     said = f"antdrive: {out / 'rollout.npz'}: cannot be written (File too large)\n"
-    assert limited(8, "run", small, "--no-figures", "-o", out) == (2, "", said)
+    assert limited("run", small, "--no-figures", "-o", out) == (2, "", said)
     assert not (tmp_path / "new").exists()
 
 
-def test_a_second_run_that_does_not_fit_leaves_the_first(small, tmp_path, antdrive):
+def test_a_second_run_that_does_not_fit_leaves_the_first(limited, antdrive, small):
     antdrive("run", small, "--no-figures", "-o", "r")
     before = {path.name: path.read_bytes() for path in Path("r").iterdir()}
-    assert limited(8, "run", small, "-o", tmp_path / "r")[0] == 2
+    assert limited("run", small, "-o", "r")[0] == 2
     assert {path.name: path.read_bytes() for path in Path("r").iterdir()} == before
 
 

@@ -57,14 +57,12 @@ class Threads(Right):
 #: What a planner may do to the process; the run goes on and keeps its results.
 CHANGES = {
     "streams": "import sys; sys.stdout.close(); sys.stderr.close(); sys.stdin.close()",
-    "replaced": "import sys; sys.stdout = sys.stderr = sys.stdin = None",
-    "files": "os.closerange(0, 3)",
-    "folder": "os.chdir('/')",
-    "depth": "import sys, inspect; sys.setrecursionlimit(len(inspect.stack(0)) + 40)",
-    "warnings": "import warnings; warnings.simplefilter('error')",
-    "floats": "import numpy; numpy.seterr(all='raise')",
-    "variables": "os.environ.clear()",
-    "umask": "os.umask(0o777)",
+    "replaced streams and folder": "import sys; sys.stdout = sys.stderr = sys.stdin = None; os.chdir('/')",
+    "files and umask": "os.closerange(0, 3); os.umask(0o777)",
+    "depth and variables": (
+        "import sys, inspect; sys.setrecursionlimit(len(inspect.stack(0)) + 40); os.environ.clear()"
+    ),
+    "warnings and floats": "import numpy, warnings; warnings.simplefilter('error'); numpy.seterr(all='raise')",
 }
 OVER = "took longer than the limit of 0.3 s"
 EXITS = "(mine.py:7) ended the process with exit code 0"
@@ -80,17 +78,19 @@ SLOW = {
 ENDS = {"Compiled": f"(mine.py:7) {OVER}", **SLOW}
 MOVING = """
 schema: 1
-bounds: [0, 0, 8, 4]
-start: [1, 2, 0]
-goal: [7, 2]
-movers: [{radius: 0.3, position: [4, 2], velocity: [0.01, 0]}]
+bounds: [0, 0, 5, 3]
+start: [0.6, 1.5, 0]
+goal: [4.4, 1.5]
+movers: [{radius: 0.3, position: [2.6, 1.5], velocity: [0.01, 0]}]
 """
+SHORT = "schema: 1\nbounds: [0, 0, 3, 2]\nstart: [0.6, 1, 0]\ngoal: [1.6, 1]\n"
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(PLANNERS)
     (tmp_path / "moving.yaml").write_text(MOVING)
+    (tmp_path / "short.yaml").write_text(SHORT)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -110,7 +110,7 @@ def said_in_one_line(done, name, words):
 
 @pytest.mark.parametrize("name", ["Compiled", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_a_planner_that_ends_its_process_or_never_ends_is_named(folder, name):
-    world = "moving.yaml" if name.endswith("Later") else "empty"
+    world = "moving.yaml" if name.endswith("Later") else "short.yaml"
     done = process("run", world, "--planner", f"mine.py:{name}", "--no-figures", "-o", "out")
     assert said_in_one_line(done, name, ENDS[name])
 
@@ -126,7 +126,7 @@ def test_a_planner_that_ends_its_process_or_never_ends_is_named(folder, name):
 )
 def test_a_file_that_never_ends_or_exits_on_import_is_named(folder, code, words):
     (folder / "import.py").write_text(code)
-    assert said_in_one_line(process("plan", "empty", "--planner", "import.py:Mine"), "import.py", words)
+    assert said_in_one_line(process("plan", "short.yaml", "--planner", "import.py:Mine"), "import.py", words)
 
 
 def test_a_sweep_and_a_comparison_count_each_error_and_end_as_a_run_does(folder, antdrive, monkeypatch):
@@ -135,11 +135,13 @@ def test_a_sweep_and_a_comparison_count_each_error_and_end_as_a_run_does(folder,
     (folder / "mine.py").write_text(PLANNERS + raising)
     planners = "-p", "mine.py:Raises", "-p", "astar"
     counted = "antdrive: planner Raises raised ValueError: lost (mine.py:44) (2 runs)\n"
-    code, out, err = antdrive("sweep", "-w", "empty", *planners, "--seeds", "2", "-o", "camp", "--jobs", "1", "--json")
+    code, out, err = antdrive(
+        "sweep", "-w", "short.yaml", *planners, "--seeds", "2", "-o", "camp", "--jobs", "1", "--json"
+    )
     assert code == 3
     assert err.endswith(counted)
     assert json.loads(out)["faults"] == {"planner Raises raised ValueError: lost (mine.py:44)": 2}
-    code, _, err = antdrive("compare", "empty", *planners, "--seeds", "2", "--no-figures", "-o", "out")
+    code, _, err = antdrive("compare", "short.yaml", *planners, "--seeds", "2", "--no-figures", "-o", "out")
     assert code == 3
     assert err.count("Raises") == 1
     assert counted in err
@@ -149,7 +151,7 @@ def test_a_sweep_and_a_comparison_count_each_error_and_end_as_a_run_does(folder,
 def test_a_sweep_records_each_of_them_and_goes_on(folder, antdrive, monkeypatch):
     monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
     planners = ", ".join(f"mine.py:{name}" for name in ("Exits", "Endless", "Compiled", "Crashes", "Right"))
-    (folder / "camp.yaml").write_text(f"schema: 1\nworlds: [empty]\nseeds: 1\nplanners: [{planners}]\n")
+    (folder / "camp.yaml").write_text(f"schema: 1\nworlds: [short.yaml]\nseeds: 1\nplanners: [{planners}]\n")
     code, _, err = antdrive("sweep", "camp.yaml", "-o", "camp", "--jobs", "1", "--plan-limit", "3")
     assert code == 3
     rows = pyarrow.parquet.read_table(folder / "camp" / "runs.parquet").to_pylist()
@@ -164,7 +166,9 @@ def test_a_sweep_records_each_of_them_and_goes_on(folder, antdrive, monkeypatch)
 def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypatch):
     monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
     planners = "-p", "a=mine.py:Endless", "-p", "b=mine.py:Right"
-    code, out, err = antdrive("compare", "empty", *planners, "--no-figures", "--json", "-o", "out", "--plan-limit", "1")
+    code, out, err = antdrive(
+        "compare", "short.yaml", *planners, "--no-figures", "--json", "-o", "out", "--plan-limit", "1"
+    )
     assert code == 3
     assert err.startswith(f"antdrive: planner Endless {ENDS['Endless'].replace('0.3', '1')} (1 run)\n")
     runs = json.loads(out)["runs"]
@@ -176,7 +180,7 @@ def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypat
 @pytest.mark.slow
 def test_suites_name_it_and_go_on(folder):
     names = ("Exits", "Endless", "Right")
-    tests = "\n".join(f"  {n.lower()}: {{world: empty, planner: 'mine.py:{n}', baseline: false}}" for n in names)
+    tests = "\n".join(f"  {n.lower()}: {{world: short.yaml, planner: 'mine.py:{n}', baseline: false}}" for n in names)
     (folder / "a.drive.yaml").write_text(f"schema: 1\nscenarios:\n{tests}\n")
     done = process("check", "a.drive.yaml", "--jobs", "2", "--film", "never", "--results", "results", limit="3")
     assert done.returncode == 1
@@ -194,7 +198,7 @@ def test_suites_name_it_and_go_on(folder):
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_a_supervised_command_as_any_other(signals, folder, number, code):
-    words = [ANTDRIVE, "run", "empty", "--planner", "mine.py:Endless", "--no-figures", "--plan-limit", "off"]
+    words = [ANTDRIVE, "run", "short.yaml", "--planner", "mine.py:Endless", "--no-figures", "--plan-limit", "off"]
     started = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     try:
         time.sleep(5)
@@ -219,7 +223,7 @@ def test_what_a_planner_changes_in_the_process_costs_no_result(folder, antdrive,
 
 
 def test_a_thread_that_a_planner_leaves_running_does_not_keep_the_command(folder):
-    done = process("run", "empty", "-p", "mine.py:Threads", "--no-figures", "-o", "out", limit="off")
+    done = process("run", "short.yaml", "-p", "mine.py:Threads", "--no-figures", "-o", "out", limit="off")
     assert (done.returncode, done.stderr) == (0, "")
     assert "certified collision-free" in done.stdout
 
@@ -229,5 +233,5 @@ def test_a_limit_that_is_no_time_is_refused(text, monkeypatch, capsys):
     from antdrive.cli.groups import exit_code_of
 
     monkeypatch.setenv("ANTDRIVE_PLAN_LIMIT", "off")
-    assert exit_code_of(["plan", "empty", "--plan-limit", text]) == 2
+    assert exit_code_of(["plan", "short.yaml", "--plan-limit", text]) == 2
     assert capsys.readouterr().err == f"antdrive: --plan-limit: must be seconds, at most 1e+06, or off; got '{text}'\n"

@@ -3,6 +3,7 @@
 import contextlib
 import operator
 import os
+import time
 from collections import Counter
 from functools import partial
 
@@ -17,8 +18,8 @@ from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of
 from antdrive.runs.pool import CHUNK_SECONDS, LONGEST_CHUNK, Pool, Waiting, WorkerDied, call_all, processes_for
-from tests.runs.campaigns.works import Deadly, Endless, Listing, Refusing, Unloadable
-from tests.runs.light_works import compiling, fails, process
+from tests.runs.campaigns.works import Deadly, Endless, Listing
+from tests.runs.light_works import Unloadable, compiling, dies_once, fails, process, refuses
 
 
 def jobs(worlds=1, seeds=8):
@@ -50,11 +51,10 @@ def test_a_run_that_kills_its_process_twice_is_recorded_and_no_other_is_lost():
 
 
 def test_a_run_whose_process_dies_once_is_tried_again(tmp_path):
-    rows = made(Deadly((2,), str(tmp_path)), 1)
-    attempts = {row["reason"]: row["attempts"] for row in rows}
-    assert len(rows) == 8
-    assert {row["outcome"] for row in rows} == {"succeeded"}
-    assert attempts == {f"seed {seed}": 2 if seed == 2 else 1 for seed in range(8)}
+    with Pool(1) as workers:
+        done = list(workers.each(partial(dies_once, tmp_path / "mark"), range(8)))
+    assert {one.result: one.attempts for one in done} == {item: 2 if item == 2 else 1 for item in range(8)}
+    assert len(done) == 8
 
 
 @pytest.mark.slow
@@ -69,21 +69,24 @@ def test_a_run_that_does_not_end_is_ended_and_not_tried_again():
 
 
 def test_a_run_that_finds_that_nothing_can_be_written_ends_the_campaign():
-    with pytest.raises(InputError, match=r"^rollouts/ab\.npz: cannot be written \(No space left on device\)$"):
-        made(Refusing(), 1)
+    with (
+        Pool(1) as workers,
+        pytest.raises(InputError, match=r"^rollouts/ab\.npz: cannot be written \(No space left on device\)$"),
+    ):
+        list(workers.each(refuses, range(8)))
 
 
 def test_somebody_else_has_a_turn_while_a_run_takes_long(monkeypatch):
     monkeypatch.setattr(pool, "POLL_INTERVAL", 0.05)
     turns = []
-    rows = made(Deadly(seconds=0.5), 1, jobs(seeds=1), tick=lambda: turns.append(1))
-    assert len(rows) == 1
+    with Pool(1, tick=lambda: turns.append(1)) as workers:
+        assert len(list(workers.each(time.sleep, [0.5]))) == 1
     assert len(turns) > 2
 
 
 def test_workers_that_end_before_they_begin_end_the_campaign():
-    with pytest.raises(InputError, match=r"^--jobs: worker processes die while starting"):
-        made(Unloadable(), 1)
+    with Pool(1) as workers, pytest.raises(InputError, match=r"^--jobs: worker processes die while starting"):
+        list(workers.each(Unloadable(), range(8)))
 
 
 @pytest.mark.slow

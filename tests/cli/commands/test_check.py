@@ -14,6 +14,7 @@ from antdrive.cli.commands import check
 from antdrive.cli.testing import evaluation
 from antdrive.runs.suites import Baseline
 from antdrive.views.artefacts import Results
+from antdrive.views.figures import run_figures
 
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
@@ -28,8 +29,9 @@ HIT = "  hit: {unseen: [{x: 2, y: 1, radius: 0.2}]}\n"
 def suite(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(run_figures, "overview", lambda rollout, path: Path(path).touch())
     (tmp_path / "small.yaml").write_text(
-        "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.4, 1], cell: 0.2}\n"
+        "{schema: 1, bounds: [0, 0, 4, 2], start: [1.3, 1, 0], goal: [2.7, 1], cell: 0.25}\n"
     )
     path = tmp_path / "a.drive.yaml"
     path.write_text(SUITE)
@@ -248,7 +250,7 @@ def test_python_tests_are_accepted_and_checked_like_suites(antdrive, suite):
     assert len(json.loads(out)["tests"]) == 3 + 3
     assert (suite.parent / "baselines" / "test_accepted_here" / "test_named.json").exists()
     (suite.parent / "small.yaml").write_text(
-        "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.2, 1], cell: 0.2}\n"
+        "{schema: 1, bounds: [0, 0, 4, 2], start: [1.3, 1, 0], goal: [2.5, 1], cell: 0.25}\n"
     )
     code, out, _ = antdrive("check", "test_accepted_here.py::test_named", *words[3:-1])
     assert (code, out.splitlines()[0]) == (1, "test_accepted_here.py::test_named: FAILED")

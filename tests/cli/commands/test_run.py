@@ -57,8 +57,8 @@ def test_no_path_is_exit_code_1_with_a_reason(antdrive):
     assert antdrive("plan", "no-path")[0] == 1
 
 
-def test_a_run_without_a_path_removes_the_log_of_an_earlier_run(antdrive):
-    antdrive("run", "empty", "-p", "astar", "--no-figures", "--out", "r")
+def test_a_run_without_a_path_removes_the_log_of_an_earlier_run(antdrive, small):
+    antdrive("run", small, "-p", "astar", "--no-figures", "--out", "r")
     assert Path("r/rollout.npz").exists()
     antdrive("run", "no-path", "-p", "astar", "--no-figures", "--out", "r")
     assert not Path("r/rollout.npz").exists()
@@ -155,8 +155,8 @@ def test_two_runs_do_not_write_into_one_folder_at_once(refused, small):
     assert line.startswith("antdrive: r: another run (process ")
 
 
-def test_a_plan_is_drawn_and_printed_without_a_drive(antdrive, tmp_path):
-    code, out, _ = antdrive("plan", "han2007-aco", "--planner", "aco-han", "--json", "--out", tmp_path / "p")
+def test_a_plan_is_drawn_and_printed_without_a_drive(antdrive, small, tmp_path):
+    code, out, _ = antdrive("plan", small, "--planner", "astar", "--json", "--out", tmp_path / "p")
     facts = json.loads(out)
     assert code == 0
     assert facts["status"] == "solved"

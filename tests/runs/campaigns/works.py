@@ -62,13 +62,3 @@ class Refusing:
         if job.seed == 3:
             raise InputError("rollouts/ab.npz: cannot be written (No space left on device)")
         return Finished(failed_row(job.key, "succeeded", f"seed {job.seed}"))
-
-
-class Unloadable:
-    """Work that ends the process that unpickles it."""
-
-    def __reduce__(self):
-        return os._exit, (7,)
-
-    def __call__(self, job):
-        raise AssertionError
