@@ -73,7 +73,10 @@ def test_the_first_path_that_closes_the_goal_may_not_be_the_shortest():
             k = DIRECTIONS.index((rn - r, cn - c))
             moves[r, c] |= 1 << k
             moves[rn, cn] |= 1 << (k + 4) % 8
-    query = Query(Grid(moves > 0, moves), (20, 5), (20, 29))
+    free = moves > 0
+    for array in (free, moves):
+        array.setflags(write=False)  # as a grid's: kernels are compiled for that
+    query = Query(Grid(free, moves), (20, 5), (20, 29))
     for search in SEARCHES:
         assert search.plan(query, RNG).cost == pytest.approx(26 + 5 * math.sqrt(2), abs=1e-9)
 
