@@ -75,6 +75,10 @@ def pixels(figure):
     return np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
 
 
+def named_on_the_map(figure):
+    return [text.get_text() for text in panels(figure)["map"].get_legend().get_texts()]
+
+
 def near(picture, colour, within=12):
     return int((np.abs(picture - np.array(colour)).max(axis=-1) < within).sum())
 
@@ -278,7 +282,9 @@ def test_an_overview_shows_all_obstacles_movers_and_the_contact(made_up_drive, t
     drive = made_up_drive(collide=True, movers=2)
     obstacles = drive.record.task.world.obstacles
     record = replace(changed(drive.record, "task.world", obstacles=obstacles[2:]), unseen=obstacles[:2])
-    full = pixels(overview(replace(drive, record=record), tmp_path / "full.png", dpi=80))
+    drawn = overview(replace(drive, record=record), tmp_path / "full.png", dpi=80)
+    assert "contact" in named_on_the_map(drawn)
+    full = pixels(drawn)
     record = changed(drive.record, "task.world", obstacles=obstacles[-1:], movers=())
     record = replace(record, outcome=Outcome.STUCK)
     bare = replace(drive, contacts=np.empty((0, 4)), movers=drive.movers[:, :0], record=record)
@@ -388,6 +394,7 @@ def test_both_drives_their_parting_and_a_contact_are_drawn(made_up_drive, tmp_pa
     marked = then_and_now(then, made_up_drive(collide=True), tmp_path / "b.png", divergence=(0.3, 1.0, 1.0), dpi=60)
     assert near(plain, START) > 100
     assert near(plain, SHELL) > 100
+    assert "contact" in named_on_the_map(marked)
     for colour in (CONTACT, BAD):
         assert near(pixels(marked), colour) > near(plain, colour) + 20
 
