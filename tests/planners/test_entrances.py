@@ -146,9 +146,9 @@ def answers(seeds):
 
 
 def test_ends_are_those_of_the_search_in_plain_python():
-    kinds, wrong = answers(range(16))
+    kinds, wrong = answers(range(9))
     assert not wrong
-    assert kinds[True, True] >= 6
+    assert kinds[True, True] >= 3
 
 
 @pytest.mark.slow
@@ -160,7 +160,7 @@ def test_ends_of_many_tasks_are_those_of_the_search_in_plain_python():
 
 def test_leads_and_turns_are_clear_where_samples_are():
     seen = collections.Counter()
-    for seed in range(60):
+    for seed in range(30):
         task, _, around = random_case(seed)
         outline, rng = OUTLINES[SHAPES[seed % len(SHAPES)]], np.random.default_rng(seed)
         for backwards in (False, True):
@@ -177,7 +177,7 @@ def test_leads_and_turns_are_clear_where_samples_are():
     assert min(seen[CLEAR], seen[BLOCKED]) >= 30
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from((3, 30)))
 def test_the_cell_of_an_end_is_the_nearest_that_a_clear_line_reaches(seed, reach):
     """Posts hide most cells, so dozens are tried."""

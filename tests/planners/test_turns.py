@@ -125,7 +125,7 @@ EDITS = st.one_of(
 
 
 @pytest.mark.parametrize("name", [name for name in REPAIRED if name in OPTIMAL])
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 3), st.integers(0, 999), st.integers(0, 999), st.lists(EDITS, max_size=10))
 def test_repairs_are_as_short_as_plans_from_scratch_after_any_edits(name, seed, start, goal, edits):
     grid, blocked = ground(seed), set()

@@ -54,6 +54,7 @@ def thinned(rng, side, cut):
         r, c = np.nonzero((moves >> k & 1 == 1) & (rng.random(moves.shape) < cut))
         moves[r, c] &= np.uint8(255 - (1 << k))
         moves[r + dr, c + dc] &= np.uint8(255 - (1 << (k + 4)))
+    moves.setflags(write=False)  # as a grid's: kernels are compiled for that
     ends = rng.choice(np.argwhere(picture.free), size=2)
     return Query(Grid(picture.free, moves), *(tuple(map(int, end)) for end in ends))
 

@@ -12,7 +12,7 @@ from antdrive.planners.anyangle.tangent import shortest
 from antdrive.worlds import Disc, Task, World, _kernels_passage, point_clearance
 from antdrive.worlds.passage import Passage, feasible, widest_passage
 
-STEP = 0.03  # of the field [m]
+STEP = 0.04  # of the field [m]
 
 
 def flooded(task):
@@ -45,7 +45,7 @@ def flooded(task):
 
 def test_the_widest_disc_is_that_of_a_flood():
     rng, through_gaps, solved = np.random.default_rng(4), 0, 0
-    for _ in range(25):
+    for _ in range(12):
         discs = tuple(Disc(*rng.uniform((0.4, 0.0), (3.6, 3.0)).tolist(), rng.uniform(0.1, 0.35)) for _ in range(18))
         ends = (0.2, 1.5), (3.8, 1.5)
         discs = tuple(d for d in discs if all(math.dist((d.x, d.y), end) > d.radius + 0.1 for end in ends))
@@ -58,8 +58,8 @@ def test_the_widest_disc_is_that_of_a_flood():
         assert passage.radius == pytest.approx(flood, abs=STEP)
         assert point_clearance(task.world, [passage.at])[0] == pytest.approx(passage.radius, abs=1e-9)
         through_gaps += bool(passage.between)
-    assert solved > 15
-    assert through_gaps > 8
+    assert solved > 7
+    assert through_gaps > 3
 
 
 def test_the_bottleneck_is_the_middle_of_the_gap():

@@ -85,7 +85,7 @@ class Query:
         from antdrive.planners._kernels_entrances import entrances  # imports the compiler
 
         world, reach = task.world, cells_beside(grid.inflate, grid.cell)
-        ends, bounds = np.array((task.start[:2], task.goal)), np.array(world.bounds, dtype=np.float64)
+        ends, bounds = np.array((task.start[:2], task.goal), dtype=np.float64), np.array(world.bounds, dtype=np.float64)
         # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal tolerance.
         found = entrances(
             grid.free, *grid.origin, grid.cell, grid.inflate, reach, ends, within_goal(task), world.discs, bounds

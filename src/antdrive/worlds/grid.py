@@ -191,7 +191,7 @@ class Grid:
             cell: side of a cell [m]
             origin: centre of cell (0, 0) [m]
         """
-        cells = np.array(free, dtype=np.bool_, ndmin=2)
+        cells = np.array(free, dtype=np.bool_, ndmin=2, order="C")
         return cls._finish(cells, np.zeros(cells.shape, dtype=np.uint8), cell, origin, 0.0)
 
     @classmethod

@@ -123,9 +123,9 @@ def test_a_bare_grid_is_planned_on_its_free_cells():
     assert result.solved
     assert result.length < result.cost
     rng = np.random.default_rng(2)
-    for seed in range(20):
+    for seed in range(8):
         query = random_query(rng, largest=10)
-        answer = solve(query, seed, iterations=5, tries=2000)
+        answer = solve(query, seed, iterations=3, tries=500)
         assert answer.solved == bool(len(answer.cells))
 
 

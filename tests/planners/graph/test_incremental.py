@@ -28,7 +28,7 @@ def test_a_search_is_a_replanner(planner):
 @BOTH
 def test_plans_equal_the_oracle(planner):
     rng = np.random.default_rng(1)
-    for _ in range(80):
+    for _ in range(40):
         for query in (random_query(rng), random_discs(rng)):
             floor = World(query.grid).optimum(query.start, query.goal)
             result = planner.plan(query, RNG)
@@ -41,10 +41,10 @@ def test_repairs_equal_the_oracle(planner):
     rng = np.random.default_rng(2)
     solved = sum(
         change_at_random(lambda q: planner.replanner(q, RNG), make(rng), rng, 8)
-        for _ in range(40)
+        for _ in range(20)
         for make in (random_query, random_discs)
     )
-    assert solved > 240  # most must have a path for the test to be meaningful
+    assert solved > 120  # most must have a path for the test to be meaningful
 
 
 @pytest.mark.slow
@@ -87,10 +87,9 @@ def test_repairs_equal_the_oracle_after_any_sequence_of_changes(planner, bits, e
 
 
 @BOTH
-@pytest.mark.parametrize("seed", range(2))
-def test_a_drive_through_an_unknown_map(planner, seed):
+def test_a_drive_through_an_unknown_map(planner):
     """The robot detects cells within three cells, treats all others as free, and replans at every step."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     truth = rng.random((40, 40)) >= 0.25
     truth[1, 1] = truth[38, 38] = True
     replanner = planner.replanner(open_ground(40, 40), RNG)

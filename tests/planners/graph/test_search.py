@@ -27,13 +27,13 @@ def check(query):
 
 def test_costs_equal_the_oracle_on_random_grids():
     rng = np.random.default_rng(1)
-    for _ in range(300):
+    for _ in range(100):
         check(random_query(rng))
 
 
 def test_costs_equal_the_oracle_among_random_discs():
     rng = np.random.default_rng(2)
-    for _ in range(100):
+    for _ in range(40):
         check(random_discs(rng))
 
 
@@ -49,7 +49,7 @@ def test_costs_equal_the_oracle_on_thousands_of_grids():
 def test_costs_equal_the_oracle_for_any_set_of_two_way_moves(side):
     """The search must not assume a relation between the moves of neighbouring cells."""
     rng = np.random.default_rng(4)
-    for _ in range(200):
+    for _ in range(60):
         query = thinned(rng, side, cut=0.3)
         floor = optimum_by_scipy(query)
         for search in SEARCHES:
@@ -73,7 +73,10 @@ def test_the_first_path_that_closes_the_goal_may_not_be_the_shortest():
             k = DIRECTIONS.index((rn - r, cn - c))
             moves[r, c] |= 1 << k
             moves[rn, cn] |= 1 << (k + 4) % 8
-    query = Query(Grid(moves > 0, moves), (20, 5), (20, 29))
+    free = moves > 0
+    for array in (free, moves):
+        array.setflags(write=False)  # as a grid's: kernels are compiled for that
+    query = Query(Grid(free, moves), (20, 5), (20, 29))
     for search in SEARCHES:
         assert search.plan(query, RNG).cost == pytest.approx(26 + 5 * math.sqrt(2), abs=1e-9)
 
@@ -132,7 +135,7 @@ def cost(free, start, goal):
     return AStar().plan(Query(Grid.from_free(free), start, goal), RNG).cost
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(pictures, st.data())
 def test_the_cost_is_the_same_in_a_turned_or_mirrored_world(free, data):
     cells = [tuple(map(int, c)) for c in np.argwhere(free)]
@@ -148,7 +151,7 @@ def test_the_cost_is_the_same_in_a_turned_or_mirrored_world(free, data):
     assert cost(moved, (start[0] + 2, start[1] + 3), (goal[0] + 2, goal[1] + 3)) == expected  # translated
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(pictures, st.data())
 def test_freeing_a_cell_never_lengthens_a_path(free, data):
     cells = [tuple(map(int, c)) for c in np.argwhere(free)]

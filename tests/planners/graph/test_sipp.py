@@ -141,7 +141,7 @@ def small_world(seed):
 
 
 HORIZON = 12.0
-FEW, MANY = range(7), pytest.param(range(14, 60), marks=pytest.mark.slow)
+FEW, MANY = range(3, 7), pytest.param(range(14, 60), marks=pytest.mark.slow)
 ABOVE, BELOW = 0.03, -2.0 * TICK  # m: motion of robot and mover between two samples, and per tick
 
 

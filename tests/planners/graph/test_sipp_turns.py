@@ -62,7 +62,7 @@ def some_query(grid, rng):
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(1, 6), pytest.param(range(8, 24), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds", [range(1, 4), pytest.param(range(8, 24), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 @pytest.mark.parametrize("stay", [False, True], ids=["arrive", "stay"])
 def test_no_path_of_an_outline_arrives_sooner_and_none_is_missed(seeds, stay):
@@ -89,7 +89,7 @@ def test_no_path_of_an_outline_arrives_sooner_and_none_is_missed(seeds, stay):
 
 def test_a_plan_leaves_the_time_for_its_turns_and_keeps_its_distance():
     turns = waits = 0
-    for seed in range(45):
+    for seed in range(25):
         _, grid, movers, rng = small_world(seed)
         query, _ = some_query(grid, rng)
         plan = plan_in_time(query, movers, speed=SPEED, yaw_rate=YAW_RATE, horizon=HORIZON)
@@ -102,8 +102,8 @@ def test_a_plan_leaves_the_time_for_its_turns_and_keeps_its_distance():
         assert plan.clearance(movers, step=0.002) >= RADIUS
         turns += int((least > 0).sum())
         waits += plan.waited > least.sum() + 1e-9
-    assert turns > 15
-    assert waits > 1
+    assert turns > 8
+    assert waits > 0
 
 
 def test_on_open_ground_a_plan_lasts_as_long_as_its_lead_its_moves_and_its_turns():

@@ -68,7 +68,7 @@ def test_an_unreachable_end_is_forgotten_after_an_edit_or_a_move():
 def test_after_any_change_the_answer_fits_the_grid_as_it_is(name):
     rng = np.random.default_rng(4)
     solved = 0
-    for turn in range(8):
+    for turn in range(6):
         query = (random_query, random_discs)[turn % 2](rng)
         replanner, world = made(name, query, turn), World(query.grid)
         assert isinstance(replanner, Replanner)
@@ -98,7 +98,7 @@ def test_after_any_change_the_answer_fits_the_grid_as_it_is(name):
                 replanner.move(tuple(map(int, result.cells[1])))
             elif rng.random() < 0.3:
                 replanner.move(tuple(map(int, rng.integers(0, query.grid.shape))))
-    assert solved > 12
+    assert solved > 9
 
 
 @pytest.mark.parametrize("name", ON_CELLS)
@@ -126,7 +126,7 @@ def test_a_cleared_cell_opens_a_path(name):
     assert "the start cell" in replanner.result().reason
 
 
-@pytest.mark.parametrize("name", ["ants", "mmas", "ga-han"])
+@pytest.mark.parametrize("name", ["ants", "mmas"])
 def test_the_same_seed_gives_the_same_answers(name):
     def answered():
         replanner, answers = made(name, catalogue()["forest"], seed=3), []
@@ -177,7 +177,7 @@ def cylinders(seed):
 
 def test_a_warm_started_colony_takes_a_fraction_of_the_work_and_stays_near_the_optimum():
     fractions, gaps = [], []
-    for seed in range(3):
+    for seed in range(2):
         query, rng = cylinders(seed), np.random.default_rng(seed)
         ants = WarmStartedColony(MergingAnts(), query, rng)
         for _ in range(3):
@@ -192,7 +192,7 @@ def test_a_warm_started_colony_takes_a_fraction_of_the_work_and_stays_near_the_o
             cold = MergingAnts().plan(ants.query, rng)
             fractions.append(warm.work / cold.work)
             gaps.append(warm.cost / optimum(ants.query) - 1)
-    assert len(fractions) > 4
+    assert len(fractions) > 3
     assert np.median(fractions) < 0.5
     assert np.median(gaps) < 0.01
     assert max(gaps) < 0.1
@@ -228,19 +228,18 @@ def alone(robot, limit=3000):
     return False
 
 
-@pytest.mark.parametrize("count", [0, 1, 40])
+@pytest.mark.parametrize("count", [0, 40])
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar", "dstar-lite"])
 @pytest.mark.parametrize("case", CASES)
 def test_one_rule_arrives_in_all_six_of_hasans_cases(case, name, count):
     query = CASES[case]
-    for seed in range(2 if count else 1):
-        movers = Strollers(query.grid, count, np.random.default_rng(seed), (query.start, query.goal))
-        robot = robot_by(name, query)
-        assert drive(robot, query, movers)[-1] == query.goal  # raises if a move is not allowed or a cell is occupied
-        stats = robot.stats
-        assert stats.decisions == stats.steps + stats.waits
-        assert stats.length >= optimum(query) - 1e-9
-        assert stats.steps <= 1.6 * len(load_planner("astar").plan(query, np.random.default_rng(0)).cells) + count
+    movers = Strollers(query.grid, count, np.random.default_rng(0), (query.start, query.goal))
+    robot = robot_by(name, query)
+    assert drive(robot, query, movers)[-1] == query.goal  # raises if a move is not allowed or a cell is occupied
+    stats = robot.stats
+    assert stats.decisions == stats.steps + stats.waits
+    assert stats.length >= optimum(query) - 1e-9
+    assert stats.steps <= 1.6 * len(load_planner("astar").plan(query, np.random.default_rng(0)).cells) + count
 
 
 @pytest.mark.parametrize("case", CASES)

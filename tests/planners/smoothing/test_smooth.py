@@ -181,7 +181,7 @@ def test_a_string_around_a_disc_more_than_once_keeps_its_windings():
 # -- properties
 
 
-@settings(max_examples=120)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6))
 def test_any_plan_in_any_forest_is_smoothed(seed):
     task, grid, plan = wander(seed)
@@ -229,10 +229,7 @@ def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(seed, angle, 
     np.testing.assert_allclose(theirs, ours @ turn.T, atol=1e-3)
 
 
-PLANNERS = (
-    "dijkstra", "astar", "dstar-lite", "aco-han", "as", "pfaco", "mmas", "mmas-dstar", "ants", "ga-han", "hybrid",
-    "tangent",
-)  # fmt: skip
+PLANNERS = ("astar", "as", "mmas-dstar", "ga-han", "tangent")  # searches, ants, fields, waypoints, exact lines
 
 
 @settings(max_examples=40)
@@ -313,7 +310,7 @@ def _barn():
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder, tarfile.open(BARN) as archive:
-        for n in range(0, 300, 18):
+        for n in range(0, 300, 36):
             (member,) = (one for one in archive.getmembers() if Path(one.name).name == f"world_{n}.world")
             archive.extract(member, folder, filter="data")
             yield import_barn(Path(folder) / member.name)

@@ -86,7 +86,7 @@ def test_ground_is_hatched_until_it_is_seen(log, spots, monkeypatch):
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_a_picture_depends_on_the_moment_alone(log, camera):
-    assert np.array_equal(picture(log, camera, 0.0, 0.2, 0.45), picture(log, camera, 0.45))
+    assert np.array_equal(picture(log, camera, 0.0, 0.45), picture(log, camera, 0.45))
 
 
 def test_hits_are_where_the_map_has_them(log, monkeypatch):

