@@ -5,6 +5,7 @@ import hashlib
 import io
 import json
 import math
+import struct
 import subprocess
 import sys
 import zipfile
@@ -185,6 +186,24 @@ def packed(content, path, kind=zipfile.ZIP_DEFLATED):
         for name, data in content.items():
             with archive.open(name, "w", force_zip64=True) as member:
                 member.write(data)
+
+
+def test_a_log_that_python_3_10_wrote_is_read_anywhere(saved, tmp_path):
+    raw, path = bytearray(saved.read_bytes()), tmp_path / "older.npz"
+    with zipfile.ZipFile(saved) as archive:
+        at = archive.start_dir
+        for info in archive.infolist():
+            begin = info.header_offset
+            raw[begin + 4 : begin + 6] = struct.pack("<H", 20)
+            raw[begin + 18 : begin + 26] = struct.pack("<2L", info.compress_size, info.file_size)
+            raw[at + 4], raw[at + 6] = 20, 20
+            at += 46 + len(info.filename)
+    path.write_bytes(raw)
+    assert Rollout.load(path).digest == Rollout.load(saved).digest
+    raw[4] = 45  # one member as others write it
+    path.write_bytes(raw)
+    with pytest.raises(InputError, match="other bytes before it"):
+        read_record(path)
 
 
 @pytest.mark.slow

@@ -39,7 +39,10 @@ Archive: TypeAlias = zipfile.ZipFile
 
 MAX_BYTES = 1 << 29  # unpacked size of all members and of one array; an hour of a drive takes 0.1 GB
 MAX_MEMBERS = 64
+HEADER, SIZES = "<4s2B4H3L2H", "<2H2Q"  # of a member of a ZIP archive, before and after the name
 DIRECTORY = "<4s4B4H3L5H2L"  # an entry of a ZIP archive's directory, before the name
+ZIP_VERSION, OLD_ZIP_VERSION = 45, 20  # that Python writes since 3.11.4, and before
+ELSEWHERE = 0xFFFFFFFF  # in place of a size that `SIZES` has
 NO_DATE = 1 << 5 | 1  # January 1st, 1980, which numpy gives every member
 LONGEST_PROBLEM = 300  # characters of a message
 
@@ -93,7 +96,7 @@ def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
 def _unpacked(archive: Archive, info: zipfile.ZipInfo) -> bytes:
     """Return a member's content, the whole of what its bytes in the file stand for."""
     assert archive.fp is not None
-    archive.fp.seek(info.header_offset + len(_as_numpy_writes(info).FileHeader(zip64=True)))
+    archive.fp.seek(info.header_offset + len(_header(info, ZIP_VERSION)))
     unpacking = zlib.decompressobj(-zlib.MAX_WBITS)
     content = unpacking.decompress(archive.fp.read(info.compress_size), info.file_size + 1)
     whole = unpacking.eof and not unpacking.unused_data
@@ -102,12 +105,12 @@ def _unpacked(archive: Archive, info: zipfile.ZipInfo) -> bytes:
     return content
 
 
-def _as_numpy_writes(info: zipfile.ZipInfo) -> zipfile.ZipInfo:
-    """Return the entry that `np.savez_compressed` writes for a member of this name, size and checksum."""
-    usual = zipfile.ZipInfo(info.filename)
-    usual.compress_type, usual.external_attr = zipfile.ZIP_DEFLATED, 0o600 << 16
-    usual.CRC, usual.compress_size, usual.file_size = info.CRC, info.compress_size, info.file_size
-    return usual
+def _header(info: zipfile.ZipInfo, version: int) -> bytes:
+    """Return what `np.savez_compressed` writes before a member of this name, size and checksum."""
+    name, sizes = info.filename.encode(), (info.compress_size, info.file_size)
+    stated = sizes if version == OLD_ZIP_VERSION else (ELSEWHERE, ELSEWHERE)
+    about = (version, 0, 0, zipfile.ZIP_DEFLATED, 0, NO_DATE, info.CRC, *stated, len(name), struct.calcsize(SIZES))
+    return struct.pack(HEADER, b"PK\x03\x04", *about) + name + struct.pack(SIZES, 1, 16, *reversed(sizes))
 
 
 def _check_members(archive: Archive) -> None:
@@ -137,19 +140,20 @@ def _check_layout(archive: Archive) -> None:
     """Refuse bytes that no array and no record holds, since the digest does not cover them.
 
     The file must be what `np.savez_compressed` writes: a header and the packed content of each member, then the directory.
-    Only the packing may differ, and the name of the system that wrote the file.
+    Only the packing may differ, the version of the format, and the name of the system that wrote the file.
     """
     file, at, directory = archive.fp, 0, b""
     assert file is not None
+    old = {info.extract_version for info in archive.infolist()} == {OLD_ZIP_VERSION}
+    version = OLD_ZIP_VERSION if old else ZIP_VERSION
     for info in archive.infolist():
-        usual = _as_numpy_writes(info)
-        header, name, sizes = usual.FileHeader(zip64=True), info.filename.encode(), (info.compress_size, info.file_size)
+        header, name, sizes = _header(info, version), info.filename.encode(), (info.compress_size, info.file_size)
         file.seek(at)
         if info.header_offset != at or file.read(len(header)) != header:
             raise ValueError(f"{info.filename}: other bytes before it than np.savez_compressed writes")
-        made_by = (usual.create_version, info.create_system, usual.extract_version)
+        made_by = (version, info.create_system, version)
         about = (*made_by, 0, 0, info.compress_type, 0, NO_DATE, info.CRC, *sizes, len(name))
-        directory += struct.pack(DIRECTORY, b"PK\x01\x02", *about, 0, 0, 0, 0, usual.external_attr, at) + name
+        directory += struct.pack(DIRECTORY, b"PK\x01\x02", *about, 0, 0, 0, 0, 0o600 << 16, at) + name
         at += len(header) + info.compress_size
     count = len(archive.infolist())
     end = struct.pack("<4s4H2LH", b"PK\x05\x06", 0, 0, count, count, len(directory), at, 0)

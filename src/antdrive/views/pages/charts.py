@@ -195,7 +195,7 @@ def _option_boxes(paired: PairedRuns, styles: Sequence[LabelStyle]) -> list[Char
             mine = [k for k in range(len(names)) if names[k] == planner and texts[k]]
             others = {_other_options(table, int(first[k]), column) for k in mine}
             if len({texts[k] for k in mine}) > 1 and len(others) == 1:  # no other option differs
-                mine.sort(key=lambda k: _natural(texts[k]))
+                mine.sort(key=lambda k: _natural(str(texts[k])))
                 charts += _boxes_of_option(paired, planner, column, mine, [texts[k] for k in mine], styles)
     return charts
 
