@@ -63,7 +63,7 @@ def genuine_drives() -> dict[str, Rollout]:
     turtlebot, jackal = load_robot("turtlebot"), load_robot("jackal")
     astar, lite = load_planner("astar"), load_planner("dstar-lite")
     plain = {"task": task, "planner": astar, "planner_name": "astar"}
-    among = {"task": moving, "planner": lite, "planner_name": "dstar-lite", "physics_hz": 80, "control_hz": 20}
+    among = {"task": moving, "planner": lite, "planner_name": "dstar-lite"}
     scenarios = {
         "turtlebot": Scenario(robot=turtlebot, **plain),  # type: ignore[arg-type]
         "jackal": Scenario(robot=jackal, **plain),  # type: ignore[arg-type]

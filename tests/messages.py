@@ -9,7 +9,7 @@ from antdrive.base import FieldError, InputError
 #: Words of other libraries, which differ between their versions.
 FOREIGN = re.compile(
     r"(not YAML: )(?!a tab|nested|a special).*|(not XML: ).*|(cannot be read: )(?!has |Pillow reads).*"
-    r"|(not a rollout)(?: \((?:Cannot parse|EOF|File is not|zip file)|: t is).*"
+    r"|(not a rollout)(?: \((?:\('|Cannot parse|EOF|File is not|zip file)|: t is).*"
     r"|(cannot be read \()(?!larger).*"
 )
 

@@ -335,7 +335,7 @@ def test_progress_counts_the_drives(cache, driven, robot):
 
 @pytest.mark.slow
 def test_the_choice_does_not_depend_on_the_number_of_processes(monkeypatch, cache, robot):
-    monkeypatch.setattr(choice, "DRIVES", 6)
+    monkeypatch.setattr(choice, "DRIVES", 18)
     one = choose_margin(robot, jobs=1)
     (entry,) = cache.iterdir()
     entry.unlink()
