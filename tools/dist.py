@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import venv
+from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -48,6 +49,18 @@ def built(folder: Path, version: str) -> Path:
     return folder / f"antdrive-{version}-py3-none-any.whl"
 
 
+def outside(home: Path) -> Callable[..., tuple[int, str, str]]:
+    """Return a function that runs a command in a folder, without this process's Python; it returns exit code and output."""
+    clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "VIRTUAL_ENV"))}
+
+    def said(*words: str | Path) -> tuple[int, str, str]:
+        line = list(map(str, words))
+        done = subprocess.run(line, cwd=home, env=clean, capture_output=True, text=True, check=False)  # noqa: S603
+        return done.returncode, done.stdout, done.stderr
+
+    return said
+
+
 def drive_outside(wheel: Path, version: str, home: Path) -> list[str]:
     """Return the problems of a wheel in a fresh environment.
 
@@ -58,24 +71,18 @@ def drive_outside(wheel: Path, version: str, home: Path) -> list[str]:
     """
     venv.create(home / "env", with_pip=True)
     python, antdrive = home / "env" / "bin" / "python", home / "env" / "bin" / "antdrive"
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "VIRTUAL_ENV"))}
-
-    def said(*words: str | Path) -> tuple[int, str]:
-        line = list(map(str, words))
-        done = subprocess.run(line, cwd=home, env=clean, capture_output=True, text=True, check=False)  # noqa: S603
-        return done.returncode, done.stdout or done.stderr
-
+    said = outside(home)
     problems = []
-    code, text = said(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel.resolve())
+    code, _, err = said(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel.resolve())
     if code:
-        return [f"{wheel.name}: does not install\n{text}"]
-    code, text = said(antdrive, "--version")
+        return [f"{wheel.name}: does not install\n{err}"]
+    code, text, _ = said(antdrive, "--version")
     if code or not text.startswith(f"antdrive {version} (pybullet "):
         problems.append(f"antdrive --version: {text.strip()}, must begin with antdrive {version} (pybullet")
     for words, wanted in COMMANDS:
-        code, text = said(antdrive, *words.split())
+        code, text, err = said(antdrive, *words.split())
         if code or wanted not in text:
-            problems.append(f"antdrive {words}: exit code {code}, must print {wanted!r}\n{text}")
+            problems.append(f"antdrive {words}: exit code {code}, must print {wanted!r}\n{text or err}")
     return problems
 
 

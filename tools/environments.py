@@ -1,15 +1,14 @@
 """Commands in fresh environments: `python -m tools.environments dist python3.10 python3.11=pybullet-arm64 python3.13=none`.
 
 For each interpreter, the wheel in the folder is installed into a fresh environment, with the distribution of PyBullet that it
-requires there, with the named one, or without any. There, in an empty folder and without the
-checkout, commands run. Those that need PyBullet must refuse in one line where it is missing. The printed table is part of
-`docs/how-to/install.md`; an exit code of 1 means that a command did something else than it must.
+requires there, with the named one, or without any. There, in an empty folder and without the checkout, commands run. Those
+that need PyBullet must refuse in one line where it is missing. `docs/notebook/reproducibility.md` has the printed table; an
+exit code of 1 means that a command did something else than it must.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import shutil
 import subprocess
 import sys
@@ -20,7 +19,7 @@ from typing import NamedTuple
 
 from antdrive.base.version import MISSING, PHYSICS
 from benchmarks.markdown import print_table
-from tools.dist import ROOT, built, version_of
+from tools.dist import ROOT, built, outside, version_of
 from tools.loop import loop
 
 #: Heads of the table's columns, each with the commands tried for it. `kept` is a drive from the environment of this script.
@@ -62,13 +61,7 @@ def environment(text: str) -> Environment:
 
 def row_of(one: Environment, wheel: Path, kept: Path, home: Path) -> tuple[list[str], list[str]]:
     """Return the row of an environment and its problems."""
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "VIRTUAL_ENV"))}
-    clean["XDG_CACHE_HOME"] = str(home / "cache")  # of compiled kernels
-    python, antdrive = home / "env" / "bin" / "python", home / "env" / "bin" / "antdrive"
-
-    def said(*words: str | Path) -> tuple[int, str, str]:
-        done = subprocess.run(list(map(str, words)), cwd=home, env=clean, capture_output=True, text=True, check=False)  # noqa: S603
-        return done.returncode, done.stdout, done.stderr
+    said, python, antdrive = outside(home), home / "env" / "bin" / "python", home / "env" / "bin" / "antdrive"
 
     def pip(*words: str | Path) -> None:
         code, _, err = said(python, "-m", "pip", "--quiet", "--disable-pip-version-check", *words)
