@@ -213,7 +213,8 @@ def import_world(
     ] = None,
     skip_unsupported: Annotated[bool, flag("SDF: skip all but upright cylinders.", "--skip-unsupported")] = False,
     unknown: Annotated[
-        str | None, option("KIND", "map_server: unknown cells are blocked or free.  [default: blocked]")
+        str | None,
+        option("KIND", "map_server: unknown cells and those of shade 205 are blocked or free.  [default: blocked]"),
     ] = None,
     overhang: Annotated[
         float | None,
@@ -229,7 +230,10 @@ def import_world(
     ] = None,
     problem: Annotated[
         int | None,
-        option("NUMBER", "MovingAI: start and goal of this problem in FILE.scen, from 0.", min=0),
+        option("NUMBER", "MovingAI: start and goal of this problem in the .scen file, from 0.", min=0),
+    ] = None,
+    scen: Annotated[
+        Path | None, option("FILE", "MovingAI: the .scen file.  [default: FILE.scen, or the only one of FILE's name]")
     ] = None,
     json: options.Json = False,
     **given: Any,
@@ -243,7 +247,7 @@ def import_world(
     from antdrive.worlds import import_file, save_task
     from antdrive.worlds.formats.cellmap import conversion_progress
     from antdrive.worlds.formats.importing import IMPORTS, import_format
-    from antdrive.worlds.formats.map_server import kept_tasks
+    from antdrive.worlds.formats.map_server import OF_SHADE, kept_tasks
 
     skipped: list[str] = []
     try:
@@ -262,6 +266,7 @@ def import_world(
                 overhang=overhang,
                 resolution=resolution,
                 problem=problem,
+                scen=scen,
             )
     except FieldError as error:
         raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
@@ -275,7 +280,10 @@ def import_world(
     lines = []
     if len(tasks) == 1:
         world = tasks[0].world
-        lines.append(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")
+        first, *more = (world.source or "").split("; ")
+        lines += [f"{world.name}: {len(world.obstacles)} obstacles, {first}", *(f"  {part}" for part in more)]
+        if unknown is None and OF_SHADE in str(world.source):
+            lines.append("  --unknown free or --unknown blocked decides on these cells")
         if file_format.is_map and len(world.obstacles) > MANY:
             lines.append(f"  planning takes seconds beyond {MANY} obstacles; a larger --overhang needs fewer")
     if skip_unsupported:
