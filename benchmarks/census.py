@@ -3,10 +3,10 @@
 FOLDER holds the repositories of `census.csv` as FOLDER/OWNER+NAME; `python -m benchmarks.census --clone FOLDER | sh` makes them
 with git. No file of theirs is kept here: each has its own licence.
 
-Every row runs `antdrive robots import` or `antdrive worlds import` in FOLDER, with the row's arguments, and is judged against what
-is expected of it. A map must block no free cell and every blocked cell beside the ground that start or goal is connected to. In a
-world, one random task on the largest ground is driven and must be certified. `--page FILE` writes the tables for
-`docs/notebook/census.md`, `--only R` takes the rows whose number begins with R (robots), M (maps) or W (worlds).
+Every row runs `antdrive robots import` or `antdrive worlds import` in FOLDER, with the row's arguments, and is judged by what is
+expected of it. A map must cover no free cell, and every blocked cell beside the ground that start or goal is connected to. In a
+world, a random task on the largest ground is driven and must be certified. `--only M` takes the rows whose number begins with M:
+R are robots, M maps and W worlds. `--page FILE` writes the tables of `docs/notebook/census.md`.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from antdrive.base.errors import InputError
 from antdrive import sweep
+from antdrive.base.errors import InputError
+from antdrive.robots import load_robot
 from antdrive.worlds import cell_map, load_task, save_task
 from antdrive.worlds.formats.cellmap import largest_ground
 from antdrive.worlds.formats.map_server import read_map
@@ -114,6 +115,7 @@ def judged(row: Row, folder: Path) -> tuple[str, str]:
         remedied = code == 2 and row.remedy and "refuse" not in row.expected
         if remedied:
             code, said = imported(row, f"{row.arguments} {row.remedy}", folder, written)
+        said = said.replace(f"{row.folder}/{row.path}: ", "").replace("antdrive: ", "").replace(scratch, "")
         lines = said.strip().splitlines() or [""]
         if code not in (0, 2):
             return BROKEN, lines[-1]
@@ -147,11 +149,15 @@ def imported(row: Row, arguments: str, folder: Path, written: Path) -> tuple[int
 
 
 def checked(row: Row, folder: Path, written: Path) -> tuple[str, str]:
-    """Check an imported map or world; return the kind of the outcome and why."""
+    """Check an imported robot, map or world; return the kind of the outcome and why, or what the robot is."""
     if row.id.startswith("M"):
         over, under = wrong_cells(folder / row.folder / row.path, written, free="--unknown free" in row.arguments)
         return (SILENT, f"{over} free cells covered, {under} blocked ones not") if over or under else (RIGHT, "")
-    return driven(written) if row.id.startswith("W") else (RIGHT, "")
+    if row.id.startswith("W"):
+        return driven(written)
+    spec = load_robot(written)
+    sizes = f"radius {spec.radius:.3g} m, wheels {spec.track:.3g} m apart, {spec.mass:.3g} kg"
+    return RIGHT, f"{sizes}, {spec.max_speed:.3g} m/s"
 
 
 def wrong_cells(path: Path, written: Path, free: bool) -> tuple[int, int]:
@@ -233,9 +239,10 @@ def page(outcomes: Sequence[Outcome]) -> Iterator[str]:
     """Yield the lines of the notebook's page."""
     yield "# A census of public robots, maps and worlds"
     yield ""
-    yield "Files of public repositories, imported with the arguments that their owners would give. None is part of antdrive: each has"
-    yield "the licence that its package or repository states. `python -m benchmarks.census FOLDER` fetches nothing; its `--clone` prints"
-    yield "the git commands. *Right* robots, maps and worlds do what a person expects of them, and *refused rightly* names the reason."
+    yield "Files of public repositories, imported with the arguments that their owners would give. None of them is part of"
+    yield "antdrive: each has the licence that its package or its repository states. `python -m benchmarks.census --clone FOLDER`"
+    yield "prints the git commands that fetch them. A refusal is right if the file has no differential drive or no whole"
+    yield "world, and its line says so."
     yield ""
     yield from table(SUMMARY, summary(outcomes))
     for letter, name in KINDS.items():
