@@ -237,7 +237,7 @@ def summary(outcomes: Sequence[Outcome]) -> Iterator[tuple[str, ...]]:
 
 def page(outcomes: Sequence[Outcome]) -> Iterator[str]:
     """Yield the lines of the notebook's page."""
-    yield "# A census of public robots, maps and worlds"
+    yield "# Public robots, maps and worlds"
     yield ""
     yield "Files of public repositories, imported with the arguments that their owners would give. None of them is part of"
     yield "antdrive: each has the licence that its package or its repository states. `python -m benchmarks.census --clone FOLDER`"
@@ -246,7 +246,6 @@ def page(outcomes: Sequence[Outcome]) -> Iterator[str]:
     yield ""
     yield from table(SUMMARY, summary(outcomes))
     for letter, name in KINDS.items():
-        yield ""
         yield f"## {name}"
         yield ""
         yield f"`python -m benchmarks.census FOLDER --only {letter}`"
@@ -280,7 +279,7 @@ def main() -> int:
     print()
     print("\n".join(table(SUMMARY, summary(outcomes))))
     if given.page:
-        Path(given.page).write_text("\n".join(page(outcomes)) + "\n", encoding="utf-8")
+        Path(given.page).write_text("\n".join(page(outcomes)).rstrip() + "\n", encoding="utf-8")
     return int(any(one.kind not in GOOD for one in outcomes))
 
 
