@@ -11,7 +11,6 @@ R are robots, M maps and W worlds. `--page FILE` writes the tables of `docs/note
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import dataclasses
 import math
@@ -41,7 +40,7 @@ SMALLEST = ("--clone somewhere",)
 ROWS = Path(__file__).with_suffix(".csv")
 KINDS = {"R": "Robots", "M": "Maps", "W": "Worlds"}
 LIMIT = 300  # of a command [s]
-ROBOT, CELL = "turtlebot3-burger", 0.1  # of the drives in worlds; [m]
+ROBOT, CELL, MOST_CELLS = "turtlebot3-burger", 0.1, 4_000_000  # of the drives in worlds; [m]
 LONGEST, SHARES = (
     25.0,
     (0.5, 0.25, 0.1),
@@ -195,9 +194,11 @@ def wrong_cells(path: Path, written: Path, free: bool) -> tuple[int, int]:
 def driven(written: Path) -> tuple[str, str]:
     """Drive one random task on the largest ground of a world file; return the kind of the outcome and why."""
     task = load_task(written)
-    start, goal = largest_ground(cell_map(task.world, CELL))
+    cell = max(CELL, math.sqrt(math.prod(task.world.size) / MOST_CELLS))
+    start, goal = largest_ground(cell_map(task.world, cell))
     save_task(dataclasses.replace(task, start=start, goal=goal), target := written.with_name("ground.yaml"))
     xmin, ymin, xmax, ymax = task.world.bounds
+    why = ""
     for share in SHARES:
         least = min(LONGEST, share * math.hypot(xmax - xmin, ymax - ymin))
         campaign = {
@@ -205,13 +206,16 @@ def driven(written: Path) -> tuple[str, str]:
             "planners": ["astar"],
             "robots": [ROBOT],
             "tasks": {"random": 1, "seed": 1, "min_distance": least},
-            "settings": {"cell": CELL},
+            "settings": {"cell": cell, "footprint": "disc"},
         }
-        with contextlib.suppress(InputError):
+        try:
             (run,) = sweep(campaign, written.with_name(f"drive-{share}"), jobs=0).table.to_pylist()
-            why = f"{len(task.world.discs)} cylinders, {run['driven_length_m']:.1f} m in {run['duration_s']:.0f} s"
-            return (RIGHT, f"{why}, certified") if run["certified"] else (DRIVE, f"{run['outcome']}: {run['reason']}")
-    return DRIVE, f"no two points {least:.1f} m apart with a path between them"
+        except InputError as error:  # such as no two points so far apart
+            why = str(error)
+            continue
+        driven = f"{len(task.world.discs)} cylinders, {run['driven_length_m']:.1f} m in {run['duration_s']:.0f} s"
+        return (RIGHT, f"{driven}, certified") if run["certified"] else (DRIVE, f"{run['outcome']}: {run['reason']}")
+    return DRIVE, why
 
 
 def result_rows(outcomes: Sequence[Outcome], links: bool) -> Iterator[tuple[str, ...]]:
