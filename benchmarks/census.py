@@ -40,7 +40,8 @@ SMALLEST = ("--clone somewhere",)
 ROWS = Path(__file__).with_suffix(".csv")
 KINDS = {"R": "Robots", "M": "Maps", "W": "Worlds"}
 LIMIT = 300  # of a command [s]
-ROBOT, CELL, MOST_CELLS = "turtlebot3-burger", 0.1, 4_000_000  # of the drives in worlds; [m]
+ROBOT, FASTER = "turtlebot3-burger", "jackal"  # drive in worlds; the second where cells are larger than CELL
+CELL, MOST_CELLS = 0.1, 4_000_000  # of the drives' grids [m]
 LONGEST, SHARES = (
     25.0,
     (0.5, 0.25, 0.1),
@@ -204,7 +205,7 @@ def driven(written: Path) -> tuple[str, str]:
         campaign = {
             "worlds": [str(target)],
             "planners": ["astar"],
-            "robots": [ROBOT],
+            "robots": [ROBOT if cell == CELL else FASTER],
             "tasks": {"random": 1, "seed": 1, "min_distance": least},
             "settings": {"cell": cell, "footprint": "disc"},
         }
