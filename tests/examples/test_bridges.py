@@ -19,7 +19,6 @@ COMMANDS = [line for line in TEXT.splitlines() if line.startswith("antdrive ")]
 
 @pytest.mark.slow
 def test_every_command_works_and_the_bag_lies_in_the_map(antdrive, tmp_path):
-    pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
     shutil.copytree(EXAMPLE, tmp_path, dirs_exist_ok=True)
     said = {}
     for command in COMMANDS:

@@ -9,8 +9,6 @@ from types import SimpleNamespace
 
 import pytest
 
-pytest.importorskip("distributed")
-
 from antdrive.base.errors import InputError
 from antdrive.runs.campaigns import canonical_bytes, make_campaign, read_results
 from antdrive.runs.campaigns.expanding import expand

@@ -155,7 +155,6 @@ def test_an_imported_robot_drives_a_barn_world_certified(name, barn_0):
 
 @needs_barn
 def test_a_robot_that_is_too_large_for_a_barn_world_says_where_and_what_it_needs(barn_0):
-    pytest.importorskip("xacrodoc")
     robot = import_urdf(URDF / "warehouse.urdf.xacro").spec
     done = run(Scenario.of(barn_0, "tangent", robot))
     assert done.outcome is Outcome.NO_PATH

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -14,6 +15,7 @@ from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError, input_error
 
 MAX_BYTES = 500_000_000  # of any file that is read; most readers have lower limits
+LFS = b"version https://git-lfs.github.com/"  # the first bytes of a pointer
 MAX_JSON_BYTES = 20_000_000  # of manifests and other JSON files that antdrive writes for itself
 
 
@@ -91,7 +93,10 @@ def _json_value(value: Any) -> Any:
 
 
 def open_regular(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES, kind: str = "a file") -> BinaryIO:
-    """Open a regular file for reading; raise InputError for anything else, and for a file larger than `max_bytes`."""
+    """Open a regular file for reading; raise InputError for anything else.
+
+    A file larger than `max_bytes` and a pointer of Git LFS, which stands for a file, are refused, too.
+    """
     try:
         found = os.stat(path)
         if not stat.S_ISREG(found.st_mode):
@@ -99,7 +104,13 @@ def open_regular(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES, kind:
             raise input_error(os.fspath(path), problem)
         if found.st_size > max_bytes:
             raise _too_large(path, max_bytes)
-        return open(path, "rb", opener=without_waiting)
+        with contextlib.ExitStack() as opened:
+            stream = opened.enter_context(open(path, "rb", opener=without_waiting))
+            if stream.peek(len(LFS)).startswith(LFS):
+                problem = "is a pointer of Git LFS, not the file; in its repository: git lfs pull"
+                raise input_error(os.fspath(path), problem)
+            opened.pop_all()
+            return stream
     except InputError:
         raise
     except (OSError, ValueError) as error:

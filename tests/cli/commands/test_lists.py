@@ -112,6 +112,21 @@ def test_show_reports_what_a_robot_reaches_by_its_disc_and_by_its_footprint(antd
     assert re.search(r"^door not passed +0\.80 m wide", shut, re.MULTILINE)
 
 
+def test_show_lists_the_doors_that_just_fail_first_and_counts_narrow_gaps(antdrive, tmp_path):
+    doors = {4.0: 0.35, 8.0: 0.05, 12.0: 0.3, 16.0: 1.0}  # widths by place
+    posts = []
+    for x, width in doors.items():
+        count = round((4 - width) / 0.1)
+        posts += [Disc(x, 0.05 + k * (2 - width / 2 - 0.1) / (count // 2 - 1), 0.05) for k in range(count // 2)]
+        posts += [Disc(x, 4 - post.y, 0.05) for post in posts[-(count // 2) :]]
+    task = Task(World("rooms", (0.0, 0.0, 20.0, 4.0), tuple(posts)), (18.0, 2.0, 0.0), (14.0, 2.0), cell=0.05)
+    save_task(task, tmp_path / "rooms.yaml")
+    out = antdrive("worlds", "show", tmp_path / "rooms.yaml", "--robot", "turtlebot")[1]
+    assert re.findall(r"^door not passed +(0\.\d+) m wide", out, re.MULTILINE) == ["0.35", "0.30"], out
+    assert "1 of 3 doors" in out
+    assert re.search(r"^no doors +\d gaps narrower than 0\.\d+ m, half of what the robot needs$", out, re.MULTILINE)
+
+
 @pytest.mark.parametrize("words", [["forest", "--set", "count=8"], ["barn", "--set", "fill=0.2"]])
 def test_one_seed_generates_one_world(antdrive, words):
     for name in ("a.yaml", "b.yaml"):

@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-import pytest
-
 from antdrive.robots import load_robot
 
 URDF = Path(__file__).parents[2] / "robots" / "importing" / "urdf"
@@ -62,7 +60,6 @@ def test_a_robot_is_imported_from_urdf_and_drawn(antdrive, tmp_path):
 
 
 def test_a_xacro_file_gives_its_first_name_to_the_robot(antdrive, tmp_path):
-    pytest.importorskip("xacrodoc", reason="xacrodoc is not installed")
     code, _, error = antdrive("robots", "import", str(URDF / "warehouse.urdf.xacro"))
     assert (code, error) == (0, "")
     assert (tmp_path / "warehouse.yaml").exists()

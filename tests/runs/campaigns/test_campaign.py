@@ -7,6 +7,7 @@ import json
 import math
 import re
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -159,6 +160,23 @@ def test_the_floor_of_random_tasks_is_stated():
     campaign = {"worlds": ["slalom", "empty"], "planners": ["astar"], "tasks": {"random": 1}}
     (remark,) = expand(make_campaign(campaign)).remarks
     assert re.match(r"random tasks are drawn from \d\d% \(world slalom\) to 100% of the connected floor", remark)
+
+
+def test_random_tasks_on_a_map_server_map_need_no_ends_and_unknown_cells_are_stated(tmp_path):
+    picture = np.full((40, 60), 254, dtype=np.uint8)
+    picture[[0, -1]], picture[:, [0, -1]], picture[:, 20], picture[:, 21:30] = 0, 0, 0, 205
+    (tmp_path / "w.pgm").write_bytes(b"P5\n60 40\n255\n" + picture.tobytes())
+    keys = "image: w.pgm\nresolution: 0.1\norigin: [3, 4, 0.5]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    (tmp_path / "w.yaml").write_text(keys)
+    campaign = {"worlds": [{"import": "w.yaml"}], "planners": ["astar"], "tasks": {"random": 2}}
+    expansion = expand(make_campaign(campaign, tmp_path))
+    for job in expansion.jobs:
+        assert all(3.0 < x < 5.9 for x in (job.case.place.task.start[0], job.case.place.task.goal[0]))
+    assert expansion.remarks[0].startswith(
+        "world w: 360 cells (15.00%) of shade 205, map savers' unknown, are taken for"
+    )
+    with pytest.raises(InputError, match="start and goal: missing"):
+        expand(make_campaign(campaign | {"tasks": "own"}, tmp_path))
 
 
 def test_random_tasks_on_a_map_need_no_problem_and_lie_on_its_largest_ground(tmp_path):

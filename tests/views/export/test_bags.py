@@ -9,9 +9,12 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import mcap.reader as mcap_reader
+import mcap_ros2.decoder as mcap_ros2
 import numpy as np
 import pytest
 import yaml
+from rosbags import rosbag2
 
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import Scanner
@@ -21,10 +24,6 @@ from antdrive.views.export.topics import message_types
 from antdrive.worlds.files.world_file import load_task
 from antdrive.worlds.grid import rasterise
 from antdrive.worlds.world import Disc
-
-rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
-mcap_reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
-mcap_ros2 = pytest.importorskip("mcap_ros2.decoder", reason="mcap-ros2-support is not installed")
 
 FRAME = (10.0, -4.0, 0.3)
 

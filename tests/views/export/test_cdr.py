@@ -15,8 +15,6 @@ from antdrive.views.export import samples
 from antdrive.views.export.samples import DriveScans
 from antdrive.views.export.topics import message_types
 
-pytest.importorskip("rosbags", reason="rosbags is not installed")
-
 BODY = SimpleNamespace(scan="base_scan", scanner=np.eye(4))
 STAMPS = np.array([0, 1, 999_999_999, 12_345_678_901], dtype=np.int64)
 

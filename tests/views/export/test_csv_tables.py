@@ -73,7 +73,6 @@ def test_a_failure_leaves_nothing(log, tmp_path, monkeypatch):
 
 
 def test_a_bag_and_its_layout_are_replaced_only_when_asked(log, tmp_path):
-    pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
     bag, layout = tmp_path / "drive.mcap", tmp_path / "drive.foxglove.json"
     layout.write_text("mine")
     with pytest.raises(

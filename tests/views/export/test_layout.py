@@ -8,10 +8,9 @@ import re
 
 import pydantic
 import pytest
+from foxglove import layouts
 
 from antdrive.views.export.exporting import foxglove_layout
-
-layouts = pytest.importorskip("foxglove.layouts", reason="foxglove-sdk is not installed")
 
 #: Of the program's own files, not of the types: titles, and what axisSize was called before.
 ELSEWHERE = {"foxglovePanelTitle", "lichtblickPanelTitle", "axisScale"}

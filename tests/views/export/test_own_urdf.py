@@ -18,8 +18,6 @@ from antdrive.views.export.samples import DriveScans
 from antdrive.views.export.topics import message_types
 from tests.made_up_drive import scanned
 
-pytest.importorskip("rosbags", reason="rosbags is not installed")
-
 URDF = Path(__file__).parents[2] / "robots" / "importing" / "urdf"
 BURGER = URDF / "burger.urdf"
 SENSOR = (
@@ -144,7 +142,6 @@ def test_a_skid_steered_robot_needs_its_axle(made_up_drive):
 
 
 def test_xacro_is_resolved():
-    pytest.importorskip("xacrodoc")
     path = URDF / "warehouse.urdf.xacro"
     text = frames_of_urdf(import_urdf(path).spec, path).text
     assert "xacro:" not in text

@@ -3,15 +3,14 @@
 import math
 from dataclasses import replace
 
+import mcap.reader as mcap_reader
+import mcap_ros2.decoder as mcap_ros2
 import numpy as np
 import pytest
 
 from antdrive.views.export.exporting import export
 from antdrive.views.export.samples import LOGGED, DriveScans
 from tests.made_up_drive import scanned
-
-mcap_reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
-mcap_ros2 = pytest.importorskip("mcap_ros2.decoder", reason="mcap-ros2-support is not installed")
 
 
 @pytest.fixture(scope="module")

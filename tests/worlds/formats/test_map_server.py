@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from antdrive.base import InputError
-from antdrive.worlds import export_map_server, import_map_server, load_task, save_task
+from antdrive.worlds import export_map_server, import_file, import_map_server, load_task, save_task
 from antdrive.worlds.formats.map_server import read_map
 
 GOOD = """\
@@ -137,10 +137,12 @@ CHANGES = {
     "resolution text": ("0.5", "5e-2"), "resolution nan": ("0.5", ".nan"), "origin without yaw": (", 0.0]", "]"),
     "negate 2": ("negate: 0", "negate: 2"), "threshold 65": ("0.65", "65"), "threshold below 0": ("0.196", "-0.1"),
     "thresholds crossed": ("0.196", "0.7"), "mode": ("0.196", "0.196\nmode: binary"),
+    "yaw nan": ("0.0]", "-nan]"), "image of another computer": ("made.pgm", "/home/someone/other.pgm"),
     "bad ends": ("0.196", "0.196\nantdrive: {start: [0.0, 0.0]}"),
 }  # fmt: skip
 IMAGES = {
     "no image": None, "no picture": b"hello", "wrong magic": PGM.replace(b"P5", b"P9"), "cut off": PGM[:-2],
+    "pointer of Git LFS": b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n",
     "gif": b"GIF89a\x01\x00\x01\x00\x80\x00\x00", "cut off in plain": b"P2 3 2 255\n1 2 3",
     "cut off in the header": b"P5\n3", "no pixels": b"P5\n0 2\n255\n", "word for a pixel": b"P2 3 1 255\n1 x 3",
     "pixel too bright": b"P2 3 1 255\n1 600 3", "maxval": b"P5 3 1 0\n123", "huge": b"P5 9999 9999 255\n123",
@@ -157,6 +159,46 @@ BAD = {
     **{name: (GOOD.replace(*change), PGM) for name, change in CHANGES.items()},
     **{name: (GOOD, image) for name, image in IMAGES.items()},
 }
+
+
+@pytest.mark.parametrize("thresh", ["0.196", "0.25"])
+@pytest.mark.parametrize(("kind", "free"), [(None, [1, 0, 0]), ("blocked", [1, 0, 0]), ("free", [1, 1, 0])])
+def test_shade_205_is_unknown_whatever_free_thresh_is(tmp_path, thresh, kind, free):
+    path = written(tmp_path, GOOD.replace("0.196", thresh))
+    (task,) = import_file(path, start=(-0.7, 2.2, 0.0), goal=(0.2, 2.2), unknown=kind)
+    assert rows_of(path, unknown_is_free={"free": True, "blocked": False}.get(kind))[1] == free
+    assert task.world.source.endswith(
+        "; 1 cells (16.67%) of shade 205, map savers' unknown, are "
+        f"{'free, for' if kind == 'free' else 'taken for unknown, though'} free_thresh 0.25 makes them free"
+    ) == (thresh == "0.25")
+
+
+def test_shade_205_is_one_of_many_in_a_picture_of_greys(tmp_path):
+    text = GOOD.replace("0.196", "0.3")
+    path = written(tmp_path, text, b"P5\n5 1\n255\n" + bytes([254, 205, 200, 210, 0]))
+    assert rows_of(path) == rows_of(path, unknown_is_free=True) == [[1, 1, 1, 1, 0]]
+    assert rows_of(path, unknown_is_free=False) == [[1, 0, 1, 1, 0]]
+    assert read_map(path).remarks == (
+        "1 cells (20.00%) of shade 205, map savers' unknown, are free, for free_thresh 0.3 makes them free",
+    )
+
+
+def test_a_saved_map_with_an_alpha_channel_keeps_its_unknown_cells(tmp_path):
+    """map_server averages alpha in, so that 205 is 217.5, and p = 0.147."""
+    Image.fromarray(np.array([[254, 205, 0]], dtype=np.uint8)).convert("LA").save(tmp_path / "made.png")
+    assert rows_of(written(tmp_path, GOOD.replace("made.pgm", "made.png"))) == [[1, 0, 0]]
+
+
+@pytest.mark.parametrize("image", ["/home/someone/made.pgm", "C:\\maps\\made.pgm", "../gone/made.pgm"])
+def test_the_image_of_another_computer_is_the_file_of_that_name_beside_the_yaml(tmp_path, image):
+    served = read_map(written(tmp_path, GOOD.replace("made.pgm", image)))
+    assert served.cells.free.shape == (2, 3)
+    assert served.remarks == (f"its image is made.pgm beside it, for there is no {image}",)
+
+
+def test_an_end_on_an_unknown_cell_names_the_option(tmp_path):
+    with pytest.raises(InputError, match=r"goal: \(-0\.2, 2\.7\) is on an unknown cell, .*--unknown free"):
+        import_map_server(written(tmp_path), start=(-0.7, 2.2, 0.0), goal=(-0.2, 2.7))
 
 
 def test_a_rotated_map_becomes_an_upright_world_with_a_frame(tmp_path):

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import Query, load_planner
 from antdrive.worlds import MapProblem, import_movingai_map, import_movingai_problems, import_movingai_task, rasterise
 from tools.shared_data import MOVINGAI
@@ -79,6 +80,21 @@ def test_a_movingai_task_takes_a_problems_ends_at_the_centres_of_their_cells(tmp
     assert (task.start, task.goal, task.cell) == ((1.0, 3.0, math.atan2(-1, 2)), (5.0, 1.0), 2.0)
     assert task.world.bounds == (0.0, 0.0, 6.0, 4.0)
     assert task.world.discs == pytest.approx(np.array([[5.0, 3.0, math.sqrt(2)]]))
+
+
+def test_a_problem_comes_from_the_only_scen_file_of_the_maps_name(tmp_path):
+    """MAPF's benchmarks call theirs MAP-random-1.scen."""
+    path, blocked = written(tmp_path, MAP), PROBLEM.replace("\t1\t1\t", "\t1\t0\t")
+    for name in ("made-random-1.scen", "made-even-1.scen", "other-even-1.scen"):
+        (tmp_path / name).write_text(f"version 1\n{PROBLEM}\n\n{blocked}\n")
+    with pytest.raises(FieldError, match=r"scen: choose one of made-even-1\.scen, made-random-1\.scen"):
+        import_movingai_task(path, problem=1)
+    place = r"made-even-1\.scen:4: the goal x = 1, y = 0 is on a blocked cell of made\.map"
+    with pytest.raises(InputError, match=place):
+        import_movingai_task(path, problem=1, scen=tmp_path / "made-even-1.scen")
+    (tmp_path / "made-random-1.scen").unlink()
+    with pytest.raises(InputError, match=place):
+        import_movingai_task(path, problem=1)
 
 
 @pytest.fixture(scope="module")

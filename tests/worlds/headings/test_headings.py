@@ -72,7 +72,8 @@ def test_turns_are_clear_where_samples_are(outline):
 @EVERY
 def test_swept_distances_are_those_of_another_library(outline):
     """The exact distance of the hull of both ends from each disc's centre."""
-    shapely = pytest.importorskip("shapely")
+    import shapely
+
     discs, bounds = crowd(5, count=12)
     rng = np.random.default_rng(5)
     for x, y in places(5, 25):

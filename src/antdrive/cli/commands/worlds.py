@@ -127,7 +127,7 @@ def show_world(
     said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name}{by} with a margin of {margin:g} m"
     said |= {"reason": why} if why and not overlap else {}
     said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
-    rows = [*said.items(), *_coverage_rows(covered)]
+    rows = [*said.items(), *_coverage_rows(covered, spec.footprint.inner_radius + margin)]
     rows += [(f"start for {name}", overlap) for name, overlap in starts.items() if overlap]
     rows += [("tasks", ", ".join(named))] if named else []
     lines = [*table(rows[0], rows[1:]), *([] if out is None else file_lines({"figure": out}))]
@@ -150,23 +150,32 @@ def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
     return {"share": covered.share, **rooms, "doors": doors}
 
 
-def _coverage_rows(covered: "Mapping[str, Coverage]") -> "Iterator[tuple[str, str]]":
-    """Yield what a robot reaches by each shape, and the narrowest doors that its disc does not pass."""
+def _coverage_rows(covered: "Mapping[str, Coverage]", least: float) -> "Iterator[tuple[str, str]]":
+    """Yield what a robot reaches by each shape, and the doors that its disc does not pass, those that just fail first.
+
+    Gaps narrower than `least` [m], such as those among chairs, are counted but are no doors.
+    """
     from antdrive.base.plane import format_point
 
     for shape, each in covered.items():
         rooms = f"{len(each.rooms_reached)} of {each.room_count} rooms"
-        passed = sum(door.passed for door in each.doors)
-        doors = f", {passed} of {len(each.doors)} doors" if each.doors else ""
+        wide = [door.passed for door in each.doors if door.width >= least]
+        doors = f", {sum(wide)} of {len(wide)} doors" if wide else ""
         reached = f"by its {shape}" if len(covered) > 1 else "reached"
         yield reached, f"{each.share:.0%} of the connected floor, {rooms}{doors}"
     last = list(covered.values())[-1].doors
     shut = [door for first, door in zip(covered["disc"].doors, last, strict=True) if not first.passed]
-    for door in shut[:MOST_DOORS]:
+    listed = sorted((door for door in shut if door.width >= least), key=lambda door: (door.passed, -door.width))
+    for door in listed[:MOST_DOORS]:
         place = f"{door.width:.2f} m wide at {format_point(door.at, 2)}"
         yield "door by footprint" if door.passed else "door not passed", place
-    if len(shut) > MOST_DOORS:
-        yield "", f"and {len(shut) - MOST_DOORS} more"
+    if len(listed) > MOST_DOORS:
+        yield "", f"and {len(listed) - MOST_DOORS} more"
+    if len(shut) > len(listed):
+        yield (
+            "no doors",
+            f"{len(shut) - len(listed)} gaps narrower than {least:.2f} m, half of what the robot needs",
+        )
 
 
 @options.with_settings(("seed",))
@@ -213,7 +222,8 @@ def import_world(
     ] = None,
     skip_unsupported: Annotated[bool, flag("SDF: skip all but upright cylinders.", "--skip-unsupported")] = False,
     unknown: Annotated[
-        str | None, option("KIND", "map_server: unknown cells are blocked or free.  [default: blocked]")
+        str | None,
+        option("KIND", "map_server: unknown cells and those of shade 205 are blocked or free.  [default: blocked]"),
     ] = None,
     overhang: Annotated[
         float | None,
@@ -229,7 +239,10 @@ def import_world(
     ] = None,
     problem: Annotated[
         int | None,
-        option("NUMBER", "MovingAI: start and goal of this problem in FILE.scen, from 0.", min=0),
+        option("NUMBER", "MovingAI: start and goal of this problem in the .scen file, from 0.", min=0),
+    ] = None,
+    scen: Annotated[
+        Path | None, option("FILE", "MovingAI: the .scen file.  [default: FILE.scen, or the only one of FILE's name]")
     ] = None,
     json: options.Json = False,
     **given: Any,
@@ -243,7 +256,7 @@ def import_world(
     from antdrive.worlds import import_file, save_task
     from antdrive.worlds.formats.cellmap import conversion_progress
     from antdrive.worlds.formats.importing import IMPORTS, import_format
-    from antdrive.worlds.formats.map_server import kept_tasks
+    from antdrive.worlds.formats.map_server import OF_SHADE, kept_tasks
 
     skipped: list[str] = []
     try:
@@ -262,6 +275,7 @@ def import_world(
                 overhang=overhang,
                 resolution=resolution,
                 problem=problem,
+                scen=scen,
             )
     except FieldError as error:
         raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
@@ -275,7 +289,10 @@ def import_world(
     lines = []
     if len(tasks) == 1:
         world = tasks[0].world
-        lines.append(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")
+        first, *more = (world.source or "").split("; ")
+        lines += [f"{world.name}: {len(world.obstacles)} obstacles, {first}", *(f"  {part}" for part in more)]
+        if unknown is None and OF_SHADE in str(world.source):
+            lines.append("  --unknown free or --unknown blocked decides on these cells")
         if file_format.is_map and len(world.obstacles) > MANY:
             lines.append(f"  planning takes seconds beyond {MANY} obstacles; a larger --overhang needs fewer")
     if skip_unsupported:

@@ -22,6 +22,7 @@ from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting
 from antdrive.sim.log.record import canonical_hash
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Task
+from antdrive.worlds.formats.map_server import OF_SHADE
 
 WORLDS, ROBOTS = "worlds", "robots"  # subfolders with the files that commands name
 
@@ -37,7 +38,7 @@ class Expansion:
     worlds: dict[str, Task]  # world files named by the runs' commands, by path relative to the campaign's folder
     robots: dict[str, Path]  # robot files, likewise
     planners: dict[str, Path]  # files of custom planners, likewise
-    remarks: tuple[str, ...]  # sentences about skipped problems and about the floor of random tasks
+    remarks: tuple[str, ...]  # sentences about skipped problems, maps' unknown cells and the floor of random tasks
 
     def idle_notes(self) -> list[str]:
         """Return a sentence for every setting without effect in some of the configurations."""
@@ -91,9 +92,11 @@ def expand(campaign: Campaign) -> Expansion:
 
 
 def _remarks(tasks: Sequence[NamedTask], skipped: Sequence[str]) -> Iterator[str]:
-    """Yield sentences about skipped problems and about the share of the floor that random tasks were drawn from."""
+    """Yield sentences about skipped problems, doubtful cells of maps, and the floor that random tasks were drawn from."""
     if skipped:
         yield f"{len(skipped)} {'problem' if len(skipped) == 1 else 'problems'} skipped; {skipped[0]}"
+    for world, source in {one.world: one.task.world.source or "" for one in tasks}.items():
+        yield from (f"world {world}: {part}" for part in source.split("; ") if OF_SHADE in part)
     origins = {one.world: one.origin for one in tasks if one.origin}
     floors = {world: origin.share for world, origin in origins.items()}
     if floors:

@@ -28,8 +28,7 @@ from antdrive.sim.forms import option_text, seed_list
 from antdrive.sim.log.record import canonical_hash, settings_of
 from antdrive.worlds import Disc, Grid, Task, World, list_worlds, load_task, load_tasks, rasterise
 from antdrive.worlds.coverage import reached_cells, share_of
-from antdrive.worlds.formats.importing import import_file
-from antdrive.worlds.formats.movingai import movingai_ends
+from antdrive.worlds.formats.importing import import_file, import_format
 from antdrive.worlds.generators.generate import generated
 
 OWN = "own"  # name of a world's default task
@@ -129,13 +128,14 @@ def _imported(
     problems = _problems(campaign, place, entry)
     suffix = "".join(f" {key}={option_text(value)}" for key, value in entry.items())
     options = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+    if isinstance(scen := entry.get("scen"), str):
+        options["scen"] = campaign.folder / scen
     drawn = isinstance(campaign.tasks, RandomTasks) and problems == [None] and not {"start", "goal"} & set(entry)
     for path in _files(campaign, (*place, "import"), pattern, ""):
         for problem in problems:
             try:
-                if drawn and path.suffix.lower() == ".map":
-                    options["start"], options["goal"] = movingai_ends(path, entry.get("resolution", 1.0))
-                tasks = import_file(path, barn=barn, problem=problem, **options)
+                anywhere = (drawn and import_format(path, barn=barn).is_map) or None
+                tasks = import_file(path, barn=barn, problem=problem, anywhere=anywhere, **options)
             except FieldError as error:
                 raise campaign.error((*place, error.key), error.problem) from None
             except TypeError:

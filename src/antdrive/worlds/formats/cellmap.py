@@ -56,12 +56,14 @@ class CellMap:
         resolution: side of a cell [m]
         origin: lower left corner of cell (0, 0): x, y [m]
         frame: pose of the cells' frame in the source map, for messages: x, y [m] and yaw [rad]
+        unknown: cells (R, C) that the source map does not know, for messages
     """
 
     free: Cells
     resolution: float
     origin: Point = (0.0, 0.0)
     frame: Pose = (0.0, 0.0, 0.0)
+    unknown: Cells | None = None
 
     @property
     def bounds(self) -> Bounds:
@@ -245,11 +247,17 @@ def file_task(
     overhang: float | None,
     cell: float | None,
     goal_tolerance: float | None,
+    anywhere: bool,
 ) -> Task:
-    """Convert a map from a file as `map_task` does, with the file's name for the world and for errors."""
+    """Convert a map from a file as `map_task` does, with the file's name for the world and for errors.
+
+    If `anywhere` is set and neither start nor goal is given, they lie on the largest connected ground.
+    """
     name = "".join(filter(str.isprintable, file.stem))[:200] or "map"
     tolerance = TOLERANCE if goal_tolerance is None else goal_tolerance
     try:
+        if anywhere and start is None and goal is None:
+            start, goal = largest_ground(cells)
         return map_task(
             cells, start, goal, name=name, source=source, overhang=overhang, cell=cell, goal_tolerance=tolerance
         )
@@ -310,6 +318,9 @@ def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
         raise input_error(key, f"{format_point(there)} is not on the map, which spans {_span(cells)}")
     if not cells.free[spot]:
         at = f"row {spot[0]} from below, column {spot[1]}"
+        if cells.unknown is not None and cells.unknown[spot]:
+            unknown = "an unknown cell, such as map savers' shade 205"
+            raise input_error(key, f"{format_point(there)} is on {unknown}: {at}; --unknown free makes such cells free")
         raise input_error(key, f"{format_point(there)} is on a blocked cell: {at}")
     return spot
 

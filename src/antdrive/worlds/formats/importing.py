@@ -32,10 +32,10 @@ class Format:
     is_map: bool = False  # whether the files are maps of cells, covered with cylinders on import
 
 
-def _read_map_server(path: Path, unknown: str = "blocked", **options: Any) -> list[Task]:
-    if unknown not in ("blocked", "free"):
+def _read_map_server(path: Path, unknown: str | None = None, **options: Any) -> list[Task]:
+    if unknown not in (None, "blocked", "free"):
         raise FieldError("unknown", f"must be blocked or free, got {unknown!r}")
-    return [import_map_server(path, unknown_is_free=unknown == "free", **options)]
+    return [import_map_server(path, unknown_is_free=None if unknown is None else unknown == "free", **options)]
 
 
 #: The import formats by name; of formats that share a suffix, the first is the default.
@@ -53,14 +53,14 @@ IMPORTS: Mapping[str, Format] = MappingProxyType(
         "map_server": Format(
             "a map_server map",
             (".yaml", ".yml"),
-            ("start", "goal", "cell", "unknown", "overhang"),
+            ("start", "goal", "cell", "unknown", "overhang", "anywhere"),
             _read_map_server,
             is_map=True,
         ),
         "movingai": Format(
             "a MovingAI map",
             (".map",),
-            ("start", "goal", "cell", "overhang", "resolution", "problem"),
+            ("start", "goal", "cell", "overhang", "resolution", "problem", "scen", "anywhere"),
             lambda path, **options: [import_movingai_task(path, **options)],
             is_map=True,
         ),
@@ -103,7 +103,7 @@ def import_file(path: str | os.PathLike[str], *, barn: bool = False, **options: 
         path: the file
         barn: whether an SDF world belongs to the BARN set, with the challenge's start, goal and bounds
         options: as for `import_sdf`, `import_barn`, `import_map_server`, `import_movingai_task` and `import_dynabarn`,
-            but a map_server map takes `unknown`, "blocked" or "free", for its unknown cells; None counts as not given
+            but a map_server map takes `unknown`, "blocked" or "free", for `unknown_is_free`; None counts as not given
 
     Raises:
         InputError: the file cannot be imported, is invalid, or contradicts an option.
@@ -119,4 +119,4 @@ def import_file(path: str | os.PathLike[str], *, barn: bool = False, **options: 
 
 
 def _listed(options: tuple[str, ...]) -> str:
-    return ", ".join(name for name in options if not name.startswith("on_"))
+    return ", ".join(name for name in options if name != "anywhere" and not name.startswith("on_"))

@@ -4,6 +4,9 @@ A pixel of shade s, from 0 (black) to 1 (white), is occupied with probability p 
 Its cell is free when p < free_thresh, occupied when p > occupied_thresh, and unknown in between; the image's last row is
 the lowest. In mode `scale`, pixels that are not opaque are unknown. In mode `raw`, the shades 0..100 (of 255) are p in
 percent, never negated, and higher shades are unknown.
+
+Map savers write unknown cells as shade 205 (p = 0.1961), which the `free_thresh` of 0.25 that newer ones write makes free.
+By default, such cells are unknown where 205 is the image's usual grey: more cells have it than all other greys.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import re
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -36,7 +40,8 @@ from antdrive.worlds.world import Task
 
 FORMATS = ("PPM", "PNG", "BMP")  # Pillow's "PPM" includes PBM and PGM
 MODES = {"1": "L", "P": "RGB"}  # black-and-white images are read as grey, palettes as colours
-FREE, OCCUPIED = 254, 0  # the shades that map_saver writes
+FREE, OCCUPIED, UNKNOWN = 254, 0, 205  # the shades that map savers write
+OF_SHADE = f"of shade {UNKNOWN}, map savers' unknown,"
 
 _RULES: ConfigDict = {**STRICT, "extra": "ignore"}
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -98,6 +103,7 @@ class ServedMap:
 
     cells: CellMap  # unknown cells are free only on request
     unknown: int  # number of cells neither free nor occupied
+    remarks: tuple[str, ...]  # what is unusual about the files
     ends: KeptTasks | None  # tasks, if antdrive wrote the map
     # pose of the cells' frame in the map's frame; nonzero for a rotated map, whose cells begin at the origin
     frame: Pose = (0.0, 0.0, 0.0)
@@ -108,10 +114,11 @@ def import_map_server(
     *,
     start: Pose | None = None,
     goal: Point | None = None,
-    unknown_is_free: bool = False,
+    unknown_is_free: bool | None = None,
     overhang: float | None = None,
     cell: float | None = None,
     goal_tolerance: float | None = None,
+    anywhere: bool = False,
 ) -> Task:
     """Import a map_server map as a world of discs; see `map_task`.
 
@@ -119,12 +126,14 @@ def import_map_server(
 
     Args:
         path: the YAML file
-        start: the robot's start pose in the map [m, m, rad]; required unless `export_map_server` wrote the map
-        goal: the goal position in the map [m]; required unless `export_map_server` wrote the map
-        unknown_is_free: whether unknown cells are free instead of blocked
+        start: the robot's start pose in the map [m, m, rad]; required unless `export_map_server` wrote the map or `anywhere`
+        goal: the goal position in the map [m]; required unless `export_map_server` wrote the map or `anywhere`
+        unknown_is_free: whether unknown cells and those of shade 205 are free or blocked; by default blocked, but the few
+            of shade 205 in an image of many greys are free if `free_thresh` says so
         overhang: largest protrusion of discs beyond blocked cells [m]; see `map_task`
         cell: the task's grid resolution [m]; by default the map's
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
+        anywhere: whether start and goal, if neither is given, lie on the largest connected ground
 
     Raises:
         InputError: a file is invalid, or `map_task` refuses the map.
@@ -141,9 +150,18 @@ def import_map_server(
     if any(served.frame):
         start, goal = _map_to_world(served.frame, start), _map_to_world(served.frame, goal)
     task = file_task(
-        file, served.cells, start, goal, source=source, overhang=overhang, cell=cell, goal_tolerance=goal_tolerance
+        file,
+        served.cells,
+        start,
+        goal,
+        source=source,
+        overhang=overhang,
+        cell=cell,
+        goal_tolerance=goal_tolerance,
+        anywhere=anywhere,
     )
-    return dataclasses.replace(task, frame=served.frame)
+    world = dataclasses.replace(task.world, source="; ".join((str(task.world.source), *served.remarks)))
+    return dataclasses.replace(task, world=world, frame=served.frame)
 
 
 def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
@@ -164,31 +182,50 @@ def _map_to_world(frame: Pose, end: Any) -> Any:
     return None if end is None else tuple(map_to_world(frame, [end])[0].tolist())
 
 
-def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> ServedMap:
-    """Read a map from its YAML file and image."""
+def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool | None = None) -> ServedMap:
+    """Read a map from its YAML file and image; `unknown_is_free` is that of `import_map_server`."""
     document = read_document(path)
     if isinstance(document.data, dict) and "image" not in document.data:
         raise document.error((), "image: missing; a map_server map names its image")
+    origin = document.data.get("origin") if isinstance(document.data, dict) else None
+    if isinstance(origin, list) and len(origin) == 3 and str(origin[2]).lstrip("+-.").lower() == "nan":
+        raise document.error(
+            ("origin", 2), f"the yaw must be a number, got {origin[2]}; write 0 if the map is not rotated"
+        )
     entry = check(MapFile, document)
+    image, remarks = Path(path).parent / entry.image, []
+    beside = Path(path).parent / re.split(r"[\\/]", entry.image)[-1]
+    if not os.path.exists(image) and os.path.isfile(beside):
+        remarks.append(f"its image is {beside.name} beside it, for there is no {entry.image}")
+        image = beside
     try:
-        level, opaque = _levels(Path(path).parent / entry.image, average_alpha=entry.mode == "trinary")
+        level, shade, opaque = _levels(image, average_alpha=entry.mode == "trinary")
     except ValueError as error:
         raise document.error(("image",), str(error)) from None
     p = level / 100 if entry.mode == "raw" else (level if entry.negate else 255 - level) / 255
     known = p <= 1.0 if entry.mode == "raw" else opaque | (entry.mode == "trinary")
     free, occupied = known & (p < entry.free_thresh), known & (p > entry.occupied_thresh)
-    cells = np.array((~occupied if unknown_is_free else free)[::-1])
+    saved = free & (shade == UNKNOWN) & (entry.mode != "raw")
+    if count := np.count_nonzero(saved):
+        greys = np.count_nonzero((shade > OCCUPIED) & (shade < FREE))
+        as_unknown = 2 * count > greys if unknown_is_free is None else not unknown_is_free
+        how = "taken for unknown, though" if as_unknown else "free, for"
+        limit = f"free_thresh {entry.free_thresh:g} makes them free"
+        remarks.append(f"{count} cells ({count / saved.size:.2%}) {OF_SHADE} are {how} {limit}")
+        free &= ~saved | (not as_unknown)
+    unknown = (~free & ~occupied)[::-1]
+    cells = np.array(free[::-1] | unknown if unknown_is_free else free[::-1])
     cells.setflags(write=False)
     x, y, yaw = entry.origin
     frame, corner = ((x, y, yaw), (0.0, 0.0)) if yaw else ((0.0, 0.0, 0.0), (x, y))
-    cell_grid = CellMap(cells, entry.resolution, corner, frame)
-    return ServedMap(cell_grid, int((~free & ~occupied).sum()), entry.antdrive, frame)
+    cell_grid = CellMap(cells, entry.resolution, corner, frame, unknown)
+    return ServedMap(cell_grid, int(unknown.sum()), tuple(remarks), entry.antdrive, frame)
 
 
-def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
-    """Return the brightness of the pixels, 0..255, and a mask of opaque pixels; both (R, C), top row first.
+def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Floats, Cells]:
+    """Return the brightness and the shade of the pixels, 0..255, and a mask of opaque pixels; all (R, C), top row first.
 
-    Brightness is the mean of the channels, including alpha in map_server's trinary mode.
+    Both are means of the channels, the brightness including alpha in map_server's trinary mode.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -212,8 +249,10 @@ def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
         raise ValueError(f"{path} cannot be read: {problem}") from None
     layers = pixels.reshape(height, width, -1)
     if image.mode not in ("LA", "RGBA"):
-        return layers.mean(axis=2), np.ones((height, width), dtype=np.bool_)
-    return (layers if average_alpha else layers[..., :-1]).mean(axis=2), layers[..., -1] == 255
+        shade = layers.mean(axis=2)
+        return shade, shade, np.ones((height, width), dtype=np.bool_)
+    shade = layers[..., :-1].mean(axis=2)
+    return layers.mean(axis=2) if average_alpha else shade, shade, layers[..., -1] == 255
 
 
 def export_map_server(

@@ -5,6 +5,7 @@ A `.map` file begins with the map's top line, which becomes the last row: rows r
 
 from __future__ import annotations
 
+import glob
 import math
 import os
 from collections.abc import Iterable
@@ -16,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.atomic import atomic_write, write_text
-from antdrive.base.errors import InputError, input_error
+from antdrive.base.errors import FieldError, input_error
 from antdrive.base.files import read_bytes
 from antdrive.base.types import Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
-from antdrive.worlds.formats.cellmap import CellMap, cell_map, file_task, largest_ground
+from antdrive.worlds.formats.cellmap import CellMap, cell_map, file_task
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.world import Task
 
@@ -33,6 +34,7 @@ PASSABLE = b".GS"  # ground (. and G), swamp (S), passable from ground
 BLOCKED = b"@OTW"  # out of bounds (@ and O), trees (T), water (W)
 
 MAX_BYTES = 100_000_000
+MOST_NAMES = 3  # of .scen files in a message
 
 
 @dataclass(frozen=True)
@@ -77,18 +79,22 @@ def import_movingai_task(
     overhang: float | None = None,
     cell: float | None = None,
     goal_tolerance: float | None = None,
+    scen: str | os.PathLike[str] | None = None,
+    anywhere: bool = False,
 ) -> Task:
     """Import a `.map` file as a world of discs; see `map_task`. `import_movingai_map` keeps the map's own cells.
 
     Args:
         path: the `.map` file; its lower left corner becomes (0, 0)
-        start: the robot's start pose [m, m, rad]; required without a problem
-        goal: the goal position [m]; required without a problem
+        start: the robot's start pose [m, m, rad]; required without a problem, unless `anywhere`
+        goal: the goal position [m]; required without a problem, unless `anywhere`
         problem: index, from 0, of the `.scen` file's problem that gives start and goal
         resolution: side of the map's cells [m]
         overhang: largest protrusion of discs beyond blocked cells [m]; see `map_task`
         cell: the task's grid resolution [m]; by default the map's
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
+        scen: the `.scen` file of the problem; by default the only one beside the map that begins with the map's name
+        anywhere: whether start and goal, if neither is given, lie on the largest connected ground
 
     Raises:
         InputError: a file or an option is invalid, the problem does not exist, or `map_task` refuses the map.
@@ -101,34 +107,45 @@ def import_movingai_task(
     if problem is not None:
         if start is not None or goal is not None:
             raise input_error("problem", "has its own start and goal; give either the problem or start and goal")
-        chosen = _problem_beside(file, problem)
+        place, chosen = _problem_of(_scen_of(file) if scen is None else Path(scen), problem)
         (r0, c0), (r1, c1) = chosen.start, chosen.goal
+        for key, (r, c) in (("start", chosen.start), ("goal", chosen.goal)):
+            if r < len(cells.free) and c < cells.free.shape[1] and not cells.free[r, c]:
+                at = f"x = {c}, y = {len(cells.free) - 1 - r}"
+                raise input_error(
+                    place, f"the {key} {at} is on a blocked cell of {file.name}; y counts from its first line"
+                )
         start = (c0 + 0.5) * resolution, (r0 + 0.5) * resolution, math.atan2(r1 - r0, c1 - c0)
         goal = (c1 + 0.5) * resolution, (r1 + 0.5) * resolution
         source += f", problem {problem} of optimal length {chosen.printed} on its cells"
     return file_task(
-        file, cells, start, goal, source=source, overhang=overhang, cell=cell, goal_tolerance=goal_tolerance
+        file,
+        cells,
+        start,
+        goal,
+        source=source,
+        overhang=overhang,
+        cell=cell,
+        goal_tolerance=goal_tolerance,
+        anywhere=anywhere,
     )
 
 
-def movingai_ends(path: str | os.PathLike[str], resolution: float = 1.0) -> tuple[Pose, Point]:
-    """Return a start and a goal for `import_movingai_task`, on the largest connected ground of a `.map` file.
-
-    Raises:
-        InputError: the file is invalid, or no two free cells are connected.
-    """
-    try:
-        return largest_ground(CellMap(_read_cells(path), resolution))
-    except InputError as error:
-        raise error if str(error).startswith(os.fspath(path)) else input_error(os.fspath(path), str(error)) from None
+def _scen_of(file: Path) -> Path:
+    """Return a map's `.scen` file: NAME.map.scen, or the only NAME-*.scen, as MAPF's benchmarks call them."""
+    usual = file.with_name(f"{file.name}.scen")
+    others = [] if usual.exists() else sorted(file.parent.glob(f"{glob.escape(file.stem)}*.scen"))
+    if len(others) > 1:
+        names = ", ".join(other.name for other in others[:MOST_NAMES]) + (" and more" if others[MOST_NAMES:] else "")
+        raise FieldError("scen", f"choose one of {names}")
+    return others[0] if others else usual
 
 
-def _problem_beside(file: Path, number: int) -> MapProblem:
-    """Read one problem of a map's `.scen` file."""
-    beside = file.with_name(f"{file.name}.scen")
-    problems = import_movingai_problems(beside)
+def _problem_of(scen: Path, number: int) -> tuple[str, MapProblem]:
+    """Return one problem of a `.scen` file, with its place for messages."""
+    problems = _numbered_problems(scen)
     if not 0 <= number < len(problems):
-        raise input_error(str(beside), f"has the problems 0 to {len(problems) - 1}, got {number}")
+        raise input_error(str(scen), f"has the problems 0 to {len(problems) - 1}, got {number}")
     return problems[number]
 
 
@@ -190,11 +207,17 @@ def import_movingai_problems(path: str | os.PathLike[str]) -> list[MapProblem]:
     Raises:
         InputError: the file is unreadable or not a list of problems.
     """
+    return [problem for _, problem in _numbered_problems(path)]
+
+
+def _numbered_problems(path: str | os.PathLike[str]) -> list[tuple[str, MapProblem]]:
+    """Return the problems of a `.scen` file, each with its file and line."""
     source, lines = _read_lines(path)
     head = lines[0].decode("ascii", "replace").split() if lines else []
     if len(head) != 2 or head[0] != "version" or head[1] not in ("1", "1.0"):
         raise input_error(f"{source}:1", f"must be `version 1`, got {_quote(lines[0] if lines else b'')}")
-    return [_problem(f"{source}:{number}", line) for number, line in enumerate(lines[1:], 2) if line.strip()]
+    numbered = ((f"{source}:{number}", line) for number, line in enumerate(lines[1:], 2) if line.strip())
+    return [(place, _problem(place, line)) for place, line in numbered]
 
 
 def _problem(place: str, line: bytes) -> MapProblem:
