@@ -255,7 +255,7 @@ def test_a_skid_steer_robot_has_the_torque_of_all_motors(tmp_path):
 def test_an_arm_in_the_footprint_is_noted_and_the_noted_height_leaves_it_out(tmp_path):
     found = imported(tmp_path, BASE, pair(), ARM)
     note = next(note for note in found.notes if "widen" in note)
-    assert note.startswith("upper on moving joints widen the footprint's radius from 0.361 m to 0.701 m")
+    assert note.startswith("links on moving joints (upper) widen the footprint's radius from 0.361 m to 0.701 m")
     below = float(re.search(r"--below ([\d.]+)", note)[1])
     without = imported(tmp_path, BASE, pair(), ARM, below=below)
     assert without.spec.radius == imported(tmp_path, BASE, pair()).spec.radius

@@ -32,7 +32,6 @@ from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml
 
-MAX_PACKAGES = 100  # referenced by one file
 MAX_NESTED = 6  # folders between a workspace and a package
 PREFIXES = ("AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH", "CMAKE_PREFIX_PATH")
 STAND_IN = f"{os.sep}missing package "  # start of the path of a missing package
@@ -41,13 +40,21 @@ STAND_IN = f"{os.sep}missing package "  # start of the path of a missing package
 def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Path | None:
     """Return a package's folder; None if missing.
 
-    The given one comes first, then one of that name beside or above the file, then those of ROS' own variables.
+    The given one comes first, then one above or beside the file, then those of ROS' own variables.
     """
     if name in packages:
         return packages[name]
-    beside = (parent / name for parent in source.resolve().parents)
+    above = source.resolve().parents
+    own = (folder for folder in above if _is_package(folder, name))
+    beside = (parent / name for parent in above)
     shared = (Path(prefix, "share", name) for key in PREFIXES for prefix in _folders(key))
-    return next((folder for folder in itertools.chain(beside, shared, _in_workspaces(name)) if folder.is_dir()), None)
+    folders = itertools.chain(own, beside, shared, _in_workspaces(name))
+    return next((folder for folder in folders if folder.is_dir()), None)
+
+
+def _is_package(folder: Path, name: str) -> bool:
+    file = folder / "package.xml"
+    return file.is_file() and f"<name>{name}</name>" in file.read_text(encoding="utf-8", errors="replace")
 
 
 def _folders(variable: str) -> list[str]:
@@ -58,7 +65,7 @@ def _in_workspaces(name: str) -> Iterator[Path]:
     """Yield the folders of a package at or below those of ROS_PACKAGE_PATH."""
     for workspace in _folders("ROS_PACKAGE_PATH"):
         for folder, inside, files in os.walk(workspace):
-            if os.path.basename(folder) == name:
+            if os.path.basename(folder) == name or _is_package(Path(folder), name):
                 yield Path(folder)
             if "package.xml" in files or folder.count(os.sep) - workspace.count(os.sep) >= MAX_NESTED:
                 inside.clear()
@@ -71,31 +78,21 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Pa
     """
     read_bytes(path, MAX_BYTES, "a xacro file")
     xacrodoc = optional("xacrodoc", "urdf", "xacro files need it")
-    known, missing = dict(packages), Missing()
-    for _ in range(MAX_PACKAGES):
-        xacrodoc.packages.reset()
-        xacrodoc.packages.update_package_cache(known)
-        asked = _Arguments(arguments)
-        try:
-            with _patched(path, missing):
-                document = xacrodoc.XacroDoc.from_file(str(path), subargs=asked, resolve_packages=False)
-            text = str(document.to_urdf_string())
-        except InputError:
-            raise
-        except Exception as error:  # xacro's expressions can raise any exception
-            name = _missing_package(error)
-            if name is None or name in known:
-                why = f"{_in_one_line(error)}{_help(error)}{missing.remedy}"
-                raise input_error(str(path), f"xacro cannot expand it: {why}") from None
-            folder = package_folder(path, name, known)
-            known[name] = folder or missing.stand_in(name)
-            continue
-        unknown = next((name for name in arguments if name not in asked.names), None)
-        if unknown is not None:
-            advice = suggest(unknown, sorted(asked.names)) if asked.names else "it has none"
-            raise InputError(f"--arg {unknown}: {path.name} has no such argument; {advice}")
-        return text, missing
-    raise input_error(str(path), f"refers to more than {MAX_PACKAGES} packages")
+    asked, missing = _Arguments(arguments), Missing()
+    try:
+        with _patched(path, packages, missing):
+            document = xacrodoc.XacroDoc.from_file(str(path), walk_up=False, subargs=asked, resolve_packages=False)
+        text = str(document.to_urdf_string())
+    except InputError:
+        raise
+    except Exception as error:  # xacro's expressions can raise any exception
+        why = f"{_in_one_line(error)}{_help(error)}{missing.remedy}"
+        raise input_error(str(path), f"xacro cannot expand it: {why}") from None
+    unknown = next((name for name in arguments if name not in asked.names), None)
+    if unknown is not None:
+        advice = suggest(unknown, sorted(asked.names)) if asked.names else "it has none"
+        raise InputError(f"--arg {unknown}: {path.name} has no such argument; {advice}")
+    return text, missing
 
 
 class OtherDriveError(InputError):
@@ -110,18 +107,12 @@ class Missing:
         self.macros: list[str] = []  # that expanded to nothing
         self.included = False  # whether a file of one of them was included
 
-    def stand_in(self, name: str) -> Path:
-        """Return a folder that does not exist, in which every included file is empty."""
-        self.packages.append(name)
-        return Path(STAND_IN + name)
-
     @property
     def remedy(self) -> str:
         """How to give them; empty if none is missing."""
-        if not self.packages:
-            return ""
+        names = ", ".join(self.packages)
         return (
-            f"; Package not found: {', '.join(self.packages)}; give its folder with --package {self.packages[0]}=FOLDER"
+            f"; Package not found: {names}; give its folder with --package {self.packages[0]}=FOLDER" if names else ""
         )
 
     @contextlib.contextmanager
@@ -144,10 +135,16 @@ class Missing:
 
 
 @contextlib.contextmanager
-def _patched(path: Path, missing: Missing) -> Iterator[None]:
+def _patched(path: Path, packages: Mapping[str, Path], missing: Missing) -> Iterator[None]:
     """Let xacro find files beside the including one, open regular files alone and pass over missing packages."""
-    xacro: Any = sys.modules["xacro"]
-    expand_macro = xacro.handle_macro_call
+    xacro, finder, reader = (sys.modules[name] for name in ("xacro", "xacrodoc.packages", "xacrodoc.xacrodoc"))
+    expand_macro = vars(xacro)["handle_macro_call"]
+
+    def find(name: str) -> str:
+        folder = package_folder(path, name, packages)
+        if folder is None and name not in missing.packages:
+            missing.packages.append(name)
+        return str(folder.resolve() if folder else STAND_IN + name)
 
     def open_text(name: str, mode: str = "r") -> io.TextIOBase:
         if os.fspath(name).startswith(STAND_IN):
@@ -160,24 +157,23 @@ def _patched(path: Path, missing: Missing) -> Iterator[None]:
     def expand_known(node: Any, macros: Any, symbols: Any) -> bool:
         try:
             return bool(expand_macro(node, macros, symbols))
-        except xacro.XacroException as error:
+        except Exception as error:
             if not missing.included or str(error) != f"unknown macro name: {node.tagName}":
                 raise
             missing.macros.append(node.tagName.removeprefix("xacro:"))
-            xacro.replace_node(node, by=None)
+            vars(xacro)["replace_node"](node, by=None)
             return True
 
-    modules = [sys.modules[name] for name in ("xacro", "xacrodoc.xacrodoc", "xacrodoc.packages") if name in sys.modules]
-    for module in modules:
-        vars(module)["open"] = open_text
-    xacro.handle_macro_call = expand_known
-    xacro.init_stacks(str(path.resolve()))
+    changes = ((xacro, "open", open_text), (reader, "open", open_text), (finder, "get_path", find))
+    before = [(module, name, vars(module).get(name, open)) for module, name, _ in changes]
+    vars(xacro)["init_stacks"](str(path.resolve()))
     try:
+        for module, name, new in (*changes, (xacro, "handle_macro_call", expand_known)):
+            vars(module)[name] = new
         yield
     finally:
-        xacro.handle_macro_call = expand_macro
-        for module in modules:
-            del vars(module)["open"]
+        for module, name, old in (*before, (xacro, "handle_macro_call", expand_macro)):
+            vars(module)[name] = old
 
 
 class _Arguments(dict[str, str]):
@@ -204,15 +200,8 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
         error = inner if isinstance(inner, BaseException) else error.__context__
 
 
-def _missing_package(error: Exception) -> str | None:
-    causes = (cause for cause in _causes(error) if type(cause).__name__ == "PackageNotFoundError")
-    return next((str(cause.args[0]) for cause in causes if cause.args), None)
-
-
 def _help(error: Exception) -> str:
     """Return a hint on how to fix the error; empty if unknown."""
-    if _missing_package(error) is not None:
-        return "; give its folder with --package NAME=FOLDER"
     kinds = {type(cause).__name__ for cause in _causes(error)}
     if "FileNotFoundError" in kinds:
         return "; if its package is in another folder, give that with --package NAME=FOLDER"
@@ -327,10 +316,11 @@ def read_model(
     """Read a URDF or xacro file."""
     root, missing = _root_element(path, arguments, packages)
     with missing.named():
-        return _model(path, root, _Shapes(path, meshes, without_meshes, packages), missing)
+        readers = [_Shapes(path, meshes, without, packages) for without in (without_meshes, True)]
+        return _model(path, root, *readers, missing)
 
 
-def _model(path: Path, root: ET.Element, reader: _Shapes, missing: Missing) -> UrdfModel:
+def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missing: Missing) -> UrdfModel:
     if root.tag != "robot":
         raise input_error(str(path), f"the root element must be <robot>, got <{root.tag}>")
     links = {_named(path, link): link for link in root.findall("link")}
@@ -349,6 +339,13 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, missing: Missing) -> U
         for element in link.findall("collision")
         for piece in reader.piece(name, places[name] @ _origin(path, element), element)
     ]
+    solid = {piece.link for piece in pieces if piece.kind != "sphere"}
+    looks = [
+        piece
+        for name in (joint.child for joint in joints.values() if joint.kind != "fixed" and joint.child not in solid)
+        for element in links[name].findall("visual")
+        for piece in visual.drawn(name, places[name], element)
+    ]
     masses = {
         name: _at_least_0(path, f"link {name}", "mass", _number(path, mass, "value", 0.0))
         for name, link in links.items()
@@ -360,7 +357,7 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, missing: Missing) -> U
         joints,
         places,
         tuple(pieces),
-        tuple(_looks(reader, links, places, joints, pieces)),
+        tuple(looks),
         masses,
         *_drive(root),
         tuple(reader.missing_meshes),
@@ -369,21 +366,6 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, missing: Missing) -> U
         ET.tostring(root, encoding="unicode"),
         missing,
     )
-
-
-def _looks(
-    reader: _Shapes,
-    links: Mapping[str, ET.Element],
-    places: Mapping[str, Floats],
-    joints: Mapping[str, UrdfJoint],
-    pieces: Sequence[CollisionPiece],
-) -> Iterator[CollisionPiece]:
-    """Yield the visual geometry, as far as it can be read, of turning links that collide as spheres or not at all."""
-    solid = {piece.link for piece in pieces if piece.kind != "sphere"}
-    for name in [joint.child for joint in joints.values() if joint.kind != "fixed" and joint.child not in solid]:
-        for element in links[name].findall("visual"):
-            with contextlib.suppress(InputError):
-                yield from reader.optional_piece(name, places[name] @ _origin(reader.path, element), element)
 
 
 def _commanded(path: Path, root: ET.Element, joints: set[str]) -> dict[str, float]:
@@ -557,18 +539,18 @@ class _Shapes:
     """A reader of collision geometry, including meshes."""
 
     def __init__(self, path: Path, meshes: Path | None, without_meshes: bool, packages: Mapping[str, Path]) -> None:
-        self.path, self._meshes, self._without, self._packages = path, meshes, without_meshes, packages
+        self._path, self._meshes, self._without, self._packages = path, meshes, without_meshes, packages
         self.missing_meshes: list[str] = []
 
     def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
         """Yield the piece of a <collision>; nothing for a missing mesh."""
         shape = element.find("geometry/*")
         if shape is None:
-            raise input_error(str(self.path), f"link {link}", "a <collision> has no geometry")
+            raise input_error(str(self._path), f"link {link}", "a <collision> has no geometry")
         radius = length = None
         if shape.tag == "box":
-            size = _numbers(self.path, shape, "size", (0.0, 0.0, 0.0))
-            _greater_than_0(self.path, f"link {link}", "the size of a <box>", float(size.min()))
+            size = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0))
+            _greater_than_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
             half = size / 2
             points = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
         elif shape.tag == "cylinder":
@@ -585,24 +567,24 @@ class _Shapes:
             mesh = self._mesh(link, shape)
             if mesh is None:
                 return
-            points = mesh * _numbers(self.path, shape, "scale", (1.0, 1.0, 1.0))
+            points = mesh * _numbers(self._path, shape, "scale", (1.0, 1.0, 1.0))
             if not (np.abs(points) <= MAX_COORDINATE).all():
                 where = f"link {link}", f"mesh {shape.get('filename')}"
-                raise input_error(str(self.path), *where, f"reaches beyond {MAX_COORDINATE:g} m")
+                raise input_error(str(self._path), *where, f"reaches beyond {MAX_COORDINATE:g} m")
         else:
-            raise input_error(str(self.path), f"link {link}", f"unknown geometry <{shape.tag}>")
+            raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
         placed = points @ place[:3, :3].T + place[:3, 3]
         centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
         yield CollisionPiece(link, shape.tag, placed, centre, radius, length)
 
-    def optional_piece(self, link: str, place: Floats, element: ET.Element) -> list[CollisionPiece]:
-        """Return the piece of a <visual>; nothing for a missing mesh."""
-        reader = _Shapes(self.path, self._meshes, True, self._packages)
-        return list(reader.piece(link, place, element))
+    def drawn(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
+        """Yield the piece of a <visual> if it can be read."""
+        with contextlib.suppress(InputError):
+            yield from self.piece(link, place @ _origin(self._path, element), element)
 
     def _extent(self, link: str, shape: ET.Element, key: str) -> float:
-        value = _number(self.path, shape, key, 0.0)
-        return _greater_than_0(self.path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
+        value = _number(self._path, shape, key, 0.0)
+        return _greater_than_0(self._path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
 
     def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
         """Return a mesh's vertices (N, 3); None if it is missing."""
@@ -611,7 +593,7 @@ class _Shapes:
         if file is None:
             if not self._without:
                 raise input_error(
-                    str(self.path),
+                    str(self._path),
                     f"link {link}",
                     f"mesh {name} not found; give --meshes FOLDER, --package NAME=FOLDER or --without-meshes",
                 )
@@ -632,9 +614,9 @@ class _Shapes:
         """Yield candidate paths of a mesh; package://NAME/FILE resolves below a folder NAME or the given folder."""
         bare = name.partition("://")[2] if "://" in name else name
         package, _, inside = bare.partition("/") if name.startswith(("package://", "model://")) else ("", "", bare)
-        if package and (home := package_folder(self.path, package, self._packages)) is not None:
+        if package and (home := package_folder(self._path, package, self._packages)) is not None:
             yield home / inside
-        folders = [self._meshes] if self._meshes is not None else [self.path.parent, *self.path.resolve().parents]
+        folders = [self._meshes] if self._meshes is not None else [self._path.parent, *self._path.resolve().parents]
         for folder in folders:
             yield folder / bare
             yield folder / inside

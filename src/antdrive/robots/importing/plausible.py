@@ -81,6 +81,6 @@ def below_arms(model: UrdfModel, low: Sequence[CollisionPiece], frame: Floats, f
     remedy = f"--below {cut:.2f} omits what begins higher" if cut > 0.02 else "edit footprint in the robot file"
     remedy += f", also some of the base, up to {base:.2f} m" if 0.02 < cut < base else ""
     yield (
-        f"{', '.join(names[:3])}{more} on moving joints widen the footprint's radius from {reach(rest):.3g} m to "
+        f"links on moving joints ({', '.join(names[:3])}{more}) widen the footprint's radius from {reach(rest):.3g} m to "
         f"{reach(wide):.3g} m, in the pose with all joints at zero; {remedy}"
     )
