@@ -115,6 +115,10 @@ OTHERS = {
         pair(-0.2, "rear_") + "".join(steered(s, 0.2, y, "hinge") for s, y in FRONT.items()),
         "steer wheels",
     ),
+    "Ackermann without limits or names": (
+        pair(-0.2, "rear_") + "".join(steered(s, 0.2, y, "pin") for s, y in FRONT.items()),
+        "left_pin, right_pin steer wheels",
+    ),
     "Ackermann by name, axes of a CAD export": (
         pair(-0.2, "rear_") + "".join(steered(s, 0.2, y, "steer", axis="0 1 0") for s, y in FRONT.items()),
         "left_steer, right_steer steer wheels",

@@ -104,5 +104,5 @@ def test_a_missing_package_that_the_base_needs_is_asked_for(tmp_path):
 
 def test_a_macro_that_no_missing_package_can_have_is_refused(tmp_path):
     path = written(tmp_path / "robot.xacro", BODY.replace("</robot>", "<xacro:lidar/></robot>"))
-    with pytest.raises(InputError, match="unknown macro name: xacro:lidar$"):
+    with pytest.raises(InputError, match=r"unknown macro name: xacro:lidar$"):
         import_urdf(path)

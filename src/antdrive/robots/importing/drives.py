@@ -15,6 +15,7 @@ ONLY_DIFFERENTIAL = "only differential drives can be simulated"
 STEERING = math.pi  # largest range of a joint that steers; casters turn further [rad]
 SWIVEL = 0.9  # minimum vertical component of the axis of a caster or a steering joint
 ROUND = 1.5  # largest ratio of a wheel's two diameters
+TRAIL = 0.05  # least distance of a caster's wheel behind its axis, in diameters
 TRAILING = 0.5  # minimum track of a trailer, in tracks of the robot; those of twin casters are smaller
 
 PLUGINS = (
@@ -47,17 +48,16 @@ def _named_steering(joint: UrdfJoint) -> bool:
 
 def bottom(model: UrdfModel, link: str) -> float:
     """Return the lowest point of a link [m]; inf without collision geometry."""
-    return min((float(p.points[:, 2].min()) for p in model.pieces if p.link == link), default=math.inf)
+    return min((piece.bottom for piece in model.by_link[link]), default=math.inf)
 
 
 def stands(model: UrdfModel, joint: UrdfJoint) -> bool:
     """Return whether a joint's child link is a wheel on the floor, not a spinning sensor, a flipper or an arm."""
-    own = [piece for piece in model.pieces if piece.link == joint.child]
-    if not own:
+    own = model.by_link[joint.child]
+    if not own or model.lowest is None:
         return "wheel" in f"{joint.name} {joint.child}".lower()
-    lowest = min(float(piece.points[:, 2].min()) for piece in model.pieces)
     size = max(float(np.ptp(piece.points[:, 2])) for piece in own)
-    if bottom(model, joint.child) > lowest + 0.25 * size:
+    if bottom(model, joint.child) > model.lowest.bottom + 0.25 * size:
         return False
     if not turns_as_wheel(joint):
         return any(piece.radius is not None for piece in own) or "wheel" in f"{joint.name} {joint.child}".lower()
@@ -98,14 +98,14 @@ def other_drive(model: UrdfModel) -> str:
         kind = next((kind for words, kind in PLUGINS if words.search(names)), "")
         if kind or drives:
             return f"plugin {names}: {kind or 'an omnidirectional drive'}; {ONLY_DIFFERENTIAL}"
-    if re.search("mecanum|holonomic", model.name, re.IGNORECASE):
-        return f"its name, {model.name}, says that it is omnidirectional; {ONLY_DIFFERENTIAL}"
+    if re.search("mecanum|holonomic|ackerman", model.name, re.IGNORECASE):
+        return f"its name, {model.name}, says that it has another drive; {ONLY_DIFFERENTIAL}"
     wheels = [joint for joint in model.joints.values() if stands(model, joint) and not _turns_upright(joint)]
     held = {joint.name: swivel for joint in wheels if (swivel := _swivel(model, joint)) is not None}
     swivels = {swivel.name: swivel for swivel in held.values()}
-    if steering := [joint.name for joint in swivels.values() if _steers(joint)]:
-        return f"{_few(steering)} steer wheels; {ONLY_DIFFERENTIAL}"
     turning = [joint for joint in wheels if turns_as_wheel(joint)]
+    if steering := [joint.name for joint in swivels.values() if _steers(joint)] or _knuckles(model, turning, held):
+        return f"{_few(steering)} steer wheels; {ONLY_DIFFERENTIAL}"
     if len(turning) >= 2 and all(joint.name in held for joint in turning):
         return (
             f"all its wheels turn about upright axes ({_few(swivels)}): an omnidirectional drive with steered wheels; "
@@ -117,6 +117,21 @@ def other_drive(model: UrdfModel) -> str:
 def _steers(joint: UrdfJoint) -> bool:
     """Return whether an upright joint above a wheel steers it; casters turn further."""
     return joint.stated < STEERING or (_named_steering(joint) and "cast" not in joint.name.lower())
+
+
+def _knuckles(model: UrdfModel, turning: Sequence[UrdfJoint], held: dict[str, UrdfJoint]) -> list[str]:
+    """Return the two or more swivels that turn wheels as large as the others on the spot; casters trail behind theirs."""
+
+    def size(joint: UrdfJoint) -> float:
+        return max((float(np.ptp(piece.points[:, 2])) for piece in model.by_link[joint.child]), default=0.0)
+
+    largest, found = max(map(size, turning), default=0.0), []
+    for joint in turning:
+        if joint.name in held and size(joint) >= 0.9 * largest > 0:
+            swivel, ahead = held[joint.name], np.cross(joint.axis, (0.0, 0.0, 1.0))
+            if abs(float(ahead @ (joint.place[:3, 3] - swivel.place[:3, 3]))) <= TRAIL * largest:
+                found.append(swivel.name)
+    return found if len(found) >= 2 and len(turning) > len(found) else []
 
 
 def _trailer(turning: Sequence[UrdfJoint], held: dict[str, UrdfJoint]) -> str:
@@ -178,10 +193,10 @@ def without_wheels(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
     if rotors := [joint.name for joint in moving if ROTOR.search(f"{joint.name} {joint.child}")]:
         return f"{_few(rotors)} are propellers, and it has no wheels on the floor; {ONLY_DIFFERENTIAL}"
     free = [joint for joint in joints if is_free(model, joint)]
-    if (why := _legs(model)) or (why := "" if free else _arm(model)):
+    if why := _legs(model):
         return f"{why}; {ONLY_DIFFERENTIAL}"
     limited = [joint for joint in moving if joint.range <= 2 * math.pi and abs(joint.axis[2]) < LEVEL]
-    limited = [joint for joint in limited if stands(model, joint)]
+    limited = [joint for joint in limited if stands(model, joint) and not any(_on(model, joint, o) for o in moving)]
     if limited and len(free) < 2:
         least = min(joint.range for joint in limited)
         names = _few(joint.name for joint in limited)
@@ -191,6 +206,8 @@ def without_wheels(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
     upright = [joint.name for joint in moving if joint.kind == "continuous" and _turns_upright(joint)]
     if len(upright) >= 2 and not free:
         return f"{_few(upright)} turn about upright axes, and no wheel about a level one: steered wheels; {ONLY_DIFFERENTIAL}"
+    if why := _arm(model):
+        return f"{why}; {ONLY_DIFFERENTIAL}"
     if any(TRACK.search(f"{joint.name} {joint.child}") for joint in joints):
         return "it has tracks and no wheels; write a robot file: antdrive robots jackal > mine.yaml"
     return f"has {len(wheels)} free-turning wheels on the floor; a differential drive has two; if it has two, {fix}"
@@ -215,11 +232,10 @@ def _not_on_axles(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
 
 def _too_low(model: UrdfModel, hanging: Sequence[UrdfJoint]) -> str:
     """Return that something rigid is lower than the wheels; empty if it is not so."""
-    if len(hanging) < 2 or not model.pieces:
+    lowest = model.lowest
+    if len(hanging) < 2 or lowest is None:
         return ""
-    lowest = min(model.pieces, key=lambda piece: float(piece.points[:, 2].min()))
-    low = float(lowest.points[:, 2].min())
-    above = {joint.name: bottom(model, joint.child) - low for joint in hanging}
+    above = {joint.name: bottom(model, joint.child) - lowest.bottom for joint in hanging}
     names = ", ".join(f"{name} by {height:.4g} m" for name, height in above.items() if math.isfinite(height))
     if not names or lowest.link in {joint.child for joint in hanging}:
         return ""

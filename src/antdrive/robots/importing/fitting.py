@@ -71,7 +71,7 @@ def _misfit(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], frame: Fl
 
     Geometry that lacks meshes may be smaller.
     """
-    pieces = sorted(solid_pieces(model, wheels), key=lambda piece: float(piece.points[:, 2].min()))
+    pieces = sorted(solid_pieces(model, wheels), key=lambda piece: piece.bottom)
     shapes: list[npt.ArrayLike] = [with_wheels([], wheels), *(from_above(piece.points, frame) for piece in pieces)]
     off = np.maximum.accumulate([_extent(shape, foot) for shape in shapes]) - _extent_of(foot)
     off = np.maximum(off, 0.0) if model.missing_meshes else np.abs(off)

@@ -15,8 +15,9 @@ import re
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -262,9 +263,12 @@ class CollisionPiece:
     link: str  # its link
     kind: str  # box, cylinder, sphere or mesh
     points: Floats  # points whose convex hull contains it (N, 3)
-    centre: Floats  # (3,)
     radius: float | None = None  # of a cylinder or sphere [m]
-    length: float | None = None  # of a cylinder [m]
+
+    @property
+    def bottom(self) -> float:
+        """Height of its lowest point [m]."""
+        return float(self.points[:, 2].min())
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,10 +292,26 @@ class UrdfModel:
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
         """Yield the joints from a link to the root."""
-        holders = {joint.child: joint for joint in self.joints.values()}
-        while link in holders:
-            yield holders[link]
-            link = holders[link].parent
+        while link in self._holders:
+            yield self._holders[link]
+            link = self._holders[link].parent
+
+    @cached_property
+    def _holders(self) -> dict[str, UrdfJoint]:
+        return {joint.child: joint for joint in self.joints.values()}
+
+    @cached_property
+    def by_link(self) -> Mapping[str, list[CollisionPiece]]:
+        """Collision geometry by link."""
+        found: dict[str, list[CollisionPiece]] = {name: [] for name in self.places}
+        for piece in self.pieces:
+            found[piece.link].append(piece)
+        return found
+
+    @cached_property
+    def lowest(self) -> CollisionPiece | None:
+        """The piece of collision geometry that reaches lowest; None without any."""
+        return min(self.pieces, key=lambda piece: piece.bottom, default=None)
 
     def drive_number(self, *tags: str) -> tuple[str, float | None]:
         """Return the first tag of the drive plugin with a positive number, and the number; None if there is none."""
@@ -316,8 +336,8 @@ def read_model(
     """Read a URDF or xacro file."""
     root, missing = _root_element(path, arguments, packages)
     with missing.named():
-        readers = [_Shapes(path, meshes, without, packages) for without in (without_meshes, True)]
-        return _model(path, root, *readers, missing)
+        reader, visual = (_Shapes(path, meshes, without, packages) for without in (without_meshes, True))
+        return _model(path, root, reader, visual, missing)
 
 
 def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missing: Missing) -> UrdfModel:
@@ -547,7 +567,7 @@ class _Shapes:
         shape = element.find("geometry/*")
         if shape is None:
             raise input_error(str(self._path), f"link {link}", "a <collision> has no geometry")
-        radius = length = None
+        radius = None
         if shape.tag == "box":
             size = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0))
             _greater_than_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
@@ -573,9 +593,7 @@ class _Shapes:
                 raise input_error(str(self._path), *where, f"reaches beyond {MAX_COORDINATE:g} m")
         else:
             raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
-        placed = points @ place[:3, :3].T + place[:3, 3]
-        centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
-        yield CollisionPiece(link, shape.tag, placed, centre, radius, length)
+        yield CollisionPiece(link, shape.tag, points @ place[:3, :3].T + place[:3, 3], radius)
 
     def drawn(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
         """Yield the piece of a <visual> if it can be read."""

@@ -75,8 +75,8 @@ def below_arms(model: UrdfModel, low: Sequence[CollisionPiece], frame: Floats, f
         return
     names = list(dict.fromkeys(piece.link for piece in wide))
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    height = min(float(piece.points[:, 2].min()) for piece in wide) - floor
-    base = max(float(piece.points[:, 2].min()) for piece in rest) - floor
+    height = min(piece.bottom for piece in wide) - floor
+    base = max(piece.bottom for piece in rest) - floor
     cut = math.floor(100 * height) / 100 - 0.01
     remedy = f"--below {cut:.2f} omits what begins higher" if cut > 0.02 else "edit footprint in the robot file"
     remedy += f", also some of the base, up to {base:.2f} m" if 0.02 < cut < base else ""

@@ -250,8 +250,8 @@ def _imported(
     wheels = driven_wheels(model, left, right, given.get("wheel_radius"))
     frame, floor = planar_frame(wheels), floor_under(wheels)
     solid = solid_pieces(model, wheels)
-    low = [piece for piece in solid if piece.points[:, 2].min() - floor <= below]
-    high = [piece for piece in solid if piece.points[:, 2].min() - floor > below]
+    low = [piece for piece in solid if piece.bottom - floor <= below]
+    high = [piece for piece in solid if piece.bottom - floor > below]
     if not {piece.link for piece in low} - {wheel.joint.child for wheel in wheels}:
         where = "" if math.isinf(below) else f" below {below:g} m"
         raise input_error(str(path), f"has no collision geometry{where} other than its wheels, so no footprint")

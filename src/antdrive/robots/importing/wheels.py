@@ -187,7 +187,7 @@ def _unpaired(model: UrdfModel, wheels: Sequence[DrivenWheel], radius: float | N
         if len(free_wheels(model)) != 2:
             return f"{names} are not on one axle"
     free = [_wheel(model, joint, radius) for joint in model.joints.values() if is_free(model, joint)]
-    round_ = [wheel for wheel in free if any(p.link == wheel.joint.child and p.radius for p in model.pieces)]
+    round_ = [wheel for wheel in free if any(piece.radius for piece in model.by_link[wheel.joint.child])]
     if why := _unlike(wheels) or _unlike(round_):
         return why
     return without_wheels(model, [wheel.joint for wheel in wheels])
@@ -209,7 +209,7 @@ def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
 
 
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
-    own: list[CollisionPiece] = [piece for piece in model.pieces if piece.link == joint.child]
+    own: list[CollisionPiece] = model.by_link[joint.child]
     looks = [piece for piece in model.looks if piece.link == joint.child]
     _, given = model.drive_number("wheel_radius", "wheelRadius")
     _, diameter = model.drive_number("wheel_diameter", "wheelDiameter")
