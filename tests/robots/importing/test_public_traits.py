@@ -119,6 +119,17 @@ OTHERS = {
         pair(-0.2, "rear_") + "".join(steered(s, 0.2, y, "pin") for s, y in FRONT.items()),
         "left_pin, right_pin steer wheels",
     ),
+    "a steered and driven front wheel": (
+        pair(-0.2)
+        + caster("front", 0.2, 0)
+        + "<ros2_control><joint name='front_swivel'><command_interface name='position'/></joint></ros2_control>",
+        "front_swivel steer wheels",
+    ),
+    "wheels that steer but do not roll": (
+        pair(-0.2, "rear_")
+        + pair(0.2, "front_").replace("continuous", "revolute").replace('xyz="0 1 0"/>', 'xyz="0 0 1"/>' + STEER),
+        "front_left_wheel_joint, front_right_wheel_joint steer wheels",
+    ),
     "Ackermann by name, axes of a CAD export": (
         pair(-0.2, "rear_") + "".join(steered(s, 0.2, y, "steer", axis="0 1 0") for s, y in FRONT.items()),
         "left_steer, right_steer steer wheels",

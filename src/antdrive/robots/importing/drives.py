@@ -27,6 +27,7 @@ PLUGINS = (
 OMNI = re.compile(r"omni(?!cam|verse)", re.IGNORECASE)
 DRIVES = re.compile(r"drive|driving|wheel|move|motion|base|control|command_?topic|cmd_?vel|odom", re.IGNORECASE)
 OMNI_WHEEL = re.compile(r"mecanum|swedish|(?<![a-z])omni(?!cam|verse)", re.IGNORECASE)
+WHEEL = re.compile(r"wheel|whl|tire|tyre", re.IGNORECASE)
 ROTOR = re.compile(r"rotor|prop(?:eller)?(?![a-z])|thruster", re.IGNORECASE)
 LEG = re.compile(r"leg|hip|thigh|calf|knee|ankle|foot|shank", re.IGNORECASE)
 TRACK = re.compile(r"track(?!ing|er|ball)|tread|crawler|caterpillar", re.IGNORECASE)
@@ -55,12 +56,12 @@ def stands(model: UrdfModel, joint: UrdfJoint) -> bool:
     """Return whether a joint's child link is a wheel on the floor, not a spinning sensor, a flipper or an arm."""
     own = model.by_link[joint.child]
     if not own or model.lowest is None:
-        return "wheel" in f"{joint.name} {joint.child}".lower()
+        return WHEEL.search(f"{joint.name} {joint.child}") is not None
     size = max(float(np.ptp(piece.points[:, 2])) for piece in own)
     if bottom(model, joint.child) > model.lowest.bottom + 0.25 * size:
         return False
     if not turns_as_wheel(joint):
-        return any(piece.radius is not None for piece in own) or "wheel" in f"{joint.name} {joint.child}".lower()
+        return any(piece.radius for piece in own) or WHEEL.search(f"{joint.name} {joint.child}") is not None
     ahead, points = np.cross(joint.axis, (0.0, 0.0, 1.0)), np.vstack([piece.points for piece in own])
     low, high = sorted((float(np.ptp(points @ ahead)), size))
     return high <= ROUND * low
@@ -71,7 +72,7 @@ def _swivel(model: UrdfModel, joint: UrdfJoint) -> UrdfJoint | None:
 
     A joint that turns the whole robot is no part of it.
     """
-    for over in model.above(joint.parent):
+    for over in model.above(joint.child):
         if _turns_upright(over) and any(over not in model.above(piece.link) for piece in model.pieces):
             return over
     return None
@@ -100,11 +101,13 @@ def other_drive(model: UrdfModel) -> str:
             return f"plugin {names}: {kind or 'an omnidirectional drive'}; {ONLY_DIFFERENTIAL}"
     if re.search("mecanum|holonomic|ackerman", model.name, re.IGNORECASE):
         return f"its name, {model.name}, says that it has another drive; {ONLY_DIFFERENTIAL}"
-    wheels = [joint for joint in model.joints.values() if stands(model, joint) and not _turns_upright(joint)]
+    wheels = [joint for joint in model.joints.values() if stands(model, joint)]
     held = {joint.name: swivel for joint in wheels if (swivel := _swivel(model, joint)) is not None}
     swivels = {swivel.name: swivel for swivel in held.values()}
     turning = [joint for joint in wheels if turns_as_wheel(joint)]
-    if steering := [joint.name for joint in swivels.values() if _steers(joint)] or _knuckles(model, turning, held):
+    if steering := [joint.name for joint in swivels.values() if _steers(model, joint)] or _knuckles(
+        model, turning, held
+    ):
         return f"{_few(steering)} steer wheels; {ONLY_DIFFERENTIAL}"
     if len(turning) >= 2 and all(joint.name in held for joint in turning):
         return (
@@ -114,9 +117,10 @@ def other_drive(model: UrdfModel) -> str:
     return _trailer(turning, held)
 
 
-def _steers(joint: UrdfJoint) -> bool:
-    """Return whether an upright joint above a wheel steers it; casters turn further."""
-    return joint.stated < STEERING or (_named_steering(joint) and "cast" not in joint.name.lower())
+def _steers(model: UrdfModel, joint: UrdfJoint) -> bool:
+    """Return whether an upright joint above a wheel steers it; casters turn further and have no motor."""
+    named = _named_steering(joint) and "cast" not in joint.name.lower()
+    return joint.stated < STEERING or named or joint.name in model.commanded
 
 
 def _knuckles(model: UrdfModel, turning: Sequence[UrdfJoint], held: dict[str, UrdfJoint]) -> list[str]:

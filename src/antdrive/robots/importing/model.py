@@ -301,6 +301,12 @@ class UrdfModel:
         return {joint.child: joint for joint in self.joints.values()}
 
     @cached_property
+    def commanded(self) -> set[str]:
+        """Joints with any command in <ros2_control>."""
+        joints = self.root.findall("ros2_control/joint")
+        return {joint.get("name", "") for joint in joints if joint.find("command_interface") is not None}
+
+    @cached_property
     def by_link(self) -> Mapping[str, list[CollisionPiece]]:
         """Collision geometry by link."""
         found: dict[str, list[CollisionPiece]] = {name: [] for name in self.places}

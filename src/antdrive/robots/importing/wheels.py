@@ -63,7 +63,8 @@ def driven_wheels(
         pairs = [_in_order(model, *pair) for pair in _axles(wheels)]
     if why := other_wheels(model, [wheel.joint for wheel in wheels]):
         raise OtherDriveError(f"{where}: {why}")
-    if not pairs:
+    named = {*model.sides[0], *model.sides[1]} | {wheel.joint.name for wheel in wheels if wheel.joint.commanded}
+    if not pairs or (left is None and len(named) > 2 and len(wheels) != 2 * len(pairs)):
         raise input_error(where, _unpaired(model, wheels, radius))
     if len(pairs) == 1:
         return pairs[0]
@@ -108,17 +109,11 @@ def _candidates(model: UrdfModel, radius: float | None) -> list[DrivenWheel]:
     if len(commanded) == 2:
         return [_wheel(model, _joint_called(model, name), radius) for name in commanded]
     free = free_wheels(model)
-    for some in (commanded, _actuated(model)):
-        if len(driven := [joint for joint in free if joint.name in some]) >= 2:
-            free = driven
-            break
+    actuated = commanded or [joint.get("name", "") for joint in model.root.findall("transmission/joint")]
+    if len(driven := [joint for joint in free if joint.name in actuated]) >= 2:
+        free = driven
     active = [joint for joint in free if not PASSIVE.search(f"{joint.name} {joint.child}")]
     return [_wheel(model, joint, radius) for joint in (active if len(active) >= 2 else free)]
-
-
-def _actuated(model: UrdfModel) -> set[str]:
-    """Return the joints of the file's <transmission> elements."""
-    return {joint.get("name", "") for joint in model.root.findall("transmission/joint")}
 
 
 def _axles(wheels: Sequence[DrivenWheel]) -> list[Pair]:
