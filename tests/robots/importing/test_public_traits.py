@@ -205,7 +205,7 @@ OTHERS = {
     ),
     "display only": (
         pair().replace("continuous", "fixed"),
-        "none of its joints moves, so the file is for display only",
+        "none of its joints moves, so the file is for display",
     ),
     "tracks": (
         '<link name="left_track"/>' + joint("t", "left_track", "0 0 0", "prismatic"),

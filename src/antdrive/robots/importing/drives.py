@@ -56,15 +56,20 @@ def stands(model: UrdfModel, joint: UrdfJoint) -> bool:
     """Return whether a joint's child link is a wheel on the floor, not a spinning sensor, a flipper or an arm."""
     own = model.by_link[joint.child]
     if not own or model.lowest is None:
-        return WHEEL.search(f"{joint.name} {joint.child}") is not None
+        return _looks_round(model, joint)
     size = max(float(np.ptp(piece.points[:, 2])) for piece in own)
     if bottom(model, joint.child) > model.lowest.bottom + 0.25 * size:
         return False
     if not turns_as_wheel(joint):
-        return any(piece.radius for piece in own) or WHEEL.search(f"{joint.name} {joint.child}") is not None
+        return _looks_round(model, joint)
     ahead, points = np.cross(joint.axis, (0.0, 0.0, 1.0)), np.vstack([piece.points for piece in own])
     low, high = sorted((float(np.ptp(points @ ahead)), size))
     return high <= ROUND * low
+
+
+def _looks_round(model: UrdfModel, joint: UrdfJoint) -> bool:
+    named = WHEEL.search(f"{joint.name} {joint.child}") is not None
+    return named or any(piece.radius for piece in model.by_link[joint.child])
 
 
 def _swivel(model: UrdfModel, joint: UrdfJoint) -> UrdfJoint | None:
@@ -108,10 +113,10 @@ def other_drive(model: UrdfModel) -> str:
     if steering := [joint.name for joint in swivels.values() if _steers(model, joint)] or _knuckles(
         model, turning, held
     ):
-        return f"{_few(steering)} steer wheels; {ONLY_DIFFERENTIAL}"
+        return f"{few(steering)} steer wheels; {ONLY_DIFFERENTIAL}"
     if len(turning) >= 2 and all(joint.name in held for joint in turning):
         return (
-            f"all its wheels turn about upright axes ({_few(swivels)}): an omnidirectional drive with steered wheels; "
+            f"all its wheels turn about upright axes ({few(swivels)}): an omnidirectional drive with steered wheels; "
             f"{ONLY_DIFFERENTIAL}"
         )
     return _trailer(turning, held)
@@ -149,8 +154,7 @@ def _trailer(turning: Sequence[UrdfJoint], held: dict[str, UrdfJoint]) -> str:
     for swivel in held.values():
         pulled = [joint for joint in turning if held.get(joint.name) is swivel]
         if widest(pulled) > TRAILING * own > 0:
-            names = _few(joint.name for joint in pulled)
-            return f"{swivel.name} joins a second body with its own wheels ({names}): a trailer; {ONLY_DIFFERENTIAL}"
+            return f"{swivel.name} joins a second body with its own wheels ({_named(pulled)}): a trailer; {ONLY_DIFFERENTIAL}"
     return ""
 
 
@@ -186,65 +190,59 @@ def _on(model: UrdfModel, joint: UrdfJoint, wheel: UrdfJoint) -> bool:
 def without_wheels(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
     """Explain that a robot has no pair of driven wheels: what it is most likely, and how to import it if it has."""
     joints = list(model.joints.values())
-    moving = [joint for joint in joints if joint.kind in ("continuous", "revolute", "prismatic", "floating", "planar")]
-    fix = "name the joints of its two driven wheels with --left and --right"
-    if len(wheels) >= 2:
-        return _not_on_axles(model, wheels)
-    if not moving:
-        return (
-            "none of its joints moves, so the file is for display only; make the joints of its driven wheels continuous"
-        )
-    if rotors := [joint.name for joint in moving if ROTOR.search(f"{joint.name} {joint.child}")]:
-        return f"{_few(rotors)} are propellers, and it has no wheels on the floor; {ONLY_DIFFERENTIAL}"
+    moving = [joint for joint in joints if joint.kind != "fixed"]
     free = [joint for joint in joints if is_free(model, joint)]
-    if why := _legs(model):
-        return f"{why}; {ONLY_DIFFERENTIAL}"
     limited = [joint for joint in moving if joint.range <= 2 * math.pi and abs(joint.axis[2]) < LEVEL]
     limited = [joint for joint in limited if stands(model, joint) and not any(_on(model, joint, o) for o in moving)]
+    rotors = [joint for joint in moving if ROTOR.search(f"{joint.name} {joint.child}")]
+    upright = [joint for joint in moving if joint.kind == "continuous" and _turns_upright(joint)]
+    fix = "name the joints of its two driven wheels with --left and --right"
+    if len(wheels) >= 2:
+        return _not_on_axles(wheels)
+    if not moving:
+        return "none of its joints moves, so the file is for display; make the joints of its driven wheels continuous"
+    if rotors:
+        return f"{_named(rotors)} are propellers, and it has no wheels on the floor; {ONLY_DIFFERENTIAL}"
+    if why := _legs(model):
+        return f"{why}; {ONLY_DIFFERENTIAL}"
     if limited and len(free) < 2:
         least = min(joint.range for joint in limited)
-        names = _few(joint.name for joint in limited)
-        return f"{names}: revolute, with a range of {least:.4g} rad; the joint of a driven wheel is continuous"
+        return (
+            f"{_named(limited)}: revolute, with a range of {least:.4g} rad; the joint of a driven wheel is continuous"
+        )
     if low := _too_low(model, [joint for joint in free if joint not in wheels]):
-        return f"{low}; if they drive it, {fix}"
-    upright = [joint.name for joint in moving if joint.kind == "continuous" and _turns_upright(joint)]
+        return f"{low}, so the wheels are not on the floor; if they drive it, {fix}"
     if len(upright) >= 2 and not free:
-        return f"{_few(upright)} turn about upright axes, and no wheel about a level one: steered wheels; {ONLY_DIFFERENTIAL}"
-    if why := _arm(model):
-        return f"{why}; {ONLY_DIFFERENTIAL}"
+        return f"{_named(upright)} turn about upright axes, and no wheel about a level one: steered wheels; {ONLY_DIFFERENTIAL}"
+    if chain := max(_chains(model), key=len, default=[]):
+        return f"it is an arm ({_named(chain)} in a row) and has no wheels on the floor; {ONLY_DIFFERENTIAL}"
     if any(TRACK.search(f"{joint.name} {joint.child}") for joint in joints):
         return "it has tracks and no wheels; write a robot file: antdrive robots jackal > mine.yaml"
     return f"has {len(wheels)} free-turning wheels on the floor; a differential drive has two; if it has two, {fix}"
 
 
-def _not_on_axles(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
-    names, count = _few(joint.name for joint in wheels), len(wheels)
-    apart = [abs(abs(float(a.axis @ b.axis)) - 1) for a in wheels for b in wheels]
-    if max(apart) > LEVEL:
-        return (
-            f"its {count} wheels point in different directions ({names}): an omnidirectional drive; {ONLY_DIFFERENTIAL}"
-        )
-    axis = wheels[0].axis
-    spots = np.array([joint.place[:3, 3] for joint in wheels])
-    if float(np.ptp(spots @ axis)) < 0.2 * float(np.ptp(spots, axis=0).max()):
-        return f"its {count} wheels are one behind the other ({names}), as on a bicycle; {ONLY_DIFFERENTIAL}"
+def _not_on_axles(wheels: Sequence[UrdfJoint]) -> str:
+    what, spots = f"its {len(wheels)} wheels", np.array([joint.place[:3, 3] for joint in wheels])
+    if max(1 - abs(float(a.axis @ b.axis)) for a in wheels for b in wheels) > LEVEL:
+        return f"{what} point in different directions ({_named(wheels)}): an omnidirectional drive; {ONLY_DIFFERENTIAL}"
+    if float(np.ptp(spots @ wheels[0].axis)) < 0.2 * float(np.ptp(spots, axis=0).max()):
+        return f"{what} are one behind the other ({_named(wheels)}), as on a bicycle; {ONLY_DIFFERENTIAL}"
     return (
-        f"no two of its {count} wheels share an axle ({names}): not a differential drive; "
+        f"no two of {what} share an axle ({_named(wheels)}): not a differential drive; "
         "if it is one, name the joints of two driven wheels with --left and --right"
     )
 
 
 def _too_low(model: UrdfModel, hanging: Sequence[UrdfJoint]) -> str:
     """Return that something rigid is lower than the wheels; empty if it is not so."""
-    lowest = model.lowest
-    if len(hanging) < 2 or lowest is None:
+    lowest, bottoms = (
+        model.lowest,
+        {joint.name: bottom(model, joint.child) for joint in hanging if _looks_round(model, joint)},
+    )
+    if len(bottoms) < 2 or lowest is None or lowest.link in {joint.child for joint in hanging}:
         return ""
-    above = {joint.name: bottom(model, joint.child) - lowest.bottom for joint in hanging}
-    names = ", ".join(f"{name} by {height:.4g} m" for name, height in above.items() if math.isfinite(height))
-    if not names or lowest.link in {joint.child for joint in hanging}:
-        return ""
-    lower = f"the collision geometry of link {lowest.link} lies lower than its wheels ({names})"
-    return f"{lower}, so the wheels are not on the floor"
+    names = ", ".join(f"{name} by {z - lowest.bottom:.4g} m" for name, z in bottoms.items() if math.isfinite(z))
+    return f"the collision geometry of link {lowest.link} lies lower than its wheels ({names})" if names else ""
 
 
 def _chains(model: UrdfModel) -> list[list[UrdfJoint]]:
@@ -259,15 +257,14 @@ def _legs(model: UrdfModel) -> str:
     """Return that a robot walks; empty if it does not."""
     chains = _chains(model)
     legs = sorted({chain[0].name for chain in chains if any(LEG.search(f"{j.name} {j.child}") for j in chain)})
-    return f"it has {len(legs)} legs ({_few(legs)}) and no wheels on the floor" if len(legs) >= 2 else ""
+    return f"it has {len(legs)} legs ({few(legs)}) and no wheels on the floor" if len(legs) >= 2 else ""
 
 
-def _arm(model: UrdfModel) -> str:
-    """Return that a robot is an arm; empty if it is not."""
-    joints = _few(joint.name for joint in max(_chains(model), key=len, default=[]))
-    return f"it is an arm ({joints} in a row) and has no wheels on the floor" if joints else ""
+def _named(joints: Iterable[UrdfJoint]) -> str:
+    return few([joint.name for joint in joints])
 
 
-def _few(names: Iterable[str]) -> str:
+def few(names: Iterable[str]) -> str:
+    """Return at most four names, and how many more there are."""
     some = list(names)
     return ", ".join(some[:4]) + (f" and {len(some) - 4} more" if len(some) > 4 else "")

@@ -17,6 +17,7 @@ import numpy as np
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
+from antdrive.robots.importing.drives import few
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.model import CollisionPiece, UrdfModel, read_model
 from antdrive.robots.importing.plausible import below_arms, implausible, plausible_speeds
@@ -259,7 +260,7 @@ def _imported(
     outline = footprint_around(with_wheels(points, wheels), kind)
     names = sorted({piece.link for piece in low})
     kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
-    what = f"{kind} around the collision geometry of {_few(names)} and the wheels"
+    what = f"{kind} around the collision geometry of {few(names)} and the wheels"
     what += "" if math.isinf(below) else f", below {below:g} m"
     values = _values(model, wheels, outline, floor, given)
     lidar, seen, unused = import_lidar(model.lidars, frame, floor, outline)
@@ -399,8 +400,8 @@ def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
     if not heavy:
         return DENSITY * box, f"assumed: {DENSITY:g} kg/m3, as the file has no masses"
     light = sorted({piece.link for piece in model.pieces} - set(heavy))
-    without = f"; {_few(light)} {'have' if len(light) > 1 else 'has'} none" if light else ""
-    return sum(model.masses.values()), f"computed: sum of the masses of {_few(heavy)}{without}"
+    without = f"; {few(light)} {'have' if len(light) > 1 else 'has'} none" if light else ""
+    return sum(model.masses.values()), f"computed: sum of the masses of {few(heavy)}{without}"
 
 
 def _text(
@@ -457,7 +458,3 @@ def _plain(value: object) -> str:
 def _quoted(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
-
-
-def _few(names: list[str]) -> str:
-    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
