@@ -80,22 +80,31 @@ def test_packages_are_found_where_ros_has_them(tmp_path, monkeypatch, variable, 
     assert track_of(path) == pytest.approx(0.44)
 
 
+def test_a_substitution_in_a_plain_file_is_resolved(tmp_path):
+    text = BODY.replace('xyz="0.0 0.22 0.1"', 'xyz="$(optenv NO_SUCH_VARIABLE 0 0.22 0.1)"')
+    assert text != BODY
+    assert track_of(written(tmp_path / "robot.urdf", text)) == pytest.approx(0.44)
+
+
 SENSOR = '<xacro:include filename="$(find sensors)/urdf/lidar.xacro"/><xacro:lidar name="front"/>'
 
 
 def test_a_missing_package_of_sensors_is_noted_with_its_macros(tmp_path):
     mount = joint("mount", "front_mount", "0 0 0.5", "fixed")
+    mount += '<link name="frame"/>' + joint("frame_joint", "frame", "0 0 0", "fixed", parent="front_camera")
     path = written(tmp_path / "robot.xacro", BODY.replace("</robot>", f"{SENSOR}{mount}</robot>"))
     found = import_urdf(path)
     assert found.spec.track == pytest.approx(0.44)
-    assert "packages not found: sensors; omitted with them: lidar; --package NAME=FOLDER adds them" in found.notes
+    assert (
+        "packages not found: sensors; omitted with them: lidar, frame; --package NAME=FOLDER adds them" in found.notes
+    )
 
 
 def test_a_missing_package_that_the_base_needs_is_asked_for(tmp_path):
     remedy = "Package not found: sensors; give its folder with --package sensors=FOLDER"
     for text in (
         robot(box("base"), SENSOR),
-        BODY.replace("</robot>", f'{SENSOR}<link name="x"/>{joint("j", "x", "0 0 0", parent="gone")}</robot>'),
+        BODY.replace('parent link="base"', 'parent link="gone"').replace("</robot>", f"{SENSOR}</robot>"),
         BODY.replace("</robot>", SENSOR + '<a b="${size}"/></robot>'),
     ):
         with pytest.raises(InputError, match=remedy):

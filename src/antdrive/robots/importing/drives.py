@@ -106,6 +106,8 @@ def other_drive(model: UrdfModel) -> str:
             return f"plugin {names}: {kind or 'an omnidirectional drive'}; {ONLY_DIFFERENTIAL}"
     if re.search("mecanum|holonomic|ackerman", model.name, re.IGNORECASE):
         return f"its name, {model.name}, says that it has another drive; {ONLY_DIFFERENTIAL}"
+    if not free_wheels(model) and (why := _legs(model)):
+        return why
     wheels = [joint for joint in model.joints.values() if stands(model, joint)]
     held = {joint.name: swivel for joint in wheels if (swivel := _swivel(model, joint)) is not None}
     swivels = {swivel.name: swivel for swivel in held.values()}
@@ -168,7 +170,10 @@ def other_wheels(model: UrdfModel, driven: Sequence[UrdfJoint]) -> str:
             return f"its driven wheels are omni or mecanum wheels ({says}); {ONLY_DIFFERENTIAL}"
         rollers = [other.name for other in model.joints.values() if other.kind != "fixed" and _on(model, other, joint)]
         if rollers:
-            return f"its wheels have {len(rollers)} rollers, such as {rollers[0]}: omni or mecanum wheels; {ONLY_DIFFERENTIAL}"
+            return (
+                _legs(model)
+                or f"its wheels have {len(rollers)} rollers, such as {rollers[0]}: omni or mecanum wheels; {ONLY_DIFFERENTIAL}"
+            )
     return ""
 
 
@@ -203,8 +208,6 @@ def without_wheels(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
         return "none of its joints moves, so the file is for display; make the joints of its driven wheels continuous"
     if rotors:
         return f"{_named(rotors)} are propellers, and it has no wheels on the floor; {ONLY_DIFFERENTIAL}"
-    if why := _legs(model):
-        return f"{why}; {ONLY_DIFFERENTIAL}"
     if limited and len(free) < 2:
         least = min(joint.range for joint in limited)
         return (
@@ -257,7 +260,7 @@ def _legs(model: UrdfModel) -> str:
     """Return that a robot walks; empty if it does not."""
     chains = _chains(model)
     legs = sorted({chain[0].name for chain in chains if any(LEG.search(f"{j.name} {j.child}") for j in chain)})
-    return f"it has {len(legs)} legs ({few(legs)}) and no wheels on the floor" if len(legs) >= 2 else ""
+    return f"it has {len(legs)} legs ({few(legs)}); {ONLY_DIFFERENTIAL}" if len(legs) >= 2 else ""
 
 
 def _named(joints: Iterable[UrdfJoint]) -> str:

@@ -230,6 +230,7 @@ def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
 # Polygon circumscribed about the unit circle, with the same bounding box.
 CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
 SIDE = re.compile(r"^(?:front|rear|back|middle)?_?(left|right)(?=\w*joint$)", re.IGNORECASE)  # tags of a drive plugin
+SUBSTITUTION = re.compile(r"\$\((?:find|arg|env|optenv|eval|dirname|cwd)\b")  # of xacro
 MAX_LINKS = 10_000
 MAX_COORDINATE = 1e6  # [m]
 MAX_MESH_BYTES = 20_000_000  # 400,000 triangles of a binary STL file
@@ -350,13 +351,17 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missi
     if root.tag != "robot":
         raise input_error(str(path), f"the root element must be <robot>, got <{root.tag}>")
     links = {_named(path, link): link for link in root.findall("link")}
-    if not links and not root.findall("joint"):
-        raise input_error(str(path), "has no links; give the file of the robot, which includes the others")
-    if not 0 < len(links) <= MAX_LINKS:
-        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MAX_LINKS}")
     local = [_joint(path, element) for element in root.findall("joint")]
-    if missing.macros:  # their links have no shape
+    if missing.macros:  # a link of theirs has no shape if it is a child; what hangs on it is omitted if it is a root
         links |= {joint.child: ET.Element("link") for joint in local if joint.child not in links}
+        while lost := {joint.child for joint in local if joint.parent not in links}:
+            missing.macros += sorted(lost)
+            local = [joint for joint in local if joint.child not in lost]
+            links = {name: link for name, link in links.items() if name not in lost}
+    if not links:
+        raise input_error(str(path), "has no links; give the file of the robot, which includes the others")
+    if len(links) > MAX_LINKS:
+        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MAX_LINKS}")
     commanded = _commanded(path, root, {joint.name for joint in local})
     places, joints = _placed(path, set(links), [replace(joint, commanded=commanded.get(joint.name)) for joint in local])
     pieces = [
@@ -437,9 +442,12 @@ def _drive(root: ET.Element) -> tuple[dict[str, str], tuple[tuple[str, ...], tup
 
 
 def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> tuple[ET.Element, Missing]:
-    """Return the root of a URDF or xacro file; xacro's elements show a xacro file, whatever its name."""
+    """Return the root of a URDF or xacro file; xacro's elements and substitutions show a xacro file, whatever its name."""
     plain = None if path.suffix.lower() == ".xacro" else parse_xml(path)
-    if plain is not None and not any(element.tag.startswith("xacro:") for element in plain.iter()):
+    if plain is not None and not any(
+        element.tag.startswith("xacro:") or any(map(SUBSTITUTION.search, element.attrib.values()))
+        for element in plain.iter()
+    ):
         if arguments:
             raise InputError(f"--arg {next(iter(arguments))}: {path.name} is not a .xacro file and has no arguments")
         return plain, Missing()

@@ -273,7 +273,7 @@ def _imported(
         *below_arms(model, low, frame, floor),
         *unused,
         *model.missing.notes,
-        *(f"omitted, because not found: {mesh}" for mesh in model.missing_meshes),
+        *([f"omitted, because not found: {'; '.join(model.missing_meshes)}"] if model.missing_meshes else []),
     ]
     notes = ["".join(c if c.isprintable() else "?" for c in note) for note in notes]
     return ImportedRobot(
