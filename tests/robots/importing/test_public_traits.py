@@ -169,6 +169,15 @@ OTHERS = {
         + re.sub('axis xyz="0 1 0"', 'axis xyz="0.866 -0.5 0"', wheel("c_wheel", -0.1, -0.17)),
         "wheels point in different directions",
     ),
+    "four omni wheels in a cross": (
+        pair()
+        + re.sub(
+            'axis xyz="0 1 0"',
+            'axis xyz="1 0 0"',
+            wheel("ahead", 0.22, 0, shape="sphere") + wheel("behind", -0.22, 0, shape="sphere"),
+        ),
+        "its 4 wheels point in different directions",
+    ),
     "planar move": (
         pair() + '<gazebo><plugin name="m" filename="libgazebo_ros_planar_move.so"/></gazebo>',
         "an omnidirectional drive",
@@ -182,6 +191,18 @@ OTHERS = {
         "an omnidirectional drive",
     ),
     "legs": (four(lambda name, x, y: chain(name, f"{x} {y} 0.4")), "it has 4 legs"),
+    "legs without a leg's names": (
+        four(
+            lambda name, x, y: (
+                chain(name, f"{x} {y} 0.4")
+                .replace("hip", "a")
+                .replace("knee", "b")
+                .replace("shank", "c")
+                .replace("thigh", "d")
+            )
+        ),
+        "it has 4 legs",
+    ),
     "legs of continuous joints": (four(lambda name, x, y: chain(name, f"{x} {y} 0.4", "continuous")), "it has 4 legs"),
     "arm": (chain("arm", "0 0 0.6"), "it is an arm (arm_hip, arm_knee in a row)"),
     "drone": (
@@ -217,7 +238,7 @@ OTHERS = {
 @pytest.mark.parametrize("kind", OTHERS)
 def test_another_robot_is_refused_by_what_it_is(tmp_path, kind):
     parts, says = OTHERS[kind]
-    base = BASE if kind not in ("legs", "legs of continuous joints") else box("base", at="0 0 0.5")
+    base = BASE if not kind.startswith("legs") else box("base", at="0 0 0.5")
     with pytest.raises(InputError, match=re.escape(says)) as caught:
         imported(tmp_path, base, parts)
     assert str(caught.value).isprintable()

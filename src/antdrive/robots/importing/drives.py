@@ -15,6 +15,7 @@ ONLY_DIFFERENTIAL = "only differential drives can be simulated"
 STEERING = math.pi  # largest range of a joint that steers; casters turn further [rad]
 SWIVEL = 0.9  # minimum vertical component of the axis of a caster or a steering joint
 ROUND = 1.5  # largest ratio of a wheel's two diameters
+STANDING = 0.02  # largest height of a foot above the floor [m]
 TRAIL = 0.05  # least distance of a caster's wheel behind its axis, in diameters
 TRAILING = 0.5  # minimum track of a trailer, in tracks of the robot; those of twin casters are smaller
 
@@ -29,7 +30,7 @@ DRIVES = re.compile(r"drive|driving|wheel|move|motion|base|control|command_?topi
 OMNI_WHEEL = re.compile(r"mecanum|swedish|(?<![a-z])omni(?!cam|verse)", re.IGNORECASE)
 WHEEL = re.compile(r"wheel|whl|tire|tyre", re.IGNORECASE)
 ROTOR = re.compile(r"rotor|prop(?:eller)?(?![a-z])|thruster", re.IGNORECASE)
-LEG = re.compile(r"leg|hip|thigh|calf|knee|ankle|foot|shank", re.IGNORECASE)
+LEG = re.compile(r"leg|hip|thigh|calf|knee|ankle|foot|shank|coxa|femur|tibia", re.IGNORECASE)
 TRACK = re.compile(r"track(?!ing|er|ball)|tread|crawler|caterpillar", re.IGNORECASE)
 
 
@@ -104,8 +105,8 @@ def other_drive(model: UrdfModel) -> str:
         kind = next((kind for words, kind in PLUGINS if words.search(names)), "")
         if kind or drives:
             return f"plugin {names}: {kind or 'an omnidirectional drive'}; {ONLY_DIFFERENTIAL}"
-    if re.search("mecanum|holonomic|ackerman", model.name, re.IGNORECASE):
-        return f"its name, {model.name}, says that it has another drive; {ONLY_DIFFERENTIAL}"
+    if re.search("mecanum|holonomic|ackerman", called := f"{model.name} ({model.source.name})", re.IGNORECASE):
+        return f"its name, {called}, says that it has another drive; {ONLY_DIFFERENTIAL}"
     if not free_wheels(model) and (why := _legs(model)):
         return why
     wheels = [joint for joint in model.joints.values() if stands(model, joint)]
@@ -162,6 +163,8 @@ def _trailer(turning: Sequence[UrdfJoint], held: dict[str, UrdfJoint]) -> str:
 
 def other_wheels(model: UrdfModel, driven: Sequence[UrdfJoint]) -> str:
     """Return why the driven wheels are omnidirectional; empty if they are not."""
+    if len(driven) > 2 and (why := _apart(driven)):
+        return why
     for joint in driven:
         link = next((e for e in model.root.findall("link") if e.get("name") == joint.child), None)
         meshes = [] if link is None else [mesh.get("filename", "") for mesh in link.iter("mesh")]
@@ -216,18 +219,25 @@ def without_wheels(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
     if low := _too_low(model, [joint for joint in free if joint not in wheels]):
         return f"{low}, so the wheels are not on the floor; if they drive it, {fix}"
     if len(upright) >= 2 and not free:
-        return f"{_named(upright)} turn about upright axes, and no wheel about a level one: steered wheels; {ONLY_DIFFERENTIAL}"
-    if chain := max(_chains(model), key=len, default=[]):
+        why = f"{_named(upright)} turn about upright axes, and no wheel about a level one"
+        return f"{why}: steered wheels or propellers; {ONLY_DIFFERENTIAL}"
+    if chain := max((chain for _, chain in _chains(model)), key=len, default=[]):
         return f"it is an arm ({_named(chain)} in a row) and has no wheels on the floor; {ONLY_DIFFERENTIAL}"
     if any(TRACK.search(f"{joint.name} {joint.child}") for joint in joints):
         return "it has tracks and no wheels; write a robot file: antdrive robots jackal > mine.yaml"
     return f"has {len(wheels)} free-turning wheels on the floor; a differential drive has two; if it has two, {fix}"
 
 
+def _apart(wheels: Sequence[UrdfJoint]) -> str:
+    """Return that wheels are not parallel; empty if they are."""
+    if max(1 - abs(float(a.axis @ b.axis)) for a in wheels for b in wheels) <= LEVEL:
+        return ""
+    what = f"its {len(wheels)} wheels point in different directions ({_named(wheels)})"
+    return f"{what}: an omnidirectional drive; {ONLY_DIFFERENTIAL}"
+
+
 def _not_on_axles(wheels: Sequence[UrdfJoint]) -> str:
     what, spots = f"its {len(wheels)} wheels", np.array([joint.place[:3, 3] for joint in wheels])
-    if max(1 - abs(float(a.axis @ b.axis)) for a in wheels for b in wheels) > LEVEL:
-        return f"{what} point in different directions ({_named(wheels)}): an omnidirectional drive; {ONLY_DIFFERENTIAL}"
     if float(np.ptp(spots @ wheels[0].axis)) < 0.2 * float(np.ptp(spots, axis=0).max()):
         return f"{what} are one behind the other ({_named(wheels)}), as on a bicycle; {ONLY_DIFFERENTIAL}"
     return (
@@ -248,18 +258,25 @@ def _too_low(model: UrdfModel, hanging: Sequence[UrdfJoint]) -> str:
     return f"the collision geometry of link {lowest.link} lies lower than its wheels ({names})" if names else ""
 
 
-def _chains(model: UrdfModel) -> list[list[UrdfJoint]]:
-    """Return the turning joints from the root to each last link that has two or more of them."""
+def _chains(model: UrdfModel) -> list[tuple[str, list[UrdfJoint]]]:
+    """Return each last link with two or more turning joints above it, and these joints from the root."""
     parents = {joint.parent for joint in model.joints.values()}
     ends = [joint.child for joint in model.joints.values() if joint.child not in parents]
-    chains = [[over for over in model.above(end) if over.kind in ("revolute", "continuous")][::-1] for end in ends]
-    return [chain for chain in chains if len(chain) >= 2]
+    chains = [(end, [o for o in model.above(end) if o.kind in ("revolute", "continuous")][::-1]) for end in ends]
+    return [(end, chain) for end, chain in chains if len(chain) >= 2]
 
 
 def _legs(model: UrdfModel) -> str:
-    """Return that a robot walks; empty if it does not."""
-    chains = _chains(model)
-    legs = sorted({chain[0].name for chain in chains if any(LEG.search(f"{j.name} {j.child}") for j in chain)})
+    """Return that a robot walks, by names or because several chains of joints end on the floor; empty if it does not."""
+    floor = -math.inf if model.lowest is None else model.lowest.bottom + STANDING
+    legs = sorted(
+        {
+            chain[0].name
+            for end, chain in _chains(model)
+            if (bottom(model, end) <= floor and not turns_as_wheel(chain[-1]))
+            or any(LEG.search(f"{joint.name} {joint.child}") for joint in chain)
+        }
+    )
     return f"it has {len(legs)} legs ({few(legs)}); {ONLY_DIFFERENTIAL}" if len(legs) >= 2 else ""
 
 

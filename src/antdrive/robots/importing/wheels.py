@@ -55,14 +55,11 @@ def driven_wheels(
         raise OtherDriveError(f"{where}: {why}")
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
-    if left is not None and right is not None:
-        wheels = [_wheel(model, _joint_called(model, name), radius) for name in (left, right)]
-        pairs = [_given_order(model, *wheels)] if _on_one_axle(*wheels) else []
-    else:
-        wheels = _candidates(model, radius)
-        pairs = [_in_order(model, *pair) for pair in _axles(wheels)]
+    given = [_joint_called(model, name) for name in (left, right) if name is not None]
+    wheels = [_wheel(model, joint, radius) for joint in given or _candidates(model)]
     if why := other_wheels(model, [wheel.joint for wheel in wheels]):
         raise OtherDriveError(f"{where}: {why}")
+    pairs = [_given_order(*pair) if given else _in_order(model, *pair) for pair in _axles(wheels)]
     named = {*model.sides[0], *model.sides[1]} | {wheel.joint.name for wheel in wheels if wheel.joint.commanded}
     if not pairs or (left is None and len(named) > 2 and len(wheels) != 2 * len(pairs)):
         raise input_error(where, _unpaired(model, wheels, radius))
@@ -100,20 +97,17 @@ def notes_on_wheels(model: UrdfModel, wheels: Pair) -> Iterator[str]:
         yield f"wheels from the {left.read_from}"
 
 
-def _candidates(model: UrdfModel, radius: float | None) -> list[DrivenWheel]:
+def _candidates(model: UrdfModel) -> list[UrdfJoint]:
     """Return the wheels that the file calls driven, otherwise those on the floor."""
-    named = [name for side in model.sides for name in side]
-    if model.sides[0] and model.sides[1]:
-        return [_wheel(model, _joint_called(model, name), radius) for name in named]
     commanded = [joint.name for joint in model.joints.values() if joint.commanded is not None]
-    if len(commanded) == 2:
-        return [_wheel(model, _joint_called(model, name), radius) for name in commanded]
+    if all(model.sides) or len(commanded) == 2:
+        return [_joint_called(model, name) for name in (sum(model.sides, ()) if all(model.sides) else commanded)]
     free = free_wheels(model)
     actuated = commanded or [joint.get("name", "") for joint in model.root.findall("transmission/joint")]
     if len(driven := [joint for joint in free if joint.name in actuated]) >= 2:
         free = driven
     active = [joint for joint in free if not PASSIVE.search(f"{joint.name} {joint.child}")]
-    return [_wheel(model, joint, radius) for joint in (active if len(active) >= 2 else free)]
+    return active if len(active) >= 2 else free
 
 
 def _axles(wheels: Sequence[DrivenWheel]) -> list[Pair]:
@@ -280,7 +274,7 @@ def _across(a: DrivenWheel, b: DrivenWheel) -> bool:
     return abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart))
 
 
-def _given_order(model: UrdfModel, a: DrivenWheel, b: DrivenWheel) -> Pair:
+def _given_order(a: DrivenWheel, b: DrivenWheel) -> Pair:
     """Return a pair as given; raise InputError if it is swapped by position and not by name."""
     if _across(a, b) and a.centre[1] < b.centre[1] and (_says(a.joint), _says(b.joint)) != ("left", "right"):
         raise InputError(
