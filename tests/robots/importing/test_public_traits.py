@@ -328,3 +328,16 @@ def test_what_is_written_can_be_read_whatever_its_digits(tmp_path):
     )
     assert robot_from_text(found.text, "a", "a") == found.spec
     assert "e-05" not in found.text
+
+
+def test_a_body_without_collision_geometry_is_refused_or_noted(tmp_path):
+    drawn = box("base").replace("collision>", "visual>")
+    with pytest.raises(InputError, match="has no collision geometry other than its wheels, so no footprint"):
+        imported(tmp_path, drawn, pair(0.2, "front_"), pair(-0.2, "rear_"))
+    found = imported(
+        tmp_path, drawn, pair(), box("mast", "0.1 0.1 0.4", "0 0 0"), joint("mast", "mast", "0 0 0.4", "fixed")
+    )
+    assert any(
+        "the footprint is no longer than the wheels; if the body's <collision> is missing" in note
+        for note in found.notes
+    )

@@ -48,6 +48,8 @@ def implausible(spec: RobotSpec, span: float, known: Collection[str]) -> Iterato
             f"mass {spec.mass:.4g} kg looks implausible: {density:.3g} kg/m3 of its box; check it, or give --set mass=KG"
         )
     wheels = max(spec.track, span + 2 * spec.wheel_radius)
+    if not span and xmax - xmin <= WIDER * 2 * spec.wheel_radius:
+        yield "the footprint is no longer than the wheels; if the body's <collision> is missing, add it to the file"
     if (long := _longer_side(foot)) > LONGEST * wheels:
         yield f"the footprint, {long:.3g} m long, looks implausible for wheels that span {wheels:.3g} m; see --figure"
 

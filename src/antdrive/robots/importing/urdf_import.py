@@ -22,7 +22,7 @@ from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.model import CollisionPiece, UrdfModel, read_model
 from antdrive.robots.importing.plausible import below_arms, implausible, plausible_speeds
 from antdrive.robots.importing.sensors import decimal, import_lidar, lidar_entry
-from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels, notes_on_wheels
+from antdrive.robots.importing.wheels import DrivenWheel, driven_links, driven_wheels, notes_on_wheels
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
 from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
@@ -208,6 +208,15 @@ class _Value(NamedTuple):
     value: float
     how: str
 
+    @property
+    def assumed(self) -> bool:
+        return self.how.startswith("assumed")
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether it is an assumed speed, or the drive plugin contradicts it."""
+        return (self.key == "max_speed" and self.assumed) or self.how.endswith(DOUBT)
+
 
 @dataclass(frozen=True, eq=False)
 class ImportedRobot:
@@ -241,64 +250,47 @@ def import_urdf(
         raise InputError(f"--footprint {footprint}: choose from {', '.join(KINDS)}")
     model = read_model(path, meshes=meshes, without_meshes=without_meshes, arguments=arguments, packages=packages)
     with model.missing.named():
-        return _imported(model, left, right, below, footprint, given)
-
-
-def _imported(
-    model: UrdfModel, left: str | None, right: str | None, below: float, kind: str, given: Mapping[str, float]
-) -> ImportedRobot:
-    path = model.source
-    wheels = driven_wheels(model, left, right, given.get("wheel_radius"))
-    frame, floor = planar_frame(wheels), floor_under(wheels)
-    solid = solid_pieces(model, wheels)
-    low = [piece for piece in solid if piece.bottom - floor <= below]
-    high = [piece for piece in solid if piece.bottom - floor > below]
-    if not {piece.link for piece in low} - {wheel.joint.child for wheel in wheels}:
-        where = "" if math.isinf(below) else f" below {below:g} m"
-        raise input_error(str(path), f"has no collision geometry{where} other than its wheels, so no footprint")
-    points = [from_above(piece.points, frame) for piece in low]
-    outline = footprint_around(with_wheels(points, wheels), kind)
-    names = sorted({piece.link for piece in low})
-    kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
-    what = f"{kind} around the collision geometry of {few(names)} and the wheels"
-    what += "" if math.isinf(below) else f", below {below:g} m"
-    values = _values(model, wheels, outline, floor, given)
-    lidar, seen, unused = import_lidar(model.lidars, frame, floor, outline)
-    text = _text(model, path, outline, what, values, lidar, seen)
-    spec = _robot_in(text, path, values)
-    notes = [
-        *notes_on_wheels(model, wheels),
-        *(f"{value.key} {value.value:.4g} is {value.how}" for value in values if _is_doubtful(value)),
-        *implausible(spec, wheels[0].span, {*given, *(value.key for value in values if _is_assumed(value))}),
-        *below_arms(model, low, frame, floor),
-        *unused,
-        *model.missing.notes,
-        *([f"omitted, because not found: {'; '.join(model.missing_meshes)}"] if model.missing_meshes else []),
-    ]
-    notes = ["".join(c if c.isprintable() else "?" for c in note) for note in notes]
-    return ImportedRobot(
-        spec,
-        text + "".join(f"# note: {note}\n" for note in notes),
-        tuple(points),
-        tuple(from_above(piece.points, frame) for piece in high),
-        model.missing_meshes,
-        tuple(notes),
-    )
-
-
-def _is_assumed(value: _Value) -> bool:
-    return value.how.startswith("assumed")
-
-
-def _is_doubtful(value: _Value) -> bool:
-    """Return whether a value is a speed that is assumed, or is contradicted by the drive plugin."""
-    return (value.key == "max_speed" and _is_assumed(value)) or value.how.endswith(DOUBT)
+        wheels = driven_wheels(model, left, right, given.get("wheel_radius"))
+        frame, floor = planar_frame(wheels), floor_under(wheels)
+        solid = solid_pieces(model, wheels)
+        low = [piece for piece in solid if piece.bottom - floor <= below]
+        high = [piece for piece in solid if piece.bottom - floor > below]
+        if not {piece.link for piece in low} - driven_links(model, wheels):
+            where = "" if math.isinf(below) else f" below {below:g} m"
+            raise input_error(str(path), f"has no collision geometry{where} other than its wheels, so no footprint")
+        points = [from_above(piece.points, frame) for piece in low]
+        outline = footprint_around(with_wheels(points, wheels), footprint)
+        names = sorted({piece.link for piece in low})
+        kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
+        what = f"{kind} around the collision geometry of {few(names)} and the wheels"
+        what += "" if math.isinf(below) else f", below {below:g} m"
+        values = _values(model, wheels, outline, floor, given)
+        lidar, seen, unused = import_lidar(model.lidars, frame, floor, outline)
+        text = _text(model, path, outline, what, values, lidar, seen)
+        spec = _robot_in(text, path, values)
+        notes = [
+            *notes_on_wheels(model, wheels),
+            *(f"{value.key} {value.value:.4g} is {value.how}" for value in values if value.doubtful),
+            *implausible(spec, wheels[0].span, {*given, *(value.key for value in values if value.assumed)}),
+            *below_arms(model, low, frame, floor),
+            *unused,
+            *model.missing.notes,
+            *([f"omitted, because not found: {'; '.join(model.missing_meshes)}"] if model.missing_meshes else []),
+        ]
+        notes = ["".join(c if c.isprintable() else "?" for c in note) for note in notes]
+        return ImportedRobot(
+            spec,
+            text + "".join(f"# note: {note}\n" for note in notes),
+            tuple(points),
+            tuple(from_above(piece.points, frame) for piece in high),
+            model.missing_meshes,
+            tuple(notes),
+        )
 
 
 def solid_pieces(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel]) -> list[CollisionPiece]:
     """Return the collision geometry without driven wheels' spheres, which are wider than the wheels."""
-    names = {name for wheel in wheels for name in (wheel.joint.name, *wheel.joints)}
-    links = {joint.child for name, joint in model.joints.items() if name in names}
+    links = driven_links(model, wheels)
     return [piece for piece in model.pieces if piece.kind != "sphere" or piece.link not in links]
 
 

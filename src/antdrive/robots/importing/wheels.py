@@ -74,6 +74,12 @@ def driven_wheels(
     return _skidding(pairs)
 
 
+def driven_links(model: UrdfModel, wheels: Pair) -> set[str]:
+    """Return the links of all driven wheels."""
+    names = {name for wheel in wheels for name in (wheel.joint.name, *wheel.joints)}
+    return {model.joints[name].child for name in names}
+
+
 def notes_on_wheels(model: UrdfModel, wheels: Pair) -> Iterator[str]:
     """Yield what was assumed about the wheels."""
     left, right = wheels
