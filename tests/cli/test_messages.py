@@ -90,7 +90,7 @@ robots import URDF/burger.urdf -o new.yaml --footprint star
 robots import URDF/burger.urdf -o new.yaml --set colour=3
 robots import URDF/burger.urdf -o new.yaml --set mass
 robots import URDF/burger.urdf -o new.yaml --set mass=-3
-robots import URDF/husky.urdf -o new.yaml
+robots import URDF/husky.urdf -o new.yaml --left rear_right_wheel --right rear_left_wheel
 robots import URDF/none.urdf -o new.yaml
 robots jackle
 robots show jackal -o a.gif

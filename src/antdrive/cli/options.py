@@ -190,7 +190,7 @@ RosPackages = Annotated[
     list[str] | None,
     option(
         "NAME=FOLDER",
-        "Folder of a ROS package. Repeatable.  [default: folder NAME beside or above FILE]",
+        "Folder of a ROS package. Repeatable.  [default: NAME beside or above FILE, or of ROS]",
         "--package",
     ),
 ]

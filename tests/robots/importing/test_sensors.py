@@ -84,11 +84,19 @@ def test_a_lidars_yaw_is_the_middle_of_its_field_of_view(tmp_path, joint, pose, 
 def test_an_unusable_lidar_is_omitted_with_the_reason(tmp_path, changes, says):
     found = imported(tmp_path, sensor(**changes))
     assert found.spec.lidar is None
-    assert f"# no lidar: sensor lds of link scan is not used: {says}" in found.text.splitlines()
-    other = imported(tmp_path, sensor(**changes), sensor(name="second"), sensor(name="third"))
-    assert (
-        f"# read: sensor second of link scan; sensor lds of link scan is not used: {says}; sensor third of link scan is not used"
-    ) in other.text.splitlines()
+    assert f"# note: sensor lds of link scan is not used: {says}" in found.text.splitlines()
+
+
+def test_a_second_lidar_is_noted_with_where_it_looks(tmp_path):
+    few = sensor(samples="1")
+    found = imported(
+        tmp_path, few, sensor(), sensor(name="back", high="1.5708", pose="<pose>0 0 0 0 0 3.1416</pose>"), few
+    )
+    assert found.spec.lidar is not None
+    assert found.notes[-2:] == (
+        "sensor back of link scan is not used, because a robot file has one lidar; it looks 135° to the right with 90° of view",
+        "sensor lds of link scan is not used: beams: must be between 3 and 10000, got 1, nor are 1 more",
+    )
 
 
 def test_what_is_no_lidar_is_none(tmp_path):

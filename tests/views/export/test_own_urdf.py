@@ -133,11 +133,12 @@ def test_frames_never_have_two_parents(made_up_drive, tmp_path):
     assert "base_footprint" in in_robot(said, "antdrive_base_footprint")
 
 
-def test_a_skid_steered_robot_needs_its_axle(made_up_drive):
+def test_a_skid_steered_robot_turns_about_the_middle_unless_it_was_imported_with_an_axle():
     axle = {"left": "front_left_wheel", "right": "front_right_wheel"}
-    robot = import_urdf(URDF / "husky.urdf", **axle).spec
-    assert frames_of_urdf(robot, URDF / "husky.urdf", **axle).joints[0].startswith("front_left")
-    with pytest.raises(InputError, match="choose the axle of rotation with --left and --right"):
+    for named in ({}, axle):
+        robot = import_urdf(URDF / "husky.urdf", **named).spec
+        assert frames_of_urdf(robot, URDF / "husky.urdf", **named).joints[0].startswith("front_left")
+    with pytest.raises(InputError, match=r"its footprint differs by 0\.256 m"):
         frames_of_urdf(robot, URDF / "husky.urdf")
 
 

@@ -131,5 +131,5 @@ def import_robot(
         robot_figure(imported.spec, figure, pieces=imported.pieces, above=imported.above)
         files["figure"] = str(figure)
     write_text(target, imported.text)
-    facts = {**robot_to_dict(imported.spec), "files": files, "left_out": list(imported.missing_meshes)}
+    facts = {**robot_to_dict(imported.spec), "files": files, "notes": list(imported.notes)}
     show(json, facts, [imported.text.rstrip(), *file_lines(files)])

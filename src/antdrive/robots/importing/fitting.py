@@ -13,7 +13,7 @@ import numpy.typing as npt
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.types import Floats
 from antdrive.robots.importing.model import UrdfJoint, UrdfModel, read_model
-from antdrive.robots.importing.urdf_import import floor_under, from_above, planar_frame, with_wheels
+from antdrive.robots.importing.urdf_import import floor_under, from_above, planar_frame, solid_pieces, with_wheels
 from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
 from antdrive.robots.outline import Footprint
 from antdrive.robots.spec import RobotSpec
@@ -46,7 +46,7 @@ def fitted_model(
     model = read_model(path, without_meshes=True, arguments=arguments, packages=packages)
     wheels = driven_wheels(model, left, right, robot.wheel_radius)
     if {wheel.joint.child for wheel in wheels} <= {piece.link for piece in model.pieces}:
-        wheels = driven_wheels(model, wheels[0].joint.name, wheels[1].joint.name)  # with their own radii
+        wheels = driven_wheels(model, left, right)  # with their own radii
     track = float(np.linalg.norm(wheels[0].centre - wheels[1].centre))
     radius = (wheels[0].radius + wheels[1].radius) / 2
     for what, value, own in (("track", track, robot.track), ("wheel radius", radius, robot.wheel_radius)):
@@ -71,7 +71,7 @@ def _misfit(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], frame: Fl
 
     Geometry that lacks meshes may be smaller.
     """
-    pieces = sorted(model.pieces, key=lambda piece: float(piece.points[:, 2].min()))
+    pieces = sorted(solid_pieces(model, wheels), key=lambda piece: piece.bottom)
     shapes: list[npt.ArrayLike] = [with_wheels([], wheels), *(from_above(piece.points, frame) for piece in pieces)]
     off = np.maximum.accumulate([_extent(shape, foot) for shape in shapes]) - _extent_of(foot)
     off = np.maximum(off, 0.0) if model.missing_meshes else np.abs(off)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import itertools
 import math
 import os
 import re
@@ -16,8 +17,10 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -30,64 +33,148 @@ from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml
 
-MAX_PACKAGES = 100  # referenced by one file
+MAX_NESTED = 6  # folders between a workspace and a package
+PREFIXES = ("AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH", "CMAKE_PREFIX_PATH")
+STAND_IN = f"{os.sep}missing package "  # start of the path of a missing package
 
 
 def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Path | None:
-    """Return a package's folder: the given one, or one of that name beside or above the file; None if missing."""
+    """Return a package's folder; None if missing.
+
+    The given one comes first, then one above or beside the file, then those of ROS' own variables.
+    """
     if name in packages:
         return packages[name]
     above = source.resolve().parents
-    return next((folder for parent in above for folder in (parent / name,) if folder.is_dir()), None)
+    own = (folder for folder in above if _is_package(folder, name))
+    beside = (parent / name for parent in above)
+    shared = (Path(prefix, "share", name) for key in PREFIXES for prefix in _folders(key))
+    folders = itertools.chain(own, beside, shared, _in_workspaces(name))
+    return next((folder for folder in folders if folder.is_dir()), None)
 
 
-def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> str:
-    """Expand a xacro file to URDF text."""
+def _is_package(folder: Path, name: str) -> bool:
+    file = folder / "package.xml"
+    return file.is_file() and f"<name>{name}</name>" in file.read_text(encoding="utf-8", errors="replace")
+
+
+def _folders(variable: str) -> list[str]:
+    return [folder for folder in os.environ.get(variable, "").split(os.pathsep) if folder]
+
+
+def _in_workspaces(name: str) -> Iterator[Path]:
+    """Yield the folders of a package at or below those of ROS_PACKAGE_PATH."""
+    for workspace in _folders("ROS_PACKAGE_PATH"):
+        for folder, inside, files in os.walk(workspace):
+            if os.path.basename(folder) == name or _is_package(Path(folder), name):
+                yield Path(folder)
+            if "package.xml" in files or folder.count(os.sep) - workspace.count(os.sep) >= MAX_NESTED:
+                inside.clear()
+
+
+def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> tuple[str, Missing]:
+    """Expand a xacro file to URDF text; also return what was left out for want of a package.
+
+    Missing packages are replaced by empty ones. Their macros expand to nothing.
+    """
     read_bytes(path, MAX_BYTES, "a xacro file")
     xacrodoc = optional("xacrodoc", "urdf", "xacro files need it")
-    known = dict(packages)
-    for _ in range(MAX_PACKAGES):
-        xacrodoc.packages.reset()
-        xacrodoc.packages.update_package_cache(known)
-        asked = _Arguments(arguments)
+    asked, missing = _Arguments(arguments), Missing()
+    try:
+        with _patched(path, packages, missing):
+            document = xacrodoc.XacroDoc.from_file(str(path), walk_up=False, subargs=asked, resolve_packages=False)
+        text = str(document.to_urdf_string())
+    except InputError:
+        raise
+    except Exception as error:  # xacro's expressions can raise any exception
+        why = f"{_in_one_line(error)}{_help(error)}{missing.remedy}"
+        raise input_error(str(path), f"xacro cannot expand it: {why}") from None
+    unknown = next((name for name in arguments if name not in asked.names), None)
+    if unknown is not None:
+        advice = suggest(unknown, sorted(asked.names)) if asked.names else "it has none"
+        raise InputError(f"--arg {unknown}: {path.name} has no such argument; {advice}")
+    return text, missing
+
+
+class OtherDriveError(InputError):
+    """A robot that does not drive differentially, whatever its file lacks."""
+
+
+class Missing:
+    """Packages that were not found, and the macros that are missing with them."""
+
+    def __init__(self) -> None:
+        self.packages: list[str] = []
+        self.macros: list[str] = []  # that expanded to nothing
+        self.included = False  # whether a file of one of them was included
+
+    @property
+    def remedy(self) -> str:
+        """How to give them; empty if none is missing."""
+        names = ", ".join(self.packages)
+        return (
+            f"; Package not found: {names}; give its folder with --package {self.packages[0]}=FOLDER" if names else ""
+        )
+
+    @contextlib.contextmanager
+    def named(self) -> Iterator[None]:
+        """Add the remedy to errors about a robot that lacks parts."""
         try:
-            with _refusing_pipes():
-                document = xacrodoc.XacroDoc.from_file(str(path), subargs=asked, resolve_packages=False)
-            text = str(document.to_urdf_string())
-        except InputError:
+            yield
+        except OtherDriveError:
             raise
-        except Exception as error:  # xacro's expressions can raise any exception
-            missing = _missing_package(error)
-            folder = None if missing is None or missing in known else package_folder(path, missing, known)
-            if missing is None or folder is None:
-                raise input_error(str(path), f"xacro cannot expand it: {_in_one_line(error)}{_help(error)}") from None
-            known[missing] = folder
-            continue
-        unknown = next((name for name in arguments if name not in asked.names), None)
-        if unknown is not None:
-            advice = suggest(unknown, sorted(asked.names)) if asked.names else "it has none"
-            raise InputError(f"--arg {unknown}: {path.name} has no such argument; {advice}")
-        return text
-    raise input_error(str(path), f"refers to more than {MAX_PACKAGES} packages")
+        except InputError as error:
+            raise InputError(f"{error}{self.remedy}") from None
+
+    @property
+    def notes(self) -> list[str]:
+        """What was left out, one line for all packages."""
+        if not self.packages:
+            return []
+        left = f"; omitted with them: {', '.join(dict.fromkeys(self.macros))}" if self.macros else ""
+        return [f"packages not found: {', '.join(self.packages)}{left}; --package NAME=FOLDER adds them"]
 
 
 @contextlib.contextmanager
-def _refusing_pipes() -> Iterator[None]:
-    """Replace `open` in xacro's modules by a function that opens regular files alone."""
+def _patched(path: Path, packages: Mapping[str, Path], missing: Missing) -> Iterator[None]:
+    """Let xacro find files beside the including one, open regular files alone and pass over missing packages."""
+    xacro, finder, reader = (sys.modules[name] for name in ("xacro", "xacrodoc.packages", "xacrodoc.xacrodoc"))
+    expand_macro = vars(xacro)["handle_macro_call"]
 
-    def open_text(path: str, mode: str = "r") -> io.TextIOBase:
-        if not os.path.exists(path):
-            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)  # which xacro explains
-        return io.TextIOWrapper(open_regular(path, MAX_BYTES, "a xacro file"), encoding="utf-8")
+    def find(name: str) -> str:
+        folder = package_folder(path, name, packages)
+        if folder is None and name not in missing.packages:
+            missing.packages.append(name)
+        return str(folder.resolve() if folder else STAND_IN + name)
 
-    modules = [sys.modules[name] for name in ("xacro", "xacrodoc.xacrodoc", "xacrodoc.packages") if name in sys.modules]
-    for module in modules:
-        vars(module)["open"] = open_text
+    def open_text(name: str, mode: str = "r") -> io.TextIOBase:
+        if os.fspath(name).startswith(STAND_IN):
+            missing.included = True
+            return io.StringIO("<robot/>")
+        if not os.path.exists(name):
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), name)  # which xacro explains
+        return io.TextIOWrapper(open_regular(Path(name), MAX_BYTES, "a xacro file"), encoding="utf-8")
+
+    def expand_known(node: Any, macros: Any, symbols: Any) -> bool:
+        try:
+            return bool(expand_macro(node, macros, symbols))
+        except Exception as error:
+            if not missing.included or str(error) != f"unknown macro name: {node.tagName}":
+                raise
+            missing.macros.append(node.tagName.removeprefix("xacro:"))
+            vars(xacro)["replace_node"](node, by=None)
+            return True
+
+    changes = ((xacro, "open", open_text), (reader, "open", open_text), (finder, "get_path", find))
+    before = [(module, name, vars(module).get(name, open)) for module, name, _ in changes]
+    vars(xacro)["init_stacks"](str(path.resolve()))
     try:
+        for module, name, new in (*changes, (xacro, "handle_macro_call", expand_known)):
+            vars(module)[name] = new
         yield
     finally:
-        for module in modules:
-            del vars(module)["open"]
+        for module, name, old in (*before, (xacro, "handle_macro_call", expand_macro)):
+            vars(module)[name] = old
 
 
 class _Arguments(dict[str, str]):
@@ -114,23 +201,18 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
         error = inner if isinstance(inner, BaseException) else error.__context__
 
 
-def _missing_package(error: Exception) -> str | None:
-    causes = (cause for cause in _causes(error) if type(cause).__name__ == "PackageNotFoundError")
-    return next((str(cause.args[0]) for cause in causes if cause.args), None)
-
-
 def _help(error: Exception) -> str:
     """Return a hint on how to fix the error; empty if unknown."""
-    if _missing_package(error) is not None:
-        return "; give its folder with --package NAME=FOLDER"
-    missing = next((cause for cause in _causes(error) if type(cause).__name__ == "ArgException"), None)
-    return "" if missing is None else "; give it with --arg NAME=VALUE"
+    kinds = {type(cause).__name__ for cause in _causes(error)}
+    if "FileNotFoundError" in kinds:
+        return "; if its package is in another folder, give that with --package NAME=FOLDER"
+    return "; give it with --arg NAME=VALUE" if "ArgException" in kinds else ""
 
 
 def _in_one_line(error: Exception) -> str:
     """Return xacro's message without class name, repetition and line breaks."""
     text = " ".join(str(error).replace("\\n", " ").split()) or type(error).__name__
-    text = re.sub(r"^<class '[^']*'>: ", "", text)
+    text = re.sub(r"^<class '[^']*'>: | \[Errno \d+\].*", "", text)
     half = len(text) // 2
     text = text[:half] if text[:half] == text[half + 1 :] else text
     inner = next((str(cause) for cause in _causes(error) if type(cause).__name__ == "ArgException"), "")
@@ -147,14 +229,13 @@ def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
 
 # Polygon circumscribed about the unit circle, with the same bounding box.
 CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
+SIDE = re.compile(r"^(?:front|rear|back|middle)?_?(left|right)(?=\w*joint$)", re.IGNORECASE)  # tags of a drive plugin
+SUBSTITUTION = re.compile(r"\$\((?:find|arg|env|optenv|eval|dirname|cwd)\b")  # of xacro
 MAX_LINKS = 10_000
 MAX_COORDINATE = 1e6  # [m]
 MAX_MESH_BYTES = 20_000_000  # 400,000 triangles of a binary STL file
 CHECKED = ("stl", "obj", "dae")  # mesh formats whose numbers are checked before trimesh reads them
 _VERTEX = re.compile(rb"^[ \t]*v(?:ertex)?[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.IGNORECASE)
-OTHER_DRIVES = re.compile(
-    r"ackermann|tricycle|bicycle|omni(?!cam)|mecanum|holonomic|swerve|planar_?move", re.IGNORECASE
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +251,8 @@ class UrdfJoint:
     velocity: float | None  # speed limit [rad/s]; None if not given
     effort: float | None  # torque limit [N m]; None if not given
     range: float  # from its lower to its upper limit [rad]; inf if it turns freely
+    stated: float  # the same, for continuous joints, too; inf if not given
+    has_axis: bool  # whether the file states the axis
     # speed limit in <ros2_control> [rad/s]: inf if unlimited, None without a velocity interface
     commanded: float | None = None
 
@@ -181,9 +264,12 @@ class CollisionPiece:
     link: str  # its link
     kind: str  # box, cylinder, sphere or mesh
     points: Floats  # points whose convex hull contains it (N, 3)
-    centre: Floats  # (3,)
     radius: float | None = None  # of a cylinder or sphere [m]
-    length: float | None = None  # of a cylinder [m]
+
+    @property
+    def bottom(self) -> float:
+        """Height of its lowest point [m]."""
+        return float(self.points[:, 2].min())
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,19 +281,44 @@ class UrdfModel:
     joints: dict[str, UrdfJoint]  # by name
     places: dict[str, Floats]  # each link's frame in the root's frame (4, 4)
     pieces: tuple[CollisionPiece, ...]  # collision geometry
+    looks: tuple[CollisionPiece, ...]  # visual geometry of turning links that collide as spheres or not at all
     masses: dict[str, float]  # of the links with a mass [kg]
     drive: dict[str, str]  # values of Gazebo's drive plugins by tag, without repeated tags
-    other_drive: str  # a Gazebo plugin that drives other than differentially; empty without one
+    sides: tuple[tuple[str, ...], tuple[str, ...]]  # joints of these plugins' left and right wheels
     missing_meshes: tuple[str, ...]
     lidars: tuple[UrdfSensor, ...]  # the lidars that Gazebo simulates
-    text: str  # URDF, without xacro
+    root: ET.Element  # the file, without xacro
+    text: str  # the same
+    missing: Missing  # packages
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
         """Yield the joints from a link to the root."""
-        holders = {joint.child: joint for joint in self.joints.values()}
-        while link in holders:
-            yield holders[link]
-            link = holders[link].parent
+        while link in self._holders:
+            yield self._holders[link]
+            link = self._holders[link].parent
+
+    @cached_property
+    def _holders(self) -> dict[str, UrdfJoint]:
+        return {joint.child: joint for joint in self.joints.values()}
+
+    @cached_property
+    def commanded(self) -> set[str]:
+        """Joints with any command in <ros2_control>."""
+        joints = self.root.findall("ros2_control/joint")
+        return {joint.get("name", "") for joint in joints if joint.find("command_interface") is not None}
+
+    @cached_property
+    def by_link(self) -> Mapping[str, list[CollisionPiece]]:
+        """Collision geometry by link."""
+        found: dict[str, list[CollisionPiece]] = {name: [] for name in self.places}
+        for piece in self.pieces:
+            found[piece.link].append(piece)
+        return found
+
+    @cached_property
+    def lowest(self) -> CollisionPiece | None:
+        """The piece of collision geometry that reaches lowest; None without any."""
+        return min(self.pieces, key=lambda piece: piece.bottom, default=None)
 
     def drive_number(self, *tags: str) -> tuple[str, float | None]:
         """Return the first tag of the drive plugin with a positive number, and the number; None if there is none."""
@@ -230,40 +341,61 @@ def read_model(
     packages: Mapping[str, Path] = MappingProxyType({}),
 ) -> UrdfModel:
     """Read a URDF or xacro file."""
-    root = _root_element(path, arguments, packages)
+    root, missing = _root_element(path, arguments, packages)
+    with missing.named():
+        reader, visual = (_Shapes(path, meshes, without, packages) for without in (without_meshes, True))
+        return _model(path, root, reader, visual, missing)
+
+
+def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missing: Missing) -> UrdfModel:
     if root.tag != "robot":
         raise input_error(str(path), f"the root element must be <robot>, got <{root.tag}>")
     links = {_named(path, link): link for link in root.findall("link")}
-    if not 0 < len(links) <= MAX_LINKS:
-        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MAX_LINKS}")
     local = [_joint(path, element) for element in root.findall("joint")]
+    if missing.macros:  # a link of theirs has no shape if it is a child; what hangs on it is omitted if it is a root
+        links |= {joint.child: ET.Element("link") for joint in local if joint.child not in links}
+        while lost := {joint.child for joint in local if joint.parent not in links}:
+            missing.macros += sorted(lost)
+            local = [joint for joint in local if joint.child not in lost]
+            links = {name: link for name, link in links.items() if name not in lost}
+    if not links:
+        raise input_error(str(path), "has no links; give the file of the robot, which includes the others")
+    if len(links) > MAX_LINKS:
+        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MAX_LINKS}")
     commanded = _commanded(path, root, {joint.name for joint in local})
     places, joints = _placed(path, set(links), [replace(joint, commanded=commanded.get(joint.name)) for joint in local])
-    reader = _Shapes(path, meshes, without_meshes, packages)
     pieces = [
         piece
         for name, link in links.items()
         for element in link.findall("collision")
         for piece in reader.piece(name, places[name] @ _origin(path, element), element)
     ]
+    solid = {piece.link for piece in pieces if piece.kind != "sphere"}
+    looks = [
+        piece
+        for name in (joint.child for joint in joints.values() if joint.kind != "fixed" and joint.child not in solid)
+        for element in links[name].findall("visual")
+        for piece in visual.drawn(name, places[name], element)
+    ]
     masses = {
         name: _at_least_0(path, f"link {name}", "mass", _number(path, mass, "value", 0.0))
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
-    lidars, missing_meshes = lidar_sensors(root, places), tuple(reader.missing_meshes)
     return UrdfModel(
         path,
         root.get("name", path.stem),
         joints,
         places,
         tuple(pieces),
+        tuple(looks),
         masses,
-        _drive(root),
-        _other_drive(root),
-        missing_meshes,
-        lidars,
+        *_drive(root),
+        tuple(reader.missing_meshes),
+        lidar_sensors(root, places),
+        root,
         ET.tostring(root, encoding="unicode"),
+        missing,
     )
 
 
@@ -289,39 +421,44 @@ def _commanded(path: Path, root: ET.Element, joints: set[str]) -> dict[str, floa
     return speeds
 
 
-def _drive(root: ET.Element) -> dict[str, str]:
-    """Return the values of drive plugins by tag.
+def _drive(root: ET.Element) -> tuple[dict[str, str], tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Return the values of drive plugins by tag, and the joints of their left and right wheels.
 
-    Tags that a plugin repeats, such as the left wheels of a skid-steer vehicle, are omitted.
+    Tags that a plugin repeats, such as the left wheels of a skid-steer vehicle, have no value.
     """
     drive: dict[str, str] = {}
+    sides: tuple[list[str], list[str]] = ([], [])
     for plugin in root.findall("gazebo/plugin"):
+        wheels = [(SIDE.search(element.tag), (element.text or "").strip()) for element in plugin]
+        if not any(side and side[1].lower() == "left" for side, _ in wheels):
+            continue
         tags = Counter(element.tag for element in plugin)
-        if any(re.fullmatch(r"left\w*joint", tag, re.IGNORECASE) for tag in tags):
-            drive |= {element.tag: (element.text or "").strip() for element in plugin if tags[element.tag] == 1}
-    return drive
+        drive |= {element.tag: (element.text or "").strip() for element in plugin if tags[element.tag] == 1}
+        for side, name in wheels:
+            if side and name:
+                sides[side[1].lower() == "right"].append(name)
+    left, right = (tuple(dict.fromkeys(names)) for names in sides)
+    return drive, (left, right)
 
 
-def _other_drive(root: ET.Element) -> str:
-    """Return the name of a plugin for steered or omnidirectional wheels; empty without one."""
-    plugins = (plugin for tag in ("gazebo/plugin", "plugin") for plugin in root.findall(tag))
-    names = ((plugin.get("name", ""), plugin.get("filename", "")) for plugin in plugins)
-    return next((" ".join(filter(None, pair)) for pair in names if any(map(OTHER_DRIVES.search, pair))), "")
-
-
-def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> ET.Element:
-    if path.suffix.lower() != ".xacro":
+def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> tuple[ET.Element, Missing]:
+    """Return the root of a URDF or xacro file; xacro's elements and substitutions show a xacro file, whatever its name."""
+    plain = None if path.suffix.lower() == ".xacro" else parse_xml(path)
+    if plain is not None and not any(
+        element.tag.startswith("xacro:") or any(map(SUBSTITUTION.search, element.attrib.values()))
+        for element in plain.iter()
+    ):
         if arguments:
             raise InputError(f"--arg {next(iter(arguments))}: {path.name} is not a .xacro file and has no arguments")
-        return parse_xml(path)
-    text = expanded(path, arguments, packages)
+        return plain, Missing()
+    text, missing = expanded(path, arguments, packages)
     with tempfile.TemporaryDirectory() as folder:
-        plain = Path(folder) / f"{path.stem}.urdf"
-        plain.write_text(text, encoding="utf-8")
+        file = Path(folder) / f"{path.stem}.urdf"
+        file.write_text(text, encoding="utf-8")
         try:
-            return parse_xml(plain)
+            return parse_xml(file), missing
         except InputError as error:
-            raise InputError(str(error).replace(str(plain), str(path))) from None
+            raise InputError(str(error).replace(str(file), str(path))) from None
 
 
 def _named(path: Path, element: ET.Element) -> str:
@@ -331,7 +468,9 @@ def _named(path: Path, element: ET.Element) -> str:
     return name
 
 
-def _numbers(path: Path, element: ET.Element | None, key: str, default: tuple[float, ...]) -> Floats:
+def _numbers(
+    path: Path, element: ET.Element | None, key: str, default: tuple[float, ...], most: float = MAX_COORDINATE
+) -> Floats:
     text = None if element is None else element.get(key)
     if text is None:
         return np.array(default)
@@ -339,14 +478,18 @@ def _numbers(path: Path, element: ET.Element | None, key: str, default: tuple[fl
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.array([math.nan])
-    if len(values) != len(default) or not np.isfinite(values).all() or not (np.abs(values) <= 1e6).all():
-        tag = "" if element is None else element.tag
-        raise input_error(str(path), f"<{tag} {key}={text!r}>", f"must be {len(default)} numbers")
+    if len(values) != len(default) or not (np.abs(values) <= most).all():
+        tag, count = (
+            "" if element is None else element.tag,
+            "a number" if len(default) == 1 else f"{len(default)} numbers",
+        )
+        size = "" if math.isinf(most) else f" of at most {most:g}"
+        raise input_error(str(path), f"<{tag} {key}={text!r}>", f"must be {count}{size}")
     return values
 
 
-def _number(path: Path, element: ET.Element | None, key: str, default: float) -> float:
-    return float(_numbers(path, element, key, (default,))[0])
+def _number(path: Path, element: ET.Element | None, key: str, default: float, most: float = MAX_COORDINATE) -> float:
+    return float(_numbers(path, element, key, (default,), most)[0])
 
 
 def _at_least_0(path: Path, where: str, what: str, value: float) -> float:
@@ -384,18 +527,20 @@ def _joint(path: Path, element: ET.Element) -> UrdfJoint:
     ends = [element.find(tag) for tag in ("parent", "child")]
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
     limit = element.find("limit")
-    lower, upper = (_number(path, limit, key, 0.0) for key in ("lower", "upper"))
+    lower, upper = (_number(path, limit, key, 0.0, math.inf) for key in ("lower", "upper"))
     velocity, effort = (
-        _at_least_0(path, f"joint {name}", f"the limit's {key}", _number(path, limit, key, 0.0))
+        _at_least_0(path, f"joint {name}", f"the limit's {key}", _number(path, limit, key, 0.0, math.inf))
         for key in ("velocity", "effort")
     )
-    axis = _numbers(path, element.find("axis"), "xyz", (1.0, 0.0, 0.0))
-    if not np.any(axis):
+    stated = element.find("axis")
+    axis = _numbers(path, stated, "xyz", (1.0, 0.0, 0.0)) if kind != "fixed" else np.array((1.0, 0.0, 0.0))
+    if not np.linalg.norm(axis) > 1e-9:
         raise input_error(str(path), f"joint {name}", "the axis must not be 0 0 0")
-    turns = math.inf if kind == "continuous" else upper - lower
-    place = _origin(path, element)
+    sweep = 0.0 if lower == upper else upper - lower
+    turns, given = (math.inf, sweep or math.inf) if kind == "continuous" else (sweep, sweep)
+    place, axis = _origin(path, element), axis / np.linalg.norm(axis)
     return UrdfJoint(
-        name, kind, parent, child, place, axis / np.linalg.norm(axis), velocity or None, effort or None, turns
+        name, kind, parent, child, place, axis, velocity or None, effort or None, turns, given, stated is not None
     )
 
 
@@ -436,7 +581,7 @@ class _Shapes:
         shape = element.find("geometry/*")
         if shape is None:
             raise input_error(str(self._path), f"link {link}", "a <collision> has no geometry")
-        radius = length = None
+        radius = None
         if shape.tag == "box":
             size = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0))
             _greater_than_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
@@ -462,9 +607,12 @@ class _Shapes:
                 raise input_error(str(self._path), *where, f"reaches beyond {MAX_COORDINATE:g} m")
         else:
             raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
-        placed = points @ place[:3, :3].T + place[:3, 3]
-        centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
-        yield CollisionPiece(link, shape.tag, placed, centre, radius, length)
+        yield CollisionPiece(link, shape.tag, points @ place[:3, :3].T + place[:3, 3], radius)
+
+    def drawn(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
+        """Yield the piece of a <visual> if it can be read."""
+        with contextlib.suppress(InputError):
+            yield from self.piece(link, place @ _origin(self._path, element), element)
 
     def _extent(self, link: str, shape: ET.Element, key: str) -> float:
         value = _number(self._path, shape, key, 0.0)
@@ -497,9 +645,9 @@ class _Shapes:
     def _candidates(self, name: str) -> Iterator[Path]:
         """Yield candidate paths of a mesh; package://NAME/FILE resolves below a folder NAME or the given folder."""
         bare = name.partition("://")[2] if "://" in name else name
-        package, _, inside = bare.partition("/") if name.startswith("package://") else ("", "", bare)
-        if package in self._packages:
-            yield self._packages[package] / inside
+        package, _, inside = bare.partition("/") if name.startswith(("package://", "model://")) else ("", "", bare)
+        if package and (home := package_folder(self._path, package, self._packages)) is not None:
+            yield home / inside
         folders = [self._meshes] if self._meshes is not None else [self._path.parent, *self._path.resolve().parents]
         for folder in folders:
             yield folder / bare

@@ -44,19 +44,34 @@ def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfS
 
 def import_lidar(
     sensors: tuple[UrdfSensor, ...], frame: Floats, floor: float, foot: Footprint
-) -> tuple[Lidar | None, str]:
-    """Return the first lidar that a robot file can hold, with a note on its source; or None, with the reasons."""
-    problems = []
-    for k, sensor in enumerate(sensors):
+) -> tuple[Lidar | None, str, list[str]]:
+    """Return the first lidar that a robot file can hold, or None, with a note on its source and notes on the others."""
+    found: Lidar | None = None
+    how, notes, unused = "", [], []
+    for sensor in sensors:
         try:
             lidar, assumed = _lidar(sensor, frame, floor)
             require_on_robot(lidar, foot)
         except FieldError as error:
-            problems.append(f"{sensor.name} is not used: {error}")
+            unused.append((sensor.name, str(error)))
             continue
-        more = [*problems, *(f"{other.name} is not used" for other in sensors[k + 1 :])]
-        return lidar, "; ".join([f"read: {sensor.name}", *assumed, *more])
-    return None, "; ".join(problems)
+        if found is None:
+            found, how = lidar, "; ".join([f"read: {sensor.name}", *assumed])
+        else:
+            view = f"looks {_towards(lidar)} with {math.degrees(lidar.field_of_view):.4g}° of view"
+            notes.append(f"{sensor.name} is not used, because a robot file has one lidar; it {view}")
+    if unused:
+        more = f", nor are {len(unused) - 1} more" if len(unused) > 1 else ""
+        notes.append(f"{unused[0][0]} is not used: {unused[0][1]}{more}")
+    return found, how, notes
+
+
+def _towards(lidar: Lidar) -> str:
+    if lidar.full_circle:
+        return "all around"
+    angle = round(math.degrees(lidar.yaw))
+    side = "left" if angle > 0 else "right"
+    return {0: "ahead", 180: "backwards"}.get(abs(angle), f"{abs(angle)}° to the {side}")
 
 
 def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list[str]]:
@@ -97,10 +112,10 @@ def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list
 def lidar_entry(lidar: Lidar) -> dict[str, str]:
     """Return a lidar's entry in a robot file."""
     values = dataclasses.asdict(lidar)
-    return {key: str(value) if key == "beams" else _decimal(value) for key, value in values.items()}
+    return {key: str(value) if key == "beams" else decimal(value) for key, value in values.items()}
 
 
-def _decimal(value: float) -> str:
+def decimal(value: float) -> str:
     """Format a number with a decimal point and without exponent, as YAML requires of floats."""
     digits = f"{value:.7f}".rstrip("0")
     return f"{digits}0" if digits.endswith(".") else digits

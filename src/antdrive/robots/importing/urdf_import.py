@@ -17,10 +17,12 @@ import numpy as np
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
+from antdrive.robots.importing.drives import few
 from antdrive.robots.importing.hull import footprint_around
-from antdrive.robots.importing.model import UrdfModel, read_model
-from antdrive.robots.importing.sensors import import_lidar, lidar_entry
-from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
+from antdrive.robots.importing.model import CollisionPiece, UrdfModel, read_model
+from antdrive.robots.importing.plausible import below_arms, implausible, plausible_speeds
+from antdrive.robots.importing.sensors import decimal, import_lidar, lidar_entry
+from antdrive.robots.importing.wheels import DrivenWheel, driven_links, driven_wheels, notes_on_wheels
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
 from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
@@ -32,7 +34,7 @@ DEFAULT_YAW_RATE = 3.14  # default if only the wheels limit it: half a turn a se
 SPARE = 0.9  # used fraction of the motors' capability
 FRICTION = 1.5  # of wheels
 RANGES = ranges_of(RobotSpec)
-NO_LIMIT = "assumed: the file has no limit"
+NO_LIMIT = "the file has no limit"
 MIN_MOTOR_ACCELERATION = 0.05  # an effort limit for less than this is not a motor's [m/s^2]
 
 Origins = dict[str, tuple[float, str]]  # values of a robot file with their origins
@@ -46,36 +48,54 @@ class _Limit(NamedTuple):
 
 
 def add_speeds(
-    model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], values: Origins, given: Mapping[str, float]
+    model: UrdfModel,
+    wheels: tuple[DrivenWheel, DrivenWheel],
+    outline: Footprint,
+    values: Origins,
+    given: Mapping[str, float],
 ) -> None:
-    """Add the limits of speed, yaw rate and wheel speed."""
+    """Add the limits of speed, yaw rate and wheel speed.
+
+    A limit of the wheels that gives an implausible speed is a placeholder, not used and named.
+    """
     radius, track = values["wheel_radius"][0], values["track"][0]
-    limit = min(_lowest(wheels, "velocity", "rad/s"), _lowest_commanded(wheels))
+    limits = (_lowest(wheels, "velocity", "rad/s"), _lowest_commanded(wheels))
+    slow, fast = plausible_speeds(outline, RANGES["max_speed"][1])
+    placeholders = [limit for limit in limits if limit.value < math.inf and not slow <= limit.value * radius <= fast]
+    limit = min((limit for limit in limits if limit not in placeholders), default=_Limit(math.inf, ""))
     turning = seven_digits(limit.value)
     reach = turning * radius
+    said = [
+        f"{limit.where}, would be {limit.value * radius:.4g} m/s, implausible for its size, not used"
+        for limit in placeholders
+    ]
     for key, tags, most, assumed, unit in (
-        ("max_speed", ("max_linear_velocity", "max_linear_speed"), reach, SPEED, "m/s"),
+        ("max_speed", ("max_linear_velocity", "max_linear_speed", "linear_velocity_limit"), reach, SPEED, "m/s"),
         ("max_yaw_rate", ("max_angular_velocity", "max_angular_speed"), 2 * reach / track, YAW_RATE, "rad/s"),
     ):
         tag, stated = model.drive_number(*tags)
         if key in given:
             continue
-        beside = ""
+        beside = list(said)
         if stated and stated > RANGES[key][1]:  # higher values mean no limit
-            beside, stated = f"<{tag}> of the drive plugin, {stated:.7g} {unit}, is {_beyond(key, unit)}", None
+            beside.append(f"<{tag}> of the drive plugin, {stated:.7g} {unit}, is {_beyond(key, unit)}")
+            stated = None
         if stated and stated > most:
-            values[key] = _five(most), f"computed: {limit.where}; <{tag}> of the drive plugin is {stated:g}"
+            how = f"computed: {limit.where}; <{tag}> of the drive plugin is {stated:g}"
+            values[key] = _five(most), "; ".join([how, *beside])
         elif stated:
-            values[key] = stated, f"read: <{tag}> of the drive plugin"
+            values[key] = stated, "; ".join([f"read: <{tag}> of the drive plugin", *beside])
+        elif most == math.inf:
+            remedy = f"; --set {key}={unit.upper()} overrides" if key == "max_speed" else ""
+            values[key] = assumed, f"assumed: {'; '.join(beside) or NO_LIMIT}{remedy}"
         else:
-            value, how = _of_joints(key, limit, reach, most, assumed)
-            values[key] = (
-                value,
-                f"assumed: {beside}" if how == NO_LIMIT and beside else "; ".join(filter(None, (how, beside))),
-            )
+            value, how = _of_joints(key, limit, most)
+            values[key] = value, "; ".join([how, *beside])
     if "max_wheel_speed" in given:
         return
     needs = 1.2 * max(values["max_speed"][0], values["max_yaw_rate"][0] * track / 2) / radius
+    limit = min((limit for limit in limits if limit.value * radius >= slow), default=_Limit(math.inf, ""))
+    turning = seven_digits(limit.value)
     if turning <= RANGES["max_wheel_speed"][1]:
         values["max_wheel_speed"] = turning, f"read: {limit.where}"
     else:
@@ -83,12 +103,8 @@ def add_speeds(
         values["max_wheel_speed"] = needs, f"assumed: 1.2 times the speeds' requirement{instead}"
 
 
-def _of_joints(key: str, limit: _Limit, reach: float, most: float, assumed: float) -> tuple[float, str]:
+def _of_joints(key: str, limit: _Limit, most: float) -> tuple[float, str]:
     """Return a speed limit derived from the joints' limits, and its origin."""
-    if reach == math.inf:
-        return assumed, NO_LIMIT
-    if reach > RANGES["max_speed"][1]:
-        return assumed, f"assumed: {limit.where} would be {reach:.4g} m/s, {_beyond('max_speed', 'm/s')}"
     if key == "max_yaw_rate" and most > DEFAULT_YAW_RATE:
         return DEFAULT_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
     how = f"computed: {limit.where}, times the wheels' radius"
@@ -153,8 +169,9 @@ def _beyond(key: str, unit: str) -> str:
 
 def _lowest(wheels: tuple[DrivenWheel, DrivenWheel], key: str, unit: str) -> _Limit:
     """Return the lower limit of the two joints, with its origin."""
-    value, name = min((getattr(wheel.joint, key) or math.inf, wheel.joint.name) for wheel in wheels)
-    return _Limit(value, f"the {key} limit of joint {name}, {value:.7g} {unit}")
+    value, wheel = min(((getattr(wheel.joint, key) or math.inf, wheel) for wheel in wheels), key=lambda pair: pair[0])
+    together = f" together with {', '.join(wheel.joints[1:])}" if key == "effort" and wheel.joints else ""
+    return _Limit(value, f"the {key} limit of joint {wheel.joint.name}{together}, {value:.7g} {unit}")
 
 
 def _lowest_commanded(wheels: tuple[DrivenWheel, DrivenWheel]) -> _Limit:
@@ -180,6 +197,7 @@ RADII = (("wheel_radius", 1.0), ("wheelRadius", 1.0), ("wheel_diameter", 0.5), (
 TRACKS = (("wheel_separation", 1.0), ("wheelSeparation", 1.0))
 DENSITY = 150.0  # assumed without masses in the file [kg/m^3]
 DIFFERENT = 0.01  # relative difference beyond which a drive plugin contradicts the geometry
+DOUBTFUL, DOUBT = 0.05, "; check which is right"  # the same, beyond which it is noted
 NOISE = "{pose_xy: 0.01, pose_yaw: 0.01, pose_rate: 20.0, encoder: 0.02, slip: 0.02, delay: 0.05}"  # the catalogue's assumption
 
 
@@ -189,6 +207,15 @@ class _Value(NamedTuple):
     key: str
     value: float
     how: str
+
+    @property
+    def assumed(self) -> bool:
+        return self.how.startswith("assumed")
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether it is an assumed speed, or the drive plugin contradicts it."""
+        return (self.key == "max_speed" and self.assumed) or self.how.endswith(DOUBT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +228,7 @@ class ImportedRobot:
     pieces: tuple[Floats, ...]
     above: tuple[Floats, ...]  # collision geometry above that height
     missing_meshes: tuple[str, ...]
+    notes: tuple[str, ...]  # assumptions and implausible values, also in the text
 
 
 def import_urdf(
@@ -221,28 +249,49 @@ def import_urdf(
     if footprint not in KINDS:
         raise InputError(f"--footprint {footprint}: choose from {', '.join(KINDS)}")
     model = read_model(path, meshes=meshes, without_meshes=without_meshes, arguments=arguments, packages=packages)
-    wheels = driven_wheels(model, left, right, given.get("wheel_radius"))
-    frame, floor = planar_frame(wheels), floor_under(wheels)
-    low = [piece for piece in model.pieces if piece.points[:, 2].min() - floor <= below]
-    high = [piece for piece in model.pieces if piece.points[:, 2].min() - floor > below]
-    if not {piece.link for piece in low} - {wheel.joint.child for wheel in wheels}:
-        where = "" if math.isinf(below) else f" below {below:g} m"
-        raise input_error(str(path), f"has no collision geometry{where} other than its wheels, so no footprint")
-    points = [from_above(piece.points, frame) for piece in low]
-    outline = footprint_around(with_wheels(points, wheels), footprint)
-    names = sorted({piece.link for piece in low})
-    kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
-    what = f"{kind} around the collision geometry of {_few(names)} and the wheels"
-    what += "" if math.isinf(below) else f", below {below:g} m"
-    values = _values(model, wheels, outline, floor, given)
-    text = _text(model, path, outline, what, values, import_lidar(model.lidars, frame, floor, outline))
-    return ImportedRobot(
-        _robot_in(text, path, values),
-        text,
-        tuple(points),
-        tuple(from_above(piece.points, frame) for piece in high),
-        model.missing_meshes,
-    )
+    with model.missing.named():
+        wheels = driven_wheels(model, left, right, given.get("wheel_radius"))
+        frame, floor = planar_frame(wheels), floor_under(wheels)
+        solid = solid_pieces(model, wheels)
+        low = [piece for piece in solid if piece.bottom - floor <= below]
+        high = [piece for piece in solid if piece.bottom - floor > below]
+        if not {piece.link for piece in low} - driven_links(model, wheels):
+            where = "" if math.isinf(below) else f" below {below:g} m"
+            raise input_error(str(path), f"has no collision geometry{where} other than its wheels, so no footprint")
+        points = [from_above(piece.points, frame) for piece in low]
+        outline = footprint_around(with_wheels(points, wheels), footprint)
+        names = sorted({piece.link for piece in low})
+        kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
+        what = f"{kind} around the collision geometry of {few(names)} and the wheels"
+        what += "" if math.isinf(below) else f", below {below:g} m"
+        values = _values(model, wheels, outline, floor, given)
+        lidar, seen, unused = import_lidar(model.lidars, frame, floor, outline)
+        text = _text(model, path, outline, what, values, lidar, seen)
+        spec = _robot_in(text, path, values)
+        notes = [
+            *notes_on_wheels(model, wheels),
+            *(f"{value.key} {value.value:.4g} is {value.how}" for value in values if value.doubtful),
+            *implausible(spec, wheels[0].span, {*given, *(value.key for value in values if value.assumed)}),
+            *below_arms(model, low, frame, floor),
+            *unused,
+            *model.missing.notes,
+            *([f"omitted, because not found: {'; '.join(model.missing_meshes)}"] if model.missing_meshes else []),
+        ]
+        notes = ["".join(c if c.isprintable() else "?" for c in note) for note in notes]
+        return ImportedRobot(
+            spec,
+            text + "".join(f"# note: {note}\n" for note in notes),
+            tuple(points),
+            tuple(from_above(piece.points, frame) for piece in high),
+            model.missing_meshes,
+            tuple(notes),
+        )
+
+
+def solid_pieces(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel]) -> list[CollisionPiece]:
+    """Return the collision geometry without driven wheels' spheres, which are wider than the wheels."""
+    links = driven_links(model, wheels)
+    return [piece for piece in model.pieces if piece.kind != "sphere" or piece.link not in links]
 
 
 def _checked(given: Mapping[str, float]) -> dict[str, float]:
@@ -286,7 +335,7 @@ def with_wheels(points: list[Floats], wheels: tuple[DrivenWheel, DrivenWheel]) -
     half = float(np.linalg.norm(wheels[0].centre - wheels[1].centre)) / 2
     corners = [(float(x), float(y)) for piece in points for x, y in piece]
     for side, wheel in zip((1, -1), wheels, strict=True):
-        for x in (-wheel.radius, wheel.radius):
+        for x in (-wheel.radius - wheel.span / 2, wheel.radius + wheel.span / 2):
             corners += [(x, side * half - wheel.width / 2), (x, side * half + wheel.width / 2)]
     return corners
 
@@ -313,7 +362,7 @@ def _values(
     }
     for key, value in given.items():
         values[key] = value, "given"
-    add_speeds(model, wheels, values, given)
+    add_speeds(model, wheels, outline, values, given)
     add_forces(model, wheels, outline, values, given)
     return [_Value(key, *values[key]) for key in ranges_of(RobotSpec) if key in values]
 
@@ -332,7 +381,8 @@ def _contradiction(model: UrdfModel, value: float, *tags: tuple[str, float]) -> 
     for tag, scale in tags:
         _, stated = model.drive_number(tag)
         if stated and abs(stated * scale - value) > DIFFERENT * value:
-            return f"; <{tag}> of the drive plugin is {stated:g}"
+            far = abs(stated * scale - value) > DOUBTFUL * value
+            return f"; <{tag}> of the drive plugin is {stated:g}" + (DOUBT if far else "")
     return ""
 
 
@@ -342,15 +392,20 @@ def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
     if not heavy:
         return DENSITY * box, f"assumed: {DENSITY:g} kg/m3, as the file has no masses"
     light = sorted({piece.link for piece in model.pieces} - set(heavy))
-    without = f"; {_few(light)} {'have' if len(light) > 1 else 'has'} none" if light else ""
-    return sum(model.masses.values()), f"computed: sum of the masses of {_few(heavy)}{without}"
+    without = f"; {few(light)} {'have' if len(light) > 1 else 'has'} none" if light else ""
+    return sum(model.masses.values()), f"computed: sum of the masses of {few(heavy)}{without}"
 
 
 def _text(
-    model: UrdfModel, path: Path, outline: Footprint, what: str, values: list[_Value], sight: tuple[Lidar | None, str]
+    model: UrdfModel,
+    path: Path,
+    outline: Footprint,
+    what: str,
+    values: list[_Value],
+    lidar: Lidar | None,
+    seen: str,
 ) -> str:
     """Return the text of the robot file."""
-    lidar, seen = sight
     name = "".join(c for c in model.name if c.isprintable()).strip() or path.stem
     rows = [("schema: 1", ""), (f"name: {_quoted(name[:200])}", "read: the robot's name")]
     rows.append((f"source: {_quoted(f'imported from {path.name}')}", ""))
@@ -372,11 +427,6 @@ def _text(
             lines += [f"# {comment}", text]
         else:
             lines.append(f"{text:30}  # {comment}")
-    if lidar is None and seen:
-        lines.append(f"# no lidar: {''.join(c if c.isprintable() else '?' for c in seen)}")
-    if model.missing_meshes:
-        left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.missing_meshes)
-        lines.append(f"# omitted, because not found: {left}")
     return "\n".join(lines) + "\n"
 
 
@@ -387,13 +437,16 @@ def _rounded(value: _Value) -> str:
 
 
 def _flow(entry: Mapping[str, object]) -> str:
-    return "{" + ", ".join(f"{key}: {value}" for key, value in entry.items()) + "}"
+    return "{" + ", ".join(f"{key}: {_plain(value)}" for key, value in entry.items()) + "}"
+
+
+def _plain(value: object) -> str:
+    """Format numbers without exponent, which YAML takes for text."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_plain, value))}]"
+    return decimal(value) if isinstance(value, float) else str(value)
 
 
 def _quoted(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
-
-
-def _few(names: list[str]) -> str:
-    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")

@@ -1,188 +1,216 @@
-"""Detection of the two driven wheels in a URDF model."""
+"""Detection of the driven wheels in a URDF model: two on one axle, or several axles of a skid-steer robot."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.types import Floats
-from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
+from antdrive.robots.importing.drives import (
+    free_wheels,
+    grips_askew,
+    is_free,
+    other_drive,
+    other_wheels,
+    turns_as_wheel,
+    without_wheels,
+)
+from antdrive.robots.importing.model import CollisionPiece, OtherDriveError, UrdfJoint, UrdfModel
 
-LEVEL = 0.1  # largest vertical component of a wheel's axis
 SAME = 0.02  # relative tolerance for equal radii and a common axle
-ONLY_DIFFERENTIAL = "only differential drives can be simulated"
-STEERING = math.pi  # largest range of a joint that steers; casters turn further [rad]
-SWIVEL = 0.9  # minimum vertical component of the axis of a caster or a steering joint
+ALIKE = 0.1  # relative tolerance of a skid-steer robot's tracks and radii
+#: Names of wheels that are not driven.
+PASSIVE = re.compile(r"cast[eo]r|passive|idler|support|omni", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
 class DrivenWheel:
-    """A driven wheel."""
+    """A driven wheel, or the middle of the driven wheels on one side of a skid-steer robot."""
 
-    joint: UrdfJoint  # the joint that turns it
+    joint: UrdfJoint  # the joint that turns it; of several, the front one with the limits of all
     centre: Floats  # in the root's frame (3,) [m]
     radius: float  # [m]
     width: float  # along its axis [m]
     read_from: str  # origin of these values, as text
     given: bool = False  # whether the radius comes from the user or the drive plugin
+    joints: tuple[str, ...] = ()  # all joints of its side, from the front
+    span: float = 0.0  # from the first to the last wheel of its side [m]
+
+
+Pair = tuple[DrivenWheel, DrivenWheel]
 
 
 def driven_wheels(
     model: UrdfModel, left: str | None = None, right: str | None = None, radius: float | None = None
-) -> tuple[DrivenWheel, DrivenWheel]:
+) -> Pair:
     """Return the left and the right driven wheel; raise InputError for robots that steer otherwise."""
-    if model.other_drive:
-        raise input_error(str(model.source), f"plugin {model.other_drive}", ONLY_DIFFERENTIAL)
-    if steering := [joint.name for joint in model.joints.values() if _steers(model, joint)]:
-        raise input_error(str(model.source), f"{', '.join(steering)} steer wheels", ONLY_DIFFERENTIAL)
+    where = str(model.source)
+    if why := other_drive(model):
+        raise OtherDriveError(f"{where}: {why}")
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
-    if left is not None and right is not None:
-        names: tuple[str, str] | None = (left, right)
-    else:
-        names = _named_in_file(model)
-    if names is not None:
-        pair = (
-            _wheel(model, _joint_called(model, names[0]), radius),
-            _wheel(model, _joint_called(model, names[1]), radius),
+    given = [_joint_called(model, name) for name in (left, right) if name is not None]
+    wheels = [_wheel(model, joint, radius) for joint in given or _candidates(model)]
+    if why := other_wheels(model, [wheel.joint for wheel in wheels]):
+        raise OtherDriveError(f"{where}: {why}")
+    pairs = [_given_order(*pair) if given else _in_order(model, *pair) for pair in _axles(wheels)]
+    named = {*model.sides[0], *model.sides[1]} | {wheel.joint.name for wheel in wheels if wheel.joint.commanded}
+    if not pairs or (left is None and len(named) > 2 and len(wheels) != 2 * len(pairs)):
+        raise input_error(where, _unpaired(model, wheels, radius))
+    if len(pairs) == 1:
+        return pairs[0]
+    if not _alike(pairs):
+        raise input_error(
+            where,
+            f"{len(pairs)} axles with unlike wheels ({_named(pairs)}); name the driven ones with "
+            f"--left {pairs[0][0].joint.name} --right {pairs[0][1].joint.name}",
         )
-        if not _on_one_axle(*pair):
-            why = _unlike(pair) or f"{names[0]} and {names[1]} are not on one axle"
-            raise input_error(str(model.source), why)
-        return pair if left is not None or _from_plugin(model) else _in_order(model, pair)
-    return _in_order(model, _only_pair(model, radius))
+    return _skidding(pairs)
 
 
-def _named_in_file(model: UrdfModel) -> tuple[str, str] | None:
-    """Return the drive plugin's joints, left first, or the only two of <ros2_control>; None without either."""
+def driven_links(model: UrdfModel, wheels: Pair) -> set[str]:
+    """Return the links of all driven wheels."""
+    names = {name for wheel in wheels for name in (wheel.joint.name, *wheel.joints)}
+    return {model.joints[name].child for name in names}
+
+
+def notes_on_wheels(model: UrdfModel, wheels: Pair) -> Iterator[str]:
+    """Yield what was assumed about the wheels."""
+    left, right = wheels
+    if left.span:
+        count = len(left.joints)
+        yield (
+            f"skid-steer: turns about the middle between its {count} axles ({', '.join(left.joints)} and "
+            f"{', '.join(right.joints)}); --left {left.joint.name} --right {right.joint.name} turns it about the first"
+        )
+    says = [_says(wheel.joint) for wheel in wheels]
+    if left.joint.name in model.sides[1] or (says == ["right", "left"]):
+        yield (
+            f"{left.joint.name} is on the left of the file's x axis, although named for the right: "
+            f"--left {right.joint.name} --right {left.joint.name} makes the robot face backwards"
+        )
+    elif left.centre[1] < right.centre[1] - abs(left.centre[0] - right.centre[0]):
+        yield f"as given, {left.joint.name} is on the left: the robot faces the file's -x axis"
+    if grips_askew(model, [left.joint.child, right.joint.child]):
+        yield "Gazebo lets its wheels slide aside, as mecanum wheels do: with such wheels it is no differential drive"
+    if "width assumed" in left.read_from and not left.given:
+        yield f"wheels from the {left.read_from}"
+
+
+def _candidates(model: UrdfModel) -> list[UrdfJoint]:
+    """Return the wheels that the file calls driven, otherwise those on the floor."""
     commanded = [joint.name for joint in model.joints.values() if joint.commanded is not None]
-    return _from_plugin(model) or ((commanded[0], commanded[1]) if len(commanded) == 2 else None)
+    if all(model.sides) or len(commanded) == 2:
+        return [_joint_called(model, name) for name in (sum(model.sides, ()) if all(model.sides) else commanded)]
+    free = free_wheels(model)
+    actuated = commanded or [joint.get("name", "") for joint in model.root.findall("transmission/joint")]
+    if len(driven := [joint for joint in free if joint.name in actuated]) >= 2:
+        free = driven
+    active = [joint for joint in free if not PASSIVE.search(f"{joint.name} {joint.child}")]
+    return active if len(active) >= 2 else free
 
 
-def _from_plugin(model: UrdfModel) -> tuple[str, str] | None:
-    left, right = (model.drive.get(f"{side}_joint") or model.drive.get(f"{side}Joint") for side in ("left", "right"))
-    return (left, right) if left and right else None
+def _axles(wheels: Sequence[DrivenWheel]) -> list[Pair]:
+    """Return the outermost two wheels of each axle."""
+    left = list(wheels)
+    pairs: list[Pair] = []
+    while left:
+        first = left.pop(0)
+        others = [wheel for wheel in left if _on_one_axle(first, wheel)]
+        if others:
+            axle = [first, *others]
+            left = [wheel for wheel in left if not any(wheel is other for other in others)]
+            pairs.append(
+                max(itertools.combinations(axle, 2), key=lambda p: float(np.ptp([w.centre for w in p], 0).max()))
+            )
+    return pairs
+
+
+def _alike(pairs: Sequence[Pair]) -> bool:
+    """Return whether axles have wheels of one size, as far apart, about parallel axes."""
+    tracks = [float(np.linalg.norm(a.centre - b.centre)) for a, b in pairs]
+    radii = [wheel.radius for pair in pairs for wheel in pair]
+    axis = pairs[0][0].joint.axis
+    level = all(abs(abs(float(axis @ pair[0].joint.axis)) - 1) <= SAME for pair in pairs)
+    return level and all(max(sizes) <= (1 + ALIKE) * min(sizes) for sizes in (tracks, radii))
+
+
+def _skidding(pairs: Sequence[Pair]) -> Pair:
+    """Return the wheels of both sides in the middle between the first and the last axle."""
+    across = pairs[0][0].centre - pairs[0][1].centre
+    ahead = np.array((across[1], -across[0], 0.0)) / np.linalg.norm(across)
+    pairs = sorted(pairs, key=lambda pair: -float(ahead @ pair[0].centre))
+    span = float(ahead @ (pairs[0][0].centre - pairs[-1][0].centre))
+    sides = []
+    for side in zip(*pairs, strict=True):
+        first, joints = side[0], [wheel.joint for wheel in side]
+        weakest = min((joint.effort for joint in joints if joint.effort), default=None)
+        joint = replace(
+            first.joint,
+            velocity=min((joint.velocity for joint in joints if joint.velocity), default=None),
+            commanded=min((joint.commanded for joint in joints if joint.commanded), default=None),
+            effort=None if weakest is None else weakest * len(joints),
+        )
+        middle = np.mean([wheel.centre for wheel in side], axis=0)
+        middle += ahead * float(ahead @ ((first.centre + side[-1].centre) / 2 - middle))
+        radius = float(np.mean([wheel.radius for wheel in side]))
+        width, names = max(wheel.width for wheel in side), tuple(joint.name for joint in joints)
+        sides.append(replace(first, joint=joint, centre=middle, radius=radius, width=width, joints=names, span=span))
+    return sides[0], sides[1]
+
+
+def _named(pairs: Sequence[Pair]) -> str:
+    return "; ".join(f"{a.joint.name} and {b.joint.name}" for a, b in pairs)
+
+
+def _unpaired(model: UrdfModel, wheels: Sequence[DrivenWheel], radius: float | None) -> str:
+    """Explain why no two wheels share an axle."""
+    names = " and ".join(wheel.joint.name for wheel in wheels)
+    if len(wheels) == 2 and not (why := _unlike(wheels)):
+        for wheel in wheels:
+            if not wheel.joint.has_axis:
+                return (
+                    f"{wheel.joint.name} has no <axis>, so it turns about its x axis and not across the robot; "
+                    'give both wheels <axis xyz="0 1 0"/>'
+                )
+        if len(free_wheels(model)) != 2:
+            return f"{names} are not on one axle"
+    free = [_wheel(model, joint, radius) for joint in model.joints.values() if is_free(model, joint)]
+    round_ = [wheel for wheel in free if any(piece.radius for piece in model.by_link[wheel.joint.child])]
+    if why := _unlike(wheels) or _unlike(round_):
+        return why
+    return without_wheels(model, [wheel.joint for wheel in wheels])
 
 
 def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
     match = model.joints.get(name) or next((joint for joint in model.joints.values() if joint.child == name), None)
-    if match is None or not _turns_as_wheel(match):
-        some = ", ".join(joint.name for joint in model.joints.values() if _turns_as_wheel(joint)) or "none"
-        problem = "no such joint or link"
-        if match is not None:
-            problem = "does not turn freely about a level axis"
-            if match.kind == "revolute":
-                problem = f"revolute, with a range of {match.range:.4g} rad; a driven wheel's joint is continuous"
-        raise input_error(str(model.source), f"{name}: {problem}; candidates: {some}")
-    return match
-
-
-def _turns_as_wheel(joint: UrdfJoint) -> bool:
-    return joint.kind in ("continuous", "revolute") and joint.range > 2 * math.pi and abs(joint.axis[2]) < LEVEL
-
-
-def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, DrivenWheel]:
-    """Return the only two wheels on the floor with a common axle, neither steered nor on a caster."""
-    where = str(model.source)
-    turning = [joint for joint in model.joints.values() if _turns_as_wheel(joint)]
-    held = {joint.name: list(model.above(joint.parent)) for joint in turning}
-    steering = [
-        over.name for joint in turning for over in held[joint.name]
-        if over.kind == "revolute" and over.range <= 2 * math.pi and abs(over.axis[2]) > SWIVEL
-    ]  # fmt: skip
-    if steering:
-        raise input_error(where, f"{', '.join(dict.fromkeys(steering))} steer wheels: not a differential drive")
-    fixed = [joint for joint in turning if all(over.kind == "fixed" for over in held[joint.name])]
-    rollers = [joint.name for joint in turning if any(over in fixed for over in held[joint.name])]
-    if rollers:
-        raise input_error(
-            where, f"its wheels have {len(rollers)} rollers, such as {rollers[0]}: not a differential drive"
-        )
-    wheels = [_wheel(model, joint, radius) for joint in fixed if _stands(model, joint)]
-    pairs = [pair for pair in itertools.combinations(wheels, 2) if _on_one_axle(*pair)]
-    if not pairs and (unlike := _unlike([_wheel(model, joint, radius) for joint in fixed if _is_round(model, joint)])):
-        raise input_error(where, unlike)
-    if len(wheels) < 2:
-        raise input_error(where, _too_few(model, fixed, wheels))
-    if not pairs:
-        names = ", ".join(wheel.joint.name for wheel in wheels)
-        raise input_error(
-            where, f"no two of its {len(wheels)} wheels share an axle ({names}): not a differential drive"
-        )
-    if len(pairs) > 1:
-        axles = "; ".join(f"{a.joint.name} and {b.joint.name}" for a, b in pairs)
-        raise input_error(
-            where,
-            f"{len(pairs)} axles with pairs of wheels ({axles}): a skid-steer drive, or some are not driven; "
-            "choose the axle of rotation with --left and --right",
-        )
-    return pairs[0]
-
-
-def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWheel]) -> str:
-    """Explain why fewer than two wheels were detected, and how to fix it."""
-    fix = "name the joints of its two driven wheels with --left and --right"
-    limited = [
-        joint
-        for joint in model.joints.values()
-        if joint.kind == "revolute" and not _turns_as_wheel(joint) and abs(joint.axis[2]) < LEVEL
-    ]
-    if limited and len(turning) < 2:
-        names = ", ".join(joint.name for joint in limited[:4])
-        least = min(joint.range for joint in limited)
-        return f"{names}: revolute, with a range of {least:.4g} rad; the joint of a driven wheel is continuous"
-    standing = {wheel.joint.name for wheel in wheels}
-    hanging = [joint for joint in turning if joint.name not in standing]
-    if len(turning) >= 2 and hanging:
-        lowest = min(model.pieces, key=lambda piece: float(piece.points[:, 2].min()))
-        low = float(lowest.points[:, 2].min())
-        above = {joint.name: _bottom(model, joint) - low for joint in hanging}
-        names = ", ".join(f"{name} by {height:.4g} m" for name, height in above.items() if math.isfinite(height))
-        if names and lowest.link not in {joint.child for joint in turning}:
-            lower = f"the collision geometry of link {lowest.link} lies lower than its wheels ({names})"
-            return f"{lower}, so the wheels are not on the floor; if they drive it, {fix}"
-    return f"has {len(wheels)} free-turning wheels on the floor; a differential drive has two; if it has two, {fix}"
-
-
-def _bottom(model: UrdfModel, joint: UrdfJoint) -> float:
-    """Return the lowest point of a joint's child link [m]; inf without collision geometry."""
-    return min((float(p.points[:, 2].min()) for p in model.pieces if p.link == joint.child), default=math.inf)
-
-
-def _steers(model: UrdfModel, joint: UrdfJoint) -> bool:
-    """Return whether a joint turns something on the floor about an upright axis, by less than a caster."""
-    if joint.kind != "revolute" or joint.range >= STEERING or abs(joint.axis[2]) <= SWIVEL:
-        return False
-    below = {other.child for other in model.joints.values() if joint in model.above(other.child)}
-    return any(_stands(model, other) for other in model.joints.values() if other.child in below)
-
-
-def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
-    """Return whether a joint's child link is a wheel on the floor, not a spinning sensor."""
-    own = [piece for piece in model.pieces if piece.link == joint.child]
-    if not own:
-        return "wheel" in f"{joint.name} {joint.child}".lower()
-    lowest = min(float(piece.points[:, 2].min()) for piece in model.pieces)
-    size = max(float(np.ptp(piece.points[:, 2])) for piece in own)
-    return _bottom(model, joint) <= lowest + 0.25 * size
-
-
-def _is_round(model: UrdfModel, joint: UrdfJoint) -> bool:
-    """Return whether a joint's child link has a cylinder or a sphere as collision geometry."""
-    return any(piece.link == joint.child and piece.radius is not None for piece in model.pieces)
+    if match is not None and turns_as_wheel(match):
+        return match
+    some = ", ".join(joint.name for joint in free_wheels(model)) or "none"
+    problem = f"no such joint or link; wheels on the floor: {some}"
+    if match is not None and match.kind == "fixed":
+        problem = "fixed, so the file is for display only; make the joints of its driven wheels continuous"
+    elif match is not None and match.kind == "revolute" and math.isfinite(match.range):
+        problem = f"revolute, with a range of {match.range:.4g} rad; a driven wheel's joint is continuous"
+    elif match is not None:
+        problem = f"does not turn freely about a level axis; wheels on the floor: {some}"
+    raise input_error(str(model.source), f"{name}: {problem}")
 
 
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
-    own: list[CollisionPiece] = [piece for piece in model.pieces if piece.link == joint.child]
-    if not own:
-        _, given = model.drive_number("wheel_radius", "wheelRadius")
-        _, diameter = model.drive_number("wheel_diameter", "wheelDiameter")
-        r = radius or given or (diameter or 0.0) / 2
+    own: list[CollisionPiece] = model.by_link[joint.child]
+    looks = [piece for piece in model.looks if piece.link == joint.child]
+    _, given = model.drive_number("wheel_radius", "wheelRadius")
+    _, diameter = model.drive_number("wheel_diameter", "wheelDiameter")
+    stated = given or (diameter or 0.0) / 2
+    if not own and (radius or stated or not looks):
+        r = radius or stated
         if not r:
             raise input_error(
                 str(model.source), f"link {joint.child}", "has no collision geometry; give --wheel-radius METRES"
@@ -190,16 +218,25 @@ def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWh
         says = "given" if radius else "the drive plugin"
         how = f"{says}; width assumed, position from joint {joint.name}"
         return DrivenWheel(joint, joint.place[:3, 3], r, 0.2 * r, how, given=True)
-    piece = max(own, key=lambda piece: float(np.ptp(piece.points, axis=0).max()))
+    piece = max(own or looks, key=lambda piece: float(np.ptp(piece.points, axis=0).max()))
+    middle, r, width = _size(piece, joint)
+    how = f"{piece.kind} of link {joint.child}" + ("" if own else ", as drawn")
+    if piece.kind == "sphere":
+        seen = [size for look in looks if look.kind != "sphere" and (size := _size(look, joint))[1] <= 1.5 * r]
+        width = max((wide for _, _, wide in seen), default=0.2 * r)
+        how += f"; width {'as drawn' if seen else 'assumed'}: {width:.4g} m"
+    if radius is not None:
+        r, how = radius, f"given, instead of {r:.4g} from {how}"
+    return DrivenWheel(joint, middle, r, width, how, given=radius is not None)
+
+
+def _size(piece: CollisionPiece, joint: UrdfJoint) -> tuple[Floats, float, float]:
+    """Return centre, radius and width of a piece that turns about a joint's axis."""
     along = piece.points @ joint.axis
     middle = joint.place[:3, 3] + joint.axis * (float(along.min() + along.max()) / 2 - joint.place[:3, 3] @ joint.axis)
     across = piece.points - middle - np.outer((piece.points - middle) @ joint.axis, joint.axis)
     r = piece.radius if piece.radius is not None else float(np.linalg.norm(across, axis=1).max())
-    width = 0.2 * r if piece.kind == "sphere" else float(np.ptp(along))
-    how = f"{piece.kind} of link {joint.child}"
-    if radius is not None:
-        r, how = radius, f"given, instead of {r:.4g} from {how}"
-    return DrivenWheel(joint, middle, r, width, how, given=radius is not None)
+    return middle, r, float(np.ptp(along))
 
 
 def _on_one_axle(a: DrivenWheel, b: DrivenWheel) -> bool:
@@ -231,14 +268,34 @@ def _unlike(wheels: Sequence[DrivenWheel]) -> str:
     return ""
 
 
-def _in_order(model: UrdfModel, pair: tuple[DrivenWheel, DrivenWheel]) -> tuple[DrivenWheel, DrivenWheel]:
-    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction."""
-    a, b = pair
+def _says(joint: UrdfJoint) -> str:
+    """Return the side in a joint's name; empty without one."""
+    sides = set(re.findall(r"left|right", f"{joint.name} {joint.child}".lower()))
+    return sides.pop() if len(sides) == 1 else ""
+
+
+def _across(a: DrivenWheel, b: DrivenWheel) -> bool:
+    """Return whether the axle is across the root's x axis, so that positions tell left from right."""
     apart = a.centre - b.centre
-    if abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart)):
-        return (a, b) if apart[1] > 0 else (b, a)
+    return abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart))
+
+
+def _given_order(a: DrivenWheel, b: DrivenWheel) -> Pair:
+    """Return a pair as given; raise InputError if it is swapped by position and not by name."""
+    if _across(a, b) and a.centre[1] < b.centre[1] and (_says(a.joint), _says(b.joint)) != ("left", "right"):
+        raise InputError(
+            f"--left {a.joint.name} is on the right: y is {a.centre[1]:.3g} m, that of {b.joint.name} {b.centre[1]:.3g} m; "
+            f"write --left {b.joint.name} --right {a.joint.name}"
+        )
+    return a, b
+
+
+def _in_order(model: UrdfModel, a: DrivenWheel, b: DrivenWheel) -> Pair:
+    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction."""
+    if _across(a, b):
+        return (a, b) if a.centre[1] > b.centre[1] else (b, a)
     for first, second in ((a, b), (b, a)):
-        if "left" in first.joint.name.lower() and "right" in second.joint.name.lower():
+        if first.joint.name in model.sides[0] or (_says(first.joint), _says(second.joint)) == ("left", "right"):
             return first, second
     raise input_error(
         str(model.source),
