@@ -341,3 +341,21 @@ def test_a_body_without_collision_geometry_is_refused_or_noted(tmp_path):
         "the footprint is no longer than the wheels; if the body's <collision> is missing" in note
         for note in found.notes
     )
+
+
+def test_a_robot_that_is_only_drawn_has_its_drawn_shape(tmp_path):
+    solid, drawn = (
+        imported(tmp_path, BASE.replace("collision", tag), pair().replace("collision", tag))
+        for tag in ("collision", "visual")
+    )
+    assert drawn.spec == solid.spec
+    assert "the file has no collision geometry: the drawn one counts" in drawn.notes
+
+
+def test_a_moving_joint_without_direction_does_not_hide_another_drive(tmp_path):
+    rollers = "".join(
+        f'<link name="r{k}"/>' + joint(f"roller_{k}", f"r{k}", "0 0 0", axis="0 0 0", parent="left_wheel")
+        for k in range(9)
+    )
+    with pytest.raises(InputError, match="mecanum"):
+        imported(tmp_path, BASE, pair(), rollers, name="mecanum_base")

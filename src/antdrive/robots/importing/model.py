@@ -367,7 +367,7 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missi
     pieces = [
         piece
         for name, link in links.items()
-        for element in link.findall("collision")
+        for element in link.findall(solid_tag(root))
         for piece in reader.piece(name, places[name] @ _origin(path, element), element)
     ]
     solid = {piece.link for piece in pieces if piece.kind != "sphere"}
@@ -397,6 +397,11 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missi
         ET.tostring(root, encoding="unicode"),
         missing,
     )
+
+
+def solid_tag(root: ET.Element) -> str:
+    """Return the tag of the geometry that counts: the drawn one if no link has collision geometry."""
+    return "visual" if root.find("link/collision/geometry") is None else "collision"
 
 
 def _commanded(path: Path, root: ET.Element, joints: set[str]) -> dict[str, float]:
@@ -535,7 +540,7 @@ def _joint(path: Path, element: ET.Element) -> UrdfJoint:
     stated = element.find("axis")
     axis = _numbers(path, stated, "xyz", (1.0, 0.0, 0.0)) if kind != "fixed" else np.array((1.0, 0.0, 0.0))
     if not np.linalg.norm(axis) > 1e-9:
-        raise input_error(str(path), f"joint {name}", "the axis must not be 0 0 0")
+        axis, stated = np.array((1.0, 0.0, 0.0)), None
     sweep = 0.0 if lower == upper else upper - lower
     turns, given = (math.inf, sweep or math.inf) if kind == "continuous" else (sweep, sweep)
     place, axis = _origin(path, element), axis / np.linalg.norm(axis)

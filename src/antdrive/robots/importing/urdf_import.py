@@ -19,7 +19,7 @@ from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
 from antdrive.robots.importing.drives import few
 from antdrive.robots.importing.hull import footprint_around
-from antdrive.robots.importing.model import CollisionPiece, UrdfModel, read_model
+from antdrive.robots.importing.model import CollisionPiece, UrdfModel, read_model, solid_tag
 from antdrive.robots.importing.plausible import below_arms, implausible, plausible_speeds
 from antdrive.robots.importing.sensors import decimal, import_lidar, lidar_entry
 from antdrive.robots.importing.wheels import DrivenWheel, driven_links, driven_wheels, notes_on_wheels
@@ -257,12 +257,16 @@ def import_urdf(
         high = [piece for piece in solid if piece.bottom - floor > below]
         if not {piece.link for piece in low} - driven_links(model, wheels):
             where = "" if math.isinf(below) else f" below {below:g} m"
-            raise input_error(str(path), f"has no collision geometry{where} other than its wheels, so no footprint")
+            raise input_error(
+                str(path),
+                f"has no collision geometry{where} other than its wheels, so no footprint; give its body <collision>",
+            )
         points = [from_above(piece.points, frame) for piece in low]
         outline = footprint_around(with_wheels(points, wheels), footprint)
         names = sorted({piece.link for piece in low})
         kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
-        what = f"{kind} around the collision geometry of {few(names)} and the wheels"
+        drawn = solid_tag(model.root) == "visual"
+        what = f"{kind} around the {'drawn' if drawn else 'collision'} geometry of {few(names)} and the wheels"
         what += "" if math.isinf(below) else f", below {below:g} m"
         values = _values(model, wheels, outline, floor, given)
         lidar, seen, unused = import_lidar(model.lidars, frame, floor, outline)
@@ -274,6 +278,7 @@ def import_urdf(
             *implausible(spec, wheels[0].span, {*given, *(value.key for value in values if value.assumed)}),
             *below_arms(model, low, frame, floor),
             *unused,
+            *(["the file has no collision geometry: the drawn one counts"] if drawn else []),
             *model.missing.notes,
             *([f"omitted, because not found: {'; '.join(model.missing_meshes)}"] if model.missing_meshes else []),
         ]
