@@ -28,6 +28,7 @@ from antdrive.base.files import open_regular, read_bytes
 from antdrive.base.optional import optional
 from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
+from antdrive.worlds.formats.meshes import read_mesh
 from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml
 
 MAX_PACKAGES = 100  # referenced by one file
@@ -149,9 +150,6 @@ def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
 CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
 MAX_LINKS = 10_000
 MAX_COORDINATE = 1e6  # [m]
-MAX_MESH_BYTES = 20_000_000  # 400,000 triangles of a binary STL file
-CHECKED = ("stl", "obj", "dae")  # mesh formats whose numbers are checked before trimesh reads them
-_VERTEX = re.compile(rb"^[ \t]*v(?:ertex)?[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.IGNORECASE)
 OTHER_DRIVES = re.compile(
     r"ackermann|tricycle|bicycle|omni(?!cam)|mecanum|holonomic|swerve|planar_?move", re.IGNORECASE
 )
@@ -483,16 +481,7 @@ class _Shapes:
                 )
             self.missing_meshes.append(f"{link}: {name}")
             return None
-        content, kind = checked_mesh(file), file.suffix.lower().removeprefix(".")
-        trimesh = optional("trimesh", "urdf", f"mesh {file.name} needs it")
-        try:  # trimesh merges vertices, and with them drops those that are not numbers: checked before
-            loaded = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=kind in CHECKED)
-            vertices = np.asarray(loaded.vertices, dtype=np.float64)
-        except Exception as error:  # each format has its own exceptions
-            raise input_error(str(file), f"cannot be read as a mesh: {error or type(error).__name__}") from None
-        if not len(vertices) or not np.isfinite(vertices).all():
-            raise input_error(str(file), "has no vertices, or vertices that are not finite")
-        return vertices * _unit(file)
+        return read_mesh(file)[0]
 
     def _candidates(self, name: str) -> Iterator[Path]:
         """Yield candidate paths of a mesh; package://NAME/FILE resolves below a folder NAME or the given folder."""
@@ -505,37 +494,3 @@ class _Shapes:
             yield folder / bare
             yield folder / inside
             yield folder / Path(bare).name
-
-
-def checked_mesh(file: Path) -> bytes:
-    """Return a mesh file's content; raise InputError if it is too large, or a coordinate is not a finite number."""
-    content, kind = read_bytes(file, MAX_MESH_BYTES, "a mesh"), file.suffix.lower().removeprefix(".")
-    count = int.from_bytes(content[80:84], "little")
-    try:
-        if kind == "stl" and len(content) == 84 + 50 * count:
-            layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-            numbers = np.frombuffer(content, layout, offset=84)["corners"]
-        elif kind in ("stl", "obj"):
-            numbers = np.array(_VERTEX.findall(content), dtype=np.bytes_).astype(np.float64)
-        elif kind == "dae":
-            lists = (e.text or "" for e in parse_xml(file).iter() if e.tag.rpartition("}")[2] == "float_array")
-            numbers = np.array(" ".join(lists).split(), dtype=np.float64)
-        else:
-            return content
-    except ValueError as error:
-        raise (error if isinstance(error, InputError) else input_error(str(file), f"not a mesh: {error}")) from None
-    if not numbers.size or not np.isfinite(numbers).all():
-        bad = int(numbers.size - np.isfinite(numbers).sum())
-        raise input_error(str(file), f"{bad} of its coordinates are not finite" if bad else "has no vertices")
-    return content
-
-
-def _unit(file: Path) -> float:
-    """Return the unit of a mesh file [m]. COLLADA states it, but trimesh ignores it; other formats have none.
-
-    As in RViz and Gazebo, the file's up axis is ignored.
-    """
-    if file.suffix.lower() != ".dae":
-        return 1.0
-    unit = next((element for element in parse_xml(file).iter() if element.tag.rpartition("}")[2] == "unit"), None)
-    return _greater_than_0(file, "<unit>", "meter", _number(file, unit, "meter", 1.0))
