@@ -209,9 +209,14 @@ def import_world(
     goal: Annotated[str | None, option("X,Y", "Goal [m]; maps contain none.")] = None,
     bounds: Annotated[
         str | None,
-        option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the cylinders]"),
+        option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the obstacles]"),
     ] = None,
-    skip_unsupported: Annotated[bool, flag("SDF: skip all but upright cylinders.", "--skip-unsupported")] = False,
+    skip_unsupported: Annotated[
+        bool, flag("SDF: skip missing models and unsupported parts.", "--skip-unsupported")
+    ] = False,
+    band: Annotated[
+        str | None, option("LOW,HIGH", "SDF: heights between which shapes are obstacles [m].  [default: 0.01,2]")
+    ] = None,
     unknown: Annotated[
         str | None, option("KIND", "map_server: unknown cells are blocked or free.  [default: blocked]")
     ] = None,
@@ -219,13 +224,13 @@ def import_world(
         float | None,
         option(
             "METRES",
-            "Maps: overhang of cylinders beyond blocked cells [m].  [default: 0.207 cells]",
+            "Maps, SDF: overhang of cylinders beyond blocked cells [m].  [default: 0.207 cells; SDF: 1 cell]",
             min=0,
             max=1e6,
         ),
     ] = None,
     resolution: Annotated[
-        float | None, option("METRES", "MovingAI: cell size [m].  [default: 1]", min=1e-6, max=1e6)
+        float | None, option("METRES", "MovingAI, SDF: cell size [m].  [default: 1; SDF: 0.02]", min=1e-6, max=1e6)
     ] = None,
     problem: Annotated[
         int | None,
@@ -256,6 +261,7 @@ def import_world(
                 bounds=numbers("--bounds", bounds, 4),
                 cell=given["cell"],
                 barn=barn,
+                band=numbers("--band", band, 2, "LOW,HIGH"),
                 skip_unsupported=skip_unsupported or None,
                 on_skipped=skipped.extend if skip_unsupported else None,
                 unknown=unknown,

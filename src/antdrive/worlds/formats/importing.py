@@ -44,7 +44,7 @@ IMPORTS: Mapping[str, Format] = MappingProxyType(
         "sdf": Format(
             "an SDF world",
             (".sdf", ".world"),
-            ("start", "goal", "bounds", "cell", "skip_unsupported", "on_skipped"),
+            ("start", "goal", "bounds", "cell", "band", "resolution", "overhang", "skip_unsupported", "on_skipped"),
             lambda path, **options: [import_sdf(path, **options)],
         ),
         "barn": Format(

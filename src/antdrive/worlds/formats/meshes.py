@@ -35,7 +35,9 @@ def read_mesh(file: Path, part: str = "") -> tuple[Floats, npt.NDArray[np.int64]
         force = "scene" if part else "mesh"
         loaded = trimesh.load(io.BytesIO(content), file_type=kind, force=force, process=kind in CHECKED)
         if part:
-            nodes = [loaded.graph[node] for node in loaded.graph.nodes_geometry if part in (node, loaded.graph[node][1])]
+            nodes = [
+                loaded.graph[node] for node in loaded.graph.nodes_geometry if part in (node, loaded.graph[node][1])
+            ]
             loaded = trimesh.util.concatenate([loaded.geometry[name].copy().apply_transform(at) for at, name in nodes])
         vertices = np.asarray(getattr(loaded, "vertices", ()), dtype=np.float64).reshape(-1, 3)
         faces = np.asarray(getattr(loaded, "faces", ()), dtype=np.int64).reshape(-1, 3)
@@ -70,8 +72,6 @@ def checked_mesh(file: Path) -> bytes:
     return content
 
 
-
-
 def _unit(file: Path) -> float:
     """Return the unit of a mesh file [m]. COLLADA states it, but trimesh ignores it; other formats have none.
 
@@ -86,5 +86,7 @@ def _unit(file: Path) -> float:
     except ValueError:
         unit = math.nan
     if not 0 < unit <= MAX_COORDINATE:
-        raise input_error(str(file), f"<unit meter={text!r}>", f"must be a number above 0 and at most {MAX_COORDINATE:g}")
+        raise input_error(
+            str(file), f"<unit meter={text!r}>", f"must be a number above 0 and at most {MAX_COORDINATE:g}"
+        )
     return unit
