@@ -181,6 +181,33 @@ def between(points: Array, count: int, axis: int, low: float, high: float, out: 
 
 
 @kernel
+def corners_of(points: Array, count: int, out: Array) -> int:
+    """Fill `out` with the corners of the hull of `points` over the floor, and return their number (Andrew 1979).
+
+    The points are sorted in place.
+    """
+    for i in range(1, count):
+        j = i
+        while j and (points[j, 0], points[j, 1]) < (points[j - 1, 0], points[j - 1, 1]):
+            for k in range(3):
+                points[j, k], points[j - 1, k] = points[j - 1, k], points[j, k]
+            j -= 1
+    found = 0
+    for side in range(2):
+        begin = found
+        for i in range(count):
+            p = points[i] if side == 0 else points[count - 1 - i]
+            while found >= begin + 2:
+                a, b = out[found - 2], out[found - 1]
+                if (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 0.0:
+                    break
+                found -= 1
+            out[found], found = p, found + 1
+        found -= 1
+    return max(found, 1)
+
+
+@kernel
 def mark_pieces(pieces: Array, low: float, high: float, corner: Array, cell: float, slack: float, tops: Array) -> None:
     """Raise tops[r, c] to the top of each convex piece that reaches into the cell between two heights.
 
@@ -188,17 +215,18 @@ def mark_pieces(pieces: Array, low: float, high: float, corner: Array, cell: flo
     columns from its least to its greatest x.
     """
     rows, cols = tops.shape
-    band, strip = np.empty((64, 3)), np.empty((4096, 3))
+    band, hull, strip = np.empty((64, 3)), np.empty((65, 3)), np.empty((4096, 3))
     for k in range(len(pieces)):
         count = between(pieces[k], pieces.shape[1], 2, low, high, band)
         if not count:
             continue
         top = pieces[k, :, 2].max()
-        first = (band[:count, 1].min() + slack - corner[1]) / cell
-        last = max(first, (band[:count, 1].max() - slack - corner[1]) / cell)
+        count = corners_of(band, count, hull)
+        first = (hull[:count, 1].min() + slack - corner[1]) / cell
+        last = max(first, (hull[:count, 1].max() - slack - corner[1]) / cell)
         for r in range(int(math.floor(max(first, 0.0))), int(math.floor(min(last, rows - 1.0))) + 1):
             bottom = corner[1] + r * cell
-            n = between(band, count, 1, bottom - slack, bottom + cell + slack, strip)
+            n = between(hull, count, 1, bottom - slack, bottom + cell + slack, strip)
             if not n:
                 continue
             left = (strip[:n, 0].min() + slack - corner[0]) / cell

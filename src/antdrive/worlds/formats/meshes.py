@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import math
 import re
 from pathlib import Path
@@ -31,6 +32,9 @@ def read_mesh(file: Path, part: str = "") -> tuple[Floats, npt.NDArray[np.int64]
     """
     content, kind = checked_mesh(file), file.suffix.lower().removeprefix(".")
     trimesh = optional("trimesh", "urdf", f"mesh {file.name} needs it")
+    log = logging.getLogger("trimesh")
+    level = log.level
+    log.setLevel(logging.CRITICAL)  # it logs each texture that it does not find
     try:  # trimesh merges vertices, and with them drops those that are not numbers: checked before
         force = "scene" if part else "mesh"
         loaded = trimesh.load(io.BytesIO(content), file_type=kind, force=force, process=kind in CHECKED)
@@ -43,6 +47,8 @@ def read_mesh(file: Path, part: str = "") -> tuple[Floats, npt.NDArray[np.int64]
         faces = np.asarray(getattr(loaded, "faces", ()), dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # each format has its own exceptions
         raise input_error(str(file), f"cannot be read as a mesh: {error or type(error).__name__}") from None
+    finally:
+        log.setLevel(level)
     if not len(vertices) or not np.isfinite(vertices).all():
         named = f" in its part {part!r}" if part else ""
         raise input_error(str(file), f"has no vertices{named}, or vertices that are not finite")

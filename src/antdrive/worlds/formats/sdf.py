@@ -17,12 +17,10 @@ from antdrive.base.plane import map_to_world
 from antdrive.base.types import Bounds, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
 from antdrive.worlds.formats.sdf_models import ACTOR_RADIUS, VARIABLES, Models, Reader
-from antdrive.worlds.formats.solids import cover_pieces
+from antdrive.worlds.formats.solids import BAND, cover_pieces, floor_height
 from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.world import Disc, Task, World
 
-BAND = (0.01, 2.0)  # heights between which shapes are obstacles [m]
-RESOLUTION = 0.02  # default side of the cells on which shapes are covered [m]
 FINE = 0.1  # default grid resolution of a task with covered shapes [m]
 MARGIN = 1.0  # from the cylinders to the default bounds [m]
 CELL = 0.25  # default grid resolution of a task [m]
@@ -63,8 +61,8 @@ def import_sdf(
         bounds: the walls' inner faces, in the world's own frame [m]; by default 1 m around the obstacles, start and goal
         cell: the task's grid resolution [m]; by default 0.25, or 0.1 with covered shapes
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
-        band: heights between which shapes are obstacles [m]; by default 0.01 and 2
-        resolution: side of the cells on which shapes are covered [m]; by default 0.02
+        band: heights between which shapes are obstacles [m]; by default 0.01 and 2 above the floor
+        resolution: side of the cells on which shapes are covered [m]; by default 0.02, or more in large worlds
         overhang: largest protrusion of cylinders beyond these cells [m]; by default their side
         skip_unsupported: skip unsupported parts and missing models instead of refusing the file
         on_skipped: called with what is skipped, each part as "model::link::collision (reason)"
@@ -76,15 +74,17 @@ def import_sdf(
     world = _world_element(file)
     kept = _KeptTask.take(file, world)
     frame = kept.numbers("frame", 3) or (0.0, 0.0, 0.0)
-    band = band or ((0.0, math.inf) if kept.values else BAND)
-    if not 0 <= band[0] < band[1]:
+    if band is not None and not 0 <= band[0] < band[1]:
         raise FieldError("band", f"must be two heights, LOW,HIGH with 0 <= LOW < HIGH, got {band[0]:g},{band[1]:g}")
-    resolution = RESOLUTION if resolution is None else resolution
+    known = (0.0, math.inf) if kept.values else band
     try:
-        models = Reader(file, band).read(world, frame)
+        models = Reader(file, known or BAND).read(world, frame)
+        if known is None and (floor := floor_height(models.solids)):
+            above = Reader(file, (BAND[0] + floor, BAND[1] + floor), floor).read(world, frame)
+            models = above if above.kinds else models
         if (models.unsupported or models.missing) and not skip_unsupported:
             raise InputError(_about_unsupported(models))
-        covering, reach = cover_pieces(models.solids, band, resolution, resolution if overhang is None else overhang)
+        covering, reach = cover_pieces(models.solids, models.band, resolution, overhang)
     except InputError as error:
         raise input_error(str(file), str(error)) from None
     if on_skipped is not None:
@@ -99,7 +99,7 @@ def import_sdf(
     if start is None:
         x, y = bounds[0] + MARGIN / 2, bounds[1] + MARGIN / 2
         start = x, y, math.atan2(goal[1] - y, goal[0] - x)
-    about = "; ".join([f"imported from {file.name}", *_about(models, band, len(covering), reach)])
+    about = "; ".join([f"imported from {file.name}", *_about(models, len(covering), reach)])
     try:
         return Task(
             World(
@@ -120,17 +120,20 @@ def import_sdf(
         raise input_error(str(file), str(error)) from None
 
 
-def _about(models: Models, band: tuple[float, float], covering: int, reach: float) -> Iterator[str]:
+def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
     """Yield what was imported, assumed and ignored."""
+    low, high = models.band
+    if models.floor:
+        yield f"the floor is {models.floor:g} m high: low plates cover most of the ground"
     if covering:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(models.kinds.items()))
         yield (
-            f"the shapes between {band[0]:g} and {band[1]:g} m ({kinds}) are fully covered; {covering} of the cylinders "
+            f"the shapes between {low:g} and {high:g} m ({kinds}) are fully covered; {covering} of the cylinders "
             f"cover what is not upright and round, and reach at most {reach + models.facets:.3g} m beyond it"
         )
     if models.movers:
         yield f"{len(models.movers)} actors move in straight lines, with a radius of {ACTOR_RADIUS:g} m"
-    names = {"flat": f"shapes up to {band[0]:g} m are floor", "above": f"shapes above {band[1]:g} m are no obstacles"}
+    names = {"flat": f"shapes up to {low:g} m are floor", "above": f"shapes above {high:g} m are no obstacles"}
     for what, count in models.counts.items():
         yield what if what.endswith("is left out") else f"{count} {names.get(what, what)}"
 

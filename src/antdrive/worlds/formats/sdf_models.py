@@ -28,6 +28,7 @@ from antdrive.worlds.world import Disc
 #: Environment variables of folders with models.
 VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "SDF_PATH", "GAZEBO_MODEL_PATH")
 FUEL_FOLDERS = ("~/.gz/fuel", "~/.ignition/fuel")  # Fuel's downloads
+CLASSIC_FOLDER = "~/.gazebo/models"  # downloads of Gazebo classic
 USUAL = re.compile(r"(sun|ground[ _]?plane)(/\d+)?/?$", re.IGNORECASE)  # floor and light, under any address
 DRIVES = re.compile(
     r"diff_?-?drive|skid_?-?steer|ackermann|mecanum|omni|planar_?move|tracked-?vehicle|velocity-?control|multicopter",
@@ -46,6 +47,8 @@ class _Missing(Unsupported):
 class Models:
     """The contents of a world between two heights."""
 
+    band: tuple[float, float]  # the heights [m]
+    floor: float = 0.0  # assumed height of the floor [m]
     discs: list[Disc] = field(default_factory=list)  # upright cylinders and spheres
     solids: list[Floats] = field(default_factory=list)  # convex pieces of all other shapes, (K, V, 3)
     facets: float = 0.0  # largest distance of pieces and discs beyond round shapes [m]
@@ -142,9 +145,9 @@ class _Wanted:
 class Reader:
     """A reader of a world and its included models."""
 
-    def __init__(self, file: Path, band: tuple[float, float]) -> None:
-        self.models = Models()
-        self._file, self._band, self._count = file, band, 0
+    def __init__(self, file: Path, band: tuple[float, float], floor: float = 0.0) -> None:
+        self.models = Models(band, floor)
+        self._file, self._count = file, 0
         self._root, self._mesh = functools.cache(parse_xml), functools.cache(read_mesh)
 
     def read(self, world: ET.Element, frame: Pose) -> Models:
@@ -257,7 +260,7 @@ class Reader:
         geometry = collision.find("geometry")
         if geometry is None or not len(geometry):
             return
-        found = solid(geometry, place, self._band, lambda shape: self._triangles(shape, file))
+        found = solid(geometry, place, self.models.band, lambda shape: self._triangles(shape, file))
         if isinstance(found, str):
             self.models.counts[found] += 1
             return
@@ -334,7 +337,7 @@ def _candidates(uri: str, source: Path) -> Iterator[Path]:
     folder_of_package = ros_package(package) if scheme in ("package", "model") else None
     if folder_of_package is not None:
         yield folder_of_package / inside
-    for folder in (*folders_in(*VARIABLES), *_real(source).parents):
+    for folder in (*folders_in(*VARIABLES), *_real(source).parents, Path(CLASSIC_FOLDER).expanduser()):
         yield from (folder / rest, folder / "models" / rest)
 
 

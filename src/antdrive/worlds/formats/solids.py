@@ -26,6 +26,10 @@ SIDES, ARC = 64, 32  # of a polygon around a circle, and of one around half of a
 FACETS = 1 / (math.cos(math.pi / SIDES) * math.cos(math.pi / ARC / 2)) - 1  # how far these reach beyond it [radii]
 TILE = 512  # cells along a side of an area that is rasterised at once
 MAX_TILES = 2000
+BAND = (0.01, 2.0)  # default heights between which shapes are obstacles, above the floor [m]
+CELL, COARSEST = 0.02, 1.0  # smallest and largest default side of a cell [m]
+MOST_RIMS = 60_000  # sides of blocked cells along free ones, of default cells: about 8,000 discs
+HIGHEST_FLOOR = 0.3  # of plates that cover most of the ground [m]
 MAX_POINTS = 10_000  # of a polyline
 
 
@@ -40,7 +44,9 @@ def numbers(text: str | None, count: int, key: str) -> Floats:
     except ValueError:
         values = np.empty(0)
     if len(values) != count or not (np.abs(values) <= MAX_COORDINATE).all():
-        raise Unsupported(f"{key} must be {count} numbers, got {(text or '').strip()[:40]!r}")
+        raise Unsupported(
+            f"{key} must be {f'{count} numbers' if count > 1 else 'a number'}, got {(text or '').strip()[:40]!r}"
+        )
     return values
 
 
@@ -165,16 +171,34 @@ def _where(z: Floats, band: tuple[float, float]) -> str:
     return "flat" if z.max() <= band[0] else "above"
 
 
+def floor_height(solids: Sequence[Floats]) -> float:
+    """Return the height of the floor [m]: of the top of low plates that cover most of the ground, or 0."""
+    tops, areas = [np.empty(0)], [np.empty(0)]
+    for pieces in solids:
+        z, is_box = pieces[:, :, 2], pieces.shape[1] == 8
+        one, two = (pieces[:, i, :2] - pieces[:, 0, :2] for i in ((4, 2) if is_box else (1, 2)))
+        area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+        areas.append(np.abs(area) if is_box else area.clip(min=0) * (np.ptp(z, axis=1) < BAND[0]) / 2)
+        tops.append(z.max(axis=1))
+    low = ((top := np.concatenate(tops)) > 0) & (top <= HIGHEST_FLOOR)
+    if not low.any():
+        return 0.0
+    covered = np.bincount((top[low] / BAND[0]).round().astype(np.int64), np.concatenate(areas)[low])
+    ends = np.array([[p[:, :, :2].min(axis=(0, 1)), p[:, :, :2].max(axis=(0, 1))] for p in solids])
+    ground = float(np.prod(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
+    return BAND[0] * float(np.flatnonzero(covered > ground / 2).max(initial=0))
+
+
 def cover_pieces(
-    solids: Sequence[Floats], band: tuple[float, float], cell: float, overhang: float
+    solids: Sequence[Floats], band: tuple[float, float], cell: float | None = None, overhang: float | None = None
 ) -> tuple[list[Disc], float]:
     """Cover convex pieces between two heights with discs.
 
     Args:
         solids: pieces (K, V, 3), several arrays of them [m]
         band: the heights [m]
-        cell: side of the cells [m]
-        overhang: largest protrusion of discs beyond blocked cells [m]
+        cell: side of the cells [m]; by default 0.02, doubled until a few thousand discs suffice
+        overhang: largest protrusion of discs beyond blocked cells [m]; by default the side of a cell
 
     Returns:
         The discs, and the largest protrusion beyond the pieces [m].
@@ -182,41 +206,63 @@ def cover_pieces(
     Raises:
         InputError: there are too many discs or cells.
     """
-    from antdrive.worlds.formats._kernels_cover import mark_pieces
-
-    tiles: dict[tuple[int, int], list[Floats]] = {}
-    for pieces in solids:
-        ends = np.hstack([pieces[:, :, :2].min(axis=1), pieces[:, :, :2].max(axis=1)])
-        spans, span_of = np.unique(np.floor(ends / (TILE * cell)).astype(np.int64), axis=0, return_inverse=True)
-        for n, (left, below, right, above) in enumerate(spans.tolist()):
-            if len(tiles) + (right - left + 1) * (above - below + 1) > MAX_TILES:
-                problem = f"its shapes reach over too many cells of {cell:g} m; give larger ones with --resolution"
-                raise input_error(problem)
-            for tile in itertools.product(range(left, right + 1), range(below, above + 1)):
-                tiles.setdefault(tile, []).append(pieces[span_of.ravel() == n])
+    side = CELL if cell is None else cell
+    tiles = _tiles(solids, side)
+    while cell is None and side < COARSEST and (tiles is None or _rims(tiles, band, side) > MOST_RIMS):
+        side *= 2
+        tiles = _tiles(solids, side)
+    if tiles is None:
+        raise input_error(f"its shapes reach over too many cells of {side:g} m; give larger ones with --resolution")
     discs: list[Disc] = []
     reach = 0.0
     for number, (tile, parts) in enumerate(sorted(tiles.items(), key=lambda item: item[0])):
         with progress_part(number, len(tiles)):
-            corner, tops = np.array(tile) * (TILE * cell), np.full((TILE, TILE), -np.inf)
-            for pieces in parts:
-                mark_pieces(pieces, *band, corner, cell, SLACK, tops)
-            used = np.argwhere(tops > -np.inf)
-            if not len(used):
-                continue
-            (row, col), (row_end, col_end) = used.min(axis=0), used.max(axis=0) + 1
-            tops, corner = tops[row:row_end, col:col_end], corner + (col * cell, row * cell)
-            covered = cover_inside(tops > -np.inf, cell, tuple(corner.tolist()), overhang)
+            corner, tops = _rasterised(tile, parts, band, side)
+            covered = cover_inside(tops > -np.inf, side, (corner[0], corner[1]), side if overhang is None else overhang)
             reach = max(reach, covered.overhang)
             for x, y, radius in covered.discs.tolist():
-                low, high = (
-                    np.floor((np.array([y, x]) + s * radius - corner[::-1]) / cell).astype(int) for s in (-1, 1)
-                )
-                window = tops[max(low[0], 0) : high[0] + 1, max(low[1], 0) : high[1] + 1]
-                discs.append(Disc(tidy(x), tidy(y), radius, float(window.max())))
+                row, col = (y - corner[1]) / side, (x - corner[0]) / side
+                low, high = (math.floor(max(v - radius / side, 0.0)) for v in (row, col)), radius / side
+                rows, cols = (slice(first, math.floor(v + high) + 1) for first, v in zip(low, (row, col), strict=True))
+                discs.append(Disc(tidy(x), tidy(y), radius, float(tops[rows, cols].max())))
     if len(discs) > MAX_DISCS:
         problem = (
             f"needs {len(discs)} cylinders; the limit is {MAX_DISCS}; a larger --resolution or --overhang needs fewer"
         )
         raise input_error(problem)
-    return discs, reach + math.sqrt(2.0) * cell
+    return discs, reach + math.sqrt(2.0) * side
+
+
+_Tiles = dict[tuple[int, int], list[Floats]]
+
+
+def _tiles(solids: Sequence[Floats], cell: float) -> _Tiles | None:
+    """Return the pieces in each tile of cells; None if there are too many tiles."""
+    tiles: _Tiles = {}
+    for pieces in solids:
+        ends = np.hstack([pieces[:, :, :2].min(axis=1), pieces[:, :, :2].max(axis=1)])
+        spans, span_of = np.unique(np.floor(ends / (TILE * cell)).astype(np.int64), axis=0, return_inverse=True)
+        for n, (left, below, right, above) in enumerate(spans.tolist()):
+            if len(tiles) + (right - left + 1) * (above - below + 1) > MAX_TILES:
+                return None
+            for tile in itertools.product(range(left, right + 1), range(below, above + 1)):
+                tiles.setdefault(tile, []).append(pieces[span_of.ravel() == n])
+    return tiles
+
+
+def _rims(tiles: _Tiles, band: tuple[float, float], cell: float) -> int:
+    """Return how many blocked cells have a free neighbour to the right or above."""
+    blocked = (_rasterised(tile, parts, band, cell)[1] > -np.inf for tile, parts in tiles.items())
+    return sum(int((cells[1:] != cells[:-1]).sum() + (cells[:, 1:] != cells[:, :-1]).sum()) for cells in blocked)
+
+
+def _rasterised(
+    tile: tuple[int, int], parts: Sequence[Floats], band: tuple[float, float], cell: float
+) -> tuple[list[float], Floats]:
+    """Return a tile's lower left corner [m] and the tops of the pieces over its cells (TILE, TILE); -inf where none are."""
+    from antdrive.worlds.formats._kernels_cover import mark_pieces
+
+    corner, tops = np.array(tile) * (TILE * cell), np.full((TILE, TILE), -np.inf)
+    for pieces in parts:
+        mark_pieces(pieces, *band, corner, cell, SLACK, tops)
+    return corner.tolist(), tops
