@@ -76,7 +76,7 @@ def import_sdf(
     frame = kept.numbers("frame", 3) or (0.0, 0.0, 0.0)
     if band is not None and not 0 <= band[0] < band[1]:
         raise FieldError("band", f"must be two heights, LOW,HIGH with 0 <= LOW < HIGH, got {band[0]:g},{band[1]:g}")
-    known = (0.0, math.inf) if kept.values else band
+    known = (float(band[0]), float(band[1])) if band else (0.0, math.inf) if kept.values else None
     try:
         models = Reader(file, known or BAND).read(world, frame)
         if known is None and (floor := floor_height(models.solids)):
