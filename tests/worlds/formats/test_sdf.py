@@ -171,7 +171,12 @@ def test_the_supported_parts_of_a_model_stay_and_each_skipped_part_is_named(tmp_
 
 
 def test_the_usual_includes_are_ignored(tmp_path):
-    names = ("model://sun", "model://ground_plane", "https://fuel.gazebosim.org/1.0/OpenRobotics/models/Ground Plane/3", "Sun")
+    names = (
+        "model://sun",
+        "model://ground_plane",
+        "https://fuel.gazebosim.org/1.0/OpenRobotics/models/Ground Plane/3",
+        "Sun",
+    )
     includes = [f"<include><uri>{name}</uri></include>" for name in names]
     assert len(discs(world(tmp_path, *includes, cylinder()))) == 1
 

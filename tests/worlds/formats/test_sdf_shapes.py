@@ -132,9 +132,9 @@ def test_what_is_above_the_band_or_flat_is_no_obstacle_and_said(tmp_path):
     made = imported(tmp_path, lamp, placed("<box><size>1 1 0.4</size></box>", lintel), carpet, post)
     assert made.obstacles == (Disc(3, 3, 0.1),)
     said = made.source.split("; ")
-    assert "2 shapes above 2 m are no obstacles" in said
-    assert "2 shapes up to 0.01 m are floor" in said
-    assert "1 bodies that could move stand as they are" in said
+    assert "shapes above 2 m, no obstacles: 2" in said
+    assert "shapes up to 0.01 m, taken for floor: 2" in said
+    assert "bodies that could move, taken to stand still: 1" in said
     assert len(imported(tmp_path, lamp, post, band=(0.0, 3.0)).obstacles) == 2
 
 
@@ -179,7 +179,9 @@ def test_the_same_mesh_is_read_once(tmp_path, monkeypatch):
 
     (tmp_path / "tent.stl").write_text(stl(*TENT))
     read = []
-    monkeypatch.setattr(sdf_models, "read_mesh", lambda *given: read.append(given) or (np.eye(3), np.array([[0, 1, 2]])))
+    monkeypatch.setattr(
+        sdf_models, "read_mesh", lambda *given: read.append(given) or (np.eye(3), np.array([[0, 1, 2]]))
+    )
     mesh = "<mesh><uri>tent.stl</uri></mesh>"
     imported(tmp_path, *(placed(mesh, (4 * i, 0, 0, 0, 0, 0), f"m{i}") for i in range(5)))
     assert len(read) == 1

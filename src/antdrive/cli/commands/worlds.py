@@ -241,9 +241,9 @@ def import_world(
 ) -> None:
     """Convert another program's world or map to a world file.
 
-    World files consist of upright cylinders. SDF cylinders are kept as they are. In a map, cylinders cover every blocked
-    cell next to free ground reachable from start or goal, so no passage becomes wider. The key `source` of the world file
-    states the overhang of cylinders beyond blocked cells.
+    World files consist of upright cylinders. SDF cylinders are kept as they are. Cylinders cover all other shapes in SDF,
+    and in a map every blocked cell next to free ground reachable from start or goal, so no passage becomes wider. The key
+    `source` of the world file states how far they reach beyond, and what was ignored.
     """
     from antdrive.worlds import import_file, save_task
     from antdrive.worlds.formats.cellmap import conversion_progress
@@ -281,12 +281,13 @@ def import_world(
     lines = []
     if len(tasks) == 1:
         world = tasks[0].world
-        lines.append(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")
-        if file_format.is_map and len(world.obstacles) > MANY:
+        first, *rest = str(world.source).split("; ")
+        lines += [f"{world.name}: {len(world.obstacles)} obstacles, {first}", *(f"  {part}" for part in rest)]
+        if "overhang" in file_format.options and len(world.obstacles) > MANY:
             lines.append(f"  planning takes seconds beyond {MANY} obstacles; a larger --overhang needs fewer")
     if skip_unsupported:
         imported[0]["skipped"] = skipped
-        lines.append(f"  kept {len(tasks[0].world.obstacles)} cylinders, skipped {len(skipped)} parts")
+        lines.append(f"  skipped {len(skipped)} parts")
         lines += [f"  skipped  {part}" for part in skipped]
     lines += [line for file in files for line in file_lines({"world": file})]
     show(json, {"worlds": imported} if is_set else imported[0], lines)

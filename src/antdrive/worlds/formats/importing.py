@@ -29,7 +29,6 @@ class Format:
     suffixes: tuple[str, ...]  # in lower case
     options: tuple[str, ...]  # the options of `read` besides the path
     read: Callable[..., list[Task]]  # reads the tasks in a file
-    is_map: bool = False  # whether the files are maps of cells, covered with cylinders on import
 
 
 def _read_map_server(path: Path, unknown: str = "blocked", **options: Any) -> list[Task]:
@@ -55,14 +54,12 @@ IMPORTS: Mapping[str, Format] = MappingProxyType(
             (".yaml", ".yml"),
             ("start", "goal", "cell", "unknown", "overhang"),
             _read_map_server,
-            is_map=True,
         ),
         "movingai": Format(
             "a MovingAI map",
             (".map",),
             ("start", "goal", "cell", "overhang", "resolution", "problem"),
             lambda path, **options: [import_movingai_task(path, **options)],
-            is_map=True,
         ),
         "dynabarn": Format("a DynaBARN set", (".json",), ("cell",), import_dynabarn),
     }

@@ -36,8 +36,8 @@ def read_mesh(file: Path, part: str = "") -> tuple[Floats, npt.NDArray[np.int64]
     level = log.level
     log.setLevel(logging.CRITICAL)  # it logs each texture that it does not find
     try:  # trimesh merges vertices, and with them drops those that are not numbers: checked before
-        force = "scene" if part else "mesh"
-        loaded = trimesh.load(io.BytesIO(content), file_type=kind, force=force, process=kind in CHECKED)
+        force = {"force": "scene", "split_objects": True, "group_material": False} if part else {"force": "mesh"}
+        loaded = trimesh.load(io.BytesIO(content), file_type=kind, process=kind in CHECKED, **force)
         if part:
             nodes = [
                 loaded.graph[node] for node in loaded.graph.nodes_geometry if part in (node, loaded.graph[node][1])

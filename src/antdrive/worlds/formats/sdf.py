@@ -21,6 +21,7 @@ from antdrive.worlds.formats.solids import BAND, cover_pieces, floor_height
 from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.world import Disc, Task, World
 
+MOST_CELLS = 5_000_000  # of a task's default grid
 FINE = 0.1  # default grid resolution of a task with covered shapes [m]
 MARGIN = 1.0  # from the cylinders to the default bounds [m]
 CELL = 0.25  # default grid resolution of a task [m]
@@ -112,7 +113,7 @@ def import_sdf(
             start,
             goal,
             kept.number("goal_tolerance", TOLERANCE) if goal_tolerance is None else goal_tolerance,
-            kept.number("cell", FINE if covering else CELL) if cell is None else cell,
+            kept.number("cell", _cell(bounds, FINE if covering else CELL)) if cell is None else cell,
             kept.number("time_limit", None),
             frame=frame,
         )
@@ -132,10 +133,10 @@ def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
             f"cover what is not upright and round, and reach at most {reach + models.facets:.3g} m beyond it"
         )
     if models.movers:
-        yield f"{len(models.movers)} actors move in straight lines, with a radius of {ACTOR_RADIUS:g} m"
-    names = {"flat": f"shapes up to {low:g} m are floor", "above": f"shapes above {high:g} m are no obstacles"}
+        yield f"actors as movers of radius {ACTOR_RADIUS:g} m, in straight lines: {len(models.movers)}"
+    names = {"flat": f"shapes up to {low:g} m, taken for floor", "above": f"shapes above {high:g} m, no obstacles"}
     for what, count in models.counts.items():
-        yield what if what.endswith("is left out") else f"{count} {names.get(what, what)}"
+        yield what if what.startswith("left out") else f"{names.get(what, what)}: {count}"
 
 
 def _in_world(frame: Pose, end: Any) -> Any:
@@ -196,20 +197,18 @@ def _about_unsupported(models: Models) -> str:
     """Return in one line what of a world cannot be imported, and what helps."""
     problems = []
     if models.missing:
+        folders = f"name their folder in {VARIABLES[0]} (or {', '.join(VARIABLES[1:])})"
         fuel = (
-            "; download those of Fuel with: gz fuel download -u URL"
-            if any("://fuel" in m for m in models.missing)
-            else ""
+            "; download Fuel's with: gz fuel download -u URL" if any("://fuel" in uri for uri in models.missing) else ""
         )
-        folders = f"name the folder that holds them in {VARIABLES[0]} (or {', '.join(VARIABLES[1:])})"
         problems.append(
-            f"{len(models.missing)} models or meshes are elsewhere: {', '.join(models.missing)}; {folders}{fuel}"
+            f"models and meshes not found ({len(models.missing)}): {', '.join(models.missing)}; {folders}{fuel}"
         )
     if models.unsupported:
         more = len(models.unsupported) - 5
         names = ", ".join(models.unsupported[:5]) + (f" and {more} more" if more > 0 else "")
-        problems.append(f"{len(models.unsupported)} parts cannot be imported: {names}")
-    return "; ".join([*problems, "or leave them out with --skip-unsupported"])
+        problems.append(f"parts that cannot be imported ({len(models.unsupported)}): {names}")
+    return "; ".join([*problems, "--skip-unsupported leaves them out"])
 
 
 def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
@@ -224,6 +223,12 @@ def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Poin
         max(x + r for x, _, r in spots) + MARGIN,
         max(y + r for _, y, r in spots) + MARGIN,
     )
+
+
+def _cell(bounds: Bounds, cell: float) -> float:
+    """Return the default grid resolution, doubled until the grid has at most `MOST_CELLS` cells [m]."""
+    area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
+    return _cell(bounds, 2 * cell) if MOST_CELLS * cell * cell < area < math.inf else cell
 
 
 def export_sdf(task: Task, path: str | Path) -> None:

@@ -148,7 +148,7 @@ class Reader:
     def __init__(self, file: Path, band: tuple[float, float], floor: float = 0.0) -> None:
         self.models = Models(band, floor)
         self._file, self._count = file, 0
-        self._root, self._mesh = functools.cache(parse_xml), functools.cache(read_mesh)
+        self._root, self._mesh, self._model = (functools.cache(each) for each in (parse_xml, read_mesh, _model_file))
 
     def read(self, world: ET.Element, frame: Pose) -> Models:
         """Read a <world>, or an <sdf> with a <model>.
@@ -165,6 +165,8 @@ class Reader:
         removed = {(name.text or "").strip() for name in world.findall("state/deletions/name")}
         for element in (world, *world.findall("state/insertions")):
             scope = self._scope(element, self._file, (_real(self._file),))
+            if self._count > MAX_MODELS:
+                raise InputError(f"has more than {MAX_MODELS} models, with the included ones")
             for body in scope.bodies:
                 if body.name not in removed:
                     self._add(scope, body, body.name, wanted, False, states.get(body.name))
@@ -184,7 +186,7 @@ class Reader:
         for child in element:
             self._count += child.tag in ("model", "include")
             if self._count > MAX_MODELS:
-                raise InputError(f"has more than {MAX_MODELS} models, with the included ones")
+                return
             if child.tag == "model":
                 yield _Body(child.get("name", "without a name"), child, child, file, self._scope(child, file, trail))
             if child.tag != "include":
@@ -193,13 +195,15 @@ class Reader:
             try:
                 if USUAL.search(uri):
                     continue
-                found = _model_file(uri, file)
+                found = self._model(uri, file)
+                if found is None:
+                    raise _Missing(uri or "an <include> without <uri>")
                 if found in trail or len(trail) > MAX_NESTING:
                     raise Unsupported(f"{found} includes itself")
                 root = self._root(found)
                 model = root if root.tag == "model" else root.find("model")
                 if root.tag == "robot" or (model is None and root.find("light") is not None):
-                    self.models.counts[f"{root.tag.replace('sdf', 'light')} {name or uri} is left out"] += 1
+                    self.models.counts[f"left out: {root.tag.replace('sdf', 'light')} {name or uri}"] += 1
                 elif model is None:
                     raise Unsupported(f"{found.name} has no <model>")
                 else:
@@ -235,7 +239,7 @@ class Reader:
         plugins = [plugin for element in (model, body.placed) for plugin in element.findall("plugin")]
         if any(DRIVES.search(f"{plugin.get('name')} {plugin.get('filename')}") for plugin in plugins):
             at = format_point((float(pose[0, 3]), float(pose[1, 3])), 2)
-            models.counts[f"robot {name} at {at} is left out"] += 1
+            models.counts[f"left out: robot {name} at {at}"] += 1
             return
         before, collisions = sum(models.kinds.values()), 0
         for link in model.findall("link"):
@@ -252,7 +256,7 @@ class Reader:
         if not (collisions or body.scope.bodies):
             models.counts["models without collision shapes"] += 1
         if sum(models.kinds.values()) > before and not static:
-            models.counts["bodies that could move stand as they are"] += 1
+            models.counts["bodies that could move, taken to stand still"] += 1
         for inner in body.scope.bodies:
             self._add(body.scope, inner, f"{name}::{inner.name}", pose, static, None)
 
@@ -301,7 +305,7 @@ class Reader:
                     frames.append((time, x, y))
             begin = frames[-1][0] if frames else begin
         if not frames:
-            self.models.counts["actors without a trajectory are left out"] += 1
+            self.models.counts["actors without a trajectory, left out"] += 1
             return
         if len(frames) == 1:
             frames.append((frames[0][0] + 1.0, *frames[0][1:]))
@@ -341,8 +345,8 @@ def _candidates(uri: str, source: Path) -> Iterator[Path]:
         yield from (folder / rest, folder / "models" / rest)
 
 
-def _model_file(uri: str, source: Path) -> Path:
-    """Return the file of an included model."""
+def _model_file(uri: str, source: Path) -> Path | None:
+    """Return the file of an included model; None if there is none."""
     for path in _candidates(uri, source):
         if os.path.isfile(path) and path.suffix.lower() in (".sdf", ".world", ".urdf", ".xml"):
             return _real(path)
@@ -355,7 +359,7 @@ def _model_file(uri: str, source: Path) -> Path:
                 return _real(named[0])
         if os.path.isfile(path / "model.sdf"):
             return _real(path / "model.sdf")
-    raise _Missing(uri or "an <include> without <uri>")
+    return None
 
 
 def read_pose(pose: ET.Element | None) -> Floats:

@@ -27,8 +27,8 @@ def test_a_gazebo_world_is_imported_and_driven(antdrive, tmp_path):
 
 def test_everything_that_is_skipped_is_printed(antdrive, tmp_path):
     post = "<geometry><cylinder><radius>0.2</radius><length>1</length></cylinder></geometry>"
-    box = "<geometry><box><size>1 1 1</size></box></geometry>"
-    parts = "".join(f"<collision name='c{i}'>{shape}</collision>" for i, shape in enumerate([box] * 7 + [post]))
+    hill = "<geometry><heightmap/></geometry>"
+    parts = "".join(f"<collision name='c{i}'>{shape}</collision>" for i, shape in enumerate([hill] * 7 + [post]))
     (tmp_path / "one.world").write_text(
         "<sdf version='1.6'><world name='one'><model name='m'><static>1</static>"
         f"<link name='l'>{parts}</link></model></world></sdf>"
@@ -36,8 +36,8 @@ def test_everything_that_is_skipped_is_printed(antdrive, tmp_path):
     words = ("worlds", "import", "one.world", "--skip-unsupported", "--start=1,1,0", "--goal", "4,2")
     code, out, err = antdrive(*words)
     assert (code, err) == (0, "")
-    named = [f"m::l::c{i} (box)" for i in range(7)]
-    assert out.splitlines()[1:9] == ["  kept 1 cylinders, skipped 7 parts", *(f"  skipped  {name}" for name in named)]
+    named = [f"m::l::c{i} (uneven ground)" for i in range(7)]
+    assert out.splitlines()[1:9] == ["  skipped 7 parts", *(f"  skipped  {name}" for name in named)]
     assert json.loads(antdrive(*words, "--json", "-o", "two.yaml")[1])["skipped"] == named
 
 
