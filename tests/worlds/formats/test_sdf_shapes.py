@@ -142,11 +142,11 @@ def test_a_thick_floor_raises_the_heights(tmp_path):
     floor = placed("<box><size>20 20 0.2</size></box>", (0, 0, 0.1, 0, 0, 0))
     step = placed("<box><size>1 1 0.1</size></box>", (0, 0, 0.25, 0, 0, 0))
     lamp = placed("<box><size>1 1 0.1</size></box>", (4, 4, 2.15, 0, 0, 0))
-    made = imported(tmp_path, floor, step, lamp)
+    made = imported(tmp_path, floor, step, lamp, resolution=0.05)
     assert "the floor is 0.2 m high" in made.source
     assert gaps(made, np.array([[0.0, 0.0], [4.0, 4.0]])).max() < 0
     assert gaps(made, np.array([[7.0, 0.0]])) > 4
-    assert gaps(imported(tmp_path, floor, band=(0.01, 2)), np.array([[9.0, 9.0]])) < 0
+    assert gaps(imported(tmp_path, floor, band=(0.01, 2), resolution=0.2), np.array([[9.0, 9.0]])) < 0
 
 
 def test_a_house_of_which_walls_enclose_the_floor_is_no_floor(tmp_path):
@@ -172,6 +172,18 @@ def test_meshes_are_covered_between_the_heights(tmp_path):
     assert gaps(made, rows).max() <= 0
     assert gaps(made, rows + (0, 3)).max() <= 0
     assert gaps(made, np.array([[0.4, 0.0], [1.6, 3.0], [1.0, 1.5]])).min() > 0
+
+
+def test_sloping_ground_is_said(tmp_path):
+    hill = [((0, 0, 0), (20, 0, 2), (0, 20, 0)), ((20, 0, 2), (20, 20, 2), (0, 20, 0))]
+    (tmp_path / "hill.stl").write_text(stl(*hill))
+    mesh = "<mesh><uri>hill.stl</uri></mesh>"
+    assert (
+        "sloping ground, taken for obstacles: 400 m2"
+        in imported(tmp_path, placed(mesh, (0,) * 6), resolution=0.2).source
+    )
+    steep = placed(mesh, (0, 0, 0, 1.2, 0, 0))
+    assert "sloping" not in imported(tmp_path, steep, resolution=0.2).source
 
 
 def test_the_same_mesh_is_read_once(tmp_path, monkeypatch):

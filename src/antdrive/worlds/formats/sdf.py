@@ -21,6 +21,7 @@ from antdrive.worlds.formats.solids import BAND, cover_pieces, floor_height
 from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.world import Disc, Task, World
 
+MOST_SLOPING = 25.0  # of an imported world without a remark [m2]
 MOST_CELLS = 5_000_000  # of a task's default grid
 FINE = 0.1  # default grid resolution of a task with covered shapes [m]
 MARGIN = 1.0  # from the cylinders to the default bounds [m]
@@ -132,6 +133,8 @@ def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
             f"the shapes between {low:g} and {high:g} m ({kinds}) are fully covered; {covering} of the cylinders "
             f"cover what is not upright and round, and reach at most {reach + models.facets:.3g} m beyond it"
         )
+    if models.sloping > MOST_SLOPING:
+        yield f"sloping ground, taken for obstacles: {models.sloping:.0f} m2"
     if models.movers:
         yield f"actors as movers of radius {ACTOR_RADIUS:g} m, in straight lines: {len(models.movers)}"
     names = {"flat": f"shapes up to {low:g} m, taken for floor", "above": f"shapes above {high:g} m, no obstacles"}

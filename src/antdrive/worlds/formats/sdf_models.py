@@ -35,6 +35,7 @@ DRIVES = re.compile(
     re.IGNORECASE,
 )
 ACTOR_RADIUS, ACTOR_HEIGHT = 0.3, 1.8  # of an actor, which has no collision shape [m]
+STEEP, FLAT = math.cos(math.radians(45)), math.cos(math.radians(1))  # of the slopes of ground
 MAX_MODELS = 20_000  # with those of included files
 MAX_NESTING = 50  # of models, and of frames that refer to each other
 
@@ -52,6 +53,7 @@ class Models:
     discs: list[Disc] = field(default_factory=list)  # upright cylinders and spheres
     solids: list[Floats] = field(default_factory=list)  # convex pieces of all other shapes, (K, V, 3)
     facets: float = 0.0  # largest distance of pieces and discs beyond round shapes [m]
+    sloping: float = 0.0  # area of imported meshes' surfaces that are neither flat nor steep [m2]
     movers: list[Keyframed] = field(default_factory=list)
     kinds: Counter[str] = field(default_factory=Counter)  # number of imported shapes by kind
     counts: Counter[str] = field(default_factory=Counter)  # of what is assumed or ignored
@@ -148,7 +150,8 @@ class Reader:
     def __init__(self, file: Path, band: tuple[float, float], floor: float = 0.0) -> None:
         self.models = Models(band, floor)
         self._file, self._count = file, 0
-        self._root, self._mesh, self._model = (functools.cache(each) for each in (parse_xml, read_mesh, _model_file))
+        self._root, self._mesh = functools.cache(parse_xml), functools.cache(read_mesh)
+        self._model = functools.cache(_model_file)
 
     def read(self, world: ET.Element, frame: Pose) -> Models:
         """Read a <world>, or an <sdf> with a <model>.
@@ -274,6 +277,10 @@ class Reader:
             models.discs.append(found)
         else:
             models.solids.append(found)
+        if kind == "mesh" and not isinstance(found, Disc):
+            normals = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+            upward, size = normals[:, 2], np.linalg.norm(normals, axis=1)
+            models.sloping += float(upward[(upward > STEEP * size) & (upward < FLAT * size)].sum()) / 2
         if kind in ROUND and not (isinstance(found, Disc) and kind == "cylinder"):
             size = found.radius if isinstance(found, Disc) else float(np.ptp(found.reshape(-1, 3), axis=0).max()) / 2
             models.facets = max(models.facets, FACETS * size)

@@ -25,7 +25,7 @@ ROUND = ("cylinder", "sphere", "cone", "capsule", "ellipsoid")
 SIDES, ARC = 64, 32  # of a polygon around a circle, and of one around half of a circle
 FACETS = 1 / (math.cos(math.pi / SIDES) * math.cos(math.pi / ARC / 2)) - 1  # how far these reach beyond it [radii]
 TILE = 512  # cells along a side of an area that is rasterised at once
-MAX_TILES = 2000
+MAX_TILES = 500  # with obstacles
 BAND = (0.01, 2.0)  # default heights between which shapes are obstacles, above the floor [m]
 CELL, COARSEST = 0.02, 1.0  # smallest and largest default side of a cell [m]
 MOST_RIMS = 60_000  # sides of blocked cells along free ones, of default cells: about 8,000 discs
@@ -81,7 +81,9 @@ def _upright(profile: Floats, place: Floats, low: float, high: float) -> Disc | 
     order = np.argsort(z, kind="stable")
     inside = radius[(z > low) & (z < high)].tolist()
     inside += [np.interp(h, z[order], radius[order]) for h in (low, high) if z.min() < h < z.max()]
-    return Disc(*place[:2, 3].tolist(), float(max(inside)), float(z.max())) if max(inside, default=0.0) > 0 else None
+    if not max(inside, default=0.0) > 0:
+        return None
+    return Disc(float(place[0, 3]), float(place[1, 3]), float(max(inside)), float(z.max()))
 
 
 def _wedges(profile: Floats) -> Floats:
