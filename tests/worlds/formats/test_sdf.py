@@ -141,6 +141,8 @@ UNSUPPORTED = {
     "short pose": cylinder("odd", "1 2 3"), "pose of words": cylinder("odd", "a b c d e f"),
     "infinite pose": cylinder("odd", "inf 0 0 0 0 0"), "negative radius": cylinder("odd", radius=-1.0),
     "flat box": shape("box", "<size>1 0 1</size>"), "no radius": shape("sphere"),
+    "quaternion": cylinder("odd").replace("<pose frame=''>", "<pose rotation_format='quat_xyzw'>"),
+    "part of a mesh": shape("mesh", "<uri>made.world</uri><submesh><name>wheel</name></submesh>"),
     "two points": shape("polyline", "<point>0 0</point><point>1 0</point><height>1</height>"),
     "far box": shape("box", "<size>1e6 1e6 9e5</size>").replace("<collision name='c'>", "<collision><pose>9e5 0 0 0 0 0</pose>"),
     "included": "<include><uri>model://house</uri></include>",

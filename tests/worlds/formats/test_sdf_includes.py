@@ -1,6 +1,5 @@
 """Gazebo worlds of several files: included models, frames, meshes, robots and actors."""
 
-import numpy as np
 import pytest
 
 from antdrive.base import InputError
@@ -168,12 +167,6 @@ def test_a_placement_frame_is_what_the_pose_places(tmp_path):
     assert places(world(tmp_path, include("model://post", inside))) == [(6, 7)]
 
 
-def test_quaternions_are_rotations(tmp_path):
-    turned = post("<pose rotation_format='quat_xyzw'>1 1 0 0 0 0.7071067811865476 0.7071067811865476</pose>")
-    moved = turned.replace("<pose>0 0 0.5", "<pose>2 0 0.5")
-    assert places(world(tmp_path, moved)) == [(1, 3)]
-
-
 CIRCLES = {
     "frames": "<frame name='a' attached_to='b'/><frame name='b' attached_to='a'/>" + post("<pose relative_to='a'/>"),
     "models": post("<pose relative_to='q'/>", "p") + post("<pose relative_to='p'/>", "q"),
@@ -256,15 +249,3 @@ def test_trajectories_follow_each_other_after_a_delay(tmp_path):
     text = actor((0, 0, 0), (2, 1, 0), more="<delay_start>3</delay_start>").replace("</script>", f"{second}</script>")
     (mover,) = import_sdf(world(tmp_path, cylinder(pose="5 5 0.5 0 0 0"), text)).world.movers
     assert mover.keyframes == ((3, 0, 0), (5, 1, 0), (6, 2, 0))
-
-
-def test_a_part_of_a_mesh_can_be_meant(tmp_path):
-    text = "o one\nv 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\no two\nv 5 0 0\nv 6 0 0\nv 5 0 1\nf 4 5 6\n"
-    (tmp_path / "pair.obj").write_text(text)
-    whole = "<mesh><uri>pair.obj</uri></mesh>"
-    part = whole.replace("</mesh>", "<submesh><name>two</name></submesh></mesh>")
-    xs = [np.array(places(world(tmp_path, placed(m, (0,) * 6))))[:, 0] for m in (whole, part)]
-    assert xs[0].min() < 1 < 5 < xs[0].max()
-    assert xs[1].min() > 4.9
-    with pytest.raises(InputError, match="in its part 'three'"):
-        import_sdf(world(tmp_path, placed(part.replace("two", "three"), (0,) * 6)))

@@ -20,29 +20,19 @@ from antdrive.worlds.limits import MAX_COORDINATE
 
 MAX_MESH_BYTES = 20_000_000  # 400,000 triangles of a binary STL file
 CHECKED = ("stl", "obj", "dae")  # mesh formats whose numbers are checked before trimesh reads them
+_UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']*)")
 _VERTEX = re.compile(rb"^[ \t]*v(?:ertex)?[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.IGNORECASE)
 
 
-def read_mesh(file: Path, part: str = "") -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Read a mesh's vertices (N, 3) [m] and its triangles (M, 3), as indices of vertices.
-
-    Args:
-        file: the mesh
-        part: the name of a part of it; empty: all of it
-    """
+def read_mesh(file: Path) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Return a mesh's vertices (N, 3) [m] and its triangles (M, 3), as indices of vertices."""
     content, kind = checked_mesh(file), file.suffix.lower().removeprefix(".")
     trimesh = optional("trimesh", "urdf", f"mesh {file.name} needs it")
     log = logging.getLogger("trimesh")
     level = log.level
     log.setLevel(logging.CRITICAL)  # it logs each texture that it does not find
     try:  # trimesh merges vertices, and with them drops those that are not numbers: checked before
-        force = {"force": "scene", "split_objects": True, "group_material": False} if part else {"force": "mesh"}
-        loaded = trimesh.load(io.BytesIO(content), file_type=kind, process=kind in CHECKED, **force)
-        if part:
-            nodes = [
-                loaded.graph[node] for node in loaded.graph.nodes_geometry if part in (node, loaded.graph[node][1])
-            ]
-            loaded = trimesh.util.concatenate([loaded.geometry[name].copy().apply_transform(at) for at, name in nodes])
+        loaded = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=kind in CHECKED)
         vertices = np.asarray(getattr(loaded, "vertices", ()), dtype=np.float64).reshape(-1, 3)
         faces = np.asarray(getattr(loaded, "faces", ()), dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # each format has its own exceptions
@@ -50,9 +40,8 @@ def read_mesh(file: Path, part: str = "") -> tuple[Floats, npt.NDArray[np.int64]
     finally:
         log.setLevel(level)
     if not len(vertices) or not np.isfinite(vertices).all():
-        named = f" in its part {part!r}" if part else ""
-        raise input_error(str(file), f"has no vertices{named}, or vertices that are not finite")
-    return vertices * _unit(file), faces
+        raise input_error(str(file), "has no vertices, or vertices that are not finite")
+    return vertices * (_unit(file, content) if kind == "dae" else 1.0), faces
 
 
 def checked_mesh(file: Path) -> bytes:
@@ -78,15 +67,9 @@ def checked_mesh(file: Path) -> bytes:
     return content
 
 
-def _unit(file: Path) -> float:
-    """Return the unit of a mesh file [m]. COLLADA states it, but trimesh ignores it; other formats have none.
-
-    As in RViz and Gazebo, the file's up axis is ignored.
-    """
-    if file.suffix.lower() != ".dae":
-        return 1.0
-    elements = (element for element in parse_xml(file).iter() if element.tag.rpartition("}")[2] == "unit")
-    text = next((element.get("meter", "1") for element in elements), "1")
+def _unit(file: Path, content: bytes) -> float:
+    """Return the unit of a COLLADA file [m], which trimesh ignores. As in RViz and Gazebo, the up axis is ignored, too."""
+    text = (*(found[1].decode(errors="replace") for found in _UNIT.finditer(content)), "1")[0]
     try:
         unit = float(text)
     except ValueError:

@@ -80,9 +80,10 @@ def import_sdf(
         raise FieldError("band", f"must be two heights, LOW,HIGH with 0 <= LOW < HIGH, got {band[0]:g},{band[1]:g}")
     known = (float(band[0]), float(band[1])) if band else (0.0, math.inf) if kept.values else None
     try:
-        models = Reader(file, known or BAND).read(world, frame)
+        reader = Reader(file)
+        models = reader.read(world, frame, known or BAND)
         if known is None and (floor := floor_height(models.solids)):
-            above = Reader(file, (BAND[0] + floor, BAND[1] + floor), floor).read(world, frame)
+            above = reader.read(world, frame, (BAND[0] + floor, BAND[1] + floor), floor)
             models = above if above.kinds else models
         if (models.unsupported or models.missing) and not skip_unsupported:
             raise InputError(_about_unsupported(models))

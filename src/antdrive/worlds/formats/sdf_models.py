@@ -22,7 +22,7 @@ from antdrive.base.types import Floats, Pose
 from antdrive.worlds.formats.meshes import read_mesh
 from antdrive.worlds.formats.solids import FACETS, ROUND, Unsupported, numbers, solid
 from antdrive.worlds.formats.xml import parse_xml, rotation_matrix
-from antdrive.worlds.movers import Keyframed
+from antdrive.worlds.movers import Keyframed, Loop
 from antdrive.worlds.world import Disc
 
 #: Environment variables of folders with models.
@@ -71,11 +71,6 @@ class _Body:
     file: Path
     scope: _Scope
 
-    @property
-    def static(self) -> bool:
-        """Whether it is fixed."""
-        return any(_true(element.findtext("static")) for element in (self.model, self.placed))
-
 
 class _Scope:
     """The frames of a world or model, to which poses in it refer."""
@@ -109,23 +104,17 @@ class _Scope:
             raise Unsupported(f"frame {name!r} refers to itself")
         first, _, rest = name.partition("::")
         part, body = self._parts.get(name), self._bodies.get(first)
-        merged = (body for body in self.bodies if _true(body.placed.get("merge")) and body.scope.has(first))
-        body, rest = (body, rest) if body is not None else (next(merged, None), name)
         if part is None and body is None:
             raise Unsupported(f"frame {name!r} does not exist")
         self._open.add(name)
         try:
-            if part is None:
-                assert body is not None
+            if body is not None:
                 return self.of_body(body) @ body.scope.frame(rest)
+            assert part is not None
             base = part.get("attached_to") if part.tag == "frame" else part.findtext("child")
             return self.place(part, (base or "").strip())
         finally:
             self._open.remove(name)
-
-    def has(self, name: str) -> bool:
-        """Return whether a frame of this name exists."""
-        return name in self._parts or name in self._bodies
 
 
 class _Wanted:
@@ -147,22 +136,18 @@ class _Wanted:
 class Reader:
     """A reader of a world and its included models."""
 
-    def __init__(self, file: Path, band: tuple[float, float], floor: float = 0.0) -> None:
-        self.models = Models(band, floor)
-        self._file, self._count = file, 0
+    def __init__(self, file: Path) -> None:
+        self._file = file
         self._root, self._mesh = functools.cache(parse_xml), functools.cache(read_mesh)
         self._model = functools.cache(_model_file)
 
-    def read(self, world: ET.Element, frame: Pose) -> Models:
-        """Read a <world>, or an <sdf> with a <model>.
+    def read(self, world: ET.Element, frame: Pose, band: tuple[float, float], floor: float = 0.0) -> Models:
+        """Read the models of a <world>, or of an <sdf>, in a frame with a pose in the file: x, y [m] and yaw [rad].
 
         As in Gazebo, the poses in a <state> replace the models' own: model and link poses in the state are in the world's
         frame, and its <scale> applies to the shapes.
-
-        Args:
-            world: the element
-            frame: pose of the wanted frame in the world's: x, y [m] and yaw [rad]
         """
+        self.models, self._count = Models(band, floor), 0
         wanted, models = _Wanted(frame), self.models
         states = {state.get("name", ""): state for state in world.findall("state/model")}
         removed = {(name.text or "").strip() for name in world.findall("state/deletions/name")}
@@ -225,7 +210,7 @@ class Reader:
         Each collision stands for itself: an unsupported one is named, and the others stay.
         """
         models, model = self.models, body.model
-        static = static or body.static
+        static = static or any(_true(element.findtext("static")) for element in (model, body.placed))
         try:
             pose = frame @ scope.of_body(body)
             scale, links = np.ones(3), {}
@@ -293,9 +278,9 @@ class Reader:
             raise _Missing(uri or "a <mesh> without <uri>")
         if shape.get("optimization"):
             raise Unsupported(f"a mesh with optimization={shape.get('optimization')!r}")
-        points, faces = self._mesh(found, (shape.findtext("submesh/name") or "").strip())
-        if _true(shape.findtext("submesh/center")):
-            points = points - (points.min(axis=0) + points.max(axis=0)) / 2
+        if shape.find("submesh") is not None:
+            raise Unsupported("a part of a mesh")
+        points, faces = self._mesh(found)
         if not len(faces):
             raise Unsupported(f"{found.name} has no triangles")
         return (points * numbers(shape.findtext("scale") or "1 1 1", 3, "scale"))[faces]
@@ -316,10 +301,9 @@ class Reader:
             return
         if len(frames) == 1:
             frames.append((frames[0][0] + 1.0, *frames[0][1:]))
-        loop = "teleport" if _true(actor.findtext("script/loop") or "true") else "once"
-        self.models.movers.append(
-            Keyframed(radius=ACTOR_RADIUS, height=ACTOR_HEIGHT, keyframes=tuple(frames), loop=loop)
-        )
+        loop: Loop = "teleport" if _true(actor.findtext("script/loop") or "true") else "once"
+        mover = Keyframed(radius=ACTOR_RADIUS, height=ACTOR_HEIGHT, keyframes=tuple(frames), loop=loop)
+        self.models.movers.append(mover)
 
 
 def _true(text: str | None) -> bool:
@@ -370,27 +354,15 @@ def _model_file(uri: str, source: Path) -> Path | None:
 
 
 def read_pose(pose: ET.Element | None) -> Floats:
-    """Return the transform (4, 4) of a <pose>: x y z [m] roll pitch yaw [rad] about fixed axes, or a quaternion x y z w."""
+    """Return the transform (4, 4) of a <pose>: x y z [m] roll pitch yaw [rad] about fixed axes."""
     if pose is None or not (pose.text or "").strip():
         return np.eye(4)
-    if pose.get("rotation_format") == "quat_xyzw":
-        x, y, z, *q = numbers(pose.text, 7, "pose")
-        return _matrix(x, y, z, *_angles(*q))
+    if pose.get("rotation_format", "euler_rpy") != "euler_rpy":
+        raise Unsupported(f"a pose with rotation_format={pose.get('rotation_format')!r}")
     x, y, z, *angles = numbers(pose.text, 6, "pose")
     if _true(pose.get("degrees")):
         angles = [math.radians(a) for a in angles]
     return _matrix(x, y, z, *angles)
-
-
-def _angles(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw of a quaternion."""
-    size = math.sqrt(x * x + y * y + z * z + w * w)
-    if not size > 0:
-        raise Unsupported("pose has the quaternion 0 0 0 0")
-    x, y, z, w = x / size, y / size, z / size, w / size
-    pitch = math.asin(min(1.0, max(-1.0, 2 * (w * y - z * x))))
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), pitch, yaw
 
 
 def _matrix(x: float, y: float, z: float, *angles: float) -> Floats:

@@ -120,16 +120,9 @@ def _extruded(shapes: Sequence[ET.Element]) -> Floats:
 def solid(
     geometry: ET.Element, place: Floats, band: tuple[float, float], mesh: Callable[[ET.Element], Floats]
 ) -> Disc | Floats | str:
-    """Return a collision's shape between two heights: a disc, or convex pieces (K, V, 3); or why there is none of it.
+    """Return a <geometry> between two heights: a disc, convex pieces (K, V, 3), or why nothing of it is there.
 
-    Args:
-        geometry: the <geometry> element
-        place: transform to the world (4, 4), with scale
-        band: the heights [m]
-        mesh: returns the triangles (K, 3, 3) of a <mesh>
-
-    Raises:
-        Unsupported: the shape cannot be imported.
+    `place` (4, 4) includes the scale; `mesh` returns the triangles (K, 3, 3) of a <mesh>.
     """
     shape = next(iter(geometry), None)
     if shape is None or shape.tag == "empty":
@@ -147,8 +140,7 @@ def solid(
         across, axis = np.linalg.norm(place[:3, :3], axis=0), place[:3, 2]
         if math.hypot(axis[0], axis[1]) <= MAX_TILT * across[2] and abs(across[0] - across[1]) <= 1e-9:
             z = place[2, 3] + place[2, 2] * profile[:, 0]
-            disc = _upright(profile, place, *band)
-            return disc or _where(z, band)
+            return _upright(profile, place, *band) or _where(z, band)
         pieces = _wedges(profile)
     elif shape.tag == "box":
         size = numbers(shape.findtext("size"), 3, "size")
@@ -194,19 +186,10 @@ def floor_height(solids: Sequence[Floats]) -> float:
 def cover_pieces(
     solids: Sequence[Floats], band: tuple[float, float], cell: float | None = None, overhang: float | None = None
 ) -> tuple[list[Disc], float]:
-    """Cover convex pieces between two heights with discs.
+    """Cover convex pieces (K, V, 3) between two heights; return discs, and the largest protrusion beyond the pieces [m].
 
-    Args:
-        solids: pieces (K, V, 3), several arrays of them [m]
-        band: the heights [m]
-        cell: side of the cells [m]; by default 0.02, doubled until a few thousand discs suffice
-        overhang: largest protrusion of discs beyond blocked cells [m]; by default the side of a cell
-
-    Returns:
-        The discs, and the largest protrusion beyond the pieces [m].
-
-    Raises:
-        InputError: there are too many discs or cells.
+    By default the side of a cell is 0.02 m, doubled until a few thousand discs suffice, and the overhang beyond blocked
+    cells is one cell.
     """
     side = CELL if cell is None else cell
     tiles = _tiles(solids, side)

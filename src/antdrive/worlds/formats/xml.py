@@ -29,6 +29,7 @@ def parse_xml(path: Path) -> ET.Element:
     """Parse an XML file and return its root element."""
     content = _COMMENT.sub(_blank, read_bytes(path, MAX_BYTES, "an XML file"))
     parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
+    parser.buffer_text = True
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth
