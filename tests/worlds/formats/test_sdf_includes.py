@@ -87,6 +87,12 @@ def test_file_addresses_and_packages_of_ros_are_found(tmp_path, monkeypatch):
     assert len(places(world(tmp_path, include(f"file://{tmp_path}/far/post/model.sdf"), mesh))) > 10
 
 
+def test_a_mesh_whose_name_differs_in_capitals_is_found_and_said(tmp_path):
+    (tmp_path / "Tent.stl").write_text(stl(*TENT))
+    task = import_sdf(world(tmp_path, placed("<mesh><uri>file://tent.STL</uri></mesh>", (0,) * 6)))
+    assert "meshes whose names differ in capitals: 1" in task.world.source
+
+
 def test_all_missing_models_are_named_in_one_line_with_the_remedy(tmp_path):
     model_in(tmp_path / "cart", post("<include><uri>model://wheel</uri></include>"))
     mesh = shape("mesh", "<uri>model://statue/meshes/statue.dae</uri>")

@@ -16,7 +16,7 @@ from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.plane import map_to_world
 from antdrive.base.types import Bounds, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
-from antdrive.worlds.formats.sdf_models import ACTOR_RADIUS, VARIABLES, Models, Reader
+from antdrive.worlds.formats.sdf_models import ACTOR_RADIUS, VARIABLES, Models, SdfReader
 from antdrive.worlds.formats.solids import BAND, cover_pieces, floor_height
 from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.world import Disc, Task, World
@@ -80,7 +80,7 @@ def import_sdf(
         raise FieldError("band", f"must be two heights, LOW,HIGH with 0 <= LOW < HIGH, got {band[0]:g},{band[1]:g}")
     known = (float(band[0]), float(band[1])) if band else (0.0, math.inf) if kept.values else None
     try:
-        reader = Reader(file)
+        reader = SdfReader(file)
         models = reader.read(world, frame, known or BAND)
         if known is None and (floor := floor_height(models.solids)):
             above = reader.read(world, frame, (BAND[0] + floor, BAND[1] + floor), floor)

@@ -62,7 +62,7 @@ class Models:
 
 
 @dataclass(frozen=True)
-class _Body:
+class _SdfModel:
     """A model in a world or in another model."""
 
     name: str
@@ -75,7 +75,7 @@ class _Body:
 class _Scope:
     """The frames of a world or model, to which poses in it refer."""
 
-    def __init__(self, element: ET.Element, bodies: list[_Body]) -> None:
+    def __init__(self, element: ET.Element, bodies: list[_SdfModel]) -> None:
         self.bodies = bodies
         self._bodies = {body.name: body for body in reversed(bodies)}
         self._parts = {
@@ -90,7 +90,7 @@ class _Scope:
             return self.frame(base)
         return self.frame(pose.get("relative_to") or pose.get("frame") or base) @ read_pose(pose)
 
-    def of_body(self, body: _Body) -> Floats:
+    def of_body(self, body: _SdfModel) -> Floats:
         """Return the pose (4, 4) of a model."""
         place = self.place(body.model if body.placed.find("pose") is None else body.placed)
         frame = body.placed.findtext("placement_frame") or body.model.get("placement_frame") or ""
@@ -133,7 +133,7 @@ class _Wanted:
         return np.eye(4) if np.array_equal(pose, self._frame) else np.asarray(self._back @ pose)
 
 
-class Reader:
+class SdfReader:
     """A reader of a world and its included models."""
 
     def __init__(self, file: Path) -> None:
@@ -169,14 +169,16 @@ class Reader:
     def _scope(self, element: ET.Element, file: Path, trail: tuple[Path, ...]) -> _Scope:
         return _Scope(element, list(self._bodies(element, file, trail)))
 
-    def _bodies(self, element: ET.Element, file: Path, trail: tuple[Path, ...]) -> Iterator[_Body]:
+    def _bodies(self, element: ET.Element, file: Path, trail: tuple[Path, ...]) -> Iterator[_SdfModel]:
         """Yield the models of a world or a model, with the included ones."""
         for child in element:
             self._count += child.tag in ("model", "include")
             if self._count > MAX_MODELS:
                 return
             if child.tag == "model":
-                yield _Body(child.get("name", "without a name"), child, child, file, self._scope(child, file, trail))
+                yield _SdfModel(
+                    child.get("name", "without a name"), child, child, file, self._scope(child, file, trail)
+                )
             if child.tag != "include":
                 continue
             uri, name = ((child.findtext(tag) or "").strip() for tag in ("uri", "name"))
@@ -196,14 +198,14 @@ class Reader:
                     raise Unsupported(f"{found.name} has no <model>")
                 else:
                     inner = self._scope(model, found, (*trail, found))
-                    yield _Body(name or model.get("name", uri), model, child, found, inner)
+                    yield _SdfModel(name or model.get("name", uri), model, child, found, inner)
             except _Missing as missing:
                 self.models.missing[str(missing)] += 1
             except (Unsupported, InputError) as error:
                 self.models.unsupported.append(f"{name or uri or 'include'} ({error})")
 
     def _add(
-        self, scope: _Scope, body: _Body, name: str, frame: Floats | _Wanted, static: bool, state: ET.Element | None
+        self, scope: _Scope, body: _SdfModel, name: str, frame: Floats | _Wanted, static: bool, state: ET.Element | None
     ) -> None:
         """Add a model's shapes and those of its nested models; `frame` is the parent's pose (4, 4) or the world's.
 
@@ -273,9 +275,14 @@ class Reader:
     def _triangles(self, shape: ET.Element, file: Path) -> Floats:
         """Return the triangles of a <mesh>, (K, 3, 3) [m]."""
         uri = (shape.findtext("uri") or shape.findtext("filename") or "").strip()
-        found = next((path for path in _candidates(uri, file) if os.path.isfile(path)), None)
+        paths = list(_candidates(uri, file))
+        found = next((path for path in paths if os.path.isfile(path)), None)
         if found is None:
-            raise _Missing(uri or "a <mesh> without <uri>")
+            beside = (other for path in paths if os.path.isdir(path.parent) for other in path.parent.iterdir())
+            found = next((other for other in beside if other.name.lower() == paths[0].name.lower()), None)
+            if found is None:
+                raise _Missing(uri or "a <mesh> without <uri>")
+            self.models.counts["meshes whose names differ in capitals"] += 1
         if shape.get("optimization"):
             raise Unsupported(f"a mesh with optimization={shape.get('optimization')!r}")
         if shape.find("submesh") is not None:
