@@ -146,6 +146,7 @@ UNSUPPORTED = {
     "two points": shape("polyline", "<point>0 0</point><point>1 0</point><height>1</height>"),
     "far box": shape("box", "<size>1e6 1e6 9e5</size>").replace("<collision name='c'>", "<collision><pose>9e5 0 0 0 0 0</pose>"),
     "included": "<include><uri>model://house</uri></include>",
+    "no mesh": shape("mesh"),
     "mesh": shape("mesh", "<uri>model://x.dae</uri>", "statue"), "population": "<population name='crowd'/>",
     "fast actor": "<actor name='a'><script><trajectory id='0'><waypoint><time>0</time><pose>0 0 0 0 0 0</pose></waypoint>"
     "<waypoint><time>1</time><pose>90 0 0 0 0 0</pose></waypoint></trajectory></script></actor>",

@@ -112,6 +112,13 @@ def test_all_missing_models_are_named_in_one_line_with_the_remedy(tmp_path):
     ]
 
 
+def test_addresses_longer_than_file_names_are_missing(tmp_path):
+    fuel = include(f"https://fuel.gazebosim.org/1.0/{'a' * 300}/models/{'b' * 300}")
+    mesh = shape("mesh", f"<uri>{'c' * 300}/{'d' * 5000}.stl</uri>")
+    with pytest.raises(InputError, match=r"not found \(2\)"):
+        import_sdf(world(tmp_path, fuel, mesh))
+
+
 def test_an_include_gives_pose_name_and_static(tmp_path):
     moving = post("<pose>9 9 0 0 0 0</pose>").replace("<static>1</static>", "")
     model_in(tmp_path / "post", moving)

@@ -278,7 +278,7 @@ class SdfReader:
         paths = list(_candidates(uri, file))
         found = next((path for path in paths if os.path.isfile(path)), None)
         if found is None:
-            beside = (other for path in paths if os.path.isdir(path.parent) for other in path.parent.iterdir())
+            beside = (other for path in paths if os.path.isdir(path.parent) for other in path.parent.glob("*"))
             found = next((other for other in beside if other.name.lower() == paths[0].name.lower()), None)
             if found is None:
                 raise _Missing(uri or "a <mesh> without <uri>")
@@ -329,8 +329,10 @@ def _candidates(uri: str, source: Path) -> Iterator[Path]:
         server, _, owner, _, name, *files = (*rest.split("/"), *[""] * 5)
         inside = "/".join(files).rstrip("/").partition("files/")[2]
         for home in FUEL_FOLDERS:
-            folder = Path(home).expanduser() / server / owner.lower() / "models" / name.lower()
-            versions = [path for path in folder.glob("*") if path.name.isdecimal()] if name else []
+            folder = Path(os.path.expanduser(home), server, owner.lower(), "models", name.lower())
+            versions = (
+                [path for path in folder.glob("*") if path.name.isdecimal()] if name and os.path.isdir(folder) else []
+            )
             yield from (path / inside for path in sorted(versions, key=lambda path: -int(path.name)))
         rest = f"{name}/{inside}"
     if not rest.strip("/"):
@@ -339,7 +341,7 @@ def _candidates(uri: str, source: Path) -> Iterator[Path]:
     folder_of_package = ros_package(package) if scheme in ("package", "model") else None
     if folder_of_package is not None:
         yield folder_of_package / inside
-    for folder in (*folders_in(*VARIABLES), *_real(source).parents, Path(CLASSIC_FOLDER).expanduser()):
+    for folder in (*folders_in(*VARIABLES), *_real(source).parents, Path(os.path.expanduser(CLASSIC_FOLDER))):
         yield from (folder / rest, folder / "models" / rest)
 
 
