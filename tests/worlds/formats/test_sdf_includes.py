@@ -224,6 +224,9 @@ def test_two_hyphens_in_a_comment_are_accepted(tmp_path):
     odd = "<!-- gz topic -t /x --json\n -- -->"
     kept = f"<link name='n'><![CDATA[<!-- kept -->]]></link>{odd}"
     assert len(places(world(tmp_path, odd, post(kept)))) == 1
+    late = tmp_path / "late.world"
+    late.write_text(" <!-- -- -->\n" + world(tmp_path, post()).read_text())
+    assert len(places(late)) == 1
     bad = world(tmp_path, odd, "<b></a>")
     with pytest.raises(InputError, match=rf"made.world:{len(bad.read_text().splitlines())}: not XML"):
         import_sdf(bad)

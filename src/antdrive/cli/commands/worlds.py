@@ -245,6 +245,7 @@ def import_world(
     and in a map every blocked cell next to free ground reachable from start or goal, so no passage becomes wider. The key
     `source` of the world file states how far they reach beyond, and what was ignored.
     """
+    from antdrive.base.plane import format_point
     from antdrive.worlds import import_file, save_task
     from antdrive.worlds.formats.cellmap import conversion_progress
     from antdrive.worlds.formats.importing import IMPORTS, import_format
@@ -283,6 +284,9 @@ def import_world(
         world = tasks[0].world
         first, *rest = str(world.source).split("; ")
         lines += [f"{world.name}: {len(world.obstacles)} obstacles, {first}", *(f"  {part}" for part in rest)]
+        if "bounds" in file_format.options and not (start and goal):
+            ends = f"start {format_point(tasks[0].start[:2], 2)}, goal {format_point(tasks[0].goal, 2)}"
+            lines.append(f"  {ends}; choose others with --start and --goal")
         if "overhang" in file_format.options and len(world.obstacles) > MANY:
             lines.append(f"  planning takes seconds beyond {MANY} obstacles; a larger --overhang needs fewer")
     if skip_unsupported:

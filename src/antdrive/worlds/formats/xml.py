@@ -17,6 +17,7 @@ from antdrive.base.types import Floats
 
 MAX_BYTES = 50_000_000  # BARN's worlds have 0.7 MB
 MAX_DEPTH = 100
+_SPACE = re.compile(rb"^\s+(?=<\?xml)")  # before the declaration: Gazebo accepts it, too
 _COMMENT = re.compile(rb"<!\[CDATA\[.*?\]\]>|<!--.*?-->", re.DOTALL)
 
 
@@ -27,7 +28,7 @@ def _blank(found: re.Match[bytes]) -> bytes:
 
 def parse_xml(path: Path) -> ET.Element:
     """Parse an XML file and return its root element."""
-    content = _COMMENT.sub(_blank, read_bytes(path, MAX_BYTES, "an XML file"))
+    content = _SPACE.sub(b"", _COMMENT.sub(_blank, read_bytes(path, MAX_BYTES, "an XML file")))
     parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
     parser.buffer_text = True
 

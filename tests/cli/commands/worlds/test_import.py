@@ -41,6 +41,20 @@ def test_everything_that_is_skipped_is_printed(antdrive, tmp_path):
     assert json.loads(antdrive(*words, "--json", "-o", "two.yaml")[1])["skipped"] == named
 
 
+def test_the_chosen_ends_and_each_remark_have_a_line(antdrive, tmp_path):
+    box = "<collision name='c'><pose>2 3 0.5 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry></collision>"
+    (tmp_path / "one.world").write_text(f"<sdf version='1.6'><model name='m'><link name='l'>{box}</link></model></sdf>")
+    code, out, err = antdrive("worlds", "import", "one.world", "--resolution=0.05", "--band=0.2,1")
+    assert (code, err) == (0, "")
+    assert "  the shapes between 0.2 and 1 m (1 box) are fully covered" in out.splitlines()
+    assert "  bodies that could move, taken to stand still: 1" in out.splitlines()
+    assert "--start and --goal" in out
+    assert (
+        "--start and --goal"
+        not in antdrive("worlds", "import", "one.world", "--start=0,0,0", "--goal=4,4", "-o", "w.yaml")[1]
+    )
+
+
 #: A building of 8 x 6 m, 0.1 m to a character: four rooms, three doors of 0.9 m, a table, and a corner that nobody has seen.
 def _building():
     rows = [["#" if r in (0, 59) or c in (0, 79) else " " for c in range(80)] for r in range(60)]
